@@ -603,12 +603,103 @@ def blackbox(folder, truth):
     known["angle_random_walk"] = {name: float(deviation / np.sqrt(rate)) for name, deviation in zip(GYRO + ACCL, sigma * scale)}
 
 
+def other_shapes(folder, truth):
+    """What the same libraries write in other ways."""
+    import h5py
+    import pandas
+
+    times, gyro, accl = samples(26)
+    seconds = (times - times[0]) / 1e9
+    units = ["--units", "rad/s,m/s^2"]
+    names = ["gx", "gy", "gz", "ax", "ay", "az"]
+    # Vectors in records, and halves.
+    records = np.zeros(len(times), [("stamp", "<i8"), ("gyro", ">f4", (3,)), ("acc", "<f8", (3,)), ("temp", "<f2")])
+    records["stamp"], records["gyro"], records["acc"] = times, gyro, accl
+    np.save(folder / "vectors.npy", records)
+    truth.add("vectors.npy", both(gyro.astype(np.float32), accl), units, kept=KEPT)
+    # A vector in a record, integers with a factor and an offset, and one unit for each axis.
+    nested = np.zeros(len(times), [("time", "f8"), ("gyro", [(axis, "f4") for axis in "xyz"]), ("name", "S8")])
+    nested["time"] = seconds
+    for axis, values in zip("xyz", gyro.T):
+        nested["gyro"][axis] = values
+    with h5py.File(folder / "nested.h5", "w") as file:
+        file.create_dataset("log", data=nested)
+    truth.add("nested.h5", rates(gyro.astype(np.float32)), ["--units", "rad/s"], kept=KEPT)
+    counts = np.round((accl - 0.5) / 0.001).astype(np.int32)
+    with h5py.File(folder / "scaled.h5", "w") as file:
+        file.create_dataset("gyro", data=(gyro * 1000).astype(np.float16)).attrs["units"] = ["mrad/s"] * 3
+        acc = file.create_dataset("acc", data=counts, compression="lzf")
+        acc.attrs.update(units="m/s^2", scale_factor=0.001, add_offset=0.5)
+        file.create_dataset("t", data=seconds)
+    halves = (gyro * 1000).astype(np.float16).astype(float) / 1000
+    truth.add("scaled.h5", both(halves, counts * 0.001 + 0.5), kept=KEPT)
+    scipy.io.savemat(folder / "level4.mat", dict(note="bench", t=seconds, gyro=gyro, acc=accl.T.astype(np.float32)), format="4")
+    truth.add("level4.mat", both(gyro, accl.astype(np.float32)), units, kept=KEPT)
+    # Durations of pandas, and objects in lines.
+    table = pandas.DataFrame(np.c_[gyro, accl], columns=names)
+    table.set_index(pandas.to_timedelta(times - times[0], unit="ns")).to_csv(folder / "durations.csv")
+    truth.add("durations.csv", both(gyro, accl), units, kept=KEPT)
+    table.assign(timestamp=seconds).to_json(folder / "objects.jsonl", orient="records", lines=True, double_precision=12)
+    truth.add("objects.jsonl", both(gyro, accl), units, kept=KEPT)
+    with open(folder / "arrays.jsonl", "w") as out:
+        for time, rate, force in zip(times, gyro, accl):
+            print(json.dumps(dict(imu=dict(gyro=rate.tolist(), acc=force.tolist()), t=time / 1e9, id="left")), file=out)
+    truth.add("arrays.jsonl", both(gyro, accl), units, kept=KEPT)
+    # As a sketch prints them, with a line of its own before.
+    with open(folder / "sketch.txt", "w") as out:
+        print("IMU ready", file=out)
+        for time, rate, force in zip(seconds, gyro, accl):
+            values = ", ".join(f"{name}: {value:.9f}" for name, value in zip(names, [*rate, *force]))
+            print(f"t: {time * 1e6:.0f}, {values}", file=out)
+    truth.add("sketch.txt", both(gyro, accl), ["--units", "us,rad/s,m/s^2"], kept=KEPT)
+    # As `write.table` of R writes them, with names that have a blank; and one column alone.
+    with open(folder / "r_table.txt", "w") as out:
+        print('"t" "gyro x" "gyro y" "gyro z"', file=out)
+        for number, (time, rate) in enumerate(zip(seconds, gyro), start=1):
+            print(f'"{number}"', f"{time:.9f}", *(f"{value:.9f}" for value in rate), file=out)
+    truth.add("r_table.txt", rates(gyro), ["--units", "rad/s"], kept=KEPT)
+    np.savetxt(folder / "units_in_brackets.txt", np.c_[seconds, gyro], header="t [s] gyro_x [rad/s] gyro_y [rad/s] gyro_z [rad/s]")
+    truth.add("units_in_brackets.txt", rates(gyro), kept=KEPT)
+    np.savetxt(folder / "one_column.txt", np.degrees(gyro[:, :1]), header="gyro_x [dps]", comments="", fmt="%.9f")
+    truth.add("one_column.txt", dict(gyro_x=np.degrees(gyro[:, 0])), ["--rate", "200"])
+
+
+def other_bags(folder, truth):
+    """Sequences of numbers, and what ROS 2 compresses by itself."""
+    from rosbags.rosbag1 import Writer as Writer1
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer as Writer2
+    from rosbags.typesys import Stores, get_typestore
+
+    times, gyro, accl = samples(27)
+    units = ["--units", "rad/s,m/s^2"]
+    sequence = ",".join(f"{channel}=data[{at}]" for at, channel in enumerate(GYRO + ACCL))
+
+    def write(writer, store, serialize):
+        array = store.types["std_msgs/msg/Float64MultiArray"]
+        layout = store.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
+        with writer:
+            connection = writer.add_connection("/numbers", array.__msgtype__, typestore=store)
+            for time, rate, force in zip(times, gyro, accl):
+                data = serialize(array(layout=layout, data=np.r_[rate, force]), array.__msgtype__)
+                writer.write(connection, int(time), data)
+
+    ros1, ros2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
+    write(Writer1(folder / "sequence.bag"), ros1, ros1.serialize_ros1)
+    chosen = ["--columns", f"time=record_time,{sequence}", *units]
+    truth.add("sequence.bag", both(gyro, accl), chosen, kept=KEPT)
+    for name, mode, ending in [("messages", CompressionMode.MESSAGE, "db3"), ("file", CompressionMode.FILE, "db3.zstd")]:
+        writer = Writer2(folder / f"compressed_{name}", version=9, storage_plugin=StoragePlugin.SQLITE3)
+        writer.set_compression(mode, CompressionFormat.ZSTD)
+        write(writer, ros2, ros2.serialize_cdr)
+        truth.add(f"compressed_{name}/compressed_{name}.{ending}", both(gyro, accl), chosen, kept=KEPT)
+
+
 def main():
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
     truth = Truth()
     writers = [tables, numpy_arrays, matlab, matlab_structures, hdf5, ros_bags, drawn_messages, ulog, ardupilot, old_ardupilot]
-    for write in writers + [blackbox, spi_captures]:
+    for write in writers + [blackbox, spi_captures, other_shapes, other_bags]:
         write(folder, truth)
     (folder / "truth.json").write_text(json.dumps(truth, indent=1))
 

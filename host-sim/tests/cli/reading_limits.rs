@@ -275,4 +275,13 @@ fn an_unknown_binary_is_named_with_a_way_to_convert_it() {
     words(&gzip(b"RDX3\nX\n\0\0\0\x03\0\x04\x02\x01"), &["R workspace", "write.csv("]);
     words(b"\x01\x02\x03\x04\x05\0\0\0sensor", &["01 02 03 04 05 00", "HDF5", "numpy.save"]);
     words(b"\xFF\xFEt\0,\0x\0\n\0", &["UTF-16", "iconv"]);
+    words(b"\x80\x05\x95\xAA\0\0\0", &["pickle", "read_pickle"]);
+    words(b"[{\"gx\": 1}, {\"gx\": 2}]", &["JSON document", "lines=True"]);
+    words(b"{\n \"gx\": [1, 2, 3]\n}\n", &["JSON document", "lines=True"]);
+    // As numpy writes a dict.
+    let header = format!("{:<117}\n", "{'descr': '|O', 'fortran_order': False, 'shape': (), }");
+    words(&[b"\x93NUMPY\x01\0\x76\0", header.as_bytes(), b"\x80\x04\x95"].concat(), &["Python objects", "numpy.savez"]);
+    // Two messages of MAVLink 2 behind their times.
+    let message = [&[0, 6, 10, 36, 24, 30, 64, 0, 0xFD, 4, 0, 0, 0, 1, 1, 0, 0, 0][..], &[0; 6]].concat();
+    words(&[message.clone(), message].concat(), &["MAVLink", "mavlogdump.py"]);
 }

@@ -65,6 +65,10 @@ impl NamedArray {
         Self { group: group.to_owned(), name: name.to_owned(), rows, columns, ..Self::default() }
     }
 
+    fn has_named_columns(&self) -> bool {
+        self.columns.first().is_some_and(|name| name.parse::<usize>().is_err())
+    }
+
     fn path(&self) -> String {
         format!("{}{}", self.group, self.name)
     }
@@ -177,7 +181,10 @@ impl<'a, R: ArrayReader> ArraySource<'a, R> {
             .iter()
             .map(|&at| {
                 let (array, column) = place(at);
-                self.arrays[array].available(&self.arrays[array].name, column)
+                let array = &self.arrays[array];
+                // The names of the numbers in a record say enough.
+                let path = if array.has_named_columns() { "" } else { array.name.as_str() };
+                array.available(path, column)
             })
             .collect();
         let known = known_by_name(&available)?;

@@ -89,7 +89,7 @@ fn topic(name: String, headers: &Headers) -> Topic {
     sensor.note = Some("gyroADC is what the flight controller has filtered and rounded".to_owned());
     let sensors = Some(sensor).filter(|sensor| sensor.has(GYROSCOPE[0])).into_iter().collect();
     let kind = headers.firmware_revision().split(" (").next().unwrap_or_default().to_owned();
-    Topic { name, kind, rows: None, columns, sensors }
+    Topic { name, kind, columns, sensors, ..Topic::default() }
 }
 
 /// The value of a line such as `H acc_1G:2048` in the header of a log.

@@ -7,10 +7,15 @@ pub(crate) const DAY_NS: i64 = 86_400 * SECOND_NS;
 const MONTHS: [&str; 12] = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"];
 
 /// Nanoseconds from 1970 to a date and a time of day in one text: ISO 8601, or any [`date`] and [`time_of_day`] with a blank or a T
-/// between them.
+/// between them; or of a duration as `0 days 00:00:01.5`.
 pub(crate) fn date_time(text: &str) -> Option<i64> {
     let at = text.find(|c: char| c == 'T' || c == 't' || c.is_ascii_whitespace())?;
-    date(&text[..at])?.checked_mul(DAY_NS)?.checked_add(time_of_day(text[at + 1..].trim_start())?)
+    let (first, rest) = (&text[..at], text[at + 1..].trim_start());
+    if let Some(clock) = rest.strip_prefix("days ").or_else(|| rest.strip_prefix("day ")) {
+        let days: i64 = first.parse().ok()?;
+        return days.checked_mul(DAY_NS)?.checked_add(time_of_day(clock.trim_start().trim_start_matches('+'))?);
+    }
+    date(first)?.checked_mul(DAY_NS)?.checked_add(time_of_day(rest)?)
 }
 
 /// Days from 1970 to a date: 2018-04-25, 2018/04/25, 25.04.2018, 25-Apr-2018, 04/25/2018, and 25/04/2018 where there is no such month.
@@ -159,7 +164,7 @@ impl CalendarClock {
 
 #[cfg(test)]
 mod tests {
-    use super::{CalendarClock, CalendarColumns, date, date_time, time_of_day};
+    use super::{CalendarClock, CalendarColumns, DAY_NS, date, date_time, time_of_day};
 
     /// By `date -u -d ... +%s`: 2018-04-25 10:00:13 is 1524650413; 2000-02-29 is day 11016.
     #[test]
@@ -178,6 +183,8 @@ mod tests {
         ] {
             assert_eq!(date_time(text), Some(NS + fraction), "{text}");
         }
+        assert_eq!(date_time("1 days 00:00:01.5"), Some(DAY_NS + 1_500_000_000));
+        assert_eq!(date_time("-1 days +23:59:59.992"), Some(-8_000_000));
         assert_eq!(time_of_day("10:00:13 PM"), Some((22 * 3600 + 13) * 1_000_000_000));
         for text in ["10:00:13.250", "10:00:13,25", "10:00:13:250"] {
             assert_eq!(time_of_day(text), Some(36_013_250_000_000), "{text}");

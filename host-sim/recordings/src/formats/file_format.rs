@@ -7,11 +7,12 @@ use crate::counts::{serial, spi_export};
 use crate::formats::ardupilot_log::{self, ArduPilotSource};
 use crate::formats::betaflight::{self, BlackboxSource};
 use crate::formats::hdf5::{self, Hdf5Reader};
-use crate::formats::matlab::MatReader;
+use crate::formats::matlab::{self, MatReader};
 use crate::formats::mcap_bag::McapSource;
 use crate::formats::numpy::{NpyReader, NpzReader};
 use crate::formats::ros_bag::RosBagSource;
 use crate::formats::sqlite_bag::SqliteSource;
+use crate::formats::sqlite_bag::ZSTD_MAGIC;
 pub use crate::formats::topics::TopicDescription;
 use crate::formats::topics::{self, Source};
 use crate::formats::ulog::UlogSource;
@@ -50,7 +51,7 @@ pub enum FileFormat {
     Npy,
     /// An archive of arrays of NumPy.
     Npz,
-    /// MATLAB, level 5.
+    /// MATLAB, levels 4 and 5.
     Mat,
     /// A bag of ROS 1.
     RosBag,
@@ -78,7 +79,7 @@ impl FileFormat {
             Self::TextTable => "text",
             Self::Npy => "an array of NumPy",
             Self::Npz => "arrays of NumPy",
-            Self::Mat => "MATLAB, level 5",
+            Self::Mat => "MATLAB",
             Self::RosBag => "a bag of ROS 1",
             Self::Mcap => "MCAP",
             Self::Sqlite => "a bag of ROS 2 in SQLite",
@@ -166,6 +167,14 @@ impl InputFile {
                 text = Some(start);
             }
         }
+        if head.starts_with(&ZSTD_MAGIC) {
+            let compressed = File::open(copy.as_ref().map_or(name, NamedTempFile::path)).map_err(fail)?;
+            let whole = zstd::Decoder::new(compressed).map_err(fail)?;
+            let expanded = copied(Metered::new(whole, budget.meter()));
+            let expanded = expanded.map_err(|error| InputError::file(name, Reason::from_io(error)))?;
+            head = self::head(expanded.path()).map_err(fail)?;
+            copy = Some(expanded);
+        }
         let format = match binary_format(&head) {
             Some(format) => format,
             None if serial::is_capture(&head) => {
@@ -174,6 +183,9 @@ impl InputFile {
                 serial::log_of_capture(BufReader::new(capture), log.path()).map_err(fail)?;
                 copy = Some(log);
                 FileFormat::FrameLog
+            }
+            None if foreign_format::is_json_document(&head) => {
+                return Err(InputError::file(name, foreign_format::JSON_DOCUMENT));
             }
             None if foreign_format::is_binary(text.as_ref().unwrap_or(&head)) => {
                 return Err(InputError::file(name, foreign_format::refusal(text.as_ref().unwrap_or(&head))));
@@ -371,6 +383,9 @@ fn head(file: &Path) -> io::Result<Vec<u8>> {
 fn binary_format(head: &[u8]) -> Option<FileFormat> {
     if hdf5::is_hdf5(head) {
         return Some(FileFormat::Hdf5);
+    }
+    if matlab::is_level_4(head) {
+        return Some(FileFormat::Mat);
     }
     MAGICS.iter().find(|(magic, _)| head.starts_with(magic)).map(|(_, format)| *format)
 }

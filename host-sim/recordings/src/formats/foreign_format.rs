@@ -18,12 +18,12 @@ const FOREIGN: &[(&[u8], &str, &str)] = &[
     (b"\xD0\xCF\x11\xE0\xA1\xB1\x1A\xE1", "a file of an old Microsoft Office", "save the sheet as CSV"),
     (b"\xFD7zXZ\0", "compressed by xz", "unxz FILE, and give the result"),
     (b"BZh", "compressed by bzip2", "bunzip2 FILE, and give the result; if it is an R workspace, write.csv in R"),
-    (b"\x28\xB5\x2F\xFD", "compressed by Zstandard", "unzstd FILE, and give the result"),
     (b"7z\xBC\xAF\x27\x1C", "a 7-Zip archive", "unpack it, and give the recording in it"),
     (b"Rar!\x1A\x07", "a RAR archive", "unpack it, and give the recording in it"),
     (b"\xFF\xFE", "text in UTF-16", "iconv -f UTF-16 -t UTF-8 FILE > FILE.csv"),
     (b"\xFE\xFF", "text in UTF-16", "iconv -f UTF-16 -t UTF-8 FILE > FILE.csv"),
-    (b"\x80\x04\x95", "a Python pickle", "in Python: load it, and numpy.save(\"FILE.npy\", array)"),
+    (b"\x80\x04\x95", PICKLE, IN_PANDAS),
+    (b"\x80\x05\x95", PICKLE, IN_PANDAS),
     (
         b"\xAA\x44\x12",
         "a binary log of a NovAtel receiver",
@@ -34,6 +34,9 @@ const FOREIGN: &[(&[u8], &str, &str)] = &[
     (b"\x89PNG", "a picture", "give the recording itself"),
     (b"\x7FELF", "a program", "give the recording itself"),
 ];
+const PICKLE: &str = "a Python pickle";
+const IN_PANDAS: &str =
+    "in Python: pandas.read_pickle(\"FILE\").to_csv(\"FILE.csv\"), or numpy.save(\"FILE.npy\", array) of an array";
 const R_WORKSPACE: &str = "an R workspace";
 const IN_R: &str = "in R: load(\"FILE\"); ls(); write.csv(NAME, \"NAME.csv\", row.names = FALSE)";
 
@@ -50,12 +53,50 @@ pub(crate) fn is_binary(head: &[u8]) -> bool {
     is_foreign || head.contains(&0) || controls * MOST_CONTROLS > head.len()
 }
 
+/// What is said of [a JSON document](is_json_document).
+pub(crate) const JSON_DOCUMENT: Reason = Reason::Foreign {
+    what: "a JSON document",
+    how: "objects are read that stand one in each line; in Python, of a list of them: \
+          pandas.read_json(\"FILE\").to_json(\"FILE.jsonl\", orient=\"records\", lines=True)",
+};
+
+/// Whether a text begins a JSON object of several lines, or of one that is longer than `head`, or a list of objects or lists.
+pub(crate) fn is_json_document(head: &[u8]) -> bool {
+    let text = head.trim_ascii_start();
+    let mut signs = text.iter().filter(|byte| !byte.is_ascii_whitespace());
+    let line = text.split(|byte| *byte == b'\n').next().unwrap_or_default().trim_ascii_end();
+    match (signs.next(), signs.next()) {
+        (Some(b'['), Some(b'{' | b'[')) => true,
+        (Some(b'{'), Some(b'"')) => !line.ends_with(b"}") && !text.starts_with(br#"{"traceEvents""#),
+        _ => false,
+    }
+}
+
 /// What a binary file looks like, and how to convert it.
 pub(crate) fn refusal(head: &[u8]) -> Reason {
     match FOREIGN.iter().find(|(magic, ..)| head.starts_with(magic)) {
         Some((_, what, how)) => Reason::Foreign { what, how },
+        None if is_mavlink(head) => Reason::Foreign {
+            what: "a telemetry log of MAVLink",
+            how: "with pymavlink: mavlogdump.py --types RAW_IMU --format csv FILE > FILE.csv (or HIGHRES_IMU, SCALED_IMU)",
+        },
         None => Reason::UnknownBinary { begins: shown(head) },
     }
+}
+
+/// Whether each message comes after a time of 8 bytes, in µs since 1970: two of version 1 or 2, one after the other.
+fn is_mavlink(head: &[u8]) -> bool {
+    const TIME: usize = 8;
+    let length = |at: usize| {
+        let header = head.get(at + TIME..at + TIME + 3)?;
+        // Header and checksum around the payload, and a signature.
+        match header[0] {
+            0xFE => Some(TIME + 8 + usize::from(header[1])),
+            0xFD => Some(TIME + 12 + usize::from(header[1]) + if header[2] & 1 == 1 { 13 } else { 0 }),
+            _ => None,
+        }
+    };
+    length(0).is_some_and(|first| length(first).is_some())
 }
 
 /// The first bytes as hexadecimal digits and as text.
@@ -85,6 +126,11 @@ mod tests {
             (&b"RDX3\nX\n\0\0\0\x03"[..], ["R workspace", "write.csv"]),
             (b"PAR1\x15\x04", ["Parquet", "read_parquet"]),
             (b"\xFF\xFEt\0,\0", ["UTF-16", "iconv"]),
+            (b"\x80\x05\x95\xAA\0\0", ["pickle", "read_pickle"]),
+            (
+                b"\0\x06\x0A\x24\x18\x1E\x40\0\xFE\0\0\x01\x01\x69\0\0\0\x06\x0A\x24\x18\x1E\x40\0\xFE\0\0",
+                ["MAVLink", "csv"],
+            ),
             (b"\x01\x02\x03\x04sensor\0\0", ["01 02 03 04 73", "(....sensor..)"]),
         ] {
             assert!(is_binary(head));

@@ -29,6 +29,9 @@ const ROWS_AT_ONCE: u64 = 4096;
 
 /// Names of attributes that state a unit, in small letters.
 const UNITS: [&str; 2] = ["unit", "units"];
+/// Those of a factor of the numbers, and of what is added to the products (NetCDF Climate and Forecast Conventions, 8.1).
+const SCALES: [&str; 2] = ["scale_factor", "scale"];
+const OFFSET: &str = "add_offset";
 /// The attribute by which MATLAB says what an array was, and what of it are no numbers.
 const MATLAB_CLASS: &str = "MATLAB_class";
 const NO_NUMBERS: [&str; 4] = ["char", "cell", "string", "function_handle"];
@@ -58,6 +61,8 @@ struct Layout {
     stride: usize,
     /// Whether each column is a row of the file.
     is_by_column: bool,
+    /// What the numbers are multiplied by, and what is added.
+    scale: Option<[f64; 2]>,
 }
 
 /// An open file.
@@ -134,7 +139,15 @@ impl Found {
         }
         let (Ok(kind), Ok(shape)) = (dataset.datatype(), dataset.shape()) else { return };
         let path = format!("{group}{name}");
-        let Some((layout, names)) = layout(&path, &kind, &shape) else { return };
+        let Some((mut layout, names)) = layout(&path, &kind, &shape) else { return };
+        let of = |known: &[&str]| {
+            attributes
+                .iter()
+                .find(|(name, _)| known.contains(&name.to_lowercase().as_str()))
+                .and_then(|(_, of)| number(of))
+        };
+        let (factor, offset) = (of(&SCALES), of(&[OFFSET]));
+        layout.scale = factor.or(offset).map(|_| [factor.unwrap_or(1.0), offset.unwrap_or(0.0)]);
         let Stated { rate, unit } = around.with(&attributes, &path);
         let (group, name, rows) = (group.to_owned(), name.to_owned(), layout.rows);
         self.arrays.push(NamedArray { group, name, rows, columns: names, unit, rate });
@@ -193,7 +206,10 @@ fn text(value: &AttrValue) -> Option<String> {
         AttrValue::StringArray(texts)
         | AttrValue::AsciiStringArray(texts)
         | AttrValue::VarLenStringArray(texts)
-        | AttrValue::VarLenAsciiStringArray(texts) => texts.first().cloned().filter(|_| texts.len() == 1),
+        | AttrValue::VarLenAsciiStringArray(texts) => {
+            let first = texts.first()?;
+            texts.iter().all(|text| text == first).then(|| first.clone())
+        }
         _ => None,
     }
 }
@@ -208,17 +224,15 @@ fn layout(path: &str, kind: &Datatype, shape: &[u64]) -> Option<(Layout, Vec<Str
     };
     let size = kind.type_size() as usize;
     let path = path.to_owned();
-    if let Datatype::Compound { members, .. } = kind {
-        if second != 1 || members.len() > MAX_COLUMNS {
+    if let Datatype::Compound { .. } = kind {
+        let mut found = Vec::new();
+        add_numbers("", kind, 0, 0, &mut found);
+        if second != 1 || found.len() > MAX_COLUMNS {
             return None;
         }
-        let number = |(name, offset, kind): (&String, u64, &Datatype)| {
-            let encoded = encoded(kind, usize::try_from(offset).ok()?)?;
-            (encoded.offset + encoded.scalar.bytes() <= size).then(|| (encoded, name.clone()))
-        };
-        let members = members.iter().map(|member| (&member.name, member.byte_offset, &member.datatype));
-        let (columns, names): (Vec<Encoded>, Vec<String>) = members.filter_map(number).unzip();
-        let layout = Layout { path, rows: first, columns, stride: size, is_by_column: false };
+        found.retain(|(encoded, _)| encoded.offset + encoded.scalar.bytes() <= size);
+        let (columns, names): (Vec<Encoded>, Vec<String>) = found.into_iter().unzip();
+        let layout = Layout { path, rows: first, columns, stride: size, is_by_column: false, scale: None };
         return Some((layout, names)).filter(|(layout, _)| !layout.columns.is_empty() && layout.rows > 0);
     }
     let element = encoded(kind, 0)?;
@@ -234,8 +248,34 @@ fn layout(path: &str, kind: &Datatype, shape: &[u64]) -> Option<(Layout, Vec<Str
         columns: (0..columns).map(|column| Encoded { offset: place(column), ..element }).collect(),
         stride: second * size,
         is_by_column,
+        scale: None,
     };
     Some((layout, (0..columns).map(|column| column.to_string()).collect()))
+}
+
+/// Adds the numbers of a record at `offset`, also in records and arrays within it: `gyro.x`, `gyro.0`.
+fn add_numbers(path: &str, kind: &Datatype, offset: usize, level: usize, found: &mut Vec<(Encoded, String)>) {
+    if found.len() > MAX_COLUMNS || Budget::check_depth(level).is_err() {
+        return;
+    }
+    let inner = |name: &str| if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };
+    match kind {
+        Datatype::Compound { members, .. } => {
+            for member in members {
+                let Ok(own) = usize::try_from(member.byte_offset) else { continue };
+                add_numbers(&inner(&member.name), &member.datatype, offset.saturating_add(own), level + 1, found);
+            }
+        }
+        Datatype::Array { base_type, dimensions } => {
+            let count = dimensions.iter().fold(1usize, |count, side| count.saturating_mul(*side as usize));
+            let size = base_type.type_size() as usize;
+            for number in 0..count.min(MAX_COLUMNS) {
+                let own = offset.saturating_add(number.saturating_mul(size));
+                add_numbers(&inner(&number.to_string()), base_type, own, level + 1, found);
+            }
+        }
+        _ => found.extend(encoded(kind, offset).map(|encoded| (encoded, path.to_owned()))),
+    }
 }
 
 /// A number of this type at `offset`; `None` for other types.
@@ -245,7 +285,7 @@ fn encoded(kind: &Datatype, offset: usize) -> Option<Encoded> {
         Datatype::FixedPoint { byte_order, layout, .. } if matches!(bytes, 1 | 2 | 4 | 8) => {
             (if layout.signed { Scalar::Signed(bytes) } else { Scalar::Unsigned(bytes) }, *byte_order)
         }
-        Datatype::FloatingPoint { byte_order, .. } if matches!(bytes, 4 | 8) => (Scalar::Float(bytes), *byte_order),
+        Datatype::FloatingPoint { byte_order, .. } if matches!(bytes, 2 | 4 | 8) => (Scalar::Float(bytes), *byte_order),
         Datatype::Enumeration { base_type, .. } => return encoded(base_type, offset),
         _ => return None,
     };
@@ -280,7 +320,11 @@ impl ArrayReader for Hdf5Reader {
         columns: &[usize],
         add: &mut dyn FnMut(u64) -> Result<(), Reason>,
     ) -> Result<Vec<Vec<Number>>, Reason> {
-        let Layout { path, rows, columns: encoded, stride, is_by_column } = &self.layouts[array];
+        let Layout { path, rows, columns: encoded, stride, is_by_column, scale } = &self.layouts[array];
+        let number = |column: usize, bytes: &[u8]| {
+            let number = encoded[column].number(bytes);
+            scale.map_or(number, |[factor, offset]| Number::Real(factor * number.value() + offset))
+        };
         if *rows as u64 > MAX_SAMPLES {
             return Err(Reason::TooManySamples);
         }
@@ -293,7 +337,7 @@ impl ArrayReader for Hdf5Reader {
                 self.meter.add_bytes(stride)?;
                 let bytes = dataset.read_raw_rows(column as u64, 1).map_err(damaged)?;
                 let elements = bytes.chunks_exact(encoded[column].scalar.bytes());
-                values.extend(elements.map(|element| encoded[column].number(element)));
+                values.extend(elements.map(|element| number(column, element)));
             }
             return Ok(values);
         }
@@ -306,7 +350,7 @@ impl ArrayReader for Hdf5Reader {
             let bytes = dataset.read_raw_rows(start, count).map_err(damaged)?;
             for row in bytes.chunks_exact(stride as usize) {
                 for (values, &column) in values.iter_mut().zip(columns) {
-                    values.push(encoded[column].number(row));
+                    values.push(number(column, row));
                 }
             }
             start += count;

@@ -67,7 +67,10 @@ impl<'a> McapSource<'a> {
             let rows = Some(messages);
             source.topics.push(match &layout {
                 Some((layout, _)) => ros_message::topic(&name, &kind, layout, rows),
-                None => Topic { name, kind, rows, ..Topic::default() },
+                None => {
+                    let encoding = Some(encoding).filter(|encoding| !matches!(encoding.as_str(), "ros1" | "cdr"));
+                    Topic { name, kind, rows, encoding, ..Topic::default() }
+                }
             });
             source.layouts.push(layout);
             source.channels.push(BTreeSet::from([id]));

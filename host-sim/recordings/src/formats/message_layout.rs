@@ -1,7 +1,8 @@
 //! Messages of which a definition says the fields: names, types, arrays and nesting, as ROS and PX4 write them.
 //!
 //! A [`MessageLayout`] lists every number of a message as a column, such as `imu.angular_velocity.x` or `gyro[2]`, and decodes messages
-//! to a number for each column. Numbers in arrays of variable length, or of more than 64 elements, are no columns and are skipped.
+//! to a number for each column. Of a sequence of floats, whose length a message says,
+//! the first 16 are columns; other numbers in sequences, and in arrays of more than 64 elements, are none and are skipped.
 
 use crate::input::budget::Budget;
 use crate::input::input_error::Reason;
@@ -10,6 +11,8 @@ use std::collections::HashMap;
 
 /// Elements of an array that are columns of their own.
 const MOST_ELEMENTS: usize = 64;
+/// The same of a sequence of floats, of which the definition does not say how many there are.
+const MOST_OF_SEQUENCE: usize = 16;
 /// Steps of a layout, of which there are some for every column: definitions that use each other can ask for any number.
 const MOST_STEPS: usize = 1 << 14;
 
@@ -20,7 +23,7 @@ pub(crate) enum Scalar {
     Signed(u8),
     /// Unsigned, of so many bytes.
     Unsigned(u8),
-    /// A float of 4 or 8 bytes.
+    /// A float of 2, 4 or 8 bytes.
     Float(u8),
 }
 
@@ -36,10 +39,23 @@ impl Scalar {
         match self {
             Self::Signed(_) => Number::Integer((word << unused).cast_signed() >> unused),
             Self::Unsigned(_) => i64::try_from(word).map_or(Number::Real(word as f64), Number::Integer),
+            Self::Float(2) => Number::Real(half(word as u16)),
             Self::Float(4) => Number::Real(f64::from(f32::from_bits(word as u32))),
             Self::Float(_) => Number::Real(f64::from_bits(word)),
         }
     }
+}
+
+/// A float of 16 bits (IEEE 754, binary16).
+fn half(bits: u16) -> f64 {
+    let (exponent, fraction) = (i32::from(bits >> 10 & 0x1F), f64::from(bits & 0x3FF));
+    let magnitude = match exponent {
+        0 => fraction * 2f64.powi(-24),
+        31 if fraction == 0.0 => f64::INFINITY,
+        31 => f64::NAN,
+        _ => (1024.0 + fraction) * 2f64.powi(exponent - 25),
+    };
+    if bits >> 15 == 1 { -magnitude } else { magnitude }
 }
 
 /// What a field holds.
@@ -92,6 +108,8 @@ enum Step {
     Number(Scalar, Option<usize>),
     Time(Option<usize>),
     Text,
+    /// A length of 32 bits and as many numbers: the first column, and how many columns there are.
+    Sequence(Scalar, usize, usize),
     /// The same steps again and again; none of their numbers is a column.
     Repeat(Repeat, Vec<Step>),
     /// The end of what can be decoded.
@@ -165,6 +183,17 @@ impl Builder<'_> {
                         self.add(&mut steps, &field.kind, &format!("{path}[{element}]"), true, level)?;
                     }
                 }
+                Repeat::Any if named && matches!(field.kind, FieldType::Scalar(Scalar::Float(_))) => {
+                    let FieldType::Scalar(scalar) = field.kind else { continue };
+                    self.count()?;
+                    steps.push(Step::Sequence(scalar, self.columns.len(), MOST_OF_SEQUENCE));
+                    let column = |element: usize| MessageColumn {
+                        name: format!("{path}[{element}]"),
+                        is_time: false,
+                        is_float: true,
+                    };
+                    self.columns.extend((0..MOST_OF_SEQUENCE).map(column));
+                }
                 repeat => {
                     let mut each = Vec::new();
                     self.add(&mut each, &field.kind, &path, false, level)?;
@@ -231,6 +260,15 @@ fn run(steps: &[Step], cursor: &mut Cursor, row: &mut [Number]) -> Option<()> {
             Step::Text => {
                 let length = cursor.word(4)?;
                 cursor.skip(usize::try_from(length).ok()?)?;
+            }
+            Step::Sequence(scalar, first, columns) => {
+                let count = usize::try_from(cursor.word(4)?).ok()?;
+                for at in 0..count.min(*columns) {
+                    row[first + at] = scalar.number(cursor.word(scalar.bytes())?);
+                }
+                if let Some(more) = count.checked_sub(*columns) {
+                    cursor.skip(scalar.bytes().checked_mul(more)?)?;
+                }
             }
             Step::Repeat(repeat, each) => {
                 let count = match repeat {

@@ -4,6 +4,7 @@ use crate::columns::column_selection::ChosenColumn;
 use crate::columns::unit::Unit;
 use crate::counts::recording::MAX_SAMPLES;
 use crate::formats::array_topics::{self, ArrayReader, ArraySource, NamedArray};
+use crate::formats::message_layout::Scalar;
 use crate::input::budget::{Budget, Meter, Metered};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::{Counted, ReadMonitor};
@@ -17,6 +18,9 @@ use zip::ZipArchive;
 
 /// Columns of a matrix beyond which it is no recording.
 const MAX_COLUMNS: u64 = 1024;
+/// What is said of an array of Python objects.
+const OBJECTS: &str = "holds Python objects, which are not read; of a dict of arrays, in Python: \
+                       numpy.savez(\"FILE.npz\", **numpy.load(\"FILE\", allow_pickle=True).item())";
 
 /// Brackets within brackets in the header of an array; fields within fields, which are not read, have five.
 const MOST_BRACKETS: usize = 8;
@@ -287,9 +291,11 @@ impl ArrayLayout {
         let mut unit = None;
         let mut fields = Vec::new();
         let mut stride = 0usize;
-        let mut add = |name: String, dtype: &DType| -> Result<(), Reason> {
-            let DType::Plain(encoding) = dtype else { return Err(unusable("has rows within rows".to_owned())) };
+        let mut add = |name: String, encoding: &TypeStr| -> Result<(), Reason> {
             let bytes = encoding.num_bytes().filter(|_| is_number(encoding));
+            if encoding.type_char() == TypeChar::Object {
+                return Err(unusable(OBJECTS.to_owned()));
+            }
             let bytes = bytes.ok_or_else(|| unusable(format!("holds no numbers but {encoding}")))?;
             let units = encoding.time_units().map(npyz::TimeUnits::to_str);
             unit = unit.or_else(|| units.and_then(Unit::parse));
@@ -302,13 +308,18 @@ impl ArrayLayout {
                 if inner > 1 {
                     return Err(unusable("is a matrix of records".to_owned()));
                 }
-                named.iter().try_for_each(|field| add(field.name.clone(), &field.dtype))?;
+                let mut plain = Vec::new();
+                for field in &named {
+                    flatten(&field.name, &field.dtype, &mut plain).map_err(unusable)?;
+                }
+                plain.into_iter().try_for_each(|(name, encoding)| add(name, encoding))?;
                 false
             }
-            plain => {
-                (0..inner).try_for_each(|number| add(number.to_string(), &plain))?;
+            DType::Plain(encoding) => {
+                (0..inner).try_for_each(|number| add(number.to_string(), &encoding))?;
                 true
             }
+            DType::Array(..) => return Err(unusable("has rows within rows".to_owned())),
         };
         let by_column = is_plain && inner > 1 && (header.order() == Order::C) != first_is_time;
         let stride = if by_column { stride / fields.len().max(1) } else { stride };
@@ -362,11 +373,35 @@ impl ArrayLayout {
     }
 }
 
+/// Adds the numbers in a field of a record: `gyro.0` of an array in it, `imu.gx` of a record in it.
+fn flatten<'a>(name: &str, dtype: &'a DType, plain: &mut Vec<(String, &'a TypeStr)>) -> Result<(), String> {
+    match dtype {
+        DType::Plain(encoding) => plain.push((name.to_owned(), encoding)),
+        DType::Array(count, inner) => {
+            for number in 0..*count {
+                let before = plain.len();
+                flatten(&format!("{name}.{number}"), inner, plain)?;
+                if plain.len() == before {
+                    // Arrays without a number, however many there are.
+                    break;
+                }
+            }
+        }
+        DType::Record(fields) => {
+            for field in fields {
+                flatten(&format!("{name}.{}", field.name), &field.dtype, plain)?;
+            }
+        }
+    }
+    let most = MAX_COLUMNS;
+    if plain.len() as u64 > most { Err(format!("has more than {most} columns")) } else { Ok(()) }
+}
+
 /// Whether [`decode`] knows the encoding.
 fn is_number(encoding: &TypeStr) -> bool {
     match encoding.type_char() {
         TypeChar::Int | TypeChar::Uint | TypeChar::Bool => matches!(encoding.num_bytes(), Some(1 | 2 | 4 | 8)),
-        TypeChar::Float => matches!(encoding.num_bytes(), Some(4 | 8)),
+        TypeChar::Float => matches!(encoding.num_bytes(), Some(2 | 4 | 8)),
         TypeChar::TimeDelta | TypeChar::DateTime => encoding.num_bytes() == Some(8),
         _ => false,
     }
@@ -383,8 +418,7 @@ fn decode(encoding: &TypeStr, bytes: &[u8]) -> Number {
     let bits = u64::from_le_bytes(word);
     let unused = 64 - 8 * size as u32;
     match (encoding.type_char(), size) {
-        (TypeChar::Float, 4) => Number::Real(f64::from(f32::from_bits(bits as u32))),
-        (TypeChar::Float, _) => Number::Real(f64::from_bits(bits)),
+        (TypeChar::Float, _) => Scalar::Float(size as u8).number(bits),
         (TypeChar::Uint | TypeChar::Bool, _) => i64::try_from(bits).map_or(Number::Real(bits as f64), Number::Integer),
         _ => Number::Integer((bits << unused).cast_signed() >> unused),
     }

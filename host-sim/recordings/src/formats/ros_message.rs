@@ -31,6 +31,7 @@ pub(crate) fn topic(name: &str, kind: &str, layout: &MessageLayout, rows: Option
         rows,
         columns: columns.iter().map(available).chain([AvailableColumn::known(RECORD_TIME, "ns")]).collect(),
         sensors: sensors(kind, columns),
+        ..Topic::default()
     }
 }
 

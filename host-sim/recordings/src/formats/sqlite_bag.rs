@@ -5,13 +5,17 @@ use crate::formats::message_layout::{Encoding, MessageLayout};
 use crate::formats::ros_definition::{self, RosVersion};
 use crate::formats::ros_message::{self, RosRows};
 use crate::formats::topics::{EachRow, Ending, Source, Topic};
-use crate::input::budget::Budget;
+use crate::input::budget::{Budget, Metered};
 use crate::input::input_error::{InputError, Reason};
 use rusqlite::{Connection, OpenFlags};
 use std::collections::HashMap;
+use std::io::{self, Read};
 use std::path::Path;
 
 const FORMAT: &str = "ROS 2 SQLite bag";
+
+/// First bytes of what Zstandard has compressed (RFC 8878, 3.1.1).
+pub(crate) const ZSTD_MAGIC: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
 
 /// Instructions of the database between two looks at the clock.
 const INSTRUCTIONS: i32 = 100_000;
@@ -87,6 +91,13 @@ fn damaged(error: rusqlite::Error, budget: Budget) -> Reason {
     }
 }
 
+fn damaged_message(error: io::Error) -> Reason {
+    match Reason::from_io(error) {
+        Reason::Io(error) => Reason::Format { format: FORMAT, error: format!("a compressed message: {error}").into() },
+        refused => refused,
+    }
+}
+
 impl Source for SqliteSource<'_> {
     fn format(&self) -> &'static str {
         FORMAT
@@ -101,6 +112,7 @@ impl Source for SqliteSource<'_> {
         let fail = |error| InputError::file(file, damaged(error, *budget));
         let (id, Some(layout)) = &layouts[topic] else { return Ok(Ending::default()) };
         let mut rows = RosRows::new(layout, Encoding::Cdr, columns);
+        let mut meter = budget.meter();
         let text = "SELECT data, timestamp FROM messages WHERE topic_id = ? ORDER BY id";
         let mut query = database.prepare(text).map_err(fail)?;
         let mut messages = query.query((id,)).map_err(fail)?;
@@ -108,7 +120,19 @@ impl Source for SqliteSource<'_> {
             match messages.next() {
                 Ok(Some(message)) => {
                     let data = message.get_ref(0).map_err(fail)?.as_blob().unwrap_or_default();
-                    each(rows.row(data, message.get(1).ok()))?;
+                    let recorded_ns = message.get(1).ok();
+                    if !data.starts_with(&ZSTD_MAGIC) {
+                        each(rows.row(data, recorded_ns))?;
+                        continue;
+                    }
+                    // `ros2 bag record --compression-mode message`.
+                    let mut expanded = Vec::new();
+                    let read = zstd::Decoder::with_buffer(data)
+                        .and_then(|input| Metered::new(input, &mut meter).read_to_end(&mut expanded));
+                    match read {
+                        Ok(_) => each(rows.row(&expanded, recorded_ns))?,
+                        Err(error) => break Some(damaged_message(error)),
+                    }
                 }
                 Ok(None) => break None,
                 Err(error) => break Some(damaged(error, *budget)),

@@ -1,8 +1,10 @@
-//! Tables of numbers in any units: CSV with commas, semicolons, tabs or blanks, with or without a heading, and sentences as of NMEA 0183.
+//! Tables of numbers in any units: CSV with commas, semicolons, tabs or blanks, with or without a heading, sentences as of NMEA 0183, and
+//! lines that name each number.
 
 use crate::columns::column_selection::{AvailableColumn, ChosenColumn, Role, SelectionError, as_they_are};
 use crate::columns::unit::Unit;
 use crate::formats::calendar::{self, CalendarClock, CalendarColumns};
+use crate::formats::labelled_row;
 use crate::formats::nmea::{self, Sentence};
 use crate::formats::row_kinds::RowKinds;
 use crate::input::delimited_text::{self, Lines};
@@ -81,6 +83,8 @@ enum Layout {
     },
     /// Those of one kind of sentence.
     Sentences { name: String, damaged: u64, others: u64 },
+    /// Each with its name; `others` are lines without these names.
+    Labelled { names: Vec<String>, calendar: Option<CalendarClock>, others: u64 },
 }
 
 /// An open table, read row by row.
@@ -116,6 +120,9 @@ impl TextTable {
         let mut preamble: Vec<(u64, String)> = Vec::new();
         let first = loop {
             let Some((line, text)) = lines.next()? else {
+                if let Some(names) = labelled_names(&preamble) {
+                    return Self::open_labelled(file, choose, lines, names, preamble);
+                }
                 let reason = if preamble.is_empty() { Reason::Empty } else { Reason::NoData };
                 return Err(InputError::file(file, reason));
             };
@@ -128,6 +135,9 @@ impl TextTable {
             }
             preamble.push((line, text.to_owned()));
             if preamble.len() > MAX_PREAMBLE {
+                if let Some(names) = labelled_names(&preamble) {
+                    return Self::open_labelled(file, choose, lines, names, preamble);
+                }
                 return Err(InputError::line(file, line, Reason::NoNumbers));
             }
         };
@@ -150,9 +160,12 @@ impl TextTable {
         let is_kind = |row: &&Vec<&str>| kind.as_ref().is_none_or(|(at, name)| row.get(*at) == Some(&name.as_str()));
         let row = rows.iter().find(is_kind).cloned().unwrap_or_default();
         let (width, calendar) = (row.len(), CalendarColumns::find(&row));
+        // As `write.table` of R numbers the rows, without a name in the heading.
+        let is_numbered = matches!(rows.as_slice(), [first, second, ..] if first[0] == "1" && second[0] == "2");
         // The heading may have one name for a date and a time of day.
-        let is_heading = |fields: usize| fields == width || is_short(fields, width, calendar);
-        let fields = |text: &str| split(text, separator).count();
+        let is_unnumbered = |fields: usize| fields + 1 == width && is_numbered;
+        let is_heading = |fields: usize| fields == width || is_short(fields, width, calendar) || is_unnumbered(fields);
+        let fields = |text: &str| names(text, separator, width).len();
         let mut headings = preamble.iter().rev().filter(|(_, text)| is_heading(fields(text)));
         let mut heading = headings.next();
         // A row of units below the names.
@@ -169,16 +182,17 @@ impl TextTable {
             return Err(InputError::line(file, *line, Reason::FieldCount { found: width, expected: fields(text) }));
         }
         let mut available: Vec<AvailableColumn> = match heading {
-            Some((_, text)) => named_columns(split(text, separator), units.as_deref()),
+            Some((_, text)) => named_columns(names(text, separator, width).into_iter(), units.as_deref()),
             None => (0..width).map(|number| AvailableColumn { name: number.to_string(), unit: None }).collect(),
         };
         if let Some(calendar) = calendar {
-            let at = calendar.position();
             if is_short(available.len(), width, Some(calendar)) {
-                available.insert(at + 1, AvailableColumn { name: "time of day".to_owned(), unit: None });
+                let time_of_day = AvailableColumn { name: "time of day".to_owned(), unit: None };
+                available.insert(calendar.position() + 1, time_of_day);
             }
-            let name = if available[at].is_time() { available[at].name.clone() } else { "time".to_owned() };
-            available[at] = AvailableColumn::known(&name, "ns");
+            set_calendar(&mut available, calendar);
+        } else if is_unnumbered(available.len()) {
+            available.insert(0, AvailableColumn { name: "row".to_owned(), unit: None });
         }
         let chosen = choose(&available).map_err(|error| match heading {
             Some((line, _)) => InputError::line(file, *line, Reason::Selection(Box::new(error))),
@@ -263,6 +277,39 @@ impl TextTable {
         })
     }
 
+    /// Opens a file whose lines name each of their numbers; `first` are the lines that were read.
+    fn open_labelled(
+        file: &Path,
+        choose: &Choose,
+        lines: Lines,
+        names: Vec<String>,
+        first: Vec<(u64, String)>,
+    ) -> Result<Self, InputError> {
+        let rows = first.iter().filter_map(|(_, text)| labelled_row::parse(text));
+        let row = rows.map(|row| values_of(&names, row)).next().unwrap_or_default();
+        let calendar = CalendarColumns::find(&row.iter().map(String::as_str).collect::<Vec<_>>());
+        let mut available = named_columns(names.iter().map(String::as_str), None);
+        if let Some(calendar) = calendar {
+            set_calendar(&mut available, calendar);
+        }
+        let chosen = choose(&available);
+        let chosen = chosen.map_err(|error| InputError::file(file, Reason::Selection(Box::new(error))))?;
+        let (row, width) = (Vec::with_capacity(chosen.len()), names.len());
+        Ok(Self {
+            file: file.to_owned(),
+            lines,
+            available,
+            chosen,
+            layout: Layout::Labelled { names, calendar: calendar.map(CalendarClock::new), others: 0 },
+            rate_hz: None,
+            note: None,
+            is_lenient: false,
+            width,
+            first: first.into(),
+            row,
+        })
+    }
+
     /// The columns that are read.
     pub(crate) fn chosen(&self) -> &[ChosenColumn] {
         &self.chosen
@@ -273,7 +320,11 @@ impl TextTable {
         let of_rate = self.rate_hz.map(|hz| format!("the file states a rate of {hz} Hz before its rows"));
         let mut notes: Vec<String> = self.note.iter().cloned().chain(of_rate).collect();
         let (name, damaged, others) = match &self.layout {
-            Layout::Columns { others: 0, .. } => return notes,
+            Layout::Columns { others: 0, .. } | Layout::Labelled { others: 0, .. } => return notes,
+            Layout::Labelled { others, .. } => {
+                notes.push(format!("{others} lines without the names of the others are left out"));
+                return notes;
+            }
             Layout::Columns { others, .. } => {
                 notes.push(format!("{others} rows of other kinds are left out; --topic reads another"));
                 return notes;
@@ -315,6 +366,20 @@ impl TextTable {
                 Layout::Columns { separator, calendar, .. } => {
                     numbers(split(text, *separator), chosen, *width, calendar.as_mut(), row).map(|()| true)
                 }
+                Layout::Labelled { names, calendar, others } => {
+                    let row_of = labelled_row::parse(text);
+                    match row_of.filter(|row_of| row_of.iter().any(|(name, _)| names.contains(name))) {
+                        Some(row_of) => {
+                            let values = values_of(names, row_of);
+                            numbers(values.iter().map(String::as_str), chosen, *width, calendar.as_mut(), row)
+                                .map(|()| true)
+                        }
+                        None => {
+                            *others += 1;
+                            Ok(false)
+                        }
+                    }
+                }
                 Layout::Sentences { name, damaged, others } => match Sentence::parse(text) {
                     Some(sentence) if !sentence.is_intact => {
                         *damaged += 1;
@@ -355,6 +420,42 @@ impl TextTable {
     pub(crate) fn is_stopped(&self) -> bool {
         self.lines.is_stopped()
     }
+}
+
+/// The names in most of the first lines of a file, where each names its numbers.
+fn labelled_names(lines: &[(u64, String)]) -> Option<Vec<String>> {
+    let mut kinds: Vec<(Vec<String>, usize)> = Vec::new();
+    for row in lines.iter().filter_map(|(_, text)| labelled_row::parse(text)) {
+        let numbers = row.iter().filter(|(_, value)| number(value).is_some()).count();
+        let names: Vec<String> = row.into_iter().map(|(name, _)| name).collect();
+        match kinds.iter_mut().find(|(known, _)| *known == names) {
+            Some((_, count)) => *count += 1,
+            None if 2 * numbers >= names.len() => kinds.push((names, 1)),
+            None => {}
+        }
+    }
+    let (names, count) = kinds.into_iter().max_by_key(|(_, count)| *count)?;
+    (2 * count > lines.len()).then_some(names)
+}
+
+/// The values of a row in the order of `names`; empty where it has none.
+fn values_of(names: &[String], row: Vec<(String, String)>) -> Vec<String> {
+    let mut values = vec![String::new(); names.len()];
+    for (at, (name, value)) in row.into_iter().enumerate() {
+        // Most rows have the same order.
+        let is_same = names.get(at) == Some(&name);
+        if let Some(at) = Some(at).filter(|_| is_same).or_else(|| names.iter().position(|known| *known == name)) {
+            values[at] = value;
+        }
+    }
+    values
+}
+
+/// Marks the column of calendar times.
+fn set_calendar(available: &mut [AvailableColumn], calendar: CalendarColumns) {
+    let at = calendar.position();
+    let name = if available[at].is_time() { available[at].name.clone() } else { "time".to_owned() };
+    available[at] = AvailableColumn::known(&name, "ns");
 }
 
 /// Whether a heading has one name for the date and the time of day of rows of `width` fields.
@@ -429,6 +530,40 @@ fn split(text: &str, separator: Option<char>) -> Box<dyn Iterator<Item = &str> +
         Some(separator) => Box::new(text.split(separator).map(delimited_text::field)),
         None => Box::new(text.split_ascii_whitespace().map(delimited_text::field)),
     }
+}
+
+/// The names in a heading above rows of `width` fields. Between blanks, a unit in brackets belongs to the name before it, and quotation
+/// marks hold a name together.
+fn names(text: &str, separator: Option<char>, width: usize) -> Vec<&str> {
+    let plain: Vec<&str> = split(text, separator).collect();
+    if separator.is_some() || plain.len() == width {
+        return plain;
+    }
+    if width == 1 {
+        return vec![delimited_text::field(text)];
+    }
+    let mut names: Vec<std::ops::Range<usize>> = Vec::new();
+    let mut closing = None;
+    for (at, letter) in text.char_indices() {
+        let end = at + letter.len_utf8();
+        let is_first = text[..at].ends_with(|before: char| before.is_ascii_whitespace()) || at == 0;
+        let belongs = closing.is_some() || matches!(letter, '[' | '(') && !names.is_empty();
+        match names.last_mut() {
+            _ if letter.is_ascii_whitespace() && closing.is_none() => continue,
+            Some(name) if belongs || !is_first => name.end = end,
+            _ => names.push(at..end),
+        }
+        closing = match (closing, letter) {
+            (Some(closing), letter) if closing != letter => Some(closing),
+            (Some(_), _) => None,
+            (None, '[') => Some(']'),
+            (None, '(') => Some(')'),
+            (None, '"') => Some('"'),
+            (None, _) => None,
+        };
+    }
+    let names = names.into_iter().map(|name| delimited_text::field(&text[name]));
+    names.filter(|name| !matches!(*name, "#" | "%")).collect()
 }
 
 /// The units of a row below the names, where it is one.

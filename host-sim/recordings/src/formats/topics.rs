@@ -20,6 +20,8 @@ pub(crate) struct Topic {
     pub(crate) name: String,
     /// Its type in the file; empty where there is none.
     pub(crate) kind: String,
+    /// How its messages are encoded, where that is not decoded.
+    pub(crate) encoding: Option<String>,
     /// Rows, where the format says how many without reading them.
     pub(crate) rows: Option<u64>,
     /// All that can be read of it.
@@ -262,7 +264,11 @@ pub(crate) fn read(
     let choice = choose(source, options).map_err(fail)?;
     let topic = &source.topics()[choice.topic];
     if topic.columns.is_empty() {
-        return Err(fail(Reason::NoDefinition(Box::new((topic.name.clone(), topic.kind.clone())))));
+        return Err(fail(match &topic.encoding {
+            _ if source.whole().is_some() => Reason::NoTopic { format: source.format() },
+            Some(encoding) => Reason::Encoding(Box::new((topic.name.clone(), encoding.clone()))),
+            None => Reason::NoDefinition(Box::new((topic.name.clone(), topic.kind.clone()))),
+        }));
     }
     let sensor = choice.sensor.map(|at| &topic.sensors[at]);
     let chosen = choose_columns(topic, sensor, options).map_err(fail)?;

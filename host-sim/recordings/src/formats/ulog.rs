@@ -224,7 +224,7 @@ impl<'a> UlogSource<'a> {
         Vector::Rate.add_to(&mut sensor, [1, 2, 3]);
         Vector::Force.add_to(&mut sensor, [4, 5, 6]);
         let (name, kind, rows) = (pair_name(pair, instance), pair.join("+"), Some(rows));
-        self.topics.push(Topic { name, kind, rows, columns, sensors: vec![sensor] });
+        self.topics.push(Topic { name, kind, rows, columns, sensors: vec![sensor], ..Topic::default() });
         self.rows.push(Rows::Pair(pair, instance));
     }
 }

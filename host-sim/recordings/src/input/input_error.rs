@@ -236,6 +236,13 @@ pub enum Reason {
         .0.0, .0.1
     )]
     NoDefinition(Box<(String, String)>),
+    /// A topic whose messages are not encoded as those of ROS, and how they are.
+    #[error(
+        "the messages of {} are encoded in {}; those of ROS 1 and ROS 2 (ros1, cdr) are decoded; in Python, mcap.reader gives the messages, of \
+         which a table is made by csv.writer",
+        .0.0, .0.1
+    )]
+    Encoding(Box<(String, String)>),
     /// A topic that the log does not have: as given, and the names of the topics.
     #[error("--topic {}: not in the file; it has {}", .0.0, .0.1)]
     UnknownTopic(Box<(String, String)>),

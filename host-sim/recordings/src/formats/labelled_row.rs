@@ -1,0 +1,69 @@
+//! Lines that name each of their numbers: `gx: 0.01, gy: 0.02` or `t=5 gx=0.01`, as sketches print them, and JSON objects, one a line.
+
+use serde_json::Value;
+
+/// What comes between a number and the next name.
+const SEPARATORS: [char; 4] = [',', ';', '\t', '|'];
+
+/// The names and the texts of the numbers of a line; `None` for another line.
+pub(crate) fn parse(line: &str) -> Option<Vec<(String, String)>> {
+    let line = line.trim();
+    if line.starts_with('{') {
+        let Ok(object @ Value::Object(_)) = serde_json::from_str(line) else { return None };
+        let mut found = Vec::new();
+        add(&object, "", &mut found);
+        return (!found.is_empty()).then_some(found);
+    }
+    let mut found = Vec::new();
+    let mut rest = line;
+    while let Some((label, after)) = rest.split_once([':', '=']) {
+        let label = label.rsplit(SEPARATORS).next().unwrap_or(label).trim_matches([' ', '>', '"']);
+        let after = after.trim_start();
+        let end = after.find(|sign: char| SEPARATORS.contains(&sign) || sign.is_ascii_whitespace());
+        let (value, next) = after.split_at(end.unwrap_or(after.len()));
+        if !label.starts_with(char::is_alphabetic) {
+            return None;
+        }
+        found.push((label.to_owned(), value.to_owned()));
+        rest = next;
+    }
+    (found.len() > 1).then_some(found)
+}
+
+/// Adds what is in a value of JSON under its path: `gyro.x` of an object, `gyro.0` of an array.
+fn add(value: &Value, path: &str, found: &mut Vec<(String, String)>) {
+    let inner = |name: &str| if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };
+    match value {
+        Value::Object(fields) => fields.iter().for_each(|(name, value)| add(value, &inner(name), found)),
+        Value::Array(values) => {
+            values.iter().enumerate().for_each(|(number, value)| add(value, &inner(&number.to_string()), found));
+        }
+        Value::Null => found.push((path.to_owned(), String::new())),
+        Value::Bool(value) => found.push((path.to_owned(), u8::from(*value).to_string())),
+        Value::Number(number) => found.push((path.to_owned(), number.to_string())),
+        Value::String(text) => found.push((path.to_owned(), text.clone())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parse;
+
+    #[test]
+    fn numbers_are_found_with_their_names() {
+        for (line, expected) in [
+            ("gx: 0.01, gy: -0.02", "gx=0.01 gy=-0.02"),
+            ("t=12 Gyro X=0.5 Y=1e-3", "t=12 Gyro X=0.5 Y=1e-3"),
+            (">gx:1,gy:2", "gx=1 gy=2"),
+            ("time: 10:00:13.5\tax: 1 g\tay: 2 g", "time=10:00:13.5 ax=1 ay=2"),
+            (r#"{"t": 5, "gyro": [0.1, 2], "imu": {"ax": null}}"#, "gyro.0=0.1 gyro.1=2 imu.ax= t=5"),
+        ] {
+            let found = parse(line).unwrap_or_else(|| panic!("{line}"));
+            let found: Vec<String> = found.into_iter().map(|(name, value)| format!("{name}={value}")).collect();
+            assert_eq!(found.join(" "), expected);
+        }
+        for line in ["0.1, 0.2", "Start Time: Unknown", "12:00:01 0.5", "[1, 2]", "{\"a\"", "# gx, gy", ""] {
+            assert_eq!(parse(line), None, "{line}");
+        }
+    }
+}
