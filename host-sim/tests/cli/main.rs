@@ -4,6 +4,7 @@
 mod analyze_and_replay;
 mod convert_and_simulate;
 mod damaged_input;
+mod documented_options;
 mod exports;
 mod formats;
 mod input_errors;

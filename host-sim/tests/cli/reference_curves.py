@@ -56,11 +56,30 @@ def blackbox(file, _):
     return rows[:, 0], rows[:, 1:]
 
 
+def ulog(file, topic):
+    from pyulog import ULog
+
+    data = next(found.data for found in ULog(file).data_list if found.name == topic)
+    rates = np.c_[tuple(data[f"gyro_rad[{axis}]"] for axis in range(3))]
+    forces = np.c_[tuple(data[f"accelerometer_m_s2[{axis}]"] for axis in range(3))]
+    return data["timestamp"].astype(float), np.c_[np.degrees(rates), forces / GRAVITY]
+
+
+def text(file, columns):
+    """Columns of a table without gaps, and the size of 1 in each, as in `1:1,2:0.001`."""
+    chosen = [part.split(":") for part in columns.split(",")]
+    with open(file) as lines:
+        rows = [line.replace(",", " ").split() for line in lines]
+    numbers = [row for row in rows if row and all(field.lstrip("+-")[:1].isdigit() for field in row)]
+    values = np.array([[float(row[int(at)]) for at, _ in chosen] for row in numbers])
+    return None, values * [float(size) for _, size in chosen]
+
+
 def main():
     reader, file, *rest = sys.argv[1:]
     times, values = globals()[reader](file, *(rest or [None]))
     found = {}
-    channels = CHANNELS if values.shape[1] == 6 else CHANNELS[3:]
+    channels = CHANNELS[3:] if reader == "hdf5" else CHANNELS[: values.shape[1]]
     for channel, column in zip(channels, values.T):
         if times is None:
             _, deviations, _, _ = allantools.oadev(column, rate=1.0, data_type="freq", taus=[1, 2, 4, 8])
