@@ -3,7 +3,7 @@
 use serde_json::Value;
 use std::path::PathBuf;
 use std::process::Command;
-use system_tests::recording;
+use system_tests::{host_sim, recording};
 
 /// Runs the command-line program and returns the bytes of its JSON report.
 fn report(arguments: &[&str], recording: &PathBuf) -> Vec<u8> {
@@ -22,20 +22,6 @@ fn report(arguments: &[&str], recording: &PathBuf) -> Vec<u8> {
         .expect("host-sim runs");
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     std::fs::read(json).expect("the report")
-}
-
-/// The path of the program: `HOST_SIM`, or built by cargo in the profile of the tests.
-fn host_sim() -> PathBuf {
-    if let Some(program) = std::env::var_os("HOST_SIM") {
-        return program.into();
-    }
-    let build = Command::new(env!("CARGO"))
-        .args(["build", "--quiet", "--locked", "--package", "host-sim", "--bin", "host-sim"])
-        .status()
-        .expect("cargo runs");
-    assert!(build.success(), "host-sim does not build");
-    let test = std::env::current_exe().expect("the path of this test");
-    test.ancestors().nth(2).expect("target/debug").join("host-sim")
 }
 
 fn channel<'a>(report: &'a Value, name: &str) -> &'a Value {
