@@ -1,5 +1,6 @@
 //! Numbers, units, names and tables as the terminal, the figures and the page show them.
 
+use crate::line_breaks::broken;
 use crate::rounding::{NONE, quantity_digits, significant};
 use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
 use noise_analysis::report::assessment::{Innovations, RecordLength};
@@ -177,26 +178,9 @@ pub fn recording_advice(record: &RecordLength) -> String {
     }
 }
 
-/// `text` broken between words so that no line is longer than `width` columns, except a single longer word. Lines after
-/// the first are indented by two columns.
+/// `text` in lines of at most `width` columns; those after the first are indented by two.
 pub fn wrap(text: &str, width: usize) -> String {
-    let mut lines = vec![String::new()];
-    for word in text.split_whitespace() {
-        let full = lines.last().is_some_and(|line| {
-            let length = line.chars().count() + 1 + word.chars().count();
-            length > width && !line.trim().is_empty()
-        });
-        if full {
-            lines.push(" ".to_owned());
-        }
-        if let Some(line) = lines.last_mut() {
-            if !line.is_empty() {
-                line.push(' ');
-            }
-            line.push_str(word);
-        }
-    }
-    lines.join("\n")
+    broken(text, width, "  ").join("\n")
 }
 
 /// A table with a frame of box characters, as wide as its cells. It is written by its `Display`, without a line break
@@ -307,19 +291,5 @@ mod tests {
         assert_eq!(parameter_name("frequency_hz"), "frequency");
         assert_eq!(parameter_name("correlation_time_s"), "correlation time");
         assert_eq!(parameter_name("at_s"), "time");
-    }
-
-    #[test]
-    fn long_text_is_broken_between_words() {
-        let text = "• sinusoid: ".to_owned() + &"word ".repeat(60);
-        let broken = wrap(&text, 100);
-        assert!(broken.lines().count() > 2);
-        assert!(broken.lines().all(|line| line.chars().count() <= 100));
-        assert_eq!(broken.split_whitespace().count(), text.split_whitespace().count());
-    }
-
-    #[test]
-    fn a_short_sentence_is_unchanged() {
-        assert_eq!(wrap("• step: at 3 s", 100), "• step: at 3 s");
     }
 }

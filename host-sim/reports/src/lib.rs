@@ -12,6 +12,7 @@ pub mod finding_text;
 pub mod formatting;
 pub mod full_tables;
 pub mod json;
+mod line_breaks;
 pub mod live;
 pub mod page;
 mod part_note;

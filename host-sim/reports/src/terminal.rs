@@ -3,6 +3,7 @@
 
 use crate::finding_text::FindingText;
 use crate::formatting::capital;
+use crate::line_breaks::broken;
 use crate::summary::{self, CoefficientTable};
 use anstyle::{AnsiColor, Style};
 use noise_analysis::report::Report;
@@ -119,7 +120,7 @@ impl Screen<'_> {
         let report = self.report;
         let mut lines =
             vec![styled(HEADING, &shortened(&summary::headline(report, self.source).join("   "), self.columns()))];
-        lines.extend(wrapped(&summary::record_sentences_in_short(report).join(" "), self.text_columns()));
+        lines.extend(broken(&summary::record_sentences_in_short(report).join(" "), self.text_columns(), ""));
         let tables = summary::coefficient_tables(report);
         if !tables.is_empty() {
             lines.push(String::new());
@@ -147,8 +148,8 @@ impl Screen<'_> {
         };
         let label = format!("{number:>2}  {}", finding.channels);
         // A long list of channels has lines of its own beside the text.
-        let labels = wrapped_to(&label, CHANNELS - 1, "    ");
-        let texts = wrapped(&text, self.text_columns() - CHANNELS);
+        let labels = broken(&label, CHANNELS - 1, "    ");
+        let texts = broken(&text, self.text_columns() - CHANNELS, "");
         (0..labels.len().max(texts.len()))
             .map(|line| {
                 let label = labels.get(line).map_or("", String::as_str);
@@ -184,7 +185,7 @@ impl Screen<'_> {
 
     /// A heading with text beside it.
     fn block(&self, heading: &str, text: &str, style: Style) -> Vec<String> {
-        let texts = wrapped(text, self.text_columns() - CHANNELS);
+        let texts = broken(text, self.text_columns() - CHANNELS, "");
         let labelled = |(index, text): (usize, String)| {
             let label = if index == 0 { heading } else { "" };
             let space = " ".repeat(CHANNELS.saturating_sub(label.chars().count()));
@@ -251,41 +252,4 @@ fn shortened(text: &str, width: usize) -> String {
         return text.to_owned();
     }
     text.chars().take(width.saturating_sub(1)).chain(['…']).collect()
-}
-
-fn wrapped(text: &str, width: usize) -> Vec<String> {
-    wrapped_to(text, width, "")
-}
-
-/// `text` broken between words into lines of at most `width` columns; all but the first begin with `indent`. A longer word
-/// is broken.
-fn wrapped_to(text: &str, width: usize, indent: &str) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
-    let mut line = String::new();
-    // Leading spaces of the text are kept.
-    let lead: String = text.chars().take_while(|letter| *letter == ' ').collect();
-    line.push_str(&lead);
-    let mut is_empty = true;
-    // Two spaces between the number and the channels of a finding are kept too.
-    for word in text.trim_start().split(' ') {
-        let length = line.chars().count() + usize::from(!is_empty) + word.chars().count();
-        if !is_empty && length > width {
-            lines.push(line.trim_end().to_owned());
-            line = indent.to_owned();
-            is_empty = true;
-        }
-        if !is_empty {
-            line.push(' ');
-        }
-        line.push_str(word);
-        is_empty = false;
-        while line.chars().count() > width {
-            let head: String = line.chars().take(width).collect();
-            let tail: String = line.chars().skip(width).collect();
-            lines.push(head);
-            line = format!("{indent}{tail}");
-        }
-    }
-    lines.push(line.trim_end().to_owned());
-    lines
 }
