@@ -3,8 +3,8 @@
 use allan_core::term::MovingAverageFilter;
 
 use crate::profile::{
-    ChannelProfile, DITHERED_AVAR_COUNTS2, DataSheetNoise, DataSheetSensitivities, HOST_CLOCK_ERROR,
-    LARGEST_SENSITIVITY_MULTIPLE, Quantity, SAMPLE_RATE_ERROR, SensorProfile,
+    ChannelProfile, DITHERED_AVAR_COUNTS2, DataSheetDeviation, DataSheetNoise, DataSheetSensitivities,
+    HOST_CLOCK_ERROR, LARGEST_SENSITIVITY_MULTIPLE, Quantity, SAMPLE_RATE_ERROR, SensorProfile,
 };
 
 /// Rate of the sample clock with SMPL_PRD = 0x0001, which the part has after reset, Hz.
@@ -20,17 +20,72 @@ const MAGNETOMETER_LSB: f64 = 0.5e-3;
 /// Largest count of a 14-bit register.
 const FULL_SCALE_COUNTS: f64 = 8191.0;
 /// 2 °/√h; 0.007 °/s.
-const GYRO_NOISE: DataSheetNoise =
-    DataSheetNoise { angle_random_walk: Some(2.0 / 60.0), in_run_bias_stability: Some(0.007), rate_random_walk: None };
+const GYRO_NOISE: DataSheetNoise = DataSheetNoise {
+    angle_random_walk: Some(2.0 / 60.0),
+    in_run_bias_stability: Some(0.007),
+    rate_random_walk: None,
+    curve: &GYRO_CURVE,
+};
 /// 0.2 m/s/√h in g·√s; 0.2 mg.
 const ACCELEROMETER_NOISE: DataSheetNoise = DataSheetNoise {
     angle_random_walk: Some(0.2 / 60.0 / 9.806_65),
     in_run_bias_stability: Some(0.2e-3),
     rate_random_walk: None,
+    curve: &ACCELEROMETER_CURVE,
 };
 /// 0.066 mgauss/√Hz.
-const MAGNETOMETER_NOISE: DataSheetNoise =
-    DataSheetNoise { angle_random_walk: Some(0.066e-3), in_run_bias_stability: None, rate_random_walk: None };
+const MAGNETOMETER_NOISE: DataSheetNoise = DataSheetNoise {
+    angle_random_walk: Some(0.066e-3),
+    in_run_bias_stability: None,
+    rate_random_walk: None,
+    curve: &[],
+};
+
+const fn deviation(tau_s: f64, mean: f64, low: f64, high: f64) -> DataSheetDeviation {
+    DataSheetDeviation { tau_s, mean, low, high }
+}
+
+/// Figure 7, page 9: mean and ±1 σ over parts, °/s, as the corners of the drawn lines have them (three digits).
+const GYRO_CURVE: [DataSheetDeviation; 18] = [
+    deviation(0.1, 0.0937, 0.0879, 0.099),
+    deviation(1.0, 0.0312, 0.0292, 0.033),
+    deviation(2.0, 0.0224, 0.021, 0.0237),
+    deviation(3.0, 0.0188, 0.0176, 0.0199),
+    deviation(5.0, 0.0149, 0.0142, 0.0157),
+    deviation(7.0, 0.0129, 0.0124, 0.0135),
+    deviation(10.0, 0.0111, 0.0106, 0.0118),
+    deviation(20.0, 0.00867, 0.0082, 0.0091),
+    deviation(30.0, 0.00758, 0.00704, 0.00802),
+    deviation(50.0, 0.00676, 0.00635, 0.00722),
+    deviation(70.0, 0.0064, 0.006, 0.00682),
+    deviation(100.0, 0.00619, 0.00576, 0.00666),
+    deviation(200.0, 0.00605, 0.00511, 0.00704),
+    deviation(300.0, 0.00644, 0.00527, 0.00764),
+    deviation(500.0, 0.00676, 0.00487, 0.00867),
+    deviation(700.0, 0.00671, 0.00435, 0.0091),
+    deviation(1000.0, 0.00699, 0.00456, 0.00948),
+    deviation(2000.0, 0.0082, 0.00431, 0.0122),
+];
+/// Figure 8, page 9: mean and ±1 σ over parts, g. The mean has no corner between 3 and 9 s.
+const ACCELEROMETER_CURVE: [DataSheetDeviation; 17] = [
+    deviation(0.1, 912.0e-6, 856.0e-6, 974.0e-6),
+    deviation(1.0, 351.0e-6, 311.0e-6, 393.0e-6),
+    deviation(2.0, 284.0e-6, 242.0e-6, 326.0e-6),
+    deviation(3.0, 260.0e-6, 217.0e-6, 306.0e-6),
+    deviation(9.0, 222.0e-6, 184.0e-6, 258.0e-6),
+    deviation(10.0, 217.0e-6, 179.0e-6, 256.0e-6),
+    deviation(20.0, 208.0e-6, 169.0e-6, 248.0e-6),
+    deviation(30.0, 208.0e-6, 172.0e-6, 244.0e-6),
+    deviation(50.0, 217.0e-6, 173.0e-6, 260.0e-6),
+    deviation(70.0, 227.0e-6, 183.0e-6, 271.0e-6),
+    deviation(100.0, 236.0e-6, 198.0e-6, 276.0e-6),
+    deviation(200.0, 258.0e-6, 215.0e-6, 304.0e-6),
+    deviation(300.0, 269.0e-6, 204.0e-6, 334.0e-6),
+    deviation(500.0, 265.0e-6, 189.0e-6, 342.0e-6),
+    deviation(700.0, 256.0e-6, 189.0e-6, 324.0e-6),
+    deviation(1000.0, 271.0e-6, 189.0e-6, 351.0e-6),
+    deviation(2000.0, 278.0e-6, 213.0e-6, 342.0e-6),
+];
 /// 0.01 °/s/°C, 0.32 °/s/V, 0.05 °/s/g.
 const GYRO_SENSITIVITIES: DataSheetSensitivities =
     DataSheetSensitivities { temperature: Some(0.01), supply: Some(0.32), specific_force: Some(0.05) };
@@ -115,6 +170,7 @@ fn filters() -> Vec<MovingAverageFilter> {
 #[cfg(test)]
 mod tests {
     use super::profile;
+    use crate::profile::DataSheetNoise;
     use adis16405_driver::{Channel, GyroRange, SamplePeriod};
 
     #[test]
@@ -126,6 +182,23 @@ mod tests {
                 assert_eq!((known.name, known.unit, known.lsb), (channel.name(), channel.unit(), channel.lsb(range)));
                 assert_eq!(known.quantity.is_inertial(), Channel::INERTIAL.contains(&channel));
             }
+        }
+    }
+
+    /// Between the random walk and the stability of Table 1 and the mean of the drawn curves lies at most a sixth, as in the sheet.
+    #[test]
+    fn the_drawn_curves_are_those_of_the_stated_noise() {
+        let profile = profile(0.05);
+        for channel in profile.channels.iter().filter(|channel| channel.quantity.is_inertial()) {
+            let DataSheetNoise { angle_random_walk, in_run_bias_stability, curve, .. } = channel.data_sheet;
+            assert!(curve.is_sorted_by(|a, b| a.tau_s < b.tau_s), "{}", channel.name);
+            assert!(curve.iter().all(|of| of.low < of.mean && of.mean < of.high), "{}", channel.name);
+            let lowest = curve.iter().map(|of| of.mean).fold(f64::INFINITY, f64::min);
+            let stated = in_run_bias_stability.expect("stated");
+            assert!((lowest / stated - 1.0).abs() < 1.0 / 6.0, "{}: {lowest}", channel.name);
+            let walk = angle_random_walk.expect("stated");
+            let shortest = curve.first().expect("a curve");
+            assert!((shortest.mean * shortest.tau_s.sqrt() / walk - 1.0).abs() < 1.0 / 6.0, "{}", channel.name);
         }
     }
 

@@ -13,7 +13,10 @@ pub mod profile_file;
 
 pub use block::{RecordingDescription, SampleBlock};
 pub use channel_id::{ChannelId, PerChannel};
-pub use profile::{ChannelProfile, DataSheetNoise, DataSheetSensitivities, HOST_CLOCK_ERROR, Quantity, SensorProfile};
+pub use profile::{
+    ChannelProfile, DataSheetDeviation, DataSheetNoise, DataSheetSensitivities, HOST_CLOCK_ERROR, Quantity,
+    SensorProfile,
+};
 
 use std::collections::BTreeMap;
 use std::ops::Range;

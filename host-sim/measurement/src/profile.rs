@@ -1,6 +1,7 @@
 //! What is known of a sensor before it is measured.
 
 use allan_core::term::MovingAverageFilter;
+use serde::{Deserialize, Serialize};
 
 /// Relative standard deviation of the clock of an ordinary host: a crystal that is not trimmed, 20 ppm.
 pub const HOST_CLOCK_ERROR: f64 = 20e-6;
@@ -133,6 +134,21 @@ pub struct DataSheetNoise {
     pub in_run_bias_stability: Option<f64>,
     /// Rate random walk: the channel's unit per √s.
     pub rate_random_walk: Option<f64>,
+    /// The drawn curve of the Allan deviation, by averaging time; empty where there is none.
+    pub curve: &'static [DataSheetDeviation],
+}
+
+/// Allan deviation of a channel in the figure of a data sheet, in the channel's unit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct DataSheetDeviation {
+    /// Averaging time, s.
+    pub tau_s: f64,
+    /// Mean over parts.
+    pub mean: f64,
+    /// Mean less the standard deviation over parts.
+    pub low: f64,
+    /// Mean plus the standard deviation over parts.
+    pub high: f64,
 }
 
 /// Typical sensitivities of the bias of a channel by its data sheet, magnitudes; `None` where it says nothing.

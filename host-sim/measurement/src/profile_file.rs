@@ -158,6 +158,7 @@ fn channel(group: &ChannelGroup, name: &str) -> Result<ChannelProfile, ProfileEr
             angle_random_walk: group.angle_random_walk,
             in_run_bias_stability: group.in_run_bias_stability,
             rate_random_walk: group.rate_random_walk,
+            curve: &[],
         },
         sensitivities: DataSheetSensitivities {
             temperature: group.temperature_sensitivity,

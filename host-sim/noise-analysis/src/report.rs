@@ -20,6 +20,7 @@ use crate::report::assessment::Assessment;
 use crate::units::coefficient_unit;
 use allan_core::model::{FittedTerm, cube_root_deviation};
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm, slope_method};
+use measurement::DataSheetDeviation;
 use serde::ser::SerializeStruct;
 use serde::{Deserialize, Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -324,7 +325,7 @@ pub struct FigureData {
 }
 
 /// Typical noise of a channel by its data sheet, in the channel's unit and seconds; `None` where it says nothing.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DataSheetReport {
     /// Angle or velocity random walk, unit·√s.
     pub angle_random_walk: Option<f64>,
@@ -332,6 +333,9 @@ pub struct DataSheetReport {
     pub in_run_bias_stability: Option<f64>,
     /// Rate random walk, unit/√s.
     pub rate_random_walk: Option<f64>,
+    /// The drawn curve of the Allan deviation, by averaging time; absent where the data sheet draws none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub curve: Vec<DataSheetDeviation>,
 }
 
 /// Root of the one-sided power spectral density of a channel as it was recorded, unit/√Hz, by ascending frequency. Lines that

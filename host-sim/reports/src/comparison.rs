@@ -116,7 +116,7 @@ pub fn of_reports(first: &SavedReport, second: &SavedReport) -> Result<Compariso
 /// The report has no values of a data sheet, or they say nothing of what was measured.
 pub fn with_data_sheet(report: &SavedReport) -> Result<Comparison, ComparisonError> {
     let exact = |value: f64| BoundedEstimate { value, low: value, high: value };
-    let specified = || report.channels.iter().filter_map(|channel| Some((channel.data_sheet?, channel)));
+    let specified = || report.channels.iter().filter_map(|channel| Some((channel.data_sheet.as_ref()?, channel)));
     if specified().next().is_none() {
         return Err(ComparisonError::NoDataSheet);
     }

@@ -137,7 +137,7 @@ pub(crate) fn overview(report: &Report) -> Option<Plot> {
         .collect();
     if let Some(sheet) = &first.figure_data.data_sheet {
         let taus: Vec<f64> = first.curve.iter().map(|point| point.tau_s).filter(|tau| has_logarithm(*tau)).collect();
-        lines.push(Line::new("data sheet", Look::Reference, sheet_curve(sheet, &taus)));
+        lines.push(data_sheet_line(sheet, &taus));
     }
     let [frame] = frames([380.0]);
     let across = Axis::logarithmic("averaging time τ, s", lines.iter().flat_map(places), [LEFT, RIGHT]);
@@ -161,8 +161,18 @@ pub(crate) fn overview(report: &Report) -> Option<Plot> {
     })
 }
 
-/// The curve that a data sheet promises: its random walk and the minimum, and its rate random walk where it names one.
-fn sheet_curve(sheet: &DataSheetReport, taus: &[f64]) -> Vec<(f64, f64)> {
+/// The curve that a data sheet draws, with the standard deviation over parts; else what it states, at the averaging times `taus`.
+fn data_sheet_line(sheet: &DataSheetReport, taus: &[f64]) -> Line {
+    if sheet.curve.is_empty() {
+        return Line::new("data sheet", Look::Reference, stated_curve(sheet, taus));
+    }
+    let points = sheet.curve.iter().map(|of| (of.tau_s, of.mean)).collect();
+    let bounds = sheet.curve.iter().map(|of| (of.low, of.high)).collect();
+    Line::new("data sheet, mean and ±1 σ over parts", Look::Reference, points).with_bounds(bounds)
+}
+
+/// The curve of what a data sheet states: its random walk and the minimum, and its rate random walk where it names one.
+fn stated_curve(sheet: &DataSheetReport, taus: &[f64]) -> Vec<(f64, f64)> {
     let of = |tau: f64| {
         let square = |value: Option<f64>| value.map_or(0.0, |value| value * value);
         let variance = square(sheet.angle_random_walk) / tau

@@ -66,11 +66,12 @@ pub(crate) fn set(report: &mut Report, measurement: &Measurement, first: Option<
 }
 
 pub(crate) fn data_sheet(noise: &DataSheetNoise) -> Option<DataSheetReport> {
-    let &DataSheetNoise { angle_random_walk, in_run_bias_stability, rate_random_walk } = noise;
+    let &DataSheetNoise { angle_random_walk, in_run_bias_stability, rate_random_walk, curve } = noise;
     (*noise != DataSheetNoise::default()).then_some(DataSheetReport {
         angle_random_walk,
         in_run_bias_stability,
         rate_random_walk,
+        curve: curve.to_vec(),
     })
 }
 

@@ -6,6 +6,10 @@ use measurement::{ChannelProfile, Quantity, SensorProfile};
 
 /// What a column is.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "a file has few columns, and a profile is copied as the rest of a column is"
+)]
 pub(crate) enum Role {
     /// Time stamps.
     Time,

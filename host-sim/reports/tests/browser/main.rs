@@ -38,6 +38,7 @@ fn report() -> Report {
             angle_random_walk: Some(0.0333),
             in_run_bias_stability: Some(0.007),
             rate_random_walk: None,
+            curve: Vec::new(),
         });
         let frequency_hz: Vec<f64> = (0..200).map(|bin| 0.001 * 1.055f64.powi(bin)).collect();
         let density: Vec<f64> = frequency_hz.iter().map(|f| 0.05 * (1.0 + 0.1 / f).sqrt()).collect();

@@ -218,7 +218,7 @@ fn no_number_with_a_unit_has_an_exponent() {
     }
     small.sample_rate_hz = 2e6;
     let mut explained = Vec::new();
-    reports::explanation::write(&small, &mut explained).expect("a vector can be written");
+    reports::explanation::write(&small, None, &mut explained).expect("a vector can be written");
     let explained = String::from_utf8(explained).expect("text");
     for (form, shown) in [("--full", text(&small)), ("page", visible(&html(&small))), ("explain", explained)] {
         assert!(!shown.is_empty(), "{form}");
@@ -289,6 +289,25 @@ fn the_page_shows_every_channel_and_coefficient() {
     assert!(page.contains("bias instability to ±20\u{a0}%: record"));
     // The story, the overview and one Allan deviation a channel: the fixture has no spectrum and no bias over time.
     assert_eq!(page.matches("<svg").count(), 8);
+}
+
+#[test]
+fn the_gyros_stand_beside_the_curve_that_the_data_sheet_draws() {
+    let mut report = report();
+    let drawn =
+        |mean: f64| format!(r#"{{"tau_s":{},"mean":{mean},"low":{},"high":{}}}"#, 1.0 / mean, 0.9 * mean, 1.1 * mean);
+    let sheet = |curve: &str| {
+        let stated = r#""angle_random_walk":0.03,"in_run_bias_stability":null,"rate_random_walk":null"#;
+        serde_json::from_str(&format!("{{{stated}{curve}}}")).expect("a data sheet")
+    };
+    let svg =
+        |report: &Report| figure::pictures(report).into_iter().find(|of| of.name == "overview").expect("a figure").svg;
+    report.channels[0].figure_data.data_sheet = Some(sheet(""));
+    let stated = svg(&report);
+    assert!(stated.contains("data sheet") && !stated.contains("over parts") && !stated.contains("band reference"));
+    report.channels[0].figure_data.data_sheet = Some(sheet(&format!(r#","curve":[{},{}]"#, drawn(0.1), drawn(0.01))));
+    let drawn = svg(&report);
+    assert!(drawn.contains("data sheet, mean and ±1 σ over parts") && drawn.contains("band reference"), "{drawn}");
 }
 
 #[test]
