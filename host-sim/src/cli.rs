@@ -10,13 +10,32 @@ use simulation::Simulation;
 use std::path::{Path, PathBuf};
 
 /// Heading of the options that say how a recording is read.
-const READING: &str = "Reading";
+const INPUT: &str = "Input";
+/// Heading of the options that say which sensor it is.
+const SENSOR: &str = "Sensor";
+/// Heading of the options that say what is simulated.
+const NOISE: &str = "Noise, effects and faults";
+/// Heading of the options that say where the result goes.
+const OUTPUT: &str = "Output";
 
-/// Noise analysis of the ADIS16405 inertial sensor, with a virtual sensor, recordings and replay.
-///
-/// Without a command: one simulated hour of the virtual sensor, its report here and as a page in `report`.
+/// Below the options of the program; each line is a command.
+const EXAMPLES: &str = "\
+Examples:
+  host-sim                                   an hour of the virtual sensor; its page in ./report
+  host-sim analyze imu.bag --page report     a recording of any inertial sensor
+  host-sim monitor /dev/ttyACM0              a device that runs the firmware, live";
+
+/// Below the options of `analyze`; each line is a command.
+const EXAMPLES_OF_ANALYZE: &str = "\
+Examples:
+  host-sim analyze flight.ulg --page report --export kalibr=imu.yaml
+  host-sim analyze imu.csv --columns gyro_x=wx,gyro_y=wy,time=t --units deg/s,ms --sensor bmi088
+  host-sim analyze run1.csv.gz run2.csv.gz --rate 100";
+
+/// Noise analysis of the ADIS16405 and other inertial sensors, and a virtual ADIS16405.
 #[derive(Debug, Parser)]
-#[command(name = "host-sim", version, args_conflicts_with_subcommands = true)]
+#[command(name = "host-sim", version, args_conflicts_with_subcommands = true, disable_help_subcommand = true)]
+#[command(after_help = EXAMPLES)]
 pub(crate) struct Cli {
     /// The subcommand.
     #[command(subcommand)]
@@ -32,26 +51,28 @@ pub(crate) struct Cli {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Analyse a recording: a table of counts or in any units, an array, a bag, a flight log, an SPI log; or compare the noise
-    /// of several.
+    /// Analyse a recording of any format, or compare the noise of several
+    #[command(after_help = EXAMPLES_OF_ANALYZE)]
     Analyze(AnalyzeArguments),
-    /// Show what is in a file without analysing it: topics, columns, units, rate, gaps, where it is at rest, and the command that
-    /// analyses it.
+    /// Show what is in a file: topics, columns, units, rate, gaps, where it is at rest
     Inspect(InspectArguments),
-    /// Send a table or an SPI frame log through the emulated bus and the driver, then analyse what was read.
-    Replay(ReplayArguments),
-    /// Explain recordings in sentences: what was found, what changes in the course of the record, and what the models foretell.
-    Explain(ExplainArguments),
-    /// Write every bus transaction of the virtual sensor, or the raw bursts of a device on a serial port, to an SPI frame
-    /// log, then analyse what was read.
+    /// Compare the coefficients of a report with those of another, or with the data sheet
+    Compare(CompareArguments),
+    /// Write the noise of a report in the file format of another program
+    Export(ExportArguments),
+    /// Write a recording of any format as a table, a NumPy array or an SPI frame log
+    Convert(ConvertArguments),
+    /// Show a device that runs the firmware, or a recording, while its record grows
+    Monitor(MonitorArguments),
+    /// Record the bus of the virtual sensor, or of a device on a serial port, and analyse it
     Record {
-        /// The log to write; gzip if it ends in .gz.
+        /// The SPI frame log to write; gzip if it ends in .gz.
         out: PathBuf,
         /// Serial port of a device that runs the firmware, such as /dev/ttyUSB0.
-        #[arg(long, conflicts_with_all = ["seed", "plain"])]
+        #[arg(long, help_heading = INPUT, conflicts_with_all = ["seed", "plain"])]
         port: Option<String>,
         /// Baud rate of the port.
-        #[arg(long, default_value_t = serial::BAUD, requires = "port")]
+        #[arg(long, help_heading = INPUT, default_value_t = serial::BAUD, requires = "port")]
         baud: u32,
         /// What to simulate.
         #[command(flatten)]
@@ -60,22 +81,15 @@ pub(crate) enum Command {
         #[command(flatten)]
         output: OutputArguments,
     },
-    /// Write the noise of a report in the file format of another program.
-    Export(ExportArguments),
-    /// Compare the coefficients of a report with those of another, or with the data sheet.
-    Compare(CompareArguments),
-    /// Write a recording of any format as a table, a NumPy array or an SPI frame log.
-    Convert(ConvertArguments),
-    /// Write a recording of the virtual sensor, with the noise, the effects and the faults that are described.
+    /// Send a table or an SPI log through the emulated bus and the driver, and analyse it
+    Replay(ReplayArguments),
+    /// Write a recording of the virtual sensor with the noise, effects and faults described
     Simulate(Box<SimulateArguments>),
-    /// Print the completions for a shell.
+    /// Print the completions for a shell
     Completions {
         /// The shell.
         shell: Shell,
     },
-    /// Show a device that runs the firmware, or a recording that is replayed, while its record grows: verdict, curves, findings,
-    /// health. Prints lines where standard output is no terminal.
-    Monitor(MonitorArguments),
 }
 
 /// Recordings to analyse, and where the report goes.
@@ -84,21 +98,20 @@ pub(crate) struct AnalyzeArguments {
     /// The first recording, and how to read it and the others.
     #[command(flatten)]
     pub(crate) recording: RecordingArguments,
-    /// More recordings of the same sensor: one summary, and whether they show the same noise; with --reports of any sensors.
+    /// More recordings: does the sensor show the same noise in all of them?
     #[arg(value_name = "FILE")]
     pub(crate) more: Vec<PathBuf>,
-    /// Analyse every sensor of a file that has several, each as a recording of its own.
-    #[arg(long, help_heading = READING, conflicts_with = "topic")]
+    /// Each sensor of the file as a recording of its own.
+    #[arg(long, help_heading = INPUT, conflicts_with = "topic")]
     pub(crate) each_sensor: bool,
-    /// A recording with motors running: its noise over that of the others, by channel and octave.
-    #[arg(long, value_name = "RUNNING", conflicts_with = "reports")]
+    /// With motors running: its noise over that of the others.
+    #[arg(long, help_heading = INPUT, value_name = "RUNNING", conflicts_with = "reports")]
     pub(crate) against: Option<PathBuf>,
-    /// Curves, models and errors alone, in memory that does not grow with the recording: no spectra, spikes, steps, temperature,
-    /// common causes or changes of the noise.
-    #[arg(long)]
+    /// Curves and models alone, in memory that does not grow.
+    #[arg(long, help_heading = OUTPUT)]
     pub(crate) quick: bool,
-    /// Write the report of each recording as NAME.json into this folder, as many recordings at a time as there are cores.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["full", "pictures", "json", "page", "exports", "axis"])]
+    /// Write the report of each recording as DIR/NAME.json.
+    #[arg(long, help_heading = OUTPUT, value_name = "DIR", conflicts_with_all = ["full", "explain", "pictures", "json", "page", "exports", "axis"])]
     pub(crate) reports: Option<PathBuf>,
     /// Where the report goes besides the terminal.
     #[command(flatten)]
@@ -111,8 +124,8 @@ pub(crate) struct InspectArguments {
     /// The files, of any format.
     #[arg(value_name = "FILE", required = true)]
     pub(crate) files: Vec<PathBuf>,
-    /// Topic, message or array of a file with several [default: all with an inertial sensor].
-    #[arg(long)]
+    /// Topic, message or array [default: all with an inertial sensor].
+    #[arg(long, help_heading = INPUT)]
     pub(crate) topic: Option<String>,
 }
 
@@ -121,11 +134,11 @@ pub(crate) struct InspectArguments {
 pub(crate) struct ReplayArguments {
     /// Register counts of an ADIS16405, or a log of its SPI bus.
     pub(crate) file: PathBuf,
-    /// Sample rate in Hz; overrides what the time stamps say.
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    /// Sample rate; overrides what the time stamps say.
+    #[arg(long, help_heading = INPUT, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate: Option<f64>,
-    /// Gyro range in which the counts were taken, deg/s; a log says it itself.
-    #[arg(long, value_enum, default_value = "300")]
+    /// Range of the gyros, deg/s: 300, 150 or 75; a log says it itself.
+    #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true)]
     pub(crate) range: GyroRangeArgument,
     /// Where the report goes besides the terminal.
     #[command(flatten)]
@@ -141,7 +154,7 @@ pub(crate) struct CompareArguments {
     /// Another, which is called better or worse than the first.
     #[arg(value_name = "REPORT", required_unless_present = "data_sheet")]
     pub(crate) second: Option<PathBuf>,
-    /// Compare with the typical values of the data sheet of the sensor that was analysed.
+    /// Compare with the typical values of the sensor's data sheet.
     #[arg(long, conflicts_with = "second")]
     pub(crate) data_sheet: bool,
     /// Where the result goes besides the terminal.
@@ -152,9 +165,9 @@ pub(crate) struct CompareArguments {
 /// How a recording is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum RecordingFormat {
-    /// Register counts of an ADIS16405, or any channels with their units in the header, in CSV; gzip if the name ends in .gz.
+    /// CSV: register counts of an ADIS16405, or any channels with their units in the header; gzip if the name ends in .gz.
     Table,
-    /// Bus transactions of an ADIS16405 in CSV, gzip if the name ends in .gz.
+    /// CSV: bus transactions of an ADIS16405; gzip if the name ends in .gz.
     Frames,
     /// A NumPy array of doubles in SI units.
     Npy,
@@ -168,22 +181,18 @@ pub(crate) struct ConvertArguments {
     pub(crate) recording: RecordingArguments,
     /// The file to write.
     pub(crate) out: PathBuf,
-    /// Its format [default: by its name, npy or table].
-    #[arg(long, value_enum)]
+    /// Its format: table, frames or npy [default: by its name, npy or table].
+    #[arg(long, help_heading = OUTPUT, value_name = "FORMAT", value_enum, hide_possible_values = true)]
     pub(crate) format: Option<RecordingFormat>,
 }
 
 /// What to simulate.
-///
-/// Coefficients are N in deg/√s or g/√Hz, B in deg/s or g, K in deg/s/√s or g/√s; without them they are those of a published
-/// ADIS16405. An effect is KIND[:CHANNEL]:KEY=VALUE,… with the names of the report, such as
-/// sinusoid:gyro_z:frequency=20.5,amplitude=0.2.
 #[derive(Debug, Args)]
 pub(crate) struct SimulateArguments {
     /// The file to write.
     pub(crate) out: PathBuf,
-    /// Its format [default: by its name, npy or table].
-    #[arg(long, value_enum)]
+    /// Its format: table, frames or npy [default: by its name, npy or table].
+    #[arg(long, help_heading = OUTPUT, value_name = "FORMAT", value_enum, hide_possible_values = true)]
     pub(crate) format: Option<RecordingFormat>,
     /// Virtual time in s [default: 3600].
     #[arg(long, allow_negative_numbers = true)]
@@ -191,47 +200,47 @@ pub(crate) struct SimulateArguments {
     /// Seed of all random numbers.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// Sample rate, Hz; the nearest one that the part has.
-    #[arg(long, value_name = "HZ", default_value_t = simulation::SAMPLE_RATE_HZ, allow_negative_numbers = true)]
+    /// Sample rate; the nearest one that the part has.
+    #[arg(long, help_heading = SENSOR, value_name = "HZ", default_value_t = simulation::SAMPLE_RATE_HZ, allow_negative_numbers = true)]
     pub(crate) rate: f64,
-    /// Full scale of the gyros, deg/s.
-    #[arg(long, value_enum, default_value = "300")]
+    /// Range of the gyros, deg/s: 300, 150 or 75.
+    #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true)]
     pub(crate) range: GyroRangeArgument,
-    /// Taps of each stage of the part's filter: 1 to 64, a power of two [default: the fewest that the range allows].
-    #[arg(long)]
+    /// Taps of a stage of the filter, 1 to 64 [default: the fewest of the range].
+    #[arg(long, help_heading = SENSOR)]
     pub(crate) taps: Option<u32>,
-    /// Coefficients of all gyros.
-    #[arg(long, value_name = "N,B,K")]
+    /// All gyros: deg/√s, deg/s, deg/s/√s [default: a published part].
+    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
     gyro: Option<String>,
-    /// Coefficients of gyro x.
-    #[arg(long, value_name = "N,B,K")]
+    /// Gyro x.
+    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
     gyro_x: Option<String>,
-    /// Coefficients of gyro y.
-    #[arg(long, value_name = "N,B,K")]
+    /// Gyro y.
+    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
     gyro_y: Option<String>,
-    /// Coefficients of gyro z.
-    #[arg(long, value_name = "N,B,K")]
+    /// Gyro z.
+    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
     gyro_z: Option<String>,
-    /// Coefficients of all accelerometers.
-    #[arg(long, value_name = "N,B,K")]
+    /// All accelerometers: g/√Hz, g, g/√s [default: a published part].
+    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
     accl: Option<String>,
-    /// Coefficients of accelerometer x.
-    #[arg(long, value_name = "N,B,K")]
+    /// Accelerometer x.
+    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
     accl_x: Option<String>,
-    /// Coefficients of accelerometer y.
-    #[arg(long, value_name = "N,B,K")]
+    /// Accelerometer y.
+    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
     accl_y: Option<String>,
-    /// Coefficients of accelerometer z.
-    #[arg(long, value_name = "N,B,K")]
+    /// Accelerometer z.
+    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
     accl_z: Option<String>,
-    /// Effect that the noise does not declare; may be repeated.
-    #[arg(long, value_name = "EFFECT")]
+    /// As in sinusoid:gyro_z:frequency=20.5,amplitude=0.2; repeatable.
+    #[arg(long, help_heading = NOISE, value_name = "EFFECT")]
     pub(crate) effect: Vec<String>,
-    /// Profile of temperature, supply or motion, such as temperature:rise=8,time_constant=900; may be repeated.
-    #[arg(long, value_name = "PROFILE")]
+    /// As in temperature:rise=8,time_constant=900; repeatable.
+    #[arg(long, help_heading = NOISE, value_name = "PROFILE")]
     pub(crate) environment: Vec<String>,
-    /// Fault of the bus, such as stuck_low:from=10,bursts=5; may be repeated.
-    #[arg(long, value_name = "FAULT")]
+    /// Of the bus, as in stuck_low:from=10,bursts=5; repeatable.
+    #[arg(long, help_heading = NOISE, value_name = "FAULT")]
     pub(crate) fault: Vec<String>,
 }
 
@@ -256,10 +265,10 @@ impl SimulateArguments {
 #[derive(Debug, Args)]
 pub(crate) struct ExportArguments {
     /// The program.
-    #[arg(long, value_enum)]
+    #[arg(long, help_heading = OUTPUT, value_enum)]
     pub(crate) format: ExportFormat,
-    /// What stands for the three axes, where the program has one number a sensor.
-    #[arg(long, value_enum, default_value_t)]
+    /// Where the program has one number a sensor: rms or worst.
+    #[arg(long, help_heading = OUTPUT, value_enum, default_value_t, hide_possible_values = true)]
     pub(crate) axis: AxisChoice,
     /// A report that `analyze --json` wrote.
     pub(crate) report: PathBuf,
@@ -273,14 +282,14 @@ pub(crate) struct RecordingArguments {
     /// The recording.
     #[command(flatten)]
     pub(crate) input: InputArguments,
-    /// Sample rate in Hz; overrides what the time stamps say.
-    #[arg(long, help_heading = READING, value_name = "HZ", allow_negative_numbers = true)]
+    /// Sample rate; overrides what the time stamps say.
+    #[arg(long, help_heading = INPUT, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate: Option<f64>,
     /// Leave out what comes before this time, s from the first sample.
-    #[arg(long, help_heading = READING, value_name = "S", value_parser = time_in_recording)]
+    #[arg(long, help_heading = INPUT, value_name = "S", value_parser = time_in_recording)]
     pub(crate) from: Option<f64>,
-    /// Leave out what comes at this time or later, s from the first sample.
-    #[arg(long, help_heading = READING, value_name = "S", value_parser = time_in_recording)]
+    /// Leave out what comes then or later, s from the first sample.
+    #[arg(long, help_heading = INPUT, value_name = "S", value_parser = time_in_recording)]
     pub(crate) to: Option<f64>,
 }
 
@@ -300,28 +309,26 @@ impl RecordingArguments {
 /// A recording.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct InputArguments {
-    /// The recording, of a format that its content tells; - for standard input.
+    /// The recording, of any format; - for standard input.
     pub(crate) file: PathBuf,
-    /// Gyro range of an ADIS16405 in which the recording was taken, deg/s.
-    #[arg(long, help_heading = READING, value_enum, default_value = "300")]
-    pub(crate) range: GyroRangeArgument,
-    /// The sensor: adis16405, generic, adis16470, bmi088, mpu6050, or a profile file [default: adis16405 for register counts
-    /// and SPI logs, else generic].
-    #[arg(long, help_heading = READING, value_name = "NAME|FILE")]
-    pub(crate) sensor: Option<String>,
-    /// Columns of the channels, as in gyro_x=wx,gyro_y=wy,time=t; a number for a column without a name, from 0; gyro.0 for
-    /// column 0 of the array gyro [default: by their names].
-    #[arg(long, help_heading = READING, value_name = "CHANNEL=COLUMN", value_delimiter = ',')]
+    /// As in gyro_x=wx,gyro_y=1,gyro_z=gyro.2 [default: by name].
+    #[arg(long, help_heading = INPUT, value_name = "CHANNEL=COLUMN", value_delimiter = ',')]
     pub(crate) columns: Vec<String>,
-    /// Units of the columns, one for each quantity, as in rad/s,m/s^2,us [default: by the names of the columns].
-    #[arg(long, help_heading = READING, value_name = "UNIT", value_delimiter = ',')]
+    /// One a quantity, as in rad/s,m/s^2,us [default: by name].
+    #[arg(long, help_heading = INPUT, value_name = "UNIT", value_delimiter = ',')]
     pub(crate) units: Vec<String>,
     /// Topic, message or array of a file with several.
-    #[arg(long, help_heading = READING)]
+    #[arg(long, help_heading = INPUT)]
     pub(crate) topic: Option<String>,
-    /// Take the guess of a column or a unit that the file does not say, if nothing else is plausible.
-    #[arg(long, help_heading = READING)]
+    /// Take a guess of column or unit if no other is plausible.
+    #[arg(long, help_heading = INPUT)]
     pub(crate) yes: bool,
+    /// Range of the gyros of an ADIS16405, deg/s: 300, 150 or 75.
+    #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true)]
+    pub(crate) range: GyroRangeArgument,
+    /// adis16405, adis16470, bmi088, mpu6050, generic or a file.
+    #[arg(long, help_heading = SENSOR, value_name = "NAME|FILE")]
+    pub(crate) sensor: Option<String>,
 }
 
 impl InputArguments {
@@ -352,22 +359,22 @@ pub(crate) struct MonitorArguments {
     #[arg(value_name = "PORT|FILE")]
     pub(crate) source: PathBuf,
     /// Baud rate of the port.
-    #[arg(long, default_value_t = serial::BAUD)]
+    #[arg(long, help_heading = INPUT, default_value_t = serial::BAUD)]
     pub(crate) baud: u32,
     /// Command to send to the device first, such as "f 819.2"; may be repeated.
-    #[arg(long, value_name = "COMMAND")]
+    #[arg(long, help_heading = INPUT, value_name = "COMMAND")]
     pub(crate) send: Vec<String>,
-    /// End after so many seconds [default: when the device disconnects or the recording ends].
+    /// End after so many seconds [default: with the connection or the recording].
     #[arg(long)]
     pub(crate) seconds: Option<f64>,
-    /// Speed of a recording: seconds of it in a second, or max for no waiting.
-    #[arg(long, value_name = "TIMES|max", default_value = "1", value_parser = replay_speed)]
+    /// Seconds of a recording in a second, or max for no waiting.
+    #[arg(long, help_heading = INPUT, value_name = "TIMES|max", default_value = "1", value_parser = replay_speed)]
     pub(crate) speed: f64,
-    /// Sample rate of a recording in Hz; overrides what the time stamps say.
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    /// Sample rate of a recording; overrides what the time stamps say.
+    #[arg(long, help_heading = INPUT, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate: Option<f64>,
-    /// Gyro range in which the recording was taken, deg/s.
-    #[arg(long, value_enum, default_value = "300")]
+    /// Range of the gyros of a recording, deg/s: 300, 150 or 75.
+    #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true)]
     pub(crate) range: GyroRangeArgument,
 }
 
@@ -387,23 +394,6 @@ fn replay_speed(text: &str) -> Result<f64, String> {
     }
     let speed = text.parse().ok().filter(|speed: &f64| speed.is_finite() && *speed > 0.0);
     speed.ok_or_else(|| "neither a positive number nor max".to_owned())
-}
-
-/// Recordings to explain.
-#[derive(Debug, Args)]
-pub(crate) struct ExplainArguments {
-    /// Tables of register counts (CSV, plain or gzip), or folders of them.
-    #[arg(required = true)]
-    pub(crate) recordings: Vec<PathBuf>,
-    /// Sample rate in Hz; overrides what the time stamps say.
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
-    pub(crate) rate: Option<f64>,
-    /// Gyro range in which the recordings were taken, deg/s.
-    #[arg(long, value_enum, default_value = "300")]
-    pub(crate) range: GyroRangeArgument,
-    /// Write every figure of the reports as SVG into this folder.
-    #[arg(long, value_name = "DIR")]
-    pub(crate) pictures: Option<PathBuf>,
 }
 
 /// Full scale of the gyros.
@@ -432,14 +422,15 @@ impl From<GyroRangeArgument> for GyroRange {
 
 /// The virtual sensor's time and noise.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Virtual sensor")]
 pub(crate) struct SimulationArguments {
-    /// Virtual time in s [default: 60 for `record`, else 3600].
+    /// Time, s [default: 60 for `record`, else 3600].
     #[arg(long, allow_negative_numbers = true)]
     pub(crate) seconds: Option<f64>,
     /// Seed of the noise.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// Only the noise of the baseline model: without this flag the sensor also hides a line and an effect of temperature.
+    /// N, B and K alone, without the line and the effect of temperature.
     #[arg(long)]
     pub(crate) plain: bool,
 }
@@ -454,11 +445,14 @@ impl SimulationArguments {
 
 /// Where the report goes.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Output")]
+#[command(next_help_heading = OUTPUT)]
 pub(crate) struct OutputArguments {
     /// Print every table of every channel instead of one screen.
-    #[arg(long, conflicts_with = "quiet")]
+    #[arg(long, conflicts_with_all = ["quiet", "explain"])]
     pub(crate) full: bool,
+    /// Print sentences: what was found, what changes, what is foretold.
+    #[arg(long, conflicts_with = "quiet")]
+    pub(crate) explain: bool,
     /// Print nothing.
     #[arg(long)]
     pub(crate) quiet: bool,
@@ -471,12 +465,11 @@ pub(crate) struct OutputArguments {
     /// Write the report as a page into this folder.
     #[arg(long, value_name = "DIR")]
     pub(crate) page: Option<PathBuf>,
-    /// Write the noise of gyros and accelerometers for another program, as in kalibr=imu.yaml, with the formats of `export`; may be
-    /// repeated.
+    /// Write the noise for a program, as in kalibr=imu.yaml; repeatable.
     #[arg(long = "export", value_name = "FORMAT=OUT", value_parser = export_target)]
     pub(crate) exports: Vec<ExportTarget>,
-    /// What stands for the three axes, where the program of --export has one number a sensor.
-    #[arg(long, value_enum, default_value_t, requires = "exports")]
+    /// Where --export has one number a sensor: rms or worst.
+    #[arg(long, value_enum, default_value_t, requires = "exports", hide_possible_values = true)]
     pub(crate) axis: AxisChoice,
 }
 
@@ -508,4 +501,21 @@ pub(crate) struct JsonArgument {
     /// Write the result as JSON.
     #[arg(long, value_name = "OUT")]
     pub(crate) json: Option<PathBuf>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Cli, EXAMPLES, EXAMPLES_OF_ANALYZE};
+    use clap::{CommandFactory, Parser};
+
+    #[test]
+    fn the_examples_are_commands_that_the_program_takes() {
+        Cli::command().debug_assert();
+        let lines = EXAMPLES.lines().chain(EXAMPLES_OF_ANALYZE.lines()).filter(|line| line.starts_with("  "));
+        let commands: Vec<&str> = lines.filter_map(|line| line.trim_start().split("   ").next()).collect();
+        assert_eq!(commands.len(), 6);
+        for command in commands {
+            assert!(Cli::try_parse_from(command.split_whitespace()).is_ok(), "{command}");
+        }
+    }
 }

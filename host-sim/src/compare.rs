@@ -1,12 +1,12 @@
 //! `compare`: a report with another, or with the data sheet.
 
 use crate::cli::CompareArguments;
+use crate::input_file::read_report;
 use crate::output::{check_result, print, write_result};
 use crate::output_files::OutputFiles;
 use anyhow::{Context, Result};
 use recordings::Printable;
 use reports::comparison;
-use reports::saved_report::SavedReport;
 use std::path::{Path, PathBuf};
 
 /// Compares the last report of the arguments with the first, or with the data sheet, and prints the table.
@@ -16,20 +16,17 @@ pub(crate) fn run(arguments: &CompareArguments) -> Result<()> {
     check_result(output, &files)?;
     let (comparison, before, after) = match second {
         Some(second) => {
-            let comparison = comparison::of_reports(&read(first)?, &read(second)?)?;
+            let comparison = comparison::of_reports(&read_report(first)?, &read_report(second)?)?;
             (comparison, name(first), name(second))
         }
         None => {
-            let comparison = comparison::with_data_sheet(&read(first)?).with_context(|| first.display().to_string())?;
+            let comparison =
+                comparison::with_data_sheet(&read_report(first)?).with_context(|| first.display().to_string())?;
             (comparison, "data sheet".to_owned(), name(first))
         }
     };
     write_result(&comparison, output, &files)?;
     print(|out| comparison.write(&before, &after, out))
-}
-
-fn read(file: &Path) -> Result<SavedReport> {
-    SavedReport::read(file).with_context(|| file.display().to_string())
 }
 
 fn name(file: &Path) -> String {

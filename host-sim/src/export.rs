@@ -1,17 +1,17 @@
 //! `export`: the noise of a report in the file format of another program.
 
 use crate::cli::{ExportArguments, ExportTarget};
+use crate::input_file::read_report;
 use crate::output::write_export;
 use crate::output_files::OutputFiles;
 use anyhow::{Context, Result};
-use reports::saved_report::SavedReport;
 
 /// Reads the report and writes the file.
 pub(crate) fn run(arguments: &ExportArguments) -> Result<()> {
     let ExportArguments { report: from, out, format, axis } = arguments;
     let files = OutputFiles::beside([from.as_path()]);
     files.check(out)?;
-    let report = SavedReport::read(from).with_context(|| from.display().to_string())?;
+    let report = read_report(from)?;
     write_export(&report, &ExportTarget { format: *format, file: out.clone() }, *axis, &files)
         .with_context(|| from.display().to_string())
 }

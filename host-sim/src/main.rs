@@ -4,8 +4,8 @@ mod analyze;
 mod cli;
 mod compare;
 mod convert;
-mod explain;
 mod export;
+mod input_file;
 mod inspect;
 mod interrupt;
 mod live;
@@ -72,6 +72,10 @@ fn main() -> ExitCode {
         Err(error) => {
             // Where standard error is closed too, the exit code alone shows the error.
             let _ = writeln!(io::stderr(), "error: {}", Printable(&output::brief(&format!("{error:#}"))));
+            if let Some(file) = input_file::similar_file(&error) {
+                let _ =
+                    writeln!(io::stderr(), "  tip: a similar file exists: {}", Printable(&file.display().to_string()));
+            }
             if let Some(question) = error.downcast_ref::<Question>() {
                 let _ = io::stderr().write_all(question.text.as_bytes());
             }
@@ -118,7 +122,6 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
             clap_complete::generate(shell, &mut Cli::command(), "host-sim", &mut script);
             output::print(|out| out.write_all(&script))
         }
-        Some(Command::Explain(arguments)) => explain::run(&arguments),
         Some(Command::Monitor(arguments)) => monitor_source(&arguments),
     }
 }

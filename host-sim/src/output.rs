@@ -11,7 +11,7 @@ use reports::json::ReportJson;
 use reports::raster::Rasterizer;
 use reports::saved_report::SavedReport;
 use reports::terminal::Screen;
-use reports::{figure, full_tables, page};
+use reports::{explanation, figure, full_tables, page};
 use serde::Serialize;
 use std::borrow::Cow;
 use std::fmt;
@@ -83,6 +83,8 @@ fn show(report: &Report, source: Option<&str>, output: &OutputArguments, page: O
     }
     if output.full {
         print(|out| full_tables::write(report, source, out))?;
+    } else if output.explain {
+        print(|out| explanation::write(report, source, out))?;
     } else {
         show_screen(report, source)?;
     }

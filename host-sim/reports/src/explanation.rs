@@ -14,11 +14,14 @@ const WIDTH: usize = 100;
 /// Averaging times at which the common mode is told, s: the octave nearest to each.
 const COMMON_MODE_TAU_S: [f64; 3] = [0.01, 40.0, 160.0];
 
-/// Writes the explanation of `report`.
+/// Writes the explanation of `report`, under the name of the recording if it has one.
 ///
 /// # Errors
 /// `out` cannot be written.
-pub fn write(report: &Report, out: &mut impl Write) -> io::Result<()> {
+pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io::Result<()> {
+    if let Some(source) = source {
+        writeln!(out, "{source}\n{}", "═".repeat(source.chars().count()))?;
+    }
     let length = duration(report.samples as f64 / report.sample_rate_hz);
     writeln!(
         out,

@@ -6,9 +6,6 @@ use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::report::{ChannelReport, DataSheetReport, Parameter, Report, SCHEMA, TermReport};
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
-use std::fs;
-use std::io;
-use std::path::Path;
 
 /// What a report says of the noise of a sensor.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -89,9 +86,6 @@ pub struct SavedParameter {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SavedReportError {
-    /// It cannot be read.
-    #[error(transparent)]
-    Io(#[from] io::Error),
     /// It is no JSON object, or has no field `schema`.
     #[error("no JSON report of this program: {0}")]
     NoReport(serde_json::Error),
@@ -117,15 +111,7 @@ impl SavedReport {
     /// Reads the JSON that `analyze --json` writes.
     ///
     /// # Errors
-    /// The file cannot be read, has another schema, or lacks a field; the error names the field.
-    pub fn read(file: &Path) -> Result<Self, SavedReportError> {
-        Self::from_json(&fs::read_to_string(file)?)
-    }
-
-    /// As [`read`](Self::read), from the text of the file.
-    ///
-    /// # Errors
-    /// As [`read`](Self::read).
+    /// The text is no JSON, has another schema, or lacks a field; the error names the field.
     pub fn from_json(text: &str) -> Result<Self, SavedReportError> {
         #[derive(Deserialize)]
         struct Version {
@@ -200,7 +186,7 @@ impl From<&ChannelReport> for SavedChannel {
                 terms: channel.refitted.terms.iter().map(term).collect(),
                 adev: channel.refitted.adev.clone(),
             },
-            data_sheet: channel.figure_data.data_sheet,
+            data_sheet: channel.figure_data.data_sheet.clone(),
         }
     }
 }

@@ -287,12 +287,12 @@ fn too_many_rows_are_refused_and_fewer_where_a_small_file_expands_to_them() {
     let mut rows = b"gyro_x_counts\n".to_vec();
     rows.resize(rows.len() + 2 * ((1 << 25) + 1), b'\n');
     rows[14..].chunks_exact_mut(2).for_each(|row| row[0] = b'1');
-    // `analyze` condenses it; `explain` would hold it in memory.
+    // `analyze` condenses it; `replay` would hold it in memory.
     let file = write(&dir, "ones.csv", &rows);
-    let line = refusal(&["explain", name(&file), "--rate", "100"]);
+    let line = refusal(&["replay", name(&file), "--rate", "100"]);
     assert!(line.contains("more than 33554432 samples"), "{line}");
     let file = write(&dir, "ones.csv.gz", &gzip(&rows));
-    let line = refusal(&["explain", name(&file), "--rate", "100"]);
+    let line = refusal(&["replay", name(&file), "--rate", "100"]);
     assert!(line.contains("far more than a recording of this size"), "{line}");
 }
 
@@ -343,24 +343,8 @@ fn outputs_are_checked_before_the_work_and_never_overwrite_the_input() {
 
 #[test]
 fn names_with_control_characters_are_escaped() {
-    let line = refusal(&["explain", "/nowhere/\u{1b}[31m.csv"]);
+    let line = refusal(&["analyze", "/nowhere/\u{1b}[31m.csv"]);
     assert!(!line.contains('\u{1b}'), "{line:?}");
     let line = refusal(&["monitor", "/dev/\u{1b}[31m"]);
     assert!(!line.contains('\u{1b}'), "{line:?}");
-}
-
-#[test]
-fn figures_of_recordings_with_like_names_do_not_overwrite_each_other() {
-    let dir = tempdir().expect("a folder");
-    let rows = table("time_s,gyro_x_counts", 50_000, |i| format!("{},", i as f64 / 100.0));
-    std::fs::create_dir(dir.path().join("other")).expect("a folder");
-    let files = ["run.1.csv", "run.2.csv", "other/run.1.csv"].map(|file| write(&dir, file, &rows));
-    let pictures = dir.path().join("pictures");
-    let output = host_sim(
-        &[&["explain"][..], &files.each_ref().map(|file| name(file)), &["--pictures", name(&pictures)]].concat(),
-    );
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    for figure in ["run.1-gyro_x-allan.svg", "run.2-gyro_x-allan.svg", "run.1-2-gyro_x-allan.svg"] {
-        assert!(pictures.join(figure).exists(), "{figure}: {}", text(&output.stdout));
-    }
 }

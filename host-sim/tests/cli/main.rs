@@ -1,4 +1,4 @@
-//! The command `host-sim`: input errors, what is in a file, damaged input, equal reports of the ways to read a recording, simulated and measured recordings,
+//! The command `host-sim`: its help, input errors, what is in a file, damaged input, equal reports of the ways to read a recording, simulated and measured recordings,
 //! exports, conversions, the live screen, quick reports, reports of many files, and a device on a serial port.
 
 mod analyze_and_replay;
@@ -7,6 +7,7 @@ mod damaged_input;
 mod documented_options;
 mod exports;
 mod formats;
+mod help;
 mod input_errors;
 mod inspection;
 mod live_screen;
@@ -24,3 +25,4 @@ mod several_recordings;
 mod simulated_sensor;
 mod stretches;
 mod text_formats;
+mod walkthrough;

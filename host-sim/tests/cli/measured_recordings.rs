@@ -4,7 +4,6 @@
 //! files in Python (periodograms, autocorrelations, regressions on averages), and the figures that `docs/recordings.md` quotes.
 //! The last are bounded from above by their scatter ([`largest`]); a better model fails no test.
 
-use crate::program::{self, host_sim};
 use adis16405_driver::GyroRange;
 use noise_analysis::analysis::analyze;
 use noise_analysis::effects::{Effect, OutputFilter};
@@ -292,22 +291,4 @@ fn one_filter_read_at_its_own_rate() {
 fn one_filter_read_at_a_slower_rate() {
     // Accelerometer Z alone would give two averages over two of the recorded samples.
     one_filter("one_filter_read_at_a_slower_rate", "adis16405-static/run3.csv.gz", Some(100.0), 8.0);
-}
-
-#[test]
-fn explain_names_the_reason_why_it_refuses() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let path = dir.path().to_str().expect("UTF-8");
-    let refused = |arguments: &[&str], reason: &str| {
-        let output = host_sim(arguments);
-        let error = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(!output.status.success() && error.contains(reason), "{arguments:?}: {error}");
-    };
-    refused(&["explain", path], "no file in it ends in .csv or .csv.gz");
-    refused(&["explain", path, "--page", "x"], "unexpected argument '--page'");
-    let table = program::write(&dir, "short.csv", b"gyro_x_counts\n1\n2\n3\n4\n5\n");
-    refused(&["explain", path], "no sample rate");
-    let output = host_sim(&["explain", table.to_str().expect("UTF-8"), "--rate", "100"]);
-    assert!(output.status.success());
-    assert!(String::from_utf8_lossy(&output.stdout).contains("enough samples"), "{output:?}");
 }

@@ -26,6 +26,9 @@ fn the_arguments_choose_what_is_printed() {
     }
     let full = run(&dir, &["--full"]);
     assert!(full.contains("── supply") && full.contains("95 % interval"), "{full}");
+    let explained = run(&dir, &["--explain"]);
+    assert!(explained.starts_with("bus.csv\n═══════\n") && explained.contains("\nWhat was found\n"), "{explained}");
+    assert!(explained.contains("has enough samples to be cut into epochs"), "{explained}");
     assert_eq!(run(&dir, &["--quiet"]), "");
     let report: Value = serde_json::from_str(&run(&dir, &["--json", "-"])).expect("JSON alone");
     assert_eq!(report["schema"], 1);

@@ -8,9 +8,6 @@ use crate::input::read_monitor::ReadMonitor;
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
 use std::path::{Path, PathBuf};
 
-/// Endings of the names of tables.
-const ENDINGS: [&str; 2] = [".csv", ".csv.gz"];
-
 /// Separators of tables from programs of other countries, which are named in the error.
 const OTHER_SEPARATORS: [char; 3] = [';', '\t', ' '];
 
@@ -48,23 +45,6 @@ pub fn read_monitored(file: &Path, range: GyroRange, monitor: &ReadMonitor) -> R
         recorder.push(row.time_stamp, &Burst::from_counts(&row.counts));
     }
     Ok(recorder.finish())
-}
-
-/// The tables in the folder `path` in the order of their names; `path` itself if it is no folder.
-///
-/// # Errors
-/// The folder cannot be read, or no name in it ends in `.csv` or `.csv.gz`.
-pub fn tables_in(path: &Path) -> Result<Vec<PathBuf>, InputError> {
-    if !path.is_dir() {
-        return Ok(vec![path.to_owned()]);
-    }
-    let fail = |error| InputError::file(path, Reason::Io(error));
-    let entries: Result<Vec<PathBuf>, _> =
-        path.read_dir().map_err(fail)?.map(|entry| entry.map(|entry| entry.path())).collect();
-    let is_table = |file: &PathBuf| ENDINGS.iter().any(|ending| file.to_string_lossy().ends_with(ending));
-    let mut tables: Vec<PathBuf> = entries.map_err(fail)?.into_iter().filter(is_table).collect();
-    tables.sort();
-    if tables.is_empty() { Err(InputError::file(path, Reason::NoTables)) } else { Ok(tables) }
 }
 
 /// One row of a table.

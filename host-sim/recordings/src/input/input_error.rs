@@ -30,9 +30,6 @@ pub enum Reason {
     /// A folder where a file is expected.
     #[error("is a directory, not a file; of a ROS 2 bag, give the .mcap or .db3 file in it")]
     Directory,
-    /// A folder without a table in it.
-    #[error("no file in it ends in .csv or .csv.gz")]
-    NoTables,
     /// No byte, or only blank lines.
     #[error("the file is empty")]
     Empty,

@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 /// The text, with single spaces in the place of line breaks.
 fn text(report: &Report) -> String {
     let mut out = Vec::new();
-    explanation::write(report, &mut out).expect("a vector can be written");
+    explanation::write(report, None, &mut out).expect("a vector can be written");
     let text = String::from_utf8(out).expect("text");
     assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
     text.split_whitespace().collect::<Vec<_>>().join(" ")
