@@ -221,7 +221,7 @@ impl TracedModel {
             }
             term
         };
-        let bounded = with_bounds_behind_a_filter(curve, &self.model);
+        let bounded = with_bounds_behind_a_filter(curve, &self.model, decimation);
         let model = Model::new(bounded.sample_period(), bounded.terms().iter().map(resolved));
         self.model = within_measured(&model, curve);
         self.decimation = decimation;
