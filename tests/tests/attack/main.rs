@@ -14,18 +14,14 @@ mod report;
 use crate::cases::Campaign;
 use std::time::{Duration, Instant};
 
-fn attack(test: &str, first: u64, duration: Duration) {
+/// Cases of the short form, four of each kind: about 30 s.
+const FEW: u64 = 4 * cases::KINDS.len() as u64;
+
+fn attack(test: &str, cases: impl Iterator<Item = u64>) {
     let mut campaign = Campaign::new();
-    if let Some(case) = std::env::var("ATTACK_CASE").ok().and_then(|text| text.parse().ok()) {
-        campaign.run(case);
-    } else {
-        let started = Instant::now();
-        let mut case = first;
-        // Each kind of attack at least once.
-        while started.elapsed() < duration || case < first + cases::KINDS.len() as u64 {
-            campaign.run(case);
-            case += 1;
-        }
+    match std::env::var("ATTACK_CASE").ok().and_then(|text| text.parse().ok()) {
+        Some(case) => campaign.run(case),
+        None => cases.for_each(|case| campaign.run(case)),
     }
     println!("{test}: {campaign}");
     let faults = campaign.faults();
@@ -33,12 +29,14 @@ fn attack(test: &str, first: u64, duration: Duration) {
 }
 
 #[test]
-fn the_program_withstands_thirty_seconds_of_attack() {
-    attack("the_program_withstands_thirty_seconds_of_attack", 0, Duration::from_secs(30));
+fn the_program_withstands_a_few_attacks_of_each_kind() {
+    attack("the_program_withstands_a_few_attacks_of_each_kind", 0..FEW);
 }
 
 #[test]
 #[ignore = "long: an hour"]
 fn the_program_withstands_an_hour_of_attack() {
-    attack("the_program_withstands_an_hour_of_attack", 1_000_000, Duration::from_secs(3600));
+    let started = Instant::now();
+    let is_time_left = |_: &u64| started.elapsed() < Duration::from_secs(3600);
+    attack("the_program_withstands_an_hour_of_attack", (1_000_000..).take_while(is_time_left));
 }
