@@ -6,6 +6,9 @@ const SIMPLE_UNITS: [&str; 11] = ["s", "ms", "min", "h", "d", "Hz", "kHz", "g", 
 /// `text` broken between words into lines of at most `width` columns; all but the first begin with `indent`. Spaces at the beginning
 /// and between words are kept, a number stays with its unit and its bound, and a longer word is broken.
 pub(crate) fn broken(text: &str, width: usize, indent: &str) -> Vec<String> {
+    let width = width.max(1);
+    // What is narrower than the indent has none.
+    let indent = if indent.chars().count() < width { indent } else { "" };
     let mut lines: Vec<String> = Vec::new();
     let mut line: String = text.chars().take_while(|letter| *letter == ' ').collect();
     let mut is_empty = true;
@@ -85,5 +88,7 @@ mod tests {
     #[test]
     fn a_word_longer_than_a_line_is_broken() {
         assert_eq!(broken("in abcdefghij", 4, ""), ["in", "abcd", "efgh", "ij"]);
+        assert_eq!(broken("in a", 1, "  "), ["i", "n", "a"]);
+        assert_eq!(broken("a", 0, "  "), ["a"]);
     }
 }
