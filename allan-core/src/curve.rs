@@ -335,11 +335,11 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
     /// Sets the degrees of freedom and bounds of each point for its variance fractions.
     fn set_confidence(&mut self, fractions: &mut dyn FnMut(&AllanPoint) -> VarianceFractions) {
         for point in &mut self.points {
-            let mut approximation =
+            let approximation =
                 ChiSquareApproximation::new(Difference::Second, point.n, point.count, point.overlap, fractions(point));
-            approximation.edf *= point.subtraction_factor();
-            point.edf = approximation.edf;
-            (point.low, point.high) = approximation.bounds(point.avar);
+            let left = point.subtraction_factor();
+            point.edf = left * approximation.edf;
+            (point.low, point.high) = approximation.bounds(point.avar, left);
         }
     }
 

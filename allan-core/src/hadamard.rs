@@ -44,11 +44,10 @@ impl HadamardPoint {
     }
 
     fn set_confidence(&mut self, fractions: VarianceFractions) {
-        let mut approximation =
-            ChiSquareApproximation::new(Difference::Third, self.n, self.count, self.overlap, fractions);
-        approximation.edf *= subtraction_factor(self.hvar, self.interpolation);
-        self.edf = approximation.edf;
-        (self.low, self.high) = approximation.bounds(self.hvar);
+        let approximation = ChiSquareApproximation::new(Difference::Third, self.n, self.count, self.overlap, fractions);
+        let left = subtraction_factor(self.hvar, self.interpolation);
+        self.edf = left * approximation.edf;
+        (self.low, self.high) = approximation.bounds(self.hvar, left);
     }
 }
 
