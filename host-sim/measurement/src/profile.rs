@@ -10,8 +10,10 @@ pub(crate) const SAMPLE_RATE_ERROR: f64 = 5e-5;
 /// The data sheet states what is typical; single parts, and their mounting, are up to ten times worse. Half an order of
 /// magnitude beyond that, √10·10, no such part is known.
 pub(crate) const LARGEST_SENSITIVITY_MULTIPLE: f64 = 31.622_776_601_683_79;
-/// Noise of 0.45 counts rounds like white noise.
-pub(crate) const DITHERED_AVAR_COUNTS2: f64 = 0.2;
+/// The largest variance that rounding makes of noise of 0.45 counts: that of a mean halfway between two counts, by the normal
+/// distribution (0.27 of a mean at a count). Larger noise rounds like white noise of a twelfth of a count², to 3 % of its deviation,
+/// wherever its mean is. A fourth is no limit: halfway between two counts the smallest noise has it.
+pub(crate) const DITHERED_AVAR_COUNTS2: f64 = 0.3;
 /// Ratio of the sensor's nominal clock to a sample rate up to which both may be the same clock: a crystal-less oscillator is
 /// off by some percent.
 const SAME_CLOCK: f64 = 1.1;

@@ -228,9 +228,26 @@ fn noise_below_a_count_is_told() {
     }
     let report = analyze(&gyro(vec![17; 30_000]));
     assert_eq!(kinds(&report), ["noise_below_count"], "a constant channel");
-    // Of 0.3 counts N is right, and nothing is to be told.
+    // Of half a count N is right, and nothing is to be told.
     let report = analyze(&gyro(white(1, 30_000, 0.5)));
     assert!(kinds(&report).is_empty(), "{:?}", kinds(&report));
+}
+
+/// 0.3 counts around 0.4 have 0.23 counts² after rounding, and around 0.5 0.25: N would be 60 to 67 % too large. It is told, and the
+/// bounds of the noise hold it.
+#[test]
+fn noise_below_a_count_is_told_wherever_its_mean_is() {
+    for (seed, mean, deviation) in [(0, 0.4, 0.3), (1, 0.5, 0.3), (2, 0.5, 0.25), (3, 0.45, 0.4), (4, 0.0, 0.4)] {
+        let mut normal = normal(seed);
+        let counts = (0..30_000).map(|_| f64::round(mean + deviation * normal()) as i32).collect();
+        let report = analyze(&gyro(counts));
+        let what = format!("{deviation} counts around {mean}");
+        let [ChannelEffect { effect: Effect::NoiseBelowCount(noise), .. }] = &only(&report).effects[..] else {
+            panic!("{what}: {:?}", kinds(&report))
+        };
+        let bounds = noise.deviation.low..=noise.deviation.high;
+        assert!(bounds.contains(&(0.05 * deviation)), "{what}: {noise:?}");
+    }
 }
 
 /// The line of 5 Hz is there; whatever else is named is no smaller than a thousandth of a count.
