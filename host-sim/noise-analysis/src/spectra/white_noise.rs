@@ -6,8 +6,8 @@
 //! their confidence where flicker noise or a walk is just not visible.
 //!
 //! A filter is assumed only where the data shows it. The candidates are no filter, the two cascaded averages of the part read
-//! at their own rate with white noise (at least that of rounding) behind them, and samples that are correlated with their
-//! next neighbours, as of a filter whose output is read more slowly. The one with the least `−2 ln L + p·ln n` is taken (G.
+//! at their own rate with white noise (at least that of rounding) behind them, and samples that are correlated with as
+//! many neighbours as a filter reaches over whose output is read more slowly. The one with the least `−2 ln L + p·ln n` is taken (G.
 //! Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978), `p` being the number of densities, with
 //! one more for the choice of the averages' length, and `n` the number of independent ordinates. Where the noise is white, a
 //! second white term behind a filter leaves `ln L` where it is (twice its rise is χ² of one or two degrees of freedom), and
@@ -35,6 +35,8 @@ const OVERLAPPING_NEIGHBOURS: f64 = 1.944 * 1.056 / 2.111;
 /// the spectrum is that of the rounding error, which is correlated where neighbouring samples differ by less than a count and
 /// then no white noise. It takes part in the choice of the filter alone.
 const PASSBAND: f64 = 0.1;
+/// Most lags at which samples are correlated: 64 taps that are read every 9th time reach over 14.
+const MOST_LAGS: u32 = 16;
 /// Rounds of the fit at most; it converges in about ten.
 const ROUNDS: usize = 60;
 /// Standard deviations by which the scatter of the bands around the fit must exceed what the fit predicts for the intervals
@@ -78,9 +80,9 @@ pub struct WhiteNoiseFit {
 pub struct KnownShapes<'a> {
     /// Its fitted model: lines and resonances are left out of the spectrum, Markov processes are fitted.
     pub model: &'a Model,
-    /// Whether the sensor's filter is known to have been read at a rate below its own, so that neighbouring samples may be
+    /// Of a filter that is known to have been read at a rate below its own, the number of samples over which it reaches: these may be
     /// correlated even where that is too little to be seen.
-    pub is_read_slowly: bool,
+    pub reach_of_slow_reading: Option<u32>,
 }
 
 /// Fits the white noise of `welch`; `None` where no fit converges, or the white noise is not told from none: its lower 95 %
@@ -89,10 +91,11 @@ pub struct KnownShapes<'a> {
 pub fn fit_white_noise(welch: &Welch, known: &KnownShapes) -> Option<WhiteNoiseFit> {
     let lines = |frequency: f64| is_near_line(known.model, frequency, LINE_WIDTHS * welch.resolution());
     let bands = Bands::new(welch, lines);
-    let correlated = FilterSpectrum::Correlated { lags: 1 };
-    let unfiltered = (!known.is_read_slowly).then_some(FilterSpectrum::Unfiltered);
+    let reach = known.reach_of_slow_reading.unwrap_or(1).clamp(1, MOST_LAGS);
+    let correlated = (1..=reach).map(|lags| FilterSpectrum::Correlated { lags });
+    let unfiltered = known.reach_of_slow_reading.is_none().then_some(FilterSpectrum::Unfiltered);
     let bartlett = TAPS_LOG2.map(|log2| FilterSpectrum::Bartlett { taps: 1 << log2 });
-    let candidates = unfiltered.into_iter().chain([correlated]).chain(bartlett);
+    let candidates = unfiltered.into_iter().chain(correlated).chain(bartlett);
     let fits = candidates.filter_map(|filter| MixtureFit::new(&bands, filter, known.model));
     let likeliest = fits.min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
     let FilterSpectrum::Bartlett { taps } = likeliest.filter else { return likeliest.white_noise(&bands) };

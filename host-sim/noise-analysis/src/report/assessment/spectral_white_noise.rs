@@ -32,11 +32,13 @@ pub(super) fn estimate(welch: Option<&Welch>, fitted: &Model, count: f64, unit: 
     let Some(welch) = welch else {
         return without(format!("the record has no {WELCH_SAMPLES} samples in a row for a spectrum"));
     };
-    let is_read_slowly = fitted.terms().iter().any(|term| match term.kind {
-        NoiseTerm::Filtered(filter) => filter.decimation != 1.0,
-        _ => false,
+    let reach_of_slow_reading = fitted.terms().iter().find_map(|term| match term.kind {
+        NoiseTerm::Filtered(filter) if filter.decimation != 1.0 => {
+            Some((f64::from(filter.stages) * (f64::from(filter.taps) - 1.0) / filter.decimation) as u32)
+        }
+        _ => None,
     });
-    let Some(fit) = fit_white_noise(welch, &KnownShapes { model: fitted, is_read_slowly }) else {
+    let Some(fit) = fit_white_noise(welch, &KnownShapes { model: fitted, reach_of_slow_reading }) else {
         return without("drift, lines or rounding hide the white noise in the spectrum".to_owned());
     };
     let in_counts = fit.sample_deviation / count;
