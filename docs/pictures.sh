@@ -3,7 +3,7 @@
 #
 #     docs/pictures.sh
 #
-#   docs/report.png       gyro x of the simulated hour that the program makes without a command
+#   docs/report.svg       gyro x of the simulated hour that the program makes without a command
 #   docs/run1-gyro_z.svg  gyro z of the first measured recording, if ADIS_RECORDINGS names the folder (docs/recordings.md)
 set -eu
 cd "$(dirname "$0")/.."
@@ -11,7 +11,7 @@ drawn=$(mktemp -d)
 trap 'rm -rf "$drawn"' EXIT
 
 cargo run --release -- --quiet --page "$drawn/page" --pictures "$drawn/simulated"
-cp "$drawn/simulated/gyro_x-allan.png" docs/report.png
+cp "$drawn/simulated/gyro_x-allan.svg" docs/report.svg
 
 if [ -n "${ADIS_RECORDINGS:-}" ]; then
     cargo run --release -- analyze "$ADIS_RECORDINGS/adis16405-static/run1.csv.gz" --rate 100 --quiet --pictures "$drawn/run1"

@@ -456,7 +456,7 @@ pub(crate) struct OutputArguments {
     /// Print nothing.
     #[arg(long)]
     pub(crate) quiet: bool,
-    /// Write every figure as SVG and PNG into this folder.
+    /// Write every figure as SVG into this folder; the page saves them as PNG.
     #[arg(long, value_name = "DIR")]
     pub(crate) pictures: Option<PathBuf>,
     /// Write the report as JSON; - for standard output.

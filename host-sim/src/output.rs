@@ -7,11 +7,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 use noise_analysis::report::Report;
 use recordings::Printable;
 use reports::export::{self, AxisChoice};
+use reports::figure::{self, Picture};
 use reports::json::ReportJson;
-use reports::raster::Rasterizer;
 use reports::saved_report::SavedReport;
 use reports::terminal::Screen;
-use reports::{explanation, figure, full_tables, page};
+use reports::{explanation, full_tables, page};
 use serde::Serialize;
 use std::borrow::Cow;
 use std::fmt;
@@ -28,7 +28,7 @@ const USUAL_COLUMNS: usize = 80;
 /// Names the file.
 pub(crate) fn check(output: &OutputArguments, files: &OutputFiles) -> Result<()> {
     let json = output.json.as_deref().filter(|file| !is_standard_stream(file));
-    for (folder, endings) in [(&output.page, &["html"][..]), (&output.pictures, &["svg", "png"])] {
+    for (folder, endings) in [(&output.page, &["html"][..]), (&output.pictures, &["svg"])] {
         if let Some(folder) = folder {
             fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
             files.check_folder(folder, endings)?;
@@ -107,16 +107,10 @@ fn columns() -> usize {
     console::Term::stdout().size_checked().map_or(USUAL_COLUMNS, |(_, columns)| usize::from(columns))
 }
 
-/// Writes every figure of a report as SVG and PNG into `folder`.
+/// Writes every figure of a report as SVG into `folder`.
 fn write_pictures(report: &Report, folder: &Path, files: &OutputFiles) -> Result<()> {
-    let pictures = figure::pictures(report);
-    let write =
-        |name: &str, ending: &str, content: &[u8]| files.write(&folder.join(format!("{name}.{ending}")), content);
-    for picture in &pictures {
-        write(&picture.name, "svg", picture.svg.as_bytes())?;
-    }
-    let rasterizer = Rasterizer::new()?;
-    pictures.iter().try_for_each(|picture| write(&picture.name, "png", &rasterizer.png(&picture.svg)?))
+    let write = |picture: Picture| files.write(&folder.join(format!("{}.svg", picture.name)), picture.svg.as_bytes());
+    figure::pictures(report).into_iter().try_for_each(write)
 }
 
 /// Writes the noise of a report in the formats that the arguments name, each as far as the others can be written.

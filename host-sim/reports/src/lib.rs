@@ -16,7 +16,6 @@ mod line_breaks;
 pub mod live;
 pub mod page;
 mod part_note;
-pub mod raster;
 pub mod rounding;
 pub mod saved_report;
 pub mod several;

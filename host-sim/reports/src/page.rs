@@ -20,8 +20,8 @@ use std::path::{Path, PathBuf};
 
 const STYLE: &str = include_str!("page/style.css");
 const SCRIPT: &str = include_str!("page/script.js");
-/// Only what is in the file itself.
-const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
+/// Only what is in the file itself; a figure that is saved as PNG is an image of its own text.
+const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
 
 /// Name of the page in its folder.
 pub const FILE: &str = "index.html";
@@ -67,7 +67,9 @@ fn render(report: &Report) -> Markup {
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
                 title { (part) " noise report" }
-                style { (PreEscaped(STYLE)) (PreEscaped(light)) "@media screen and (prefers-color-scheme: dark){" (PreEscaped(dark)) "}" }
+                style { (PreEscaped(STYLE)) }
+                style id="figures" { (PreEscaped(light)) }
+                style { "@media screen and (prefers-color-scheme: dark){" (PreEscaped(dark)) "}" }
             }
             body {
                 a.skip href="#findings" { "To the findings" }

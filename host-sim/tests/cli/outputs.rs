@@ -40,7 +40,7 @@ fn no_input_is_written_whatever_it_is_called() {
     // A figure that leads to it.
     let pictures = dir.path().join("pictures");
     fs::create_dir(&pictures).expect("a folder");
-    std::os::unix::fs::symlink(&rows, pictures.join("gyro_x-allan.png")).expect("a link");
+    std::os::unix::fs::symlink(&rows, pictures.join("gyro_x-allan.svg")).expect("a link");
     is_refused(&host_sim(&["analyze", name(&rows), "--pictures", name(&pictures)]));
     // Standard input.
     let output = Command::new(PROGRAM)

@@ -38,22 +38,12 @@ fn the_arguments_choose_what_is_printed() {
 }
 
 #[test]
-fn every_figure_is_written_as_svg_and_png() {
+fn every_figure_is_written_as_svg() {
     let dir = TempDir::new().expect("a folder");
     let pictures = dir.path().join("pictures");
     run(&dir, &["--pictures", pictures.to_str().expect("UTF-8")]);
-    let names: BTreeSet<String> = std::fs::read_dir(&pictures)
-        .expect("the folder")
-        .map(|entry| entry.expect("a file").file_name().to_string_lossy().into_owned())
-        .collect();
     for name in ["overview", "gyro_x-allan", "gyro_x-spectrum", "gyro_x-bias", "accl_z-allan"] {
         let svg = std::fs::read(pictures.join(format!("{name}.svg"))).expect("an SVG");
         assert!(svg.starts_with(b"<svg "), "{name}");
-        let png = std::fs::read(pictures.join(format!("{name}.png"))).expect("a PNG");
-        // The signature and the width, twice that of the figure. DEFLATE takes at least a 1032nd of an empty picture, 5 kB.
-        assert!(png.starts_with(b"\x89PNG\r\n\x1a\n") && png[16..20] == 1520_u32.to_be_bytes(), "{name}");
-        assert!(png.len() > 15_000, "{name}: {} bytes", png.len());
     }
-    let of = |ending: &str| names.iter().filter(|name| name.ends_with(ending)).count();
-    assert_eq!(of(".svg"), of(".png"));
 }

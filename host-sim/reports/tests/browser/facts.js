@@ -1,6 +1,6 @@
 "use strict";
 // What a browser shows of a page: run in the parent of an iframe that holds it. The facts become the text of an element.
-function facts(frame) {
+async function facts(frame) {
   const view = frame.contentWindow;
   const page = frame.contentDocument;
   const channels = (colour) => (colour.match(/[\d.]+/g) || []).map(Number);
@@ -57,8 +57,12 @@ function facts(frame) {
       }), drawn,
     };
   });
-  const button = page.querySelector("button");
-  button?.click();
+  const button = (text) => [...page.querySelectorAll("button")].find((of) => of.textContent === text);
+  const copy = button("Copy as CSV");
+  copy?.click();
+  const save = button("Save as PNG");
+  save?.click();
+  for (let tries = 0; save && !save.dataset.png && tries < 100; tries += 1) await new Promise((done) => setTimeout(done, 20));
   return {
     width: page.documentElement.clientWidth,
     overflow: page.documentElement.scrollWidth - page.documentElement.clientWidth,
@@ -70,15 +74,33 @@ function facts(frame) {
     dark: view.matchMedia("(prefers-color-scheme: dark)").matches,
     requests: view.performance.getEntriesByType("resource").map((entry) => entry.name),
     links: [...page.querySelectorAll("a[href^='#']")].filter((link) => !page.getElementById(link.getAttribute("href").slice(1))).map((link) => link.href),
-    csv: button?.dataset.csv ?? null,
+    csv: copy?.dataset.csv ?? null,
+    png: save?.dataset.png ? await pixels(save.dataset.png) : null,
     figures,
   };
 }
-window.addEventListener("load", () => {
+// The size of an image, and how many of its pixels have each colour that at least 200 have.
+async function pixels(source) {
+  const image = new Image();
+  image.src = source;
+  await image.decode();
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [image.width, image.height];
+  const drawn = canvas.getContext("2d");
+  drawn.drawImage(image, 0, 0);
+  const counts = {};
+  const { data } = drawn.getImageData(0, 0, image.width, image.height);
+  for (let at = 0; at < data.length; at += 4) {
+    const colour = [...data.slice(at, at + 3)].map((of) => of.toString(16).padStart(2, "0")).join("");
+    counts[colour] = (counts[colour] ?? 0) + 1;
+  }
+  return { width: image.width, height: image.height, colours: Object.fromEntries(Object.entries(counts).filter(([, count]) => count >= 200)) };
+}
+window.addEventListener("load", async () => {
   const result = document.createElement("pre");
   result.id = "facts";
   try {
-    result.textContent = JSON.stringify([...document.querySelectorAll("iframe")].map(facts));
+    result.textContent = JSON.stringify(await Promise.all([...document.querySelectorAll("iframe")].map(facts)));
   } catch (error) {
     result.textContent = JSON.stringify({ error: String(error), stack: error.stack });
   }

@@ -296,4 +296,13 @@ fn values_are_read_by_keyboard_and_pointer_and_tables_are_copied() {
     let csv = facts[0]["csv"].as_str().expect("the table");
     assert!(csv.starts_with("channel,angle random walk N,"), "{csv}");
     assert!(csv.contains("\nx,2.21 ± 0.14,"), "{csv}");
+    // The first figure as it is on light ground, with twice the pixels: ground, measured curve and models.
+    let png = &facts[0]["png"];
+    let view = reports::figure::pictures(&report())[0].svg.clone();
+    let size = view.split("viewBox=\"0 0 ").nth(1).and_then(|rest| rest.split('"').next()).expect("a size");
+    let doubled: Vec<u64> = size.split(' ').map(|of| 2 * of.parse::<u64>().expect("pixels")).collect();
+    assert_eq!([&png["width"], &png["height"]], [doubled[0], doubled[1]]);
+    for colour in ["ffffff", "1f5fa8", "a8480d", "0b7559"] {
+        assert!(png["colours"][colour].as_u64().is_some(), "{colour}: {png}");
+    }
 }
