@@ -40,6 +40,7 @@ mod transforms;
 mod welch;
 mod white_noise;
 mod whitened_spectrum;
+mod whittle;
 
 pub use autocorrelation::correlation_time;
 pub use equation_5::allan_deviations_by_spectrum;
@@ -47,7 +48,8 @@ pub use line_envelope::Modulation;
 pub use lines::find_lines;
 pub(crate) use lines::{find_lines_over, without_sines, without_slow_sines};
 pub(crate) use markov_spectrum::MarkovEstimate;
-pub use smooth_shape::{SpectralBand, SpectralShape};
+pub use smooth_shape::SpectralShape;
 pub use welch::Welch;
 pub use white_noise::{FilterSpectrum, KnownShapes, WhiteNoiseFit, fit_white_noise};
 pub use whitened_spectrum::SpectralLine;
+pub use whittle::SpectralBand;

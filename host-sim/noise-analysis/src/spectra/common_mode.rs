@@ -6,7 +6,8 @@
 
 use super::markov_spectrum::{MarkovEstimate, MarkovFit, OWN, SHARED, TERMS, most_likely, time_constants};
 use super::periodogram::{SineTapered, low_frequency_bands};
-use super::smooth_shape::{SpectralBand, walk_amplitude};
+use super::smooth_shape::walk_amplitude;
+use super::whittle::SpectralBand;
 use crate::samples::uniform_series::UniformSeries;
 use std::f64::consts::PI;
 

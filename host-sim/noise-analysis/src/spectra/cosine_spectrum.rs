@@ -7,7 +7,7 @@
 //! (N. Ahmed, T. Natarajan and K. Rao, "Discrete cosine transform", IEEE Trans. Computers C-23, 1974).
 
 use super::markov_spectrum::{MarkovEstimate, MarkovFit, OWN, TERMS, most_likely, time_constants};
-use super::smooth_shape::SpectralBand;
+use super::whittle::SpectralBand;
 use crate::detectors::noise_grid::markov_covariance;
 use crate::samples::uniform_series::UniformSeries;
 use std::f64::consts::PI;

@@ -11,8 +11,8 @@
 
 use super::periodogram::{smooth_length, taper};
 use super::slow_background::SlowBackground;
-use super::smooth_shape::SpectralBand;
 use super::transforms;
+use super::whittle::SpectralBand;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{quantile, upper_tail};
 use crate::effects::findings::SIGNIFICANCE;

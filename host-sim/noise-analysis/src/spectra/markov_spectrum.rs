@@ -1,7 +1,7 @@
 //! A Markov process in a spectrum: the likeliest time constant and variance beside white, flicker and random-walk noise, by
 //! Whittle's likelihood.
 
-use super::smooth_shape::{SpectralBand, fit_mixture, mixture_density};
+use super::whittle::{Sign, SpectralBand, fit_mixture, mixture_density};
 use crate::bounds::BoundedEstimate;
 use crate::distributions::NORMAL_975;
 
@@ -77,7 +77,7 @@ impl MarkovFit {
     /// process with the time constant `time`.
     pub(super) fn new(bands: &[SpectralBand], bases: &[[f64; TERMS]], time: f64, process: usize) -> Self {
         let mut densities = [0.0; TERMS];
-        let objective = fit_mixture(bands, bases, &mut densities);
+        let objective = fit_mixture(bands, bases, Sign::NonNegative, &mut densities);
         let variance = densities[process];
         let fractions = bases.iter().map(|basis| basis[process] * variance / mixture_density(basis, &densities));
         let information: f64 = fractions.zip(bands).map(|(fraction, band)| band.ordinates * fraction * fraction).sum();

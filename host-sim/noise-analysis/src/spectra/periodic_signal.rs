@@ -8,8 +8,8 @@
 use super::line_models::{Sine, transform_at};
 use super::periodogram::taper;
 use super::slow_background::SlowBackground;
-use super::smooth_shape::SpectralBand;
 use super::transforms;
+use super::whittle::SpectralBand;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, exponential_sum_tail, mean_ratio_tail};
 use crate::effects::findings::SIGNIFICANCE;

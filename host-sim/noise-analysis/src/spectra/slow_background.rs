@@ -1,6 +1,6 @@
 //! The smooth density of slow noise in block means: white noise, a random walk, and Markov processes of many time constants.
 
-use super::smooth_shape::{SpectralBand, fit_mixture, mixture_density};
+use super::whittle::{Sign, SpectralBand, fit_mixture, mixture_density};
 
 /// Corner of the slowest Markov process, in periods per record; that of each further one is twice the one before.
 const LEAST_CORNER: f64 = 2.0;
@@ -15,7 +15,7 @@ impl<const TERMS: usize> SlowBackground<TERMS> {
     pub(super) fn fit(bands: &[SpectralBand]) -> Option<Self> {
         let bases: Vec<[f64; TERMS]> = bands.iter().map(|band| Self::basis(band.frequency)).collect();
         let mut densities = [0.0; TERMS];
-        fit_mixture(bands, &bases, &mut densities);
+        fit_mixture(bands, &bases, Sign::NonNegative, &mut densities);
         (densities.iter().sum::<f64>() > 0.0).then_some(Self { densities })
     }
 

@@ -1,164 +1,12 @@
 //! The smooth part of a spectrum, as a sum of known shapes.
 //!
-//! Densities are fitted by Whittle's likelihood: an ordinate `P` of a spectrum is gamma distributed around its density
-//! `S`, so the fit minimises `Σ g·(ln S + P/S)`, `g` being half the degrees of freedom of the ordinate. [`SpectralShape`]
-//! is white, flicker and random-walk noise behind a digital filter; `Background` corrects it by local medians, which
+//! [`SpectralShape`], fitted by Whittle's likelihood, is white, flicker and random-walk noise behind a digital filter; `Background` corrects it by local medians, which
 //! lines hardly move.
 
-use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use super::whittle::{Sign, SpectralBand, fit_mixture, information, mixture_density};
+use nalgebra::DMatrix;
 use std::f64::consts::PI;
 use std::ops::Range;
-
-/// An average over neighbouring ordinates of a spectrum.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SpectralBand {
-    /// Hz.
-    pub frequency: f64,
-    /// One-sided, unit²/Hz.
-    pub density: f64,
-    /// Number of independent ordinates that were averaged: half the degrees of freedom.
-    pub ordinates: f64,
-}
-
-/// Rounds of the multiplicative fit, which bring the densities near enough for the scoring.
-const MULTIPLICATIVE_ROUNDS: usize = 8;
-/// Most rounds of the scoring, and the gain in ln likelihood of a round with which it ends: what is left to gain then is far less
-/// than 1/2, by which the likelihood falls at one standard deviation.
-const SCORING_ROUNDS: usize = 50;
-const LEAST_GAIN: f64 = 1e-4;
-/// Shortest part of a step of the scoring that is tried.
-const SHORTEST_STEP: f64 = 1e-3;
-
-/// Fits the densities of `TERMS` shapes whose values in each band are `bases`; returns `Σ g·(ln S + P/S)` with them.
-///
-/// Begins with each shape alone explaining an equal part of the bands. A few rounds multiply the densities by factors
-/// that keep them non-negative and never lower the likelihood (C. Févotte and J. Idier, "Algorithms for nonnegative matrix
-/// factorization with the β-divergence", Neural Computation 23, 2011, for the Itakura-Saito divergence, which is Whittle's
-/// likelihood). Fisher's scoring, with steps that are halved until the likelihood grows, does the rest.
-pub(super) fn fit_mixture<const TERMS: usize>(
-    bands: &[SpectralBand],
-    bases: &[[f64; TERMS]],
-    densities: &mut [f64; TERMS],
-) -> f64 {
-    for (term, density) in densities.iter_mut().enumerate() {
-        let shown = bands.iter().zip(bases).filter(|(_, basis)| basis[term] > 0.0);
-        let (sum, weight) = shown.fold((0.0, 0.0), |(sum, weight), (band, basis)| {
-            let alone = (band.density / basis[term]).max(f64::MIN_POSITIVE);
-            (sum + band.ordinates * alone.ln(), weight + band.ordinates)
-        });
-        *density = if weight > 0.0 { (sum / weight).exp() / TERMS as f64 } else { 0.0 };
-    }
-    for _ in 0..MULTIPLICATIVE_ROUNDS {
-        multiplicative_step(bands, bases, densities);
-    }
-    let mut objective = mixture_objective(bands, bases, densities);
-    for _ in 0..SCORING_ROUNDS {
-        let next = weighted_least_squares(bands, bases, densities);
-        let step = |part: f64| -> [f64; TERMS] {
-            std::array::from_fn(|term| densities[term] + part * (next[term] - densities[term]))
-        };
-        let parts = std::iter::successors(Some(1.0), |part| Some(part / 2.0)).take_while(|&part| part > SHORTEST_STEP);
-        let tried = parts.map(|part| (mixture_objective(bands, bases, &step(part)), step(part)));
-        let Some((likelier, reached)) = tried.into_iter().find(|(tried, _)| *tried < objective) else { break };
-        let gain = objective - likelier;
-        (objective, *densities) = (likelier, reached);
-        if gain < LEAST_GAIN {
-            break;
-        }
-    }
-    objective
-}
-
-/// A round of Fisher's scoring: the densities that are not negative and whose sum is nearest to the bands, each weighted by the
-/// inverse of its variance under the present `densities`. What is negative is set to 0, one term after another.
-fn weighted_least_squares<const TERMS: usize>(
-    bands: &[SpectralBand],
-    bases: &[[f64; TERMS]],
-    densities: &[f64; TERMS],
-) -> [f64; TERMS] {
-    // Of the information, the triangle that the loop below reads: rows up to the diagonal.
-    let (mut information, mut pull) = ([[0.0; TERMS]; TERMS], [0.0; TERMS]);
-    for (band, basis) in bands.iter().zip(bases) {
-        let density = mixture_density(basis, densities);
-        if density <= 0.0 {
-            continue;
-        }
-        let relative: [f64; TERMS] = std::array::from_fn(|term| basis[term] / density);
-        let towards = band.ordinates * band.density / density;
-        for row in 0..TERMS {
-            for column in 0..=row {
-                information[row][column] += band.ordinates * relative[column] * relative[row];
-            }
-            pull[row] += towards * relative[row];
-        }
-    }
-    // In units in which each term alone is known to 1.
-    let scale: [f64; TERMS] = std::array::from_fn(|term| information[term][term].sqrt());
-    let mut is_left_out: [bool; TERMS] = std::array::from_fn(|term| scale[term] == 0.0);
-    loop {
-        let entry = |row: usize, column: usize| {
-            if is_left_out[row] || is_left_out[column] {
-                f64::from(u8::from(row == column))
-            } else {
-                information[row.max(column)][row.min(column)] / (scale[row] * scale[column])
-            }
-        };
-        let matrix = SMatrix::<f64, TERMS, TERMS>::from_fn(entry);
-        let right =
-            SVector::<f64, TERMS>::from_fn(|term, _| if is_left_out[term] { 0.0 } else { pull[term] / scale[term] });
-        let Some(cholesky) = matrix.cholesky() else { return *densities };
-        let solved = cholesky.solve(&right);
-        if solved.iter().any(|value| !value.is_finite()) {
-            return *densities;
-        }
-        let (least, value) = solved.argmin();
-        if value >= 0.0 {
-            return std::array::from_fn(|term| if is_left_out[term] { 0.0 } else { solved[term] / scale[term] });
-        }
-        is_left_out[least] = true;
-    }
-}
-
-/// A round of the multiplicative fit.
-fn multiplicative_step<const TERMS: usize>(
-    bands: &[SpectralBand],
-    bases: &[[f64; TERMS]],
-    densities: &mut [f64; TERMS],
-) {
-    let (mut pull, mut push) = ([0.0; TERMS], [0.0; TERMS]);
-    for (band, basis) in bands.iter().zip(bases) {
-        let density = mixture_density(basis, densities);
-        if density <= 0.0 {
-            continue;
-        }
-        for term in 0..TERMS {
-            let weight = band.ordinates * basis[term] / density;
-            pull[term] += weight * band.density / density;
-            push[term] += weight;
-        }
-    }
-    for term in (0..TERMS).filter(|&term| push[term] > 0.0) {
-        densities[term] *= (pull[term] / push[term]).sqrt();
-    }
-}
-
-/// Density of the mixture where its shapes have the values `basis`.
-pub(super) fn mixture_density<const TERMS: usize>(basis: &[f64; TERMS], densities: &[f64; TERMS]) -> f64 {
-    basis.iter().zip(densities).map(|(basis, density)| basis * density).sum()
-}
-
-/// `Σ g·(ln S + P/S)` over the bands, `S` being the mixture.
-fn mixture_objective<const TERMS: usize>(
-    bands: &[SpectralBand],
-    bases: &[[f64; TERMS]],
-    densities: &[f64; TERMS],
-) -> f64 {
-    let of_band = |(band, basis): (&SpectralBand, &[f64; TERMS])| {
-        let density = mixture_density(basis, densities).max(f64::MIN_POSITIVE);
-        band.ordinates * (density.ln() + band.density / density)
-    };
-    bands.iter().zip(bases).map(of_band).sum()
-}
 
 /// Longest filter that is tried: two cascaded averages of `2^6` samples each, the largest setting of the ADIS16405.
 const LARGEST_TAPS_LOG2: u32 = 6;
@@ -188,8 +36,7 @@ impl SpectralShape {
     /// Density at `frequency` in Hz, unit²/Hz.
     #[must_use]
     pub fn density(&self, frequency: f64) -> f64 {
-        let basis = shape_basis(frequency, self.sample_period, self.taps);
-        basis.iter().zip(self.densities).map(|(basis, density)| basis * density).sum()
+        mixture_density(&shape_basis(frequency, self.sample_period, self.taps), &self.densities)
     }
 
     /// N in unit·√s: the root of half the density of the white noise before the filter. Only of a spectrum that is known to
@@ -209,14 +56,14 @@ impl SpectralShape {
         if present.first() != Some(&0) {
             return None;
         }
-        let mut information = DMatrix::zeros(present.len(), present.len());
-        for band in bands {
-            let basis = shape_basis(band.frequency, self.sample_period, self.taps);
-            let total = self.density(band.frequency);
-            let fractions = present.iter().map(|&term| basis[term] * self.densities[term] / total);
-            let fractions = DVector::from_iterator(present.len(), fractions);
-            information += band.ordinates * &fractions * fractions.transpose();
-        }
+        let basis = |band: &SpectralBand| shape_basis(band.frequency, self.sample_period, self.taps);
+        let bases: Vec<[f64; TERMS]> = bands.iter().map(basis).collect();
+        let of_densities = information(bands, &bases, &self.densities);
+        let entry = |row: usize, column: usize| {
+            let (row, column) = (present[row], present[column]);
+            self.densities[row] * self.densities[column] * of_densities[(row, column)]
+        };
+        let information = DMatrix::from_fn(present.len(), present.len(), entry);
         let variance = information.cholesky()?.inverse()[(0, 0)];
         Some(variance.sqrt() / 2.0)
     }
@@ -226,7 +73,7 @@ impl SpectralShape {
         let basis = |band: &SpectralBand| shape_basis(band.frequency, sample_period, taps);
         let bases: Vec<[f64; TERMS]> = bands.iter().map(basis).collect();
         let mut shape = Self { sample_period, taps, densities: [0.0; TERMS] };
-        let objective = fit_mixture(bands, &bases, &mut shape.densities);
+        let objective = fit_mixture(bands, &bases, Sign::NonNegative, &mut shape.densities);
         (shape, objective)
     }
 }

@@ -1,7 +1,8 @@
 //! Welch's estimate of a power spectral density: the average of the periodograms of overlapping windowed segments.
 
-use super::smooth_shape::{SpectralBand, SpectralShape};
+use super::smooth_shape::SpectralShape;
 use super::transforms;
+use super::whittle::SpectralBand;
 use crate::samples::uniform_series::UniformSeries;
 use realfft::RealToComplex;
 use realfft::num_complex::Complex;

@@ -15,9 +15,10 @@
 
 use super::smooth_shape::{filter_gain, walk_amplitude};
 use super::welch::Welch;
+use super::whittle::{Sign, SpectralBand, fit_mixture, information, mixture_density};
 use crate::bounds::BoundedEstimate;
 use allan_core::{Model, NoiseTerm};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use std::f64::consts::PI;
 
 /// Lowest point of the spectrum that is used: below, the removed mean and the window's skirts change a steep spectrum.
@@ -37,8 +38,6 @@ const OVERLAPPING_NEIGHBOURS: f64 = 1.944 * 1.056 / 2.111;
 const PASSBAND: f64 = 0.1;
 /// Most lags at which samples are correlated: 64 taps that are read every 9th time reach over 14.
 const MOST_LAGS: u32 = 16;
-/// Rounds of the fit at most; it converges in about ten.
-const ROUNDS: usize = 60;
 /// Standard deviations by which the scatter of the bands around the fit must exceed what the fit predicts for the intervals
 /// to be widened.
 const SIGNIFICANT_MISFIT: f64 = 3.0;
@@ -85,7 +84,7 @@ pub struct KnownShapes<'a> {
     pub reach_of_slow_reading: Option<u32>,
 }
 
-/// Fits the white noise of `welch`; `None` where no fit converges, or the white noise is not told from none: its lower 95 %
+/// Fits the white noise of `welch`; `None` where the shapes cannot be told apart, or the white noise not from none: its lower 95 %
 /// bound is not above 0.
 #[must_use]
 pub fn fit_white_noise(welch: &Welch, known: &KnownShapes) -> Option<WhiteNoiseFit> {
@@ -120,66 +119,44 @@ struct Bands {
     resolution: f64,
     /// Points of the spectrum in each band.
     points: Vec<Vec<usize>>,
-    /// Mean density, one-sided, unit²/Hz.
-    densities: DVector<f64>,
-    /// Independent ordinates.
-    ordinates: DVector<f64>,
+    bands: Vec<SpectralBand>,
 }
 
 impl Bands {
     fn new(welch: &Welch, is_line: impl Fn(f64) -> bool) -> Self {
-        let points = welch.band_points(LOWEST, is_line);
-        let averages = points.iter().map(|band| welch.average(band));
-        let (densities, ordinates): (Vec<f64>, Vec<f64>) = averages
-            .filter(|band| band.density > 0.0)
-            .map(|band| (band.density, OVERLAPPING_NEIGHBOURS * band.ordinates))
-            .unzip();
-        let points = points.into_iter().filter(|band| welch.average(band).density > 0.0).collect();
-        Self {
-            sample_period: welch.sample_period(),
-            resolution: welch.resolution(),
-            points,
-            densities: densities.into(),
-            ordinates: ordinates.into(),
-        }
+        let counted = |points: &Vec<usize>| {
+            let band = welch.average(points);
+            SpectralBand { ordinates: OVERLAPPING_NEIGHBOURS * band.ordinates, ..band }
+        };
+        let bands = welch.band_points(LOWEST, is_line).into_iter().map(|points| (counted(&points), points));
+        let (bands, points) = bands.filter(|(band, _)| band.density > 0.0).unzip();
+        Self { sample_period: welch.sample_period(), resolution: welch.resolution(), points, bands }
     }
 
     /// The bands in which `is_kept` holds at the first point's frequency in Hz.
     fn filtered(&self, is_kept: impl Fn(f64) -> bool) -> Self {
-        let kept: Vec<usize> =
-            (0..self.points.len()).filter(|&at| is_kept(self.points[at][0] as f64 * self.resolution)).collect();
-        let of = |values: &DVector<f64>| DVector::from_iterator(kept.len(), kept.iter().map(|&at| values[at]));
-        Self {
-            sample_period: self.sample_period,
-            resolution: self.resolution,
-            points: kept.iter().map(|&at| self.points[at].clone()).collect(),
-            densities: of(&self.densities),
-            ordinates: of(&self.ordinates),
-        }
+        let all = self.points.iter().zip(&self.bands);
+        let kept = all.filter(|(points, _)| is_kept(points[0] as f64 * self.resolution));
+        let (points, bands) = kept.map(|(points, band)| (points.clone(), *band)).unzip();
+        Self { points, bands, ..*self }
     }
 
     /// The mean of a density over each band, as the Hann window shows it: a point of the spectrum has 2/3 of the density
     /// at its own frequency and 1/6 of that at either neighbour's.
-    fn averaged(&self, density: impl Fn(f64) -> f64) -> DVector<f64> {
+    fn averaged(&self, density: impl Fn(f64) -> f64) -> Vec<f64> {
         let last = self.points.iter().flatten().max().map_or(0, |last| last + 1);
         let at: Vec<f64> = (0..=last).map(|point| density(point as f64 * self.resolution)).collect();
         let shown = |&point: &usize| 2.0 / 3.0 * at[point] + (at[point - 1] + at[point + 1]) / 6.0;
         let mean = |band: &Vec<usize>| band.iter().map(shown).sum::<f64>() / band.len() as f64;
-        DVector::from_iterator(self.points.len(), self.points.iter().map(mean))
-    }
-
-    /// Whittle's `−ln L` up to a constant for these modelled densities; infinite unless all are positive.
-    fn objective(&self, modelled: &DVector<f64>) -> f64 {
-        let of = |((g, p), s): ((&f64, &f64), &f64)| if *s > 0.0 { g * (s.ln() + p / s) } else { f64::INFINITY };
-        self.ordinates.iter().zip(&self.densities).zip(modelled).map(of).sum()
+        self.points.iter().map(mean).collect()
     }
 }
 
 /// A fitted sum of shapes.
 struct MixtureFit {
     filter: FilterSpectrum,
-    /// Value of each shape in each band for a coefficient of 1.
-    shapes: DMatrix<f64>,
+    /// Of each band the value of each shape for a coefficient of 1.
+    bases: Vec<Vec<f64>>,
     coefficients: DVector<f64>,
     /// What a coefficient of 1 of each shape contributes to the density of white noise at 0 Hz, and to the variance of a
     /// sample, over the Nyquist frequency.
@@ -198,7 +175,7 @@ impl MixtureFit {
             _ => 1.0,
         };
         // Each white shape with its contributions at 0 Hz and to the variance of a sample.
-        let mut white: Vec<(DVector<f64>, f64, f64)> = Vec::new();
+        let mut white: Vec<(Vec<f64>, f64, f64)> = Vec::new();
         match filter {
             FilterSpectrum::Unfiltered => white.push((bands.averaged(|_| 1.0), 1.0, 1.0)),
             FilterSpectrum::Bartlett { taps } => {
@@ -220,8 +197,7 @@ impl MixtureFit {
         let markov = model.terms().iter().filter(|term| matches!(term.kind, NoiseTerm::Markov(_)));
         let markov = markov.map(|term| bands.averaged(|f| gain(f) * term.kind.process().density(f, period)));
         let count = white.len();
-        let columns: Vec<DVector<f64>> =
-            white.iter().map(|shape| shape.0.clone()).chain(coloured).chain(markov).collect();
+        let columns: Vec<Vec<f64>> = white.iter().map(|shape| shape.0.clone()).chain(coloured).chain(markov).collect();
         let padded = |values: Vec<f64>| {
             DVector::from_iterator(columns.len(), values.into_iter().chain(std::iter::repeat(0.0)).take(columns.len()))
         };
@@ -230,19 +206,22 @@ impl MixtureFit {
         if bands.points.len() <= columns.len() {
             return None;
         }
-        let shapes = DMatrix::from_columns(&columns);
-        let coefficients = fit(bands, &shapes)?;
+        let row = |band: usize| columns.iter().map(|column| column[band]).collect();
+        let bases: Vec<Vec<f64>> = (0..bands.points.len()).map(row).collect();
+        let mut coefficients = DVector::zeros(columns.len());
+        let objective = fit_mixture(&bands.bands, &bases, Sign::Any, coefficients.as_mut_slice());
         let parameters = columns.len() + usize::from(count == 2 && matches!(filter, FilterSpectrum::Bartlett { .. }));
-        let criterion =
-            2.0 * bands.objective(&(&shapes * &coefficients)) + parameters as f64 * bands.ordinates.sum().ln();
-        Some(Self { filter, shapes, coefficients, at_zero, in_sample, criterion })
+        let ordinates: f64 = bands.bands.iter().map(|band| band.ordinates).sum();
+        let criterion = 2.0 * objective + parameters as f64 * ordinates.ln();
+        Some(Self { filter, bases, coefficients, at_zero, in_sample, criterion })
     }
 
     fn white_noise(&self, bands: &Bands) -> Option<WhiteNoiseFit> {
-        let modelled = &self.shapes * &self.coefficients;
-        let widened = misfit(bands, &modelled, self.coefficients.len());
+        let coefficients = self.coefficients.as_slice();
+        let modelled = self.bases.iter().map(|basis| mixture_density(basis, coefficients));
+        let widened = misfit(&bands.bands, modelled, coefficients.len());
         let density = self.at_zero.dot(&self.coefficients);
-        let along = information(bands, &self.shapes, &modelled).cholesky()?.solve(&self.at_zero);
+        let along = information(&bands.bands, &self.bases, coefficients).cholesky()?.solve(&self.at_zero);
         let reach = TWO_SIDED_95 * widened * self.at_zero.dot(&along).sqrt();
         if density - reach <= 0.0 {
             return None;
@@ -262,79 +241,17 @@ impl MixtureFit {
     }
 }
 
-/// Fisher information of the bands on the coefficients.
-fn information(bands: &Bands, shapes: &DMatrix<f64>, modelled: &DVector<f64>) -> DMatrix<f64> {
-    let mut weighted = shapes.clone();
-    for (mut row, (ordinates, density)) in weighted.row_iter_mut().zip(bands.ordinates.iter().zip(modelled)) {
-        row *= *ordinates / (density * density);
-    }
-    shapes.transpose() * weighted
-}
-
-/// The likeliest coefficients, by Fisher scoring with shortened steps where the likelihood would fall. Begins with the
-/// non-negative mixture of those shapes that are themselves non-negative.
-fn fit(bands: &Bands, shapes: &DMatrix<f64>) -> Option<DVector<f64>> {
-    let mut coefficients = non_negative_start(bands, shapes);
-    let mut objective = bands.objective(&(shapes * &coefficients));
-    for _ in 0..ROUNDS {
-        let modelled = shapes * &coefficients;
-        let pull = (&bands.densities - &modelled)
-            .component_mul(&bands.ordinates)
-            .component_div(&modelled.component_mul(&modelled));
-        // Columns of one length: flicker and walk are larger than white noise by orders of magnitude.
-        let information = information(bands, shapes, &modelled);
-        let scale = information.diagonal().map(|entry| 1.0 / entry.sqrt());
-        let scaled = DMatrix::from_diagonal(&scale) * information * DMatrix::from_diagonal(&scale);
-        let step = scaled.cholesky()?.solve(&scale.component_mul(&(shapes.transpose() * pull))).component_mul(&scale);
-        let halved = |halvings: i32| &coefficients + 0.5f64.powi(halvings) * &step;
-        let tried = (0..30).map(halved).map(|next| (bands.objective(&(shapes * &next)), next));
-        let Some((lower, next)) = tried.into_iter().find(|(tried, _)| *tried < objective) else {
-            return Some(coefficients);
-        };
-        let gained = objective - lower;
-        (objective, coefficients) = (lower, next);
-        if gained < 1e-6 {
-            return Some(coefficients);
-        }
-    }
-    None
-}
-
-/// A mixture with positive densities to begin with: the multiplicative steps of [`fit_mixture`] for shapes without
-/// negative values.
-///
-/// [`fit_mixture`]: super::smooth_shape
-fn non_negative_start(bands: &Bands, shapes: &DMatrix<f64>) -> DVector<f64> {
-    let is_positive: Vec<bool> = shapes.column_iter().map(|shape| shape.iter().all(|value| *value >= 0.0)).collect();
-    let count = is_positive.iter().filter(|positive| **positive).count() as f64;
-    // Each shape alone explains its part of the mean logarithm of the bands.
-    let alone = |column: usize| {
-        let shape = shapes.column(column);
-        let logs = bands.densities.iter().zip(shape.iter()).map(|(p, s)| (p / s.max(1e-12)).ln());
-        (logs.zip(&bands.ordinates).map(|(log, g)| log * g).sum::<f64>() / bands.ordinates.sum()).exp() / count
-    };
-    let start = (0..shapes.ncols()).map(|column| if is_positive[column] { alone(column) } else { 0.0 });
-    let mut coefficients = DVector::from_iterator(shapes.ncols(), start);
-    for _ in 0..30 {
-        let modelled = shapes * &coefficients;
-        let push = bands.ordinates.component_div(&modelled);
-        let pull = push.component_mul(&bands.densities).component_div(&modelled);
-        let (pull, push) = (shapes.transpose() * pull, shapes.transpose() * push);
-        for (at, coefficient) in coefficients.iter_mut().enumerate().filter(|(at, _)| is_positive[*at]) {
-            *coefficient *= (pull[at] / push[at]).sqrt();
-        }
-    }
-    coefficients
-}
-
 /// By how much more the bands scatter around the fit than it predicts, as a factor of the standard deviation; 1 where chance
 /// explains it.
 ///
 /// The deviance `2g·(P/S − 1 − ln(P/S))` of a band has the expectation `1 + 1/(6g)` for `g` ordinates, and about the variance 2.
-fn misfit(bands: &Bands, modelled: &DVector<f64>, parameters: usize) -> f64 {
-    let of = |((g, p), s): ((&f64, &f64), &f64)| 2.0 * g * (p / s - 1.0 - (p / s).ln()) / (1.0 + 1.0 / (6.0 * g));
-    let deviance: f64 = bands.ordinates.iter().zip(&bands.densities).zip(modelled).map(of).sum();
-    let freedom = (bands.points.len() - parameters) as f64;
+fn misfit(bands: &[SpectralBand], modelled: impl Iterator<Item = f64>, parameters: usize) -> f64 {
+    let of = |(band, s): (&SpectralBand, f64)| {
+        let (g, ratio) = (band.ordinates, band.density / s);
+        2.0 * g * (ratio - 1.0 - ratio.ln()) / (1.0 + 1.0 / (6.0 * g))
+    };
+    let deviance: f64 = bands.iter().zip(modelled).map(of).sum();
+    let freedom = (bands.len() - parameters) as f64;
     if deviance > freedom + SIGNIFICANT_MISFIT * (2.0 * freedom).sqrt() { (deviance / freedom).sqrt() } else { 1.0 }
 }
 

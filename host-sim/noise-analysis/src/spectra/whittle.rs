@@ -1,0 +1,217 @@
+//! Densities of known shapes in a spectrum, by Whittle's likelihood.
+//!
+//! An ordinate `P` of a spectrum is gamma distributed around its density `S`, so the fit minimises `Σ g·(ln S + P/S)`, `g` being
+//! half the degrees of freedom of the ordinate.
+
+use nalgebra::{DMatrix, DVector};
+
+/// An average over neighbouring ordinates of a spectrum.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpectralBand {
+    /// Hz.
+    pub frequency: f64,
+    /// One-sided, unit²/Hz.
+    pub density: f64,
+    /// Number of independent ordinates that were averaged: half the degrees of freedom.
+    pub ordinates: f64,
+}
+
+/// What the densities of shapes may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sign {
+    /// Each is 0 or more, and so is each shape.
+    NonNegative,
+    /// Only their sum is positive.
+    Any,
+}
+
+/// Rounds of the multiplicative fit, which bring the densities near enough for the scoring.
+const MULTIPLICATIVE_ROUNDS: usize = 8;
+/// Most rounds of the scoring, and the gain in ln likelihood of a round with which it ends: what is left to gain then is far less
+/// than 1/2, by which the likelihood falls at one standard deviation.
+const SCORING_ROUNDS: usize = 50;
+const LEAST_GAIN: f64 = 1e-4;
+/// Shortest part of a step of the scoring that is tried.
+const SHORTEST_STEP: f64 = 1e-3;
+
+/// Fits the densities of shapes whose values in each band are a row of `bases`; returns `Σ g·(ln S + P/S)` with them.
+///
+/// Begins with each shape that is nowhere negative alone explaining an equal part of the bands. A few rounds multiply the densities
+/// of these by factors that keep them non-negative and never lower the likelihood (C. Févotte and J. Idier, "Algorithms for
+/// nonnegative matrix factorization with the β-divergence", Neural Computation 23, 2011, for the Itakura-Saito divergence, which is
+/// Whittle's likelihood). Fisher's scoring, with steps that are halved until the likelihood grows, does the rest.
+pub(super) fn fit_mixture<R: AsRef<[f64]>>(
+    bands: &[SpectralBand],
+    bases: &[R],
+    sign: Sign,
+    densities: &mut [f64],
+) -> f64 {
+    let is_positive: Vec<bool> =
+        (0..densities.len()).map(|term| bases.iter().all(|basis| basis.as_ref()[term] >= 0.0)).collect();
+    let positive = is_positive.iter().filter(|is_positive| **is_positive).count() as f64;
+    for (term, density) in densities.iter_mut().enumerate() {
+        let shown = bands.iter().zip(bases).filter(|(_, basis)| is_positive[term] && basis.as_ref()[term] > 0.0);
+        let (sum, weight) = shown.fold((0.0, 0.0), |(sum, weight), (band, basis)| {
+            let alone = (band.density / basis.as_ref()[term]).max(f64::MIN_POSITIVE);
+            (sum + band.ordinates * alone.ln(), weight + band.ordinates)
+        });
+        *density = if weight > 0.0 { (sum / weight).exp() / positive } else { 0.0 };
+    }
+    for _ in 0..MULTIPLICATIVE_ROUNDS {
+        multiplicative_step(bands, bases, &is_positive, densities);
+    }
+    let mut objective = mixture_objective(bands, bases, densities);
+    for _ in 0..SCORING_ROUNDS {
+        let Some(next) = weighted_least_squares(bands, bases, sign, densities) else { break };
+        let step = |part: f64| -> Vec<f64> {
+            densities.iter().zip(&next).map(|(density, next)| density + part * (next - density)).collect()
+        };
+        let parts = std::iter::successors(Some(1.0), |part| Some(part / 2.0)).take_while(|&part| part > SHORTEST_STEP);
+        let mut tried = parts.map(step).map(|reached| (mixture_objective(bands, bases, &reached), reached));
+        let Some((likelier, reached)) = tried.find(|(tried, _)| *tried < objective) else { break };
+        let gain = objective - likelier;
+        objective = likelier;
+        densities.copy_from_slice(&reached);
+        if gain < LEAST_GAIN {
+            break;
+        }
+    }
+    objective
+}
+
+/// A round of Fisher's scoring: the densities of that sign whose sum is nearest to the bands, each weighted by the inverse of its
+/// variance under the present `densities`. What is negative and may not be is set to 0, one term after another. `None` if the bands do
+/// not tell the shapes apart.
+fn weighted_least_squares<R: AsRef<[f64]>>(
+    bands: &[SpectralBand],
+    bases: &[R],
+    sign: Sign,
+    densities: &[f64],
+) -> Option<Vec<f64>> {
+    let information = information(bands, bases, densities);
+    let mut pull = vec![0.0; densities.len()];
+    for (band, basis) in bands.iter().zip(bases) {
+        let density = mixture_density(basis.as_ref(), densities);
+        if density > 0.0 {
+            let towards = band.ordinates * band.density / (density * density);
+            pull.iter_mut().zip(basis.as_ref()).for_each(|(pull, shape)| *pull += towards * shape);
+        }
+    }
+    // In units in which each term alone is known to 1.
+    let scale = information.diagonal().map(f64::sqrt);
+    let mut is_left_out: Vec<bool> = scale.iter().map(|scale| *scale == 0.0).collect();
+    loop {
+        let entry = |row: usize, column: usize| {
+            if is_left_out[row] || is_left_out[column] {
+                f64::from(u8::from(row == column))
+            } else {
+                information[(row, column)] / (scale[row] * scale[column])
+            }
+        };
+        let matrix = DMatrix::from_fn(pull.len(), pull.len(), entry);
+        let right =
+            DVector::from_fn(pull.len(), |term, _| if is_left_out[term] { 0.0 } else { pull[term] / scale[term] });
+        let solved = matrix.cholesky()?.solve(&right);
+        if solved.iter().any(|value| !value.is_finite()) {
+            return None;
+        }
+        let (least, value) = solved.argmin();
+        if sign == Sign::Any || value >= 0.0 {
+            let unscaled = |term: usize| if is_left_out[term] { 0.0 } else { solved[term] / scale[term] };
+            return Some((0..pull.len()).map(unscaled).collect());
+        }
+        is_left_out[least] = true;
+    }
+}
+
+/// Fisher's information of the bands on the densities.
+pub(super) fn information<R: AsRef<[f64]>>(bands: &[SpectralBand], bases: &[R], densities: &[f64]) -> DMatrix<f64> {
+    let terms = densities.len();
+    let mut information = DMatrix::zeros(terms, terms);
+    for (band, basis) in bands.iter().zip(bases) {
+        let basis = basis.as_ref();
+        let density = mixture_density(basis, densities);
+        if density <= 0.0 {
+            continue;
+        }
+        let weight = band.ordinates / (density * density);
+        for (column, mut entries) in information.column_iter_mut().enumerate() {
+            let of_column = weight * basis[column];
+            entries.iter_mut().zip(basis).for_each(|(entry, shape)| *entry += of_column * shape);
+        }
+    }
+    information
+}
+
+/// A round of the multiplicative fit of the terms that are nowhere negative.
+fn multiplicative_step<R: AsRef<[f64]>>(
+    bands: &[SpectralBand],
+    bases: &[R],
+    is_positive: &[bool],
+    densities: &mut [f64],
+) {
+    let mut sums = vec![(0.0, 0.0); densities.len()];
+    for (band, basis) in bands.iter().zip(bases) {
+        let density = mixture_density(basis.as_ref(), densities);
+        if density <= 0.0 {
+            continue;
+        }
+        let (push, towards) = (band.ordinates / density, band.density / density);
+        for (sums, shape) in sums.iter_mut().zip(basis.as_ref()) {
+            *sums = (sums.0 + push * shape * towards, sums.1 + push * shape);
+        }
+    }
+    for ((density, (pull, push)), is_positive) in densities.iter_mut().zip(sums).zip(is_positive) {
+        if *is_positive && push > 0.0 {
+            *density *= (pull / push).sqrt();
+        }
+    }
+}
+
+/// Density of the mixture where its shapes have the values `basis`.
+pub(super) fn mixture_density(basis: &[f64], densities: &[f64]) -> f64 {
+    basis.iter().zip(densities).map(|(basis, density)| basis * density).sum()
+}
+
+/// `Σ g·(ln S + P/S)` over the bands, `S` being the mixture.
+fn mixture_objective<R: AsRef<[f64]>>(bands: &[SpectralBand], bases: &[R], densities: &[f64]) -> f64 {
+    let of_band = |(band, basis): (&SpectralBand, &R)| {
+        let density = mixture_density(basis.as_ref(), densities).max(f64::MIN_POSITIVE);
+        band.ordinates * (density.ln() + band.density / density)
+    };
+    bands.iter().zip(bases).map(of_band).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Bands whose densities are exactly those of a mixture: the fit is that mixture, of either sign.
+    #[test]
+    fn the_densities_of_exact_bands_are_found() {
+        let frequencies: Vec<f64> = (1..=40).map(|at| 0.02 * f64::from(at)).collect();
+        let shapes = |f: f64| [1.0, 1.0 / f, 2.0 * (std::f64::consts::PI * f).cos()];
+        let bases: Vec<[f64; 3]> = frequencies.iter().map(|f| shapes(*f)).collect();
+        for (sign, truth) in [(Sign::Any, [3.0, 0.2, -0.4]), (Sign::Any, [2.0, -0.02, 0.9])] {
+            let band = |(f, basis): (&f64, &[f64; 3])| SpectralBand {
+                frequency: *f,
+                density: mixture_density(basis, &truth),
+                ordinates: 50.0,
+            };
+            let bands: Vec<SpectralBand> = frequencies.iter().zip(&bases).map(band).collect();
+            let mut densities = [0.0; 3];
+            fit_mixture(&bands, &bases, sign, &mut densities);
+            for (found, truth) in densities.iter().zip(truth) {
+                assert!((found - truth).abs() < 1e-4, "{densities:?}");
+            }
+        }
+        // Without a negative density the nearest mixture has none of the shape that would need one.
+        let bases: Vec<[f64; 2]> = frequencies.iter().map(|f| [1.0, 1.0 / f]).collect();
+        let band = |f: &f64| SpectralBand { frequency: *f, density: 2.0 - 0.02 / f, ordinates: 50.0 };
+        let bands: Vec<SpectralBand> = frequencies.iter().map(band).collect();
+        let mut densities = [0.0; 2];
+        fit_mixture(&bands, &bases, Sign::NonNegative, &mut densities);
+        let mean = bands.iter().map(|band| band.density).sum::<f64>() / 40.0;
+        assert!(densities[1] == 0.0 && (densities[0] - mean).abs() < 1e-3, "{densities:?}, {mean}");
+    }
+}
