@@ -3,7 +3,7 @@
 use crate::acquisition::{DataReadyMonitor, DrdyEdge, TimedBurst};
 use crate::channel_validity::{is_frame_sound, is_marked, refused_channels};
 use crate::channels::ChannelSet;
-use crate::gross_error_gate::GrossErrorGate;
+use crate::gross_error_gate::{FIRST_BLOCK, GrossErrorGate};
 use crate::scale::ReportScale;
 use crate::statistics::{CHANNELS, ChannelEstimator, ChannelSums, SampleLosses, Statistics};
 use crate::transmit::{RawStream, TransmitQueue};
@@ -70,6 +70,8 @@ pub struct Estimators<'m> {
     repeated: u32,
     /// Bursts still to come that the sensor's filter mixes with what was before the probe.
     settling: u32,
+    /// Bursts still to come from which the gate learns the noise before any is used.
+    learning: u32,
     /// Bursts used since the sensor was probed.
     used_since_probe: u32,
     /// The latest burst that a sensor can have sent had its error flag set.
@@ -96,6 +98,7 @@ impl<'m> Estimators<'m> {
             unusable_cause: "",
             repeated: 0,
             settling: 0,
+            learning: 0,
             used_since_probe: 0,
             error_flag: false,
             processed: 0,
@@ -179,7 +182,7 @@ impl<'m> Estimators<'m> {
         self.monitor.mark_probed(now_us);
         self.unusable = 0;
         self.settling = settling_samples(self.config);
-        self.gate.disarm();
+        self.learning = if self.gate.is_learning() { FIRST_BLOCK } else { 0 };
         self.used_since_probe = 0;
         self.error_flag = false;
     }
@@ -188,7 +191,6 @@ impl<'m> Estimators<'m> {
     /// suspect.
     pub(crate) fn mark_resumed(&mut self, now_us: u64) {
         self.monitor.mark_probed(now_us);
-        self.gate.disarm();
     }
 
     /// Starts again without samples, for a sensor that has the configuration `config` from now on. The raw stream stays on
@@ -296,14 +298,8 @@ impl<'m> Estimators<'m> {
             self.statistics.push([0; CHANNELS.len()], ChannelSet::ALL);
             return;
         }
-        if self.settling > 0 && is_frame_sound(burst) {
-            self.settling -= 1;
-            add(&mut self.health.settling, 1);
-            // Before the first sample there is no gap.
-            if self.statistics.has_samples() {
-                self.statistics.push([0; CHANNELS.len()], ChannelSet::ALL);
-            }
-            return;
+        if self.settling + self.learning > 0 && is_frame_sound(burst) {
+            return self.settle(burst);
         }
         let mut validity = self.validator.validate(burst);
         let faults = &mut validity.faults;
@@ -314,8 +310,7 @@ impl<'m> Estimators<'m> {
             add(&mut self.health.frozen, 1);
         }
         let (faults, refused) = (validity.faults, refused_channels(validity));
-        let counts = burst.counts();
-        let counts = CHANNELS.map(|channel| i32::from(counts.get(channel)));
+        let counts = estimated_counts(burst);
         let gross = self.gate.find(&counts, refused);
         self.statistics.push(counts, refused.union(gross));
         if refused.has_all_inertial() {
@@ -331,6 +326,24 @@ impl<'m> Estimators<'m> {
         add(&mut health.marked, u32::from(is_marked(faults)));
     }
 
+    /// Takes a burst that is not used: the sensor's filter settles, or the gate learns the noise. Not inlined: they are few.
+    #[inline(never)]
+    fn settle(&mut self, burst: &Burst) {
+        let counts = estimated_counts(burst);
+        if self.settling > 0 {
+            self.settling -= 1;
+            self.gate.follow(&counts);
+        } else {
+            self.learning -= 1;
+            self.gate.find(&counts, ChannelSet::EMPTY);
+        }
+        add(&mut self.health.settling, 1);
+        // Before the first sample there is no gap.
+        if self.statistics.has_samples() {
+            self.statistics.push([0; CHANNELS.len()], ChannelSet::ALL);
+        }
+    }
+
     /// Repetitions from which on the sensor is frozen. The filter is two averages of 2^M samples.
     fn frozen_after(&self) -> u32 {
         (FROZEN_FILTER_LENGTHS << (self.config.filter_taps_log2() + 1)).max(FROZEN_BURSTS)
@@ -340,6 +353,11 @@ impl<'m> Estimators<'m> {
         self.unusable = self.unusable.saturating_add(2);
         self.unusable_cause = cause;
     }
+}
+
+fn estimated_counts(burst: &Burst) -> [i32; CHANNELS.len()] {
+    let counts = burst.counts();
+    CHANNELS.map(|channel| i32::from(counts.get(channel)))
 }
 
 fn add(counter: &mut u32, more: u32) {

@@ -114,6 +114,7 @@ fn run(fault: Fault, share: f64, seed: u64) -> Cell {
     let mut estimators = Estimators::new(&mut statistics, config);
     let (mut noise, mut random) = (Random(seed), Random(seed + 1000));
     let (mut cell, mut before, mut suspect_for, mut gap) = (Cell::default(), [0; BURST_BYTES], 0, 0);
+    estimators.mark_probed(0);
     for period in 0..SAMPLES {
         let mut counts = [2068, 0, 0, 0, 0, 0, 300, 100, -200, 300, 0, 500];
         for (index, count) in counts[1..7].iter_mut().enumerate() {
@@ -133,6 +134,9 @@ fn run(fault: Fault, share: f64, seed: u64) -> Cell {
         let lengths_before = lengths(&estimators);
         let at_us = (f64::from(period) * PERIOD_US) as u64;
         estimators.process(TimedBurst { at_us, dropped: 0, burst }, 0);
+        if estimators.health().bursts == 0 {
+            continue; // the sensor settles, and the gate learns the noise
+        }
         let used: Vec<bool> = lengths(&estimators).iter().zip(lengths_before).map(|(now, then)| *now > then).collect();
         let (right, found) = (Burst::from_bytes(&sent).counts(), Burst::from_bytes(&arrived).counts());
         for (channel, &used) in CHANNELS.iter().zip(&used) {
@@ -174,8 +178,7 @@ fn shift(cell: &Cell, sound: &Cell) -> f64 {
         .fold(0.0, |most, shift| if shift.abs() > f64::abs(most) { shift } else { most })
 }
 
-/// With 1 % of the frames lost, a bit error rate of 10⁻⁶, and any fault in one of 10,000 bursts N stays within its bounds; no fault ends
-/// the sampling.
+/// With a bit error rate of 10⁻⁵, and with any fault in 1 % of the bursts, N stays within its bounds; no fault ends the sampling.
 #[test]
 fn damaged_bursts_are_refused_or_small() {
     let flips = |rate: f64| (Fault::Flips(rate), 1.0 - (1.0 - rate).powi(BURST_BITS as i32));
@@ -214,7 +217,8 @@ fn damaged_bursts_are_refused_or_small() {
             );
             // Without damage nothing is refused but what follows a refused sample: the gate's false alarms are 1e-11 of the samples.
             assert_eq!((sound.wrong, sound.needless, sound.probes), (0, 0, 0));
-            let asked = matches!(fault, Fault::Failed | Fault::LostEdge) || share < 1e-3;
+            // Flips at 10⁻⁴ add 0.5 counts² to a variance of 110, a quarter per cent of N, below the limit of the gate.
+            let asked = share <= 1e-2;
             assert!(!asked || shift.abs() < 1.0, "{fault:?} in {share:.1e}: N shifted by {shift} half-widths");
             // Of the flips of data bits the gate lets through those by less than its limit, seven times the rms difference of two samples
             // and three counts: by 2^0 to 2^6 of 14 bits in a gyro, to 2^4 in an accelerometer, and 2^0 and 2^1 in the supply and in the

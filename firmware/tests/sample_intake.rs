@@ -1,6 +1,7 @@
 //! Sampling and estimating without a board: order, gaps and counters by cause, the raw stream.
 
 use adis16405_driver::{BURST_BYTES, Burst, Channel, Config, Counts, GyroRange, OutputWord, SamplePeriod};
+use allan_core::model::FittedTerm;
 use firmware::{
     BurstQueue, CHANNELS, ChannelSums, EdgeAction, Estimators, Sampler, Statistics, TimedBurst, TransmitBuffer,
     TransmitQueue, estimate,
@@ -15,6 +16,8 @@ const SUPPLY: i16 = 2068;
 /// Samples that the default filter, of 2^2 taps a stage, mixes with what was before: 2N = 8, and 6.2 ms for the analogue part,
 /// 5.1 periods and the one that they begin in.
 const SETTLING: u32 = 8 + 6;
+/// Samples after the first probe from which the gate against gross errors learns the noise.
+const LEARNING: u32 = 32;
 
 /// A valid burst whose inertial counts depend on `k`.
 fn burst(k: i16) -> Burst {
@@ -100,13 +103,14 @@ fn after_a_silence_samples_are_not_used_before_the_probe() {
         assert!(estimators.is_suspect());
     }
     estimators.mark_probed(at_us(101) + 1);
-    for period in 102..=102 + SETTLING {
+    let unused = SETTLING + LEARNING;
+    for period in 102..=102 + unused {
         estimators.process(timed(period, Some(burst(4))), 0);
     }
     let estimator = estimators.channel(0).unwrap();
-    assert_eq!((estimator.len(), estimator.missing()), (2, 101 + u64::from(SETTLING)));
+    assert_eq!((estimator.len(), estimator.missing()), (2, 101 + u64::from(unused)));
     let health = estimators.health();
-    assert_eq!((health.lost_edges, health.suspect, health.used, health.settling), (99, 2, 2, SETTLING));
+    assert_eq!((health.lost_edges, health.suspect, health.used, health.settling), (99, 2, 2, unused));
 }
 
 #[test]
@@ -202,6 +206,20 @@ fn raw_messages_without_room_are_dropped_and_counted() {
     assert_eq!((counters.frames + counters.missing, counters.missing), (20, dropped));
     assert_eq!(counters.bad_frames, 0);
     assert_eq!(estimators.health().used, 320, "the estimators lose nothing");
+}
+
+/// Normal random numbers by Box and Muller, from a linear congruential generator (Knuth's MMIX constants).
+struct Normal(u64);
+
+impl Normal {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+    }
+
+    fn next(&mut self) -> f64 {
+        (-2.0 * self.uniform().ln()).sqrt() * (std::f64::consts::TAU * self.uniform()).cos()
+    }
 }
 
 /// Counts of a sensor at rest.
@@ -357,7 +375,7 @@ fn samples_that_the_filter_mixes_with_a_self_test_are_a_gap() {
         }
         let (estimator, health) = (estimators.channel(0).unwrap(), estimators.health());
         assert_eq!(estimator.sum_of_squares(0).map(|(squares, _)| squares), Some(0), "2^{taps_log2} taps");
-        let most = tests * ((2 << taps_log2) + (0.007 * 819.2) as u32 + 1);
+        let most = tests * ((2 << taps_log2) + (0.007 * 819.2) as u32 + 1) + LEARNING;
         assert!((1..=most).contains(&health.settling), "2^{taps_log2} taps: {health:?}");
         assert_eq!(health.used + health.settling, tests * 1638, "{health:?}");
     }
@@ -414,21 +432,13 @@ fn bit_errors_leave_n_within_its_bounds() {
     const SAMPLES: u32 = 2_000_000;
     const FLIPS_A_BIT: f64 = 1e-6;
     let config = Config::new(GyroRange::Dps300, 0, SamplePeriod::nearest(204.8).unwrap()).unwrap();
-    let mut state = 7_u64;
-    let mut uniform = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
-    };
+    let mut random = Normal(7);
     let mut statistics = Statistics::new();
     let mut estimators = Estimators::new(&mut statistics, config);
     let (mut flips, mut to_next) = (0, 0.0);
     for period in 0..SAMPLES {
         let mut counts = AT_REST;
-        for pair in counts[1..7].chunks_mut(2) {
-            let (radius, angle) = ((-2.0 * uniform().ln()).sqrt(), std::f64::consts::TAU * uniform());
-            pair[0] = (SIGMA * radius * angle.cos()).round() as i16;
-            pair[1] = (SIGMA * radius * angle.sin()).round() as i16;
-        }
+        counts[1..7].iter_mut().for_each(|count| *count = (SIGMA * random.next()).round() as i16);
         let mut burst = Burst::from_counts(&Counts::new(counts));
         // Flips are independent: the number of bits between two has an exponential distribution.
         let bits = 12.0 * 16.0;
@@ -436,7 +446,7 @@ fn bit_errors_leave_n_within_its_bounds() {
             let bit = to_next as usize;
             burst.words[bit / 16].0 ^= 1 << (bit % 16);
             flips += 1;
-            to_next += 1.0 - uniform().ln() / FLIPS_A_BIT;
+            to_next += 1.0 - random.uniform().ln() / FLIPS_A_BIT;
         }
         to_next -= bits;
         estimators
@@ -457,4 +467,41 @@ fn bit_errors_leave_n_within_its_bounds() {
     }
     assert!(health.gross_errors > 0 && health.gross_errors < flips, "{health:?}");
     assert_eq!(health.recoveries, 0);
+}
+
+/// Ten seconds of noise from a probe on, in which these samples of gyro x are wrong by so many counts.
+fn random_walk_with_errors(errors: &[(u32, i16)]) -> (FittedTerm, Health) {
+    let config = Config::new(GyroRange::Dps300, 0, SamplePeriod::nearest(204.8).unwrap()).unwrap();
+    let mut statistics = Statistics::new();
+    let mut estimators = Estimators::new(&mut statistics, config);
+    estimators.mark_probed(0);
+    let mut normal = Normal(5);
+    for period in 1..2049_u32 {
+        let mut counts = AT_REST;
+        counts[1..7].iter_mut().for_each(|count| *count = (10.5 * normal.next()).round() as i16);
+        counts[1] += errors.iter().find(|&&(at, _)| at == period).map_or(0, |&(_, error)| error);
+        let burst = Some(Burst::from_counts(&Counts::new(counts)));
+        let at_us = (f64::from(period) * 1e6 / 204.8) as u64;
+        estimators.process(TimedBurst { at_us, dropped: 0, burst }, 0);
+    }
+    let sums = ChannelSums::from_estimator(estimators.channel(0).unwrap());
+    (sums.fit_baseline(CHANNELS[0], estimators.scale()).terms()[0], estimators.health())
+}
+
+/// A flipped bit of 4,096 counts in any of the first 300 samples after a start, or another one within sixteen samples of it, leaves N
+/// within its bounds: it is in the samples that are not used, or refused.
+#[test]
+fn gross_errors_after_a_start_and_close_together_leave_n_within_its_bounds() {
+    let (sound, _) = random_walk_with_errors(&[]);
+    let single = (1..300).map(|at| vec![(at, 4096)]);
+    let pairs = (1..17).flat_map(|apart| [1024, -2048].map(|error| vec![(1000, 4096), (1000 + apart, error)]));
+    for errors in single.chain(pairs) {
+        let (found, health) = random_walk_with_errors(&errors);
+        assert!((sound.low..sound.high).contains(&found.value), "{errors:?}: {found:?}, without {sound:?}");
+        let unused = 2 + 2 + LEARNING; // 2N, and 6.2 ms
+        let expected = errors.iter().filter(|&&(at, _)| at > unused).count() as u32;
+        // After an error in the last settling sample, the level to compare with, the next one is refused.
+        let spare = u32::from(errors[0].0 == unused);
+        assert!((expected..=expected + spare).contains(&health.gross_errors), "{errors:?}: {health:?}");
+    }
 }

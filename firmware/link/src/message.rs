@@ -443,12 +443,11 @@ pub struct Health {
     /// Steps of recovery: the sensor was reset by its RST line.
     pub reset_lines: u32,
     /// Bursts not used because the sensor's filter still mixed them with what was before a self-test, a reset or a change of
-    /// settings.
+    /// settings; and 32 after a start or such a change, from which the gate against gross errors learns the noise.
     pub settling: u32,
     /// Times that the data-ready line was masked because it oscillated.
     pub data_ready_masked: u32,
-    /// Bursts of which a channel was refused as a gross error: further from the sample before than its noise makes likely, and
-    /// not followed by another such sample.
+    /// Bursts of which a channel was refused as a gross error: further from the sample before than its noise makes likely.
     pub gross_errors: u32,
     /// Messages and text lines that were not copied to the USB port, since the host did not read it.
     pub usb_dropped: u32,

@@ -10,7 +10,7 @@ mod emulator;
 mod estimator;
 mod functions;
 mod gate;
-#[allow(dead_code, reason = "a file of the firmware, which disarms the gate, too")]
+#[allow(dead_code, reason = "a file of the firmware, which asks the gate for its state, too")]
 #[path = "../../../firmware/src/gross_error_gate.rs"]
 mod gross_error_gate;
 #[path = "../../../allan-core/tests/support/late_state.rs"]
