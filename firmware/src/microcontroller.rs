@@ -14,13 +14,18 @@ pub mod stm32f4;
 
 use crate::board::{BrownOutLevel, DataReadyLine, SensorBus, WatchdogExtension};
 use crate::bus_frame::MicrosecondCounter;
+use crate::transmit::TransmitBuffer;
+use crate::usb_port::{UsbIdentity, UsbPort};
 use adis16405_driver::BURST_BYTES;
 use core::convert::Infallible;
+use core::fmt::Write;
 use defmt_rtt as _;
 use embedded_hal::digital::OutputPin;
+use heapless::String;
 use heapless::spsc::{Consumer, Producer, Queue};
 use link::{BootCause, ClockSource};
 use settings_flash::FlashMemory;
+use usb_device::bus::{UsbBus, UsbBusAllocator};
 
 /// The bytes from the serial port to the application.
 pub type ReceiveBuffer = Queue<u8, 64>;
@@ -41,6 +46,32 @@ pub struct UsbParts<U> {
     pub transmit: Producer<'static, u8>,
     /// Bytes received.
     pub receive: Consumer<'static, u8>,
+}
+
+impl<B: UsbBus> UsbParts<UsbPort<'static, B>> {
+    /// Starts the port of a `vendor`'s `product` on a bus, with the number of the board in hexadecimal as its serial number: at most
+    /// twelve bytes. To be called once; `None` afterwards, or if the bus has too few endpoints.
+    pub fn start(
+        bus: &'static UsbBusAllocator<B>,
+        (vendor, product): (u16, u16),
+        board_number: impl IntoIterator<Item = u8>,
+    ) -> Option<Self> {
+        let serial_number = cortex_m::singleton!(SERIAL_NUMBER: String<24> = String::new())?;
+        for byte in board_number {
+            write!(serial_number, "{byte:02X}").ok()?;
+        }
+        let to_port = cortex_m::singleton!(USB_TRANSMIT: TransmitBuffer = TransmitBuffer::new())?;
+        let from_port = cortex_m::singleton!(USB_RECEIVE: ReceiveBuffer = ReceiveBuffer::new())?;
+        let ((transmit, to_port), (from_port, receive)) = (to_port.split(), from_port.split());
+        let port = UsbPort::new(bus, UsbIdentity { vendor, product, serial_number }, (to_port, from_port))?;
+        Some(Self { port, transmit, receive })
+    }
+}
+
+impl<B: UsbBus> ServedPort for UsbPort<'static, B> {
+    fn serve(&mut self) -> u32 {
+        UsbPort::serve(self)
+    }
 }
 
 impl<U> UsbParts<U> {

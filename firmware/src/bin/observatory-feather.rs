@@ -13,16 +13,15 @@
 #![no_std]
 #![no_main]
 
-use firmware::BusTiming;
-use firmware::microcontroller::stm32f4::bus::{Spi1Bus, spi1_bus};
-use firmware::microcontroller::stm32f4::port::{BAUD, UsartPort};
-use firmware::microcontroller::stm32f4::start::{Started, Stm32f4, data_ready_input};
+use firmware::microcontroller::stm32f4::bus::Spi1Bus;
+use firmware::microcontroller::stm32f4::port::UsartPort;
+use firmware::microcontroller::stm32f4::start::{SensorWires, Stm32f4};
 #[cfg(feature = "feather-usb")]
 use firmware::microcontroller::stm32f4::usb::{Stm32UsbPort, usb_port};
 use firmware::microcontroller::{BoardParts, BoardSupport, NotConnected, UartQueues};
 use stm32f4xx_hal::gpio::{Input, Output, PA4, PC1, PC4};
 use stm32f4xx_hal::pac::{self, USART3};
-use stm32f4xx_hal::{prelude::*, serial};
+use stm32f4xx_hal::prelude::*;
 
 const CRYSTAL_HZ: u32 = 12_000_000;
 
@@ -43,28 +42,24 @@ impl BoardSupport for Feather {
     type ResetLine = NotConnected;
 
     fn start(device: pac::Peripherals, queues: UartQueues) -> BoardParts<Self> {
-        let Started { cause, clock, mut rcc, microcontroller } =
-            Stm32f4::start((device.RCC, device.FLASH, device.TIM2, device.IWDG), CRYSTAL_HZ);
-        let (gpioa, gpiob, gpioc) =
-            (device.GPIOA.split(&mut rcc), device.GPIOB.split(&mut rcc), device.GPIOC.split(&mut rcc));
-
-        let settings = serial::Config::default().baudrate(BAUD.bps());
-        let usart =
-            device.USART3.serial((gpiob.pb10, gpiob.pb11), settings, &mut rcc).expect("the baud rate is in range");
-        let wires = (gpioa.pa4, gpioa.pa5, gpioa.pa6, gpioa.pa7);
-        let bus = spi1_bus((device.SPI1, device.DMA2), wires, &mut rcc, BusTiming::SAFE);
-        let data_ready = data_ready_input(gpioc.pc4, (device.EXTI, device.SYSCFG), &mut rcc);
-        let led = gpioc.pc1.into_push_pull_output();
-
+        let mut started = Stm32f4::start((device.RCC, device.FLASH, device.TIM2, device.IWDG), CRYSTAL_HZ);
+        let rcc = &mut started.rcc;
+        let (a, b, c) = (device.GPIOA.split(rcc), device.GPIOB.split(rcc), device.GPIOC.split(rcc));
+        let uart = UsartPort::new(device.USART3, (b.pb10, b.pb11), queues, rcc);
         #[cfg(not(feature = "feather-usb"))]
         let usb = None;
         #[cfg(feature = "feather-usb")]
         let usb = {
             let registers = (device.OTG_FS_GLOBAL, device.OTG_FS_DEVICE, device.OTG_FS_PWRCLK);
-            usb_port(registers, (gpioa.pa11, gpioa.pa12), &rcc.clocks)
+            usb_port(registers, (a.pa11, a.pa12), &rcc.clocks)
         };
-        let (core_hz, uart) = (rcc.clocks.hclk().raw(), UsartPort::new(usart, queues));
-        BoardParts { cause, clock, core_hz, microcontroller, data_ready, bus, uart, usb, led, reset_line: None }
+        let sensor = SensorWires {
+            spi: (device.SPI1, device.DMA2),
+            pins: (a.pa4, a.pa5, a.pa6, a.pa7),
+            data_ready: c.pc4,
+            edges: (device.EXTI, device.SYSCFG),
+        };
+        started.board(sensor, uart, usb, c.pc1.into_push_pull_output())
     }
 }
 

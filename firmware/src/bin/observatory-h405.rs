@@ -11,14 +11,13 @@
 #![no_std]
 #![no_main]
 
-use firmware::BusTiming;
-use firmware::microcontroller::stm32f4::bus::{Spi1Bus, spi1_bus};
-use firmware::microcontroller::stm32f4::port::{BAUD, UsartPort};
-use firmware::microcontroller::stm32f4::start::{Started, Stm32f4, data_ready_input};
+use firmware::microcontroller::stm32f4::bus::Spi1Bus;
+use firmware::microcontroller::stm32f4::port::UsartPort;
+use firmware::microcontroller::stm32f4::start::{SensorWires, Stm32f4};
 use firmware::microcontroller::{BoardParts, BoardSupport, NotConnected, UartQueues};
 use stm32f4xx_hal::gpio::{Input, Output, PA4, PB0, PC12};
 use stm32f4xx_hal::pac::{self, USART2};
-use stm32f4xx_hal::{prelude::*, serial};
+use stm32f4xx_hal::prelude::*;
 
 const CRYSTAL_HZ: u32 = 8_000_000;
 
@@ -36,22 +35,17 @@ impl BoardSupport for H405 {
     type ResetLine = NotConnected;
 
     fn start(device: pac::Peripherals, queues: UartQueues) -> BoardParts<Self> {
-        let Started { cause, clock, mut rcc, microcontroller } =
-            Stm32f4::start((device.RCC, device.FLASH, device.TIM2, device.IWDG), CRYSTAL_HZ);
-        let (gpioa, gpiob, gpioc) =
-            (device.GPIOA.split(&mut rcc), device.GPIOB.split(&mut rcc), device.GPIOC.split(&mut rcc));
-
-        let settings = serial::Config::default().baudrate(BAUD.bps());
-        let usart =
-            device.USART2.serial((gpioa.pa2, gpioa.pa3), settings, &mut rcc).expect("the baud rate is in range");
-        let wires = (gpioa.pa4, gpioa.pa5, gpioa.pa6, gpioa.pa7);
-        let bus = spi1_bus((device.SPI1, device.DMA2), wires, &mut rcc, BusTiming::SAFE);
-        let data_ready = data_ready_input(gpiob.pb0, (device.EXTI, device.SYSCFG), &mut rcc);
-        let led = gpioc.pc12.into_push_pull_output();
-
-        let (core_hz, uart) = (rcc.clocks.hclk().raw(), UsartPort::new(usart, queues));
-        let (usb, reset_line) = (None, None);
-        BoardParts { cause, clock, core_hz, microcontroller, data_ready, bus, uart, usb, led, reset_line }
+        let mut started = Stm32f4::start((device.RCC, device.FLASH, device.TIM2, device.IWDG), CRYSTAL_HZ);
+        let rcc = &mut started.rcc;
+        let (a, b, c) = (device.GPIOA.split(rcc), device.GPIOB.split(rcc), device.GPIOC.split(rcc));
+        let uart = UsartPort::new(device.USART2, (a.pa2, a.pa3), queues, rcc);
+        let sensor = SensorWires {
+            spi: (device.SPI1, device.DMA2),
+            pins: (a.pa4, a.pa5, a.pa6, a.pa7),
+            data_ready: b.pb0,
+            edges: (device.EXTI, device.SYSCFG),
+        };
+        started.board(sensor, uart, None, c.pc12.into_push_pull_output())
     }
 }
 

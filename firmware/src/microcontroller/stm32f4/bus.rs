@@ -38,7 +38,7 @@ pub struct Spi1Bus<S> {
 }
 
 /// SPI1 in mode 3 on PA5 (SCK), PA6 (MISO) and PA7 (MOSI), with chip select on PA4. MISO floats, as the data-ready pin does.
-pub fn spi1_bus(
+pub(super) fn spi1_bus(
     (spi, dma): (SPI1, DMA2),
     (select, sck, miso, mosi): (PA4, PA5, PA6, PA7),
     rcc: &mut Rcc,

@@ -1,12 +1,15 @@
 //! The serial port to the host on a USART.
 
 use crate::microcontroller::{ServedPort, UartQueues};
+use stm32f4xx_hal::gpio::PushPull;
 use stm32f4xx_hal::nb;
 use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::rcc::Rcc;
+use stm32f4xx_hal::serial::config::Config;
 use stm32f4xx_hal::serial::{Instance, Rx, RxListen, Serial, Tx, TxISR, TxListen};
 
 /// Baud rate of the serial port, 8N1.
-pub const BAUD: u32 = 460_800;
+const BAUD: u32 = 460_800;
 
 /// A USART, served in its interrupt.
 pub struct UsartPort<U: Instance> {
@@ -16,8 +19,15 @@ pub struct UsartPort<U: Instance> {
 }
 
 impl<U: Instance> UsartPort<U> {
-    /// Enables the receive interrupt.
-    pub fn new(usart: Serial<U>, queues: UartQueues) -> Self {
+    /// Starts the port and its receive interrupt.
+    pub fn new(
+        usart: U,
+        pins: (impl Into<U::Tx<PushPull>>, impl Into<U::Rx<PushPull>>),
+        queues: UartQueues,
+        rcc: &mut Rcc,
+    ) -> Self {
+        let settings = Config::default().baudrate(BAUD.bps());
+        let usart: Serial<U> = usart.serial(pins, settings, rcc).expect("the baud rate is in range");
         let (tx, mut rx) = usart.split();
         rx.listen();
         Self { tx, rx, queues }

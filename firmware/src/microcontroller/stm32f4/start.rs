@@ -1,13 +1,14 @@
-//! Start of an STM32F4: cause, watchdog, brown-out level, clocks; and the data-ready input.
+//! Start of an STM32F4: cause, watchdog, brown-out level, clocks; the sensor's wires, the data-ready input among them.
 
+use super::bus::{Spi1Bus, spi1_bus};
 use super::flash::Stm32Flash;
-use crate::board::{BrownOutLevel, DataReadyLine};
+use crate::board::{BrownOutLevel, BusTiming, DataReadyLine};
 use crate::bus_frame::{MicrosecondCounter, wait_for};
-use crate::microcontroller::{DataReadyPin, Microcontroller};
+use crate::microcontroller::{BoardParts, BoardSupport, DataReadyPin, Microcontroller, UsbParts};
 use cortex_m::peripheral::SCB;
 use link::{BootCause, ClockSource};
-use stm32f4xx_hal::gpio::{Edge, ExtiPin, Input, Pin};
-use stm32f4xx_hal::pac::{DBGMCU, EXTI, FLASH, IWDG, RCC, SYSCFG, TIM2};
+use stm32f4xx_hal::gpio::{Edge, ExtiPin, Input, Output, PA4, PA5, PA6, PA7, Pin};
+use stm32f4xx_hal::pac::{DBGMCU, DMA2, EXTI, FLASH, IWDG, RCC, SPI1, SYSCFG, TIM2};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Enable, Rcc, Reset};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
@@ -61,6 +62,39 @@ pub struct Started {
     pub rcc: Rcc,
     /// The microcontroller.
     pub microcontroller: Stm32f4,
+}
+
+/// How the sensor is wired to a board.
+pub struct SensorWires<const P: char, const N: u8> {
+    /// SPI1, and the controller of its DMA transfers.
+    pub spi: (SPI1, DMA2),
+    /// Chip select, SCK, MISO and MOSI.
+    pub pins: (PA4, PA5, PA6, PA7),
+    /// The pin at DIO1.
+    pub data_ready: Pin<P, N>,
+    /// What makes an edge of that pin an interrupt.
+    pub edges: (EXTI, SYSCFG),
+}
+
+impl Started {
+    /// The parts of a board with these wires, without a reset line.
+    pub fn board<B, const P: char, const N: u8>(
+        self,
+        sensor: SensorWires<P, N>,
+        uart: B::Uart,
+        usb: Option<UsbParts<B::Usb>>,
+        led: B::Led,
+    ) -> BoardParts<B>
+    where
+        Pin<P, N, Input>: ExtiPin,
+        B: BoardSupport<Microcontroller = Stm32f4, DataReady = Pin<P, N, Input>, Bus = Spi1Bus<PA4<Output>>>,
+    {
+        let Self { cause, clock, mut rcc, microcontroller } = self;
+        let bus = spi1_bus(sensor.spi, sensor.pins, &mut rcc, BusTiming::SAFE);
+        let data_ready = data_ready_input(sensor.data_ready, sensor.edges, &mut rcc);
+        let core_hz = rcc.clocks.hclk().raw();
+        BoardParts { cause, clock, core_hz, microcontroller, data_ready, bus, uart, usb, led, reset_line: None }
+    }
 }
 
 impl Stm32f4 {
@@ -154,7 +188,7 @@ impl Microcontroller for Stm32f4 {
 
 /// Makes a pin the data-ready input. It floats: the sensor drives it, with 3.3 V, and a pin tolerates more only without a
 /// pull-up or pull-down (STM32F405 data sheet, table 7, FT).
-pub fn data_ready_input<const P: char, const N: u8>(
+fn data_ready_input<const P: char, const N: u8>(
     pin: Pin<P, N>,
     (mut exti, syscfg): (EXTI, SYSCFG),
     rcc: &mut Rcc,
