@@ -33,7 +33,7 @@ pub struct Start {
     pub finished: &'static mut FinishedEpoch,
 }
 
-/// Time for which auto-null stays armed.
+/// Time for which a write to the sensor's flash stays armed.
 const ARMED_US: u64 = 10_000_000;
 /// Time between two checkpoints of one channel each.
 const CHECKPOINT_US: u64 = 100_000;
@@ -267,6 +267,14 @@ impl App {
                 let line = bench_console::read_register(register, &self.state, board);
                 self.print(board, format_args!("{line}"));
             }
+            DeviceCommand::WriteRegister(register, value)
+                if bench_console::writes_flash(register, value) && !self.disarm(now_us) =>
+            {
+                self.print(
+                    board,
+                    format_args!("not armed: this writes the sensor's flash; arm, then poke within 10 s"),
+                );
+            }
             DeviceCommand::WriteRegister(register, value) => {
                 let line = bench_console::write_register(register, value, &self.state, board);
                 self.print(board, format_args!("{line}"));
@@ -348,8 +356,13 @@ impl App {
         self.print(board, format_args!("statistics reset: the sensor is configured anew"));
     }
 
+    /// Returns whether a write to the sensor's flash was armed; the next one has to be armed again.
+    fn disarm(&mut self, now_us: u64) -> bool {
+        now_us < core::mem::take(&mut self.armed_until_us)
+    }
+
     fn auto_null(&mut self, board: &mut impl Board, now_us: u64) {
-        if now_us >= core::mem::take(&mut self.armed_until_us) {
+        if !self.disarm(now_us) {
             return self.print(board, format_args!("not armed: arm first, then autonull within 10 s"));
         }
         board.set_sampling(false);

@@ -103,6 +103,15 @@ pub(crate) fn read_register(register: Register, state: &DeviceState, board: &mut
     line(register, ask(Read(register), state, board))
 }
 
+/// The bits of GLOB_CMD by which the sensor writes its flash memory: auto-null, factory restore, flash update, precision auto-null
+/// (ADIS16400/ADIS16405 data sheet Rev. B, pages 10 and 13).
+const FLASH_COMMANDS: u16 = 1 << 0 | 1 << 1 | 1 << 3 | 1 << 4;
+
+/// Whether the sensor writes its flash memory, of which each write takes one of 10,000 cycles, when this is written.
+pub(crate) fn writes_flash(register: Register, value: u16) -> bool {
+    register == Register::GlobCmd && value & FLASH_COMMANDS != 0
+}
+
 /// Writes a register and, if it can be read, reads it back. The device does not know of the change: `check` sets rate, range, filter and
 /// data ready as it has them.
 pub(crate) fn write_register(register: Register, value: u16, state: &DeviceState, board: &mut impl Board) -> TextLine {

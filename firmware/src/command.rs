@@ -27,7 +27,7 @@ pub const HELP: [&str; 33] = [
     "the sensor, which must be still, with Enter:",
     "check      self-test: passed or failed",
     "deflect    self-test with the deflection of each axis",
-    "arm        allow autonull for 10 s",
+    "arm        allow one write to the sensor's flash within 10 s, such as autonull",
     "autonull   store the gyro output as the bias",
     "the bench, with Enter:",
     "dump       all registers of the sensor by name, in hexadecimal",

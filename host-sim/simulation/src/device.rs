@@ -239,13 +239,22 @@ impl SimulatedBoard {
         self.now_us = self.now_us.max(us);
     }
 
+    /// Takes the time of the part, which transactions and delays advance. Returns whether it has gone on.
+    fn follow_part(&mut self) -> bool {
+        let now_us = self.now_us.max(self.bus.bus().part().now() / 1000);
+        if !self.bus.faults().borrow().hide_samples() {
+            self.usable_us += now_us - self.now_us;
+        }
+        std::mem::replace(&mut self.now_us, now_us) < now_us
+    }
+
     /// The two sampling interrupts and the one of the estimators.
     fn data_ready(&mut self) {
         if self.edge() == EdgeAction::StartBurst {
             let mut answer = [0; BURST_BYTES];
             let Ok(()) = self.bus.transfer(&mut answer, &BURST_REQUEST);
             self.sampler.transfer_ended(Some(&answer));
-            self.now_us();
+            self.follow_part();
         }
         if !self.bus.faults().borrow().no_estimators {
             estimate(&mut self.estimators, &mut self.transmit_queue, &mut self.arrivals);
@@ -279,13 +288,11 @@ impl Board for SimulatedBoard {
     type Delay<'a> = VirtualDelay;
 
     fn now_us(&mut self) -> u64 {
-        // Transactions of the driver advance the part's time.
-        let now_us = self.now_us.max(self.bus.bus().part().now() / 1000);
-        if !self.bus.faults().borrow().hide_samples() {
-            self.usable_us += now_us - self.now_us;
+        if self.follow_part() {
+            // A delay of the driver feeds the watchdog meanwhile, as on a board.
+            self.fed_us = self.now_us;
         }
-        self.now_us = now_us;
-        now_us
+        self.now_us
     }
 
     fn sensor_bus(&mut self) -> (FaultyBus, VirtualDelay) {
