@@ -177,7 +177,10 @@ mod tests {
         let all = counters(&health);
         assert!(all.iter().map(|counter| counter.value).eq(1..=COUNTERS as u32), "{all:?}");
         let lines: Vec<TextLine> = risen(&Health::default(), &health).collect();
-        let events: Vec<&Counter> = all.iter().filter(|counter| counter.counts_events).collect();
+        let (events, figures): (Vec<&Counter>, Vec<&Counter>) = all.iter().partition(|counter| counter.counts_events);
+        let load = ["awake_permille", "sampling_cycles", "estimator_cycles", "stack_bytes", "stack_size"];
+        let others = ["bursts", "used", "queue_peak"].into_iter().chain(load);
+        assert!(figures.iter().map(|counter| counter.name).eq(others), "{figures:?}");
         assert_eq!(lines.len(), events.len());
         for (line, counter) in lines.iter().zip(events) {
             assert!(

@@ -140,7 +140,7 @@ impl<const W: u32> GrossErrorGate<W> {
     #[inline(never)]
     fn end_block(&mut self) {
         let (is_first, is_known) = (self.is_learning(), self.block == BLOCK);
-        let to_mean = if is_first { NORMAL_SHARE } else { 1 } * (BLOCK / self.block);
+        let to_mean = if is_first { NORMAL_SHARE } else { 1 } * (BLOCK / self.block.max(1)); // which cannot be 0
         let width = if is_first { 2 * W } else { W };
         for channel in &mut self.channels {
             let newest = core::mem::take(&mut channel.sum).saturating_mul(to_mean);

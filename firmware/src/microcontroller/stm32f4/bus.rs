@@ -57,8 +57,8 @@ pub(super) fn spi1_bus(
 impl<S: OutputPin<Error = Infallible>> Spi1Bus<S> {
     /// Transfers the next bytes of the burst: all of them, or one word if there is to be a gap between words.
     fn start_bytes(&mut self) {
-        let from = self.started;
         let count = if self.select.timing.word_gap_ns == 0 { BURST_BYTES } else { 2 };
+        let from = self.started.min(BURST_BYTES - count);
         self.started += count;
         let data = registers().dr().as_ptr() as u32;
         self.clear_flags();
