@@ -3,6 +3,7 @@
 mod ardupilot_log;
 mod array_topics;
 mod betaflight;
+mod blackbox_frames;
 mod calendar;
 pub mod file_format;
 mod foreign_format;

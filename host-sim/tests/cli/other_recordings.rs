@@ -146,6 +146,25 @@ fn a_blackbox_log_opens_without_options() {
     assert!((0.1..0.3).contains(&lost), "{lost} lost");
     let Some(reference) = reference(test, &["blackbox", name(&file)]) else { return };
     assert_eq!(report["samples"], reference["rows"]);
+    // Every value: the sums of all rows, each times its number, are those of orangebox up to the rounding of a double.
+    let dir = tempdir().expect("a folder");
+    let table = dir.path().join("all.csv");
+    let converted = messages(&["convert", name(&file), name(&table)]);
+    assert!(converted.0, "{}", converted.1);
+    let text = std::fs::read_to_string(&table).expect("a table");
+    let mut lines = text.lines();
+    let heading: Vec<&str> = lines.next().expect("a heading").split(',').collect();
+    let mut sums = vec![0.0; heading.len()];
+    for (row, line) in lines.enumerate() {
+        for (sum, number) in sums.iter_mut().zip(line.split(',')) {
+            *sum += (row + 1) as f64 * number.parse::<f64>().expect("a number");
+        }
+    }
+    for (channel, expected) in reference["sums"].as_object().expect("channels") {
+        let at = heading.iter().position(|name| name.starts_with(channel.as_str())).expect(channel);
+        let expected = expected.as_f64().expect("a number");
+        assert!((sums[at] / expected - 1.0).abs() < 1e-9, "{channel}: {} and {expected}", sums[at]);
+    }
 }
 
 /// A log of PX4 opens without options; any other message of it is read by its name.

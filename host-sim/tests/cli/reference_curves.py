@@ -4,7 +4,7 @@
     python3 reference_curves.py READER FILE [ARGUMENT]
 
 Prints in JSON by channel the overlapping Allan deviation at 1, 2, 4 and 8 samples, in deg/s or g, of a recording without gaps; with them, of
-the samples between which the time is less than 1.5 times the median, at 1 sample.
+the samples between which the time is less than 1.5 times the median, at 1 sample; and the sum of all values, each times its row from 1.
 """
 
 import json
@@ -88,7 +88,8 @@ def main():
             near = (steps > 0) & (steps < 1.5 * np.median(steps))
             deviations = [np.sqrt(np.mean(np.diff(column)[near] ** 2) / 2)]
         found[channel] = [float(deviation) for deviation in deviations]
-    print(json.dumps(dict(rows=len(values), curves=found)))
+    sums = np.arange(1, len(values) + 1) @ values
+    print(json.dumps(dict(rows=len(values), curves=found, sums=dict(zip(channels, sums)))))
 
 
 main()

@@ -3,13 +3,12 @@
 
 use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::AvailableColumn;
+use crate::formats::blackbox_frames::{BlackboxLog, Damage};
 use crate::formats::topics::{EachRow, Ending, Source, Topic, TopicSensor};
 use crate::input::input_error::{InputError, Reason};
 use crate::tables::sensor_table::Number;
 
-use blackbox_log::frame::{FieldDef, Frame, FrameDef};
-use blackbox_log::prelude::ParserEvent;
-use blackbox_log::{File as Blackbox, Headers};
+use std::convert::Infallible;
 use std::path::Path;
 
 const FORMAT: &str = "blackbox log";
@@ -41,10 +40,10 @@ impl<'a> BlackboxSource<'a> {
         let mut source = Self { file, bytes: Vec::new(), ranges: Vec::new(), topics: Vec::new() };
         let mut refused = None;
         for range in starts.windows(2).map(|ends| ends[0]..ends[1]) {
-            match headers(&bytes[range.clone()]) {
-                Ok(headers) => {
+            match parse(&bytes[range.clone()]) {
+                Ok(log) => {
                     let name = format!("log:{}", source.topics.len());
-                    source.topics.push(topic(name, &headers));
+                    source.topics.push(topic(name, &log));
                     source.ranges.push(range);
                 }
                 Err(reason) => _ = refused.get_or_insert(reason),
@@ -58,20 +57,18 @@ impl<'a> BlackboxSource<'a> {
     }
 }
 
-/// The headers of a log.
-fn headers(log: &[u8]) -> Result<Headers<'_>, Reason> {
-    let damaged = |error: String| Reason::Format { format: FORMAT, error: error.into() };
-    let first = Blackbox::new(log).parse(0);
-    let headers = first.ok_or_else(|| damaged("it has no header".to_owned()))?;
-    headers.map_err(|error| damaged(error.to_string()))
+fn parse(log: &[u8]) -> Result<BlackboxLog<'_>, Reason> {
+    BlackboxLog::parse(log).map_err(|error| Reason::Format { format: FORMAT, error: error.into() })
 }
 
 /// Fields of the main frames, each with the size of 1 in its unit, and the unit.
-fn topic(name: String, headers: &Headers) -> Topic {
-    let fields: Vec<&str> = headers.main_frame_def().iter().map(|FieldDef { name, .. }| name).collect();
+fn topic(name: String, log: &BlackboxLog) -> Topic {
+    let fields: Vec<&str> = log.fields().iter().map(|field| field.name).collect();
     let at = |name: &str| fields.iter().position(|field| *field == name);
+    // Baseflight's own scale has another unit. Cleanflight is what Betaflight and INAV state too.
+    let rate = if log.header("Firmware type") == Some("Cleanflight") { "deg/s" } else { "" };
     let unit = |name: &str| match name {
-        name if RATES.contains(&name) => "deg/s",
+        name if RATES.contains(&name) => rate,
         name if FORCES.contains(&name) => "g",
         _ => "",
     };
@@ -81,56 +78,46 @@ fn topic(name: String, headers: &Headers) -> Topic {
         columns: vec![("time", fields.len(), None), ("sample", fields.len() + 1, None)],
         ..TopicSensor::default()
     };
-    for (names, channels, unit) in [(RATES, GYROSCOPE, "deg/s"), (FORCES, ACCELEROMETER, "g")] {
+    for (names, channels, unit) in [(RATES, GYROSCOPE, rate), (FORCES, ACCELEROMETER, "g")] {
         if let [Some(x), Some(y), Some(z)] = names.map(at) {
             sensor.add_axes(channels, [x, y, z], unit);
         }
     }
     sensor.note = Some("gyroADC is what the flight controller has filtered and rounded".to_owned());
     let sensors = Some(sensor).filter(|sensor| sensor.has(GYROSCOPE[0])).into_iter().collect();
-    let kind = headers.firmware_revision().split(" (").next().unwrap_or_default().to_owned();
+    let revision = log.header("Firmware revision").unwrap_or_default();
+    let kind = revision.split(" (").next().unwrap_or_default().to_owned();
     Topic { name, kind, columns, sensors, ..Topic::default() }
 }
 
-/// The value of a line such as `H acc_1G:2048` in the header of a log.
-fn header<'a>(log: &'a [u8], name: &str) -> Option<&'a str> {
-    let lines = log.split(|byte| *byte == b'\n').take_while(|line| line.starts_with(b"H "));
-    let value =
-        |line: &'a [u8]| std::str::from_utf8(line).ok()?.strip_prefix("H ")?.strip_prefix(name)?.strip_prefix(':');
-    lines.filter_map(value).next().map(str::trim)
+/// deg/s in a count of the gyroscope: `gyro_scale` is the bits of a float, and a log of high resolution has tenths of it.
+fn rate_scale(log: &BlackboxLog) -> f64 {
+    let bits = log.header("gyro_scale").and_then(|text| u32::from_str_radix(text.trim_start_matches("0x"), 16).ok());
+    let scale = bits.map_or(1.0, |bits| f64::from(f32::from_bits(bits)));
+    if log.header("blackbox_high_resolution") == Some("1") { scale / 10.0 } else { scale }
 }
 
-/// deg/s in a count of the gyroscope: `gyro_scale` is the bits of a float, and a log of high resolution has tenths of it.
-fn rate_scale(log: &[u8]) -> f64 {
-    let bits = header(log, "gyro_scale").and_then(|text| u32::from_str_radix(text.trim_start_matches("0x"), 16).ok());
-    let scale = bits.map_or(1.0, |bits| f64::from(f32::from_bits(bits)));
-    if header(log, "blackbox_high_resolution") == Some("1") { scale / 10.0 } else { scale }
+/// g in a count of the accelerometer.
+fn force_scale(log: &BlackboxLog) -> f64 {
+    let counts = log.header("acc_1G").and_then(|text| text.parse::<f64>().ok()).filter(|counts| *counts > 0.0);
+    counts.map_or(f64::NAN, f64::recip)
 }
 
 /// Part of the median by which the steps between neighbours differ at most.
 const JITTER: f64 = 0.1;
 
 /// The usual time between two frames, us: the mean of the steps near the median. `None` of fewer than two frames.
-fn usual_step(headers: &Headers) -> Option<f64> {
-    let mut frames = headers.data_parser();
+fn usual_step(log: &BlackboxLog) -> Option<f64> {
     let (mut steps, mut last) = (Vec::new(), None);
-    while let Some(event) = frames.next() {
-        if let ParserEvent::Main(frame) = event {
-            let time = frame.time_raw();
-            steps.extend(last.filter(|last| *last < time).map(|last| (time - last) as f64));
-            last = Some(time);
-        }
-    }
+    let Ok(_) = log.for_each_frame(|_, time| -> Result<(), Infallible> {
+        steps.extend(last.filter(|last| *last < time).map(|last| (time - last) as f64));
+        last = Some(time);
+        Ok(())
+    });
     let middle = steps.len() / 2;
     let median = (!steps.is_empty()).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1)?;
     steps.retain(|step| (step / median - 1.0).abs() <= JITTER);
     Some(steps.iter().sum::<f64>() / steps.len() as f64)
-}
-
-/// g in a count of the accelerometer.
-fn force_scale(log: &[u8]) -> f64 {
-    let counts = header(log, "acc_1G").and_then(|text| text.parse::<f64>().ok()).filter(|counts| *counts > 0.0);
-    counts.map_or(f64::NAN, f64::recip)
 }
 
 impl Source for BlackboxSource<'_> {
@@ -144,39 +131,41 @@ impl Source for BlackboxSource<'_> {
 
     fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError> {
         let fail = |reason| InputError::file(self.file, reason);
-        let log = &self.bytes[self.ranges[topic].clone()];
-        let headers = headers(log).map_err(fail)?;
-        let fields: Vec<(&str, bool)> =
-            headers.main_frame_def().iter().map(|FieldDef { name, signed, .. }| (name, signed)).collect();
-        let (rate, force) = (rate_scale(log), force_scale(log));
-        let scale = |&column: &usize| match fields.get(column) {
-            Some((name, _)) if RATES.contains(name) => Some(rate),
-            Some((name, _)) if FORCES.contains(name) => Some(force),
+        let log = parse(&self.bytes[self.ranges[topic].clone()]).map_err(fail)?;
+        let fields = log.fields();
+        let (rate, force) = (rate_scale(&log), force_scale(&log));
+        let scale = |&column: &usize| match fields.get(column).map(|field| field.name) {
+            Some(name) if RATES.contains(&name) => Some(rate),
+            Some(name) if FORCES.contains(&name) => Some(force),
             _ => None,
         };
         let scales: Vec<Option<f64>> = columns.iter().map(scale).collect();
         // The clock of the samples is regular: a frame is at the nearest of its ticks, and later than the one before.
-        let step = usual_step(&headers).unwrap_or(1.0);
+        let step = usual_step(&log).unwrap_or(1.0);
         let (mut number, mut first) = (-1i64, None);
-        let mut frames = headers.data_parser();
         let mut row = Vec::with_capacity(columns.len());
-        while let Some(event) = frames.next() {
-            let ParserEvent::Main(frame) = event else { continue };
-            let time = frame.time_raw();
-            let ticks = (time.saturating_sub(*first.get_or_insert(time)) as f64 / step).round() as i64;
+        let damage = log.for_each_frame(|values, time| {
+            let ticks = ((time - *first.get_or_insert(time)) as f64 / step).round() as i64;
             number = ticks.max(number.saturating_add(1));
             row.clear();
             for (&column, scale) in columns.iter().zip(&scales) {
-                let field = match (fields.get(column), frame.get_raw(column)) {
-                    (Some((_, true)), Some(raw)) => Number::Integer(i64::from(raw.cast_signed())),
-                    (Some((_, false)), Some(raw)) => Number::Integer(i64::from(raw)),
+                row.push(match (values.get(column), scale) {
+                    (Some(value), Some(scale)) => Number::Real(scale * *value as f64),
+                    (Some(value), None) => Number::Integer(*value),
                     _ if column == fields.len() + 1 => Number::Integer(number),
-                    _ => i64::try_from(time).map_or(Number::Real(f64::NAN), Number::Integer),
-                };
-                row.push(scale.map_or(field, |scale| Number::Real(scale * field.value())));
+                    _ => Number::Integer(time),
+                });
             }
-            each(&row)?;
-        }
-        Ok(Ending::default())
+            each(&row)
+        })?;
+        Ok(Ending { notes: notes(damage), ..Ending::default() })
     }
+}
+
+/// What the user should know of damaged places.
+fn notes(Damage { places, frames }: Damage) -> Vec<String> {
+    let note = format!(
+        "the log is damaged at {places} places; what is lost there, and {frames} P frames up to the next I frames, are gaps"
+    );
+    if places > 0 { vec![note] } else { Vec::new() }
 }
