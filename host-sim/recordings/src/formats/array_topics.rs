@@ -8,7 +8,7 @@ use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
 use crate::tables::any_sensor::ReadOptions;
 use crate::tables::sensor_table::Number;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 
 /// Names of vectors whose unit is a matter of course, as in NaveGo and in textbooks on strapdown navigation.
@@ -137,29 +137,24 @@ impl<'a, R: ArrayReader> ArraySource<'a, R> {
             .flat_map(|(number, array)| (0..array.columns.len()).map(move |column| (number, column)))
             .collect();
         let mut source = Self { file, reader, arrays, topics: Vec::new(), places, members: Vec::new(), budget };
-        source.add_topic(String::new(), |_| true);
-        let mut groups: Vec<String> = Vec::new();
-        for array in &source.arrays {
-            if !groups.contains(&array.group) {
-                groups.push(array.group.clone());
-            }
-        }
-        for group in groups {
-            let name = group.trim_end_matches(['.', '/']).to_owned();
-            let topic =
-                if name.is_empty() { 0 } else { source.add_topic(name, |array| array.group.starts_with(&group)) };
-            source.topics[topic].sensors = source.sensor(&group, topic).into_iter().collect();
-        }
         let paths: Vec<String> = source.arrays.iter().map(NamedArray::path).collect();
-        for path in paths.into_iter().filter(|path| !path.is_empty()) {
-            source.add_topic(path.clone(), |array| array.path() == path);
+        let groups_of: Vec<String> = source.arrays.iter().map(|array| array.group.clone()).collect();
+        source.add_topic(String::new(), |_| true);
+        let mut known = HashSet::new();
+        for group in groups_of.iter().filter(|group| known.insert(group.as_str())) {
+            let name = group.trim_end_matches(['.', '/']).to_owned();
+            let topic = if name.is_empty() { 0 } else { source.add_topic(name, |at| groups_of[at].starts_with(group)) };
+            source.topics[topic].sensors = source.sensor(group, topic).into_iter().collect();
+        }
+        for path in paths.iter().filter(|path| !path.is_empty()) {
+            source.add_topic(path.clone(), |at| paths[at] == *path);
         }
         source
     }
 
-    fn add_topic(&mut self, name: String, is_member: impl Fn(&NamedArray) -> bool) -> usize {
-        let members: Vec<usize> =
-            (0..self.places.len()).filter(|&at| is_member(&self.arrays[self.places[at].0])).collect();
+    /// Adds a topic of the arrays whose numbers are members.
+    fn add_topic(&mut self, name: String, is_member: impl Fn(usize) -> bool) -> usize {
+        let members: Vec<usize> = (0..self.places.len()).filter(|&at| is_member(self.places[at].0)).collect();
         let available = |&at: &usize| {
             let (number, column) = self.places[at];
             self.arrays[number].available(&self.arrays[number].path(), column)

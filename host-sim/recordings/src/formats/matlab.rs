@@ -16,10 +16,13 @@ const FORMAT: &str = "MATLAB";
 
 /// Columns of a matrix beyond which it is no recording.
 const MAX_COLUMNS: usize = 1024;
-/// Elements of an array of structures or of cells, and fields of a structure, beyond which it is no recording.
+/// Elements of an array of cells or of structures with arrays, and fields of a structure, beyond which it is no recording.
 const MAX_CHILDREN: usize = 1024;
-/// Arrays of a file.
-const MAX_ARRAYS: usize = 1 << 16;
+/// Numbers of a field of a structure that are a sample, and not an array of samples.
+const MAX_IN_SAMPLE: usize = 16;
+/// Arrays of a file; and those with every sample of an array of structures.
+const MAX_ARRAYS: usize = 1 << 12;
+const MAX_PARTS: usize = 1 << 20;
 /// Bytes of a name.
 const MAX_NAME: u64 = 256;
 /// Bytes that are decoded at once; a multiple of every number's.
@@ -93,11 +96,50 @@ pub(crate) fn is_level_4(head: &[u8]) -> bool {
     })
 }
 
+/// A matrix of a file, or a field of an array of structures that have a sample each.
+#[derive(Debug, Clone)]
+struct ListedArray {
+    group: String,
+    name: String,
+    sides: [usize; 2],
+    parts: Parts,
+}
+
+/// The matrices, by their numbers in the file, of which an array is made: one, or one of each structure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Parts {
+    first: usize,
+    stride: usize,
+    /// `None` of a matrix.
+    structures: Option<usize>,
+}
+
+impl Parts {
+    fn contain(self, number: usize) -> bool {
+        let from = number.checked_sub(self.first);
+        from.is_some_and(|from| from % self.stride == 0 && from / self.stride < self.count())
+    }
+
+    fn count(self) -> usize {
+        self.structures.unwrap_or(1)
+    }
+}
+
+impl ListedArray {
+    /// Samples, and numbers in each.
+    fn shape(&self) -> [usize; 2] {
+        let [rows, columns] = self.sides;
+        match self.parts.structures {
+            Some(count) => [count, rows * columns],
+            None => [rows.max(columns), rows.min(columns)],
+        }
+    }
+}
+
 /// An open `.mat` file, which is read from its beginning for each array.
 pub(crate) struct MatReader {
     file: PathBuf,
-    /// Lengths of the two sides of each array.
-    sides: Vec<[usize; 2]>,
+    arrays: Vec<ListedArray>,
     budget: Budget,
 }
 
@@ -106,12 +148,13 @@ impl MatReader {
         let fail = |reason| InputError::file(file, reason);
         let mut listing = Walk::new(budget);
         listing.file(file).map_err(fail)?;
-        let array = |(group, name, [rows, columns]): &(String, String, [usize; 2])| {
-            NamedArray::matrix(group, name, (*rows).max(*columns), (*rows).min(*columns))
+        let array = |array: &ListedArray| {
+            let [rows, columns] = array.shape();
+            NamedArray::matrix(&array.group, &array.name, rows, columns)
         };
         let arrays = listing.arrays.iter().map(array).collect();
-        let sides = listing.arrays.into_iter().map(|(.., sides)| sides).collect();
-        Ok(ArraySource::new(file, Self { file: file.to_owned(), sides, budget }, arrays, budget))
+        let reader = Self { file: file.to_owned(), arrays: listing.arrays, budget };
+        Ok(ArraySource::new(file, reader, arrays, budget))
     }
 }
 
@@ -124,31 +167,46 @@ impl ArrayReader for MatReader {
         columns: &[usize],
         add: &mut dyn FnMut(u64) -> Result<(), Reason>,
     ) -> Result<Vec<Vec<Number>>, Reason> {
-        let rows = self.sides[array][0].max(self.sides[array][1]) as u64;
+        let rows = self.arrays[array].shape()[0] as u64;
         if rows > MAX_SAMPLES {
             return Err(Reason::TooManySamples);
         }
         add(rows * columns.len() as u64)?;
-        let mut walk = Walk { wanted: Some((array, columns)), ..Walk::new(self.budget) };
+        let mut walk = Walk::new(self.budget);
+        walk.values = vec![Vec::new(); columns.len()];
+        walk.wanted = Some((self.arrays[array].parts, columns));
         walk.file(&self.file)?;
-        walk.values.ok_or(Reason::Truncated { format: FORMAT })
+        if walk.is_done() { Ok(walk.values) } else { Err(Reason::Truncated { format: FORMAT }) }
     }
 }
 
 /// A way through all data elements of a file: to list its arrays, or to read one of them.
 struct Walk<'a> {
-    /// Number of the array that is read, and its columns.
-    wanted: Option<(usize, &'a [usize])>,
-    /// Group, name and sides of each array until now.
-    arrays: Vec<(String, String, [usize; 2])>,
-    values: Option<Vec<Vec<Number>>>,
+    /// What is read, and its columns.
+    wanted: Option<(Parts, &'a [usize])>,
+    arrays: Vec<ListedArray>,
+    /// Matrices until now, and those of them that were read.
+    walked: usize,
+    taken: usize,
+    values: Vec<Vec<Number>>,
     is_big_endian: bool,
     meter: Meter,
 }
 
 impl Walk<'_> {
     fn new(budget: Budget) -> Self {
-        Self { wanted: None, arrays: Vec::new(), values: None, is_big_endian: false, meter: budget.meter() }
+        let meter = budget.meter();
+        Self { wanted: None, arrays: Vec::new(), walked: 0, taken: 0, values: Vec::new(), is_big_endian: false, meter }
+    }
+
+    /// Whether all that is wanted has been read.
+    fn is_done(&self) -> bool {
+        self.wanted.is_some_and(|(parts, _)| self.taken == parts.count())
+    }
+
+    /// Whether the matrix that comes is to be read.
+    fn takes_next(&self) -> bool {
+        self.wanted.is_some_and(|(parts, _)| parts.contain(self.walked))
     }
 
     fn file(&mut self, file: &Path) -> Result<(), Reason> {
@@ -160,7 +218,7 @@ impl Walk<'_> {
         input.read_exact(&mut header).map_err(ended)?;
         self.is_big_endian = header.ends_with(b"MI");
         let mut bytes = [0; TAG_BYTES];
-        while self.values.is_none() && input.read_exact(&mut bytes).is_ok() {
+        while !self.is_done() && input.read_exact(&mut bytes).is_ok() {
             let tag = Tag::read(&mut bytes.as_slice(), self.is_big_endian)?;
             let mut element = input.by_ref().take(u64::from(tag.length));
             let mut padding = 0;
@@ -179,10 +237,13 @@ impl Walk<'_> {
                 element.set_limit(0);
             }
             io::copy(&mut element, &mut io::sink()).map_err(ended)?;
-            if element.limit() > 0 && self.values.is_none() {
+            if element.limit() > 0 && !self.is_done() {
                 return Err(Reason::Truncated { format: FORMAT });
             }
             io::copy(&mut input.by_ref().take(padding), &mut io::sink()).map_err(ended)?;
+            if self.arrays.len() > MAX_ARRAYS {
+                return Err(Reason::Array(format!("more than {MAX_ARRAYS} arrays")));
+            }
         }
         Ok(())
     }
@@ -190,7 +251,7 @@ impl Walk<'_> {
     /// The matrices of a file of level 4.
     fn matrices_4(&mut self, mut input: BufReader<File>) -> Result<(), Reason> {
         let mut header = [0; HEADER_4_BYTES];
-        while self.values.is_none() && input.read_exact(&mut header).is_ok() {
+        while !self.is_done() && input.read_exact(&mut header).is_ok() {
             let damaged = || Reason::Format { format: FORMAT, error: "no header of a matrix of level 4".into() };
             let matrix = Matrix4::parse(&header).ok_or_else(damaged)?;
             self.is_big_endian = matrix.is_big_endian;
@@ -200,8 +261,8 @@ impl Walk<'_> {
             let mut element = input.by_ref().take(matrix.bytes);
             let is_recording = matrix.bytes > 0 && matrix.sides[0].min(matrix.sides[1]) <= MAX_COLUMNS;
             if let Some(scalar) = matrix.scalar.filter(|_| is_recording) {
-                if self.wanted.is_some_and(|(wanted, _)| wanted == self.arrays.len()) {
-                    self.values = Some(self.columns(&mut element, matrix.sides, scalar, matrix.bytes)?);
+                if self.takes_next() {
+                    self.columns(&mut element, matrix.sides, scalar, matrix.bytes)?;
                 }
                 self.add(String::new(), name, matrix.sides)?;
             }
@@ -216,9 +277,36 @@ impl Walk<'_> {
     }
 
     fn add(&mut self, group: String, name: String, sides: [usize; 2]) -> Result<(), Reason> {
-        self.arrays.push((group, name, sides));
-        let most = MAX_ARRAYS;
-        if self.arrays.len() > most { Err(Reason::Array(format!("more than {most} arrays"))) } else { Ok(()) }
+        let parts = Parts { first: self.walked, stride: 1, structures: None };
+        self.arrays.push(ListedArray { group, name, sides, parts });
+        self.walked += 1;
+        let most = MAX_PARTS;
+        if self.walked > most { Err(Reason::Array(format!("more than {most} arrays"))) } else { Ok(()) }
+    }
+
+    /// Joins the arrays from `start` on, those of `count` structures `group`, where each structure has the same fields with a sample each;
+    /// else leaves out those of so many structures that they are no recording.
+    fn join(&mut self, start: usize, count: usize, group: &str) {
+        let all = &self.arrays[start..];
+        let fields = all.len() / count;
+        let place = |at: usize| all[at].group.strip_prefix(&inner_group(group, at / fields));
+        let is_alike = |at: usize| {
+            let (one, first) = (&all[at], &all[at % fields]);
+            let is_sample = one.parts.structures.is_none() && one.sides[0] * one.sides[1] <= MAX_IN_SAMPLE;
+            is_sample && (&one.name, one.sides, place(at)) == (&first.name, first.sides, place(at % fields))
+        };
+        if fields > 0 && fields * count == all.len() && (0..all.len()).all(is_alike) {
+            let joined = |at: usize| ListedArray {
+                group: format!("{group}.{}", place(at).unwrap_or_default()),
+                parts: Parts { stride: fields, structures: Some(count), ..all[at].parts },
+                ..all[at].clone()
+            };
+            let joined: Vec<ListedArray> = (0..fields).map(joined).collect();
+            self.arrays.truncate(start);
+            self.arrays.extend(joined);
+        } else if count > MAX_CHILDREN {
+            self.arrays.truncate(start);
+        }
     }
 
     /// A data element of the outermost level, which is an array or is left out.
@@ -253,20 +341,22 @@ impl Walk<'_> {
             (class, &[rows, columns])
                 if NUMERIC.contains(&class) && rows.min(columns) <= MAX_COLUMNS && elements > 0 =>
             {
-                let is_wanted = self.wanted.is_some_and(|(wanted, _)| wanted == self.arrays.len());
-                if is_wanted {
-                    self.values = Some(self.numbers(input, [rows, columns])?);
+                if self.takes_next() {
+                    self.numbers(input, [rows, columns])?;
                 }
                 self.add(group.to_owned(), name, [rows, columns])?;
             }
-            (STRUCTURE, _) if elements <= MAX_CHILDREN => {
+            (STRUCTURE, _) if elements <= MAX_PARTS => {
                 let fields = self.fields(input)?;
+                let (start, group) = (self.arrays.len(), format!("{group}{name}"));
                 for element in 0..elements {
-                    let inner =
-                        if elements == 1 { format!("{group}{name}.") } else { format!("{group}{name}.{element}.") };
+                    let inner = if elements == 1 { format!("{group}.") } else { inner_group(&group, element) };
                     for field in &fields {
                         self.child(input, &inner, field.clone(), level)?;
                     }
+                }
+                if elements > 1 {
+                    self.join(start, elements, &group);
                 }
             }
             (CELL, _) if elements <= MAX_CHILDREN => {
@@ -276,14 +366,14 @@ impl Walk<'_> {
             }
             _ => {}
         }
-        if self.values.is_some() {
+        if self.is_done() {
             return Ok(());
         }
         input.skip(end.saturating_sub(input.at))
     }
 
     fn child(&mut self, input: &mut Counted, group: &str, name: String, level: usize) -> Result<(), Reason> {
-        if self.values.is_some() {
+        if self.is_done() {
             return Ok(());
         }
         let tag = Tag::read(input, self.is_big_endian)?;
@@ -334,8 +424,8 @@ impl Walk<'_> {
         Ok(bytes)
     }
 
-    /// The wanted columns of the element of the real parts.
-    fn numbers(&mut self, input: &mut Counted, [rows, columns]: [usize; 2]) -> Result<Vec<Vec<Number>>, Reason> {
+    /// Takes the wanted columns of the element of the real parts.
+    fn numbers(&mut self, input: &mut Counted, [rows, columns]: [usize; 2]) -> Result<(), Reason> {
         let tag = Tag::read(input, self.is_big_endian)?;
         let unknown = || Reason::Format { format: FORMAT, error: "an array has numbers of an unknown type".into() };
         let scalar = match tag.kind {
@@ -359,26 +449,29 @@ impl Walk<'_> {
         }
     }
 
-    /// The wanted columns of the numbers of a matrix, which have so many bytes.
+    /// Takes the wanted columns of the numbers of a matrix, which have so many bytes.
     fn columns(
-        &self,
+        &mut self,
         input: &mut dyn Read,
         [rows, columns]: [usize; 2],
         scalar: Scalar,
         bytes: u64,
-    ) -> Result<Vec<Vec<Number>>, Reason> {
-        let wanted = self.wanted.map_or(&[][..], |(_, columns)| columns);
+    ) -> Result<(), Reason> {
+        let Some((parts, wanted)) = self.wanted else { return Ok(()) };
         let size = scalar.bytes();
-        let mut values: Vec<Vec<Number>> = vec![Vec::new(); wanted.len()];
-        // The first index varies fastest.
-        let is_by_column = rows >= columns;
+        let is_big_endian = self.is_big_endian;
         let mut at = 0;
         let mut take = |bytes: &[u8]| {
             for word in bytes.chunks_exact(size) {
-                let column = if is_by_column { at / rows } else { at % rows };
+                // The first index varies fastest.
+                let column = match parts.structures {
+                    Some(_) => at,
+                    None if rows >= columns => at / rows,
+                    None => at % rows,
+                };
                 at += 1;
-                for (values, _) in values.iter_mut().zip(wanted).filter(|(_, wanted)| **wanted == column) {
-                    values.push(scalar.number(number(word, self.is_big_endian)));
+                for (values, _) in self.values.iter_mut().zip(wanted).filter(|(_, wanted)| **wanted == column) {
+                    values.push(scalar.number(number(word, is_big_endian)));
                 }
             }
         };
@@ -390,8 +483,14 @@ impl Walk<'_> {
             take(&buffer[..count]);
             left -= count as u64;
         }
-        Ok(values)
+        self.taken += 1;
+        Ok(())
     }
+}
+
+/// The group of the fields of a structure in an array of them.
+fn inner_group(group: &str, element: usize) -> String {
+    format!("{group}.{element}.")
 }
 
 /// A number of up to 8 bytes.
