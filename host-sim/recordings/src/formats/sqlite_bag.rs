@@ -61,10 +61,11 @@ impl<'a> SqliteSource<'a> {
     }
 }
 
-/// Whether the database has this table; a view is none.
+/// Whether the database has this table. A view is none, nor is a table with columns that are computed: the file could make them of any size.
 fn has_table(database: &Connection, name: &str) -> rusqlite::Result<bool> {
-    let mut query = database.prepare("SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ?")?;
-    query.exists((name,))
+    let computed = "SELECT 1 FROM pragma_table_xinfo(sqlite_master.name) WHERE hidden <> 0";
+    let text = format!("SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ? AND NOT EXISTS ({computed})");
+    database.prepare(&text)?.exists((name,))
 }
 
 /// Names of the tables and views; of many the first.
@@ -139,5 +140,55 @@ impl Source for SqliteSource<'_> {
             }
         };
         Ok(Ending { damage, notes: rows.notes(), rate_hz: None })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::SqliteSource;
+    use crate::formats::topics::Source;
+    use crate::input::budget::Budget;
+    use crate::input::input_error::{InputError, Reason};
+    use rusqlite::Connection;
+    use std::path::PathBuf;
+    use tempfile::{TempDir, tempdir};
+
+    const TOPICS: &str = "CREATE TABLE topics(id INTEGER, name TEXT, type TEXT);";
+    const MESSAGES: &str = "CREATE TABLE messages(id INTEGER, topic_id INTEGER, timestamp INTEGER, data BLOB);";
+
+    fn database(statements: &[&str]) -> (TempDir, PathBuf) {
+        let dir = tempdir().expect("a folder");
+        let file = dir.path().join("bag.db3");
+        Connection::open(&file).expect("a database").execute_batch(&statements.concat()).expect("written");
+        (dir, file)
+    }
+
+    fn reason(opened: Result<SqliteSource, InputError>) -> Option<Reason> {
+        opened.err().map(|error| error.reason)
+    }
+
+    #[test]
+    fn a_query_that_takes_longer_than_the_budget_is_stopped() {
+        // Enough topics that the database looks at the clock while it sorts them.
+        let rows = "WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c LIMIT 20000)
+            INSERT INTO topics SELECT x, 'a', 'b' FROM c;";
+        let (_dir, file) = database(&[TOPICS, MESSAGES, rows]);
+        let opened = SqliteSource::open(&file, Budget::new(0)).expect("a bag");
+        assert_eq!(opened.topics().len(), 20_000);
+        let stopped = reason(SqliteSource::open(&file, Budget::spent()));
+        assert!(matches!(stopped, Some(Reason::TooSlow { .. })), "{stopped:?}");
+    }
+
+    #[test]
+    fn a_table_whose_columns_are_computed_is_none() {
+        let computed =
+            "CREATE TABLE messages(id INTEGER, topic_id INTEGER, timestamp INTEGER, data AS (zeroblob(900000000)));";
+        for statements in
+            [[TOPICS, computed], ["CREATE TABLE topics(id INTEGER, name AS (hex(zeroblob(id))), type TEXT);", MESSAGES]]
+        {
+            let (_dir, file) = database(&statements);
+            let refused = reason(SqliteSource::open(&file, Budget::new(0)));
+            assert!(matches!(refused, Some(Reason::NoSensor { .. })), "{refused:?}");
+        }
     }
 }

@@ -53,6 +53,13 @@ impl Budget {
         Ok(Self::new(if metadata.is_file() { metadata.len() } else { u64::MAX }))
     }
 
+    /// Without any time left.
+    #[cfg(test)]
+    pub(crate) fn spent() -> Self {
+        let budget = Self::new(0);
+        Self { end: budget.end.and_then(|end| end.checked_sub(budget.time)), ..budget }
+    }
+
     /// The same for another reading, from now on.
     pub(crate) fn again(self) -> Self {
         Self { end: Instant::now().checked_add(self.time), ..self }
