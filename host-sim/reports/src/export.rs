@@ -69,7 +69,7 @@ const NOISES: [&str; 3] = ["angle_random_walk", "bias_instability", "rate_random
 /// Refuses what a file of another program cannot hold as what it is.
 fn check(report: &SavedReport) -> Result<(), ExportError> {
     let name = |text: &String| {
-        let is_name = !text.chars().any(|c| c.is_control() || ",\"'\\".contains(c));
+        let is_name = text.chars().all(|c| c.is_alphanumeric() || " _-./^*()[]%°".contains(c));
         if is_name { Ok(()) } else { Err(ExportError::NoName(text.clone())) }
     };
     for channel in &report.channels {
@@ -107,4 +107,47 @@ fn table(report: &SavedReport) -> String {
         }
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{AxisChoice, ExportError, ExportFormat, export};
+    use crate::saved_report::SavedReport;
+    use clap::ValueEnum;
+
+    /// A report with one term of every axis.
+    fn report(value: &str, name: &str) -> SavedReport {
+        let term = format!(
+            r#"{{"kind":"angle_random_walk","parameters":{{"value":{{"value":{value},"low":0.0,"high":null,"unit":"deg/sqrt(s)"}}}}}}"#
+        );
+        let channel = |name: &str, unit: &str| {
+            format!(r#"{{"name":"{name}","unit":"{unit}","curve":[],"final":{{"terms":[{term}],"adev":[]}}}}"#)
+        };
+        let axes =
+            |sensor: &str, unit: &str| ["x", "y", "z"].map(|axis| channel(&format!("{sensor}_{axis}"), unit)).join(",");
+        let own = channel(name, "deg/s");
+        let channels = [axes("gyro", "deg/s"), axes("accl", "g"), own].join(",");
+        SavedReport::from_json(&format!(r#"{{"schema":1,"sample_rate_hz":100.0,"channels":[{channels}]}}"#))
+            .expect("a report")
+    }
+
+    /// A report may have been changed by hand. What no file can hold as what it is ends in an error of every format.
+    #[test]
+    fn impossible_numbers_and_names_are_refused_by_every_format() {
+        for format in ExportFormat::value_variants() {
+            let written = |value: &str, name: &str| export(&report(value, name), *format, AxisChoice::Rms);
+            // A format may ask for terms that are not there.
+            let sound = written("0.01", "gyro_w");
+            let is_refused = matches!(sound, Err(ExportError::NoCoefficient { .. } | ExportError::NoName(_)));
+            assert!(!is_refused, "{format:?}");
+            for value in ["-1e308", "1e308", "-0.01"] {
+                let refused = written(value, "gyro_w");
+                assert!(matches!(refused, Err(ExportError::NoCoefficient { .. })), "{format:?} of {value}");
+            }
+            for name in [r"gyro\u001b[31m", r"gyro\n_x", "gyro,x", r"gyro\u202e"] {
+                let refused = written("0.01", name);
+                assert!(matches!(refused, Err(ExportError::NoName(_))), "{format:?} of {name}");
+            }
+        }
+    }
 }

@@ -25,24 +25,42 @@ fn is_refused(output: &Output) {
 }
 
 #[test]
-fn no_input_is_written_whatever_it_is_called() {
+fn the_profile_of_the_sensor_is_an_input() {
     let dir = tempdir().expect("a folder");
     let rows = table(&dir);
-    let content = fs::read(&rows).expect("rows");
-    // The profile of the sensor is read too.
     let profile = write(&dir, "p.toml", b"name = \"x\"\n");
     is_refused(&host_sim(&["analyze", name(&rows), "--sensor", name(&profile), "--json", name(&profile)]));
     assert_eq!(fs::read(&profile).expect("the profile"), b"name = \"x\"\n");
-    // Another name of the same file.
+}
+
+#[test]
+fn another_name_of_an_input_is_the_input() {
+    let dir = tempdir().expect("a folder");
+    let rows = table(&dir);
+    let content = fs::read(&rows).expect("rows");
     let hard = dir.path().join("hard.csv");
     fs::hard_link(&rows, &hard).expect("a link");
     is_refused(&host_sim(&["analyze", name(&rows), "--json", name(&hard)]));
-    // A figure that leads to it.
+    assert!(fs::read(&rows).expect("the input") == content);
+}
+
+#[test]
+fn a_picture_that_leads_to_an_input_is_the_input() {
+    let dir = tempdir().expect("a folder");
+    let rows = table(&dir);
+    let content = fs::read(&rows).expect("rows");
     let pictures = dir.path().join("pictures");
     fs::create_dir(&pictures).expect("a folder");
     std::os::unix::fs::symlink(&rows, pictures.join("gyro_x-allan.svg")).expect("a link");
     is_refused(&host_sim(&["analyze", name(&rows), "--pictures", name(&pictures)]));
-    // Standard input.
+    assert!(fs::read(&rows).expect("the input") == content);
+}
+
+#[test]
+fn the_file_on_standard_input_is_an_input() {
+    let dir = tempdir().expect("a folder");
+    let rows = table(&dir);
+    let content = fs::read(&rows).expect("rows");
     let output = Command::new(PROGRAM)
         .args(["analyze", "-", "--json", name(&rows)])
         .stdin(File::open(&rows).expect("rows"))

@@ -41,7 +41,7 @@ pub enum ExportError {
         /// As the report has it.
         value: String,
     },
-    /// A name that would be read as something else: it has control characters, a comma or a quotation mark.
+    /// A name that could be read as something else: it has characters such as a comma, a quotation mark or a control character.
     #[error("{0:?} is no name of a channel, a term or a unit: the report is damaged")]
     NoName(String),
 }
