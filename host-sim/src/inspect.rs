@@ -10,6 +10,7 @@ use recordings::inspection::{ColumnGuess, InspectedColumn, InspectedTable, Propo
 use recordings::sample_stream::StreamError;
 use recordings::time_base::TimeBaseError;
 use recordings::{ColumnSelection, InputError, Printable, Reason};
+use reports::rounding::plain;
 use std::fmt::{self, Display, Write as _};
 use std::io::Write;
 use std::path::Path;
@@ -287,23 +288,24 @@ fn line(column: &InspectedColumn, reason: &str) -> [String; 7] {
         unit.unwrap_or("").to_owned(),
         if is_number { first.join(" ") } else { "no numbers".to_owned() },
         if is_number { short(*mean) } else { String::new() },
-        if is_number { short(*noise) } else { String::new() },
+        if is_number { rounded(*noise, 3) } else { String::new() },
         step.map_or_else(String::new, short),
         guess,
     ]
 }
 
-/// A number in six digits.
+/// A number in six digits; whole ones have all of theirs.
 fn short(value: f64) -> String {
+    if value.fract() == 0.0 && value.abs() < 1e20 { format!("{value:.0}") } else { rounded(value, 6) }
+}
+
+/// A number in so many significant digits.
+fn rounded(value: f64, digits: i32) -> String {
     let magnitude = value.abs();
-    if value.fract() == 0.0 && magnitude < 1e20 {
-        format!("{value:.0}")
-    } else if value == 0.0 || (1e-3..1e7).contains(&magnitude) {
-        let decimals = (5.0 - magnitude.max(1e-3).log10().floor()).clamp(0.0, 8.0) as usize;
-        let text = format!("{value:.decimals$}");
-        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    if value == 0.0 || (1e-3..1e7).contains(&magnitude) {
+        plain(value, digits)
     } else {
-        format!("{value:.5e}")
+        format!("{value:.*e}", digits as usize - 1)
     }
 }
 
