@@ -2,9 +2,6 @@
 
 use serde_json::Value;
 
-/// Degrees of freedom of a point from which on its bounds are those of the exact distribution (`allan_core`, confidence).
-const LEAST_EDF: f64 = 3.0;
-
 /// The first contradiction in a report.
 pub(crate) fn contradiction(report: &Value) -> Option<String> {
     let rate_hz = report["sample_rate_hz"].as_f64()?;
@@ -38,9 +35,7 @@ fn outside_of_its_bounds(value: &Value, path: &str) -> Option<String> {
             let number = |name: &str| fields.get(name).and_then(Value::as_f64);
             if let (Some(low), Some(high)) = (number("low"), number("high")) {
                 let estimate = number("value").or(number("adev"));
-                // Of fewer the bounds of a point are no quantiles: the approximation is one for this range.
-                let is_known = number("edf").is_none_or(|edf| edf >= LEAST_EDF);
-                if is_known && (low > high || estimate.is_some_and(|estimate| !(low..=high).contains(&estimate))) {
+                if low > high || estimate.is_some_and(|estimate| !(low..=high).contains(&estimate)) {
                     return Some(format!("{path}: {estimate:?} within {low} and {high}"));
                 }
             }
