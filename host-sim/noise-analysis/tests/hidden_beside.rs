@@ -108,3 +108,28 @@ fn half_a_second_is_a_knock() {
         }
     }
 }
+
+/// A damped oscillation of 60 times the noise in one channel, of 8 times in another, where single samples stand out of it, and ten
+/// spikes of 12 times the noise in a third: a knock in two channels, and spikes where they are.
+#[test]
+fn what_stands_out_during_a_knock_of_another_channel_is_the_knock() {
+    const RATE_HZ: f64 = 100.0;
+    const SAMPLES: usize = 60_000;
+    const START: usize = 20_000;
+    for seed in 0..3 {
+        let channel = |knock: f64, spikes: usize| -> Vec<f64> {
+            let mut random = ChaCha8Rng::seed_from_u64(seed + (knock as u64) + 100 * spikes as u64);
+            let value = |at: usize| {
+                let time_s = (at as f64 - START as f64) / RATE_HZ;
+                let decay = if time_s < 0.0 { 0.0 } else { (-time_s / 0.1).exp() * (TAU * 20.0 * time_s).sin() };
+                let is_spike = spikes > 0 && at % (SAMPLES / spikes) == 5_000;
+                20.0 * (random.sample::<f64, _>(StandardNormal) + knock * decay + if is_spike { 12.0 } else { 0.0 })
+            };
+            (0..SAMPLES).map(value).collect()
+        };
+        let channels = [("gyro_x", channel(60.0, 0)), ("gyro_y", channel(8.0, 0)), ("gyro_z", channel(0.0, 10))];
+        let report = record(RATE_HZ, &channels);
+        let found: Vec<Vec<&str>> = report.channels.iter().map(kinds).collect();
+        assert_eq!(found, [["knock"], ["knock"], ["spikes"]], "seed {seed}");
+    }
+}

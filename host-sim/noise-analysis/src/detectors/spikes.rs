@@ -32,6 +32,9 @@ const DECAYED: f64 = 0.3;
 /// Most that a disturbance is longer on either side than the samples that stand out, in the length of these.
 const LONGEST_DECAY: f64 = 4.0;
 
+/// Highest probability by which chance puts a spike into the time of a knock, where it is taken for a part of it.
+const COINCIDENCE: f64 = 0.05;
+
 /// Least fraction of the spikes that is assumed to exceed the threshold; bounds the rate that the detected ones imply.
 const LEAST_DETECTED: f64 = 0.05;
 
@@ -210,9 +213,34 @@ impl SpikeRule {
         (singles, disturbances)
     }
 
-    /// The disturbances in a part of the same channel.
-    pub(crate) fn disturbances(&self, series: &Series) -> Vec<Disturbance> {
-        self.separate(self.find(series), series.values.len() as u64).1
+    /// What `singles`, which stand out of `samples` samples, show of the `known` disturbances, those of other channels or of this one: each
+    /// of these ranges in which, or within its length of which, some stand out, and where chance puts one of the others in fewer than
+    /// one of twenty cases.
+    pub(crate) fn parts_of(&self, singles: &FoundSpikes, known: &[Range<u64>], samples: u64) -> Vec<Disturbance> {
+        let around = |known: &Range<u64>| {
+            let length = known.end - known.start;
+            known.start.saturating_sub(length)..known.end + length
+        };
+        let events = singles.events();
+        let is_within = |event: &Range<usize>, known: &Range<u64>| around(known).contains(&singles.slots[event.start]);
+        let others = events.iter().filter(|event| !known.iter().any(|known| is_within(event, known))).count();
+        let part = |known: &Range<u64>| {
+            let inside: Vec<usize> = events.iter().filter(|event| is_within(event, known)).cloned().flatten().collect();
+            let (first, last) = (singles.slots[*inside.first()?], singles.slots[*inside.last()?]);
+            let window = around(known);
+            // One more than those that are there, whose rate is not known better.
+            let expected = (others + 1) as f64 * (window.end - window.start) as f64 / samples.max(1) as f64;
+            let squares = inside.iter().map(|&at| (singles.sizes[at] / self.interpolation.deviation).powi(2));
+            let count = inside.len();
+            (expected < COINCIDENCE).then(|| Disturbance {
+                certain: first..last + 1,
+                slots: known.start.min(first.saturating_sub(REACH as u64))..known.end.max(last + 1 + REACH as u64),
+                level: (squares.sum::<f64>() / count as f64).sqrt(),
+                count,
+                p_value: expected,
+            })
+        };
+        known.iter().filter_map(part).collect()
     }
 
     /// The spikes of a channel in `unit` that was looked at for `hours`, in `samples` samples, as they are reported; `None` if there are

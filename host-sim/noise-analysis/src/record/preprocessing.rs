@@ -9,7 +9,7 @@ use crate::detectors::bias::{self, BiasChanges, BiasSensitivity};
 use crate::detectors::bias_response::BiasResponse;
 use crate::detectors::knocks::{self, Knock, KnockRule};
 use crate::detectors::noise_grid::NoiseGrids;
-use crate::detectors::spikes::{self, SpikeRule};
+use crate::detectors::spikes::{self, Disturbance, FoundSpikes, SpikeRule};
 use crate::detectors::vibration_rectification::{Acceleration, largest_sensitivity};
 use crate::effects::Effect;
 use crate::effects::findings::{Correction, Detection};
@@ -20,6 +20,7 @@ use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra;
 use measurement::{ChannelId, Measurement, PerChannel, Quantity};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Sample periods that one channel does not use, in ascending order.
@@ -254,6 +255,35 @@ impl ChannelExclusion {
     }
 }
 
+/// What stands out of the noise of one channel by single samples.
+struct StandingOut {
+    rule: SpikeRule,
+    disturbances: Vec<Disturbance>,
+    singles: FoundSpikes,
+    /// Samples that were looked at.
+    samples: u64,
+}
+
+impl StandingOut {
+    /// By a rule in the parts of a channel, in the order of time.
+    fn find(rule: SpikeRule, parts: &[&Series]) -> Self {
+        let (mut disturbances, mut singles, mut samples) = (Vec::new(), FoundSpikes::default(), 0);
+        for part in parts {
+            let of_part = part.values.len() as u64;
+            let (single, disturbed) = rule.separate(rule.find(part), of_part);
+            singles.extend(single);
+            disturbances.extend(disturbed);
+            samples += of_part;
+        }
+        Self { rule, disturbances, singles, samples }
+    }
+
+    /// What its single samples show of the `known` knocks.
+    fn parts_of(&self, known: &[Range<u64>]) -> Vec<Disturbance> {
+        self.rule.parts_of(&self.singles, known, self.samples)
+    }
+}
+
 /// The knocks in the inertial channels.
 struct KnocksInChannels {
     by_whole: PerChannel<Vec<Knock>>,
@@ -283,7 +313,8 @@ impl KnocksInChannels {
         knocks
     }
 
-    /// Adds what is too short for a level of the noise, and is no single sample.
+    /// Adds what is too short for a level of the noise, and is no single sample; then what single samples show of the knocks that other
+    /// channels have.
     fn add_disturbances(&mut self, record: &CondensedRecord, series: &PerChannel<Series>, middle: u64) {
         let found = per_channel(series.ids(), |channel| {
             if !record.channels[channel].can_show_spikes {
@@ -293,20 +324,23 @@ impl KnocksInChannels {
                 let own = &series[channel];
                 own.clone().without(&slots_within(own, &knocks[channel]))
             };
-            let whole = quiet(&self.by_whole);
-            let by_whole = SpikeRule::fit(&whole).map(|rule| rule.disturbances(&whole));
-            let halves = quiet(&self.by_first_half);
+            let (whole, halves) = (quiet(&self.by_whole), quiet(&self.by_first_half));
             let (first, second) = (halves.before(middle), halves.from(middle));
-            let by_first_half =
-                SpikeRule::fit(&first).map(|rule| [rule.disturbances(&first), rule.disturbances(&second)].concat());
-            Some([by_whole.unwrap_or_default(), by_first_half.unwrap_or_default()])
+            let of_parts =
+                |fitted: &Series, parts: &[&Series]| SpikeRule::fit(fitted).map(|rule| StandingOut::find(rule, parts));
+            Some([of_parts(&whole, &[&whole]), of_parts(&first, &[&first, &second])])
         });
-        for ((found, own), (by_whole, by_first_half)) in
-            found.into_vec().into_iter().zip(series).zip(self.by_whole.iter_mut().zip(&mut self.by_first_half))
-        {
-            let Some([whole, halves]) = found else { continue };
-            Knock::add_disturbances(by_whole, whole, own);
-            Knock::add_disturbances(by_first_half, halves, own);
+        for (at, knocks) in [&mut self.by_whole, &mut self.by_first_half].into_iter().enumerate() {
+            let of = |channel: ChannelId| found[channel].as_ref().and_then(|found| found[at].as_ref());
+            for ((channel, series), knocks) in series.with_ids().zip(knocks.iter_mut()) {
+                let disturbances = of(channel).map(|found| found.disturbances.clone()).unwrap_or_default();
+                Knock::add_disturbances(knocks, disturbances, series);
+            }
+            let known: Vec<Range<u64>> = knocks.iter().flatten().map(|knock| knock.slots.clone()).collect();
+            for ((channel, series), knocks) in series.with_ids().zip(knocks.iter_mut()) {
+                let parts = of(channel).map(|found| found.parts_of(&known)).unwrap_or_default();
+                Knock::add_disturbances(knocks, parts, series);
+            }
         }
     }
 
