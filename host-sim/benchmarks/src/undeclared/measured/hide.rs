@@ -6,7 +6,7 @@ use crate::undeclared::generator::{add_sensed, quantized_angle};
 use crate::undeclared::outside::OutsideEffect;
 use crate::undeclared::sample_loss::lose_samples;
 use adis16405_driver::Channel;
-use measurement::{MeasuredChannel, Measurement};
+use measurement::{MeasuredChannel, Measurement, Quantity};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use virtual_sensor::{InjectedEffect, OutputRegister};
@@ -33,8 +33,11 @@ impl HiddenEffect {
     }
 }
 
+/// Distance in samples at which equal samples are equal by chance.
+const BY_CHANCE: usize = 64;
+
 /// `stretch` with an effect. The counts of a channel that it is in are made continuous by a uniform dither of one count, and are
-/// rounded again: an effect of size 0 changes none.
+/// rounded again: an effect of size 0 changes none. A sample that was read twice stays so.
 pub(super) fn hide(stretch: &Measurement, effect: &HiddenEffect, seed: u64) -> Measurement {
     let mut changed = stretch.clone();
     match effect {
@@ -52,10 +55,27 @@ pub(super) fn hide(stretch: &Measurement, effect: &HiddenEffect, seed: u64) -> M
         let output = simulation::output_register(channel);
         let own = changed.channels.iter_mut().find(|of| of.profile.name == channel.name());
         if let Some(own) = own.filter(|_| effect.shows_in(output)) {
+            let read_again = read_again(stretch, own.profile.quantity);
             change_channel(own, &stretch.slots, stretch.period_s(), effect, output, seed);
+            for at in (1..own.counts.len()).filter(|&at| read_again[at]) {
+                own.counts[at] = own.counts[at - 1];
+            }
         }
     }
     changed
+}
+
+/// Of each sample whether it is the one before, read again: the channels of `quantity` all equal those of the sample before, and at
+/// least twice as many samples do so as by chance, as those do that are [`BY_CHANCE`] apart.
+fn read_again(stretch: &Measurement, quantity: Quantity) -> Vec<bool> {
+    let of_quantity = || stretch.channels.iter().filter(|channel| channel.profile.quantity == quantity);
+    let is_equal = |at: usize, distance: usize| {
+        at >= distance && of_quantity().all(|channel| channel.counts[at] == channel.counts[at - distance])
+    };
+    let equal: Vec<bool> = (0..stretch.len()).map(|at| is_equal(at, 1)).collect();
+    let by_chance = (0..stretch.len()).filter(|&at| is_equal(at, BY_CHANCE)).count();
+    let are_read_again = equal.iter().filter(|is_equal| **is_equal).count() > 2 * by_chance;
+    if are_read_again { equal } else { vec![false; equal.len()] }
 }
 
 fn random(seed: u64, stream: u64) -> ChaCha8Rng {
