@@ -21,6 +21,7 @@ mod markov_process;
 mod motion;
 mod noise_below_count;
 mod output_filter;
+mod periodic;
 mod rate_ramp;
 mod repeated_samples;
 mod resonance;
@@ -53,6 +54,7 @@ pub use markov_process::{MarkovEvidence, MarkovProcess};
 pub use motion::{MotionInterval, MotionScale};
 pub use noise_below_count::NoiseBelowCount;
 pub use output_filter::OutputFilter;
+pub use periodic::Periodic;
 pub use rate_ramp::{LinearDrift, LinearDriftEvidence};
 pub use repeated_samples::RepeatedSamples;
 pub use resonance::ResonantLine;
@@ -85,6 +87,8 @@ pub enum Effect {
     ResonantLine(ResonantLine),
     /// A line whose frequency runs.
     Chirp(Chirp),
+    /// A slow signal that repeats and is no sinusoid.
+    Periodic(Periodic),
     /// Odd harmonics of one fundamental.
     SquareWave(SquareWave),
     /// Jumps to and fro between two levels.
@@ -196,6 +200,7 @@ kinds!(
     SinusoidalLine,
     ResonantLine,
     Chirp,
+    Periodic,
     SquareWave,
     TelegraphNoise,
     MarkovProcess,

@@ -116,6 +116,17 @@ impl Wording {
                 ),
                 "; a speed that changes",
             ),
+            Effect::Periodic(of) => text(
+                format!(
+                    "the same every {:.1} s, but no sinusoid: the harmonics have {:.0} % of the deviation of the fundamental, \
+                     {:.0} times the noise, by chance at any period {}",
+                    1.0 / of.frequency_hz.value,
+                    of.harmonics_percent.value,
+                    of.sum,
+                    self.chance(of.p_value)
+                ),
+                "; something that is switched by a clock or a thermostat",
+            ),
             Effect::SquareWave(of) => text(
                 format!(
                     "{} of a square wave at {:.4} Hz: amplitudes fall with the number of the harmonic",
@@ -429,15 +440,6 @@ impl Wording {
                     1.0 / frequency_hz
                 ),
                 format!("; {}", self.line(line).sentence()),
-            ),
-            Observation::PeriodicSignal { sum, p_value, .. } => text(
-                format!(
-                    "the same every {:.1} s, but no sinusoid: the harmonics have {percent:.0} % of the deviation of the fundamental, \
-                     {sum:.0} times the noise, by chance at any period {}",
-                    1.0 / frequency_hz,
-                    self.chance(*p_value)
-                ),
-                "",
             ),
             Observation::DecayingDisturbances { time_constant_s, sum, reversed, p_value } => text(
                 format!(

@@ -202,6 +202,15 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
             ),
             Advice::new("Look for a motor whose speed changes over the record", format!(".{}", off())),
         ),
+        Effect::Periodic(of) => (
+            format!(
+                "A change that repeats every {} and is no sinusoid{reaches}: a fundamental at {} with an amplitude of {}.",
+                span(1.0 / of.frequency_hz.value),
+                hertz(of.frequency_hz),
+                size(of.amplitude)
+            ),
+            Advice::new(CYCLING, format!(".{}", off())),
+        ),
         Effect::SquareWave(of) => (
             format!("A square wave of {} with an amplitude of {}.", hertz(of.frequency_hz), size(of.amplitude)),
             Advice::new("Look for a load on the supply or a heater that switches at this rate", format!(".{}", off())),

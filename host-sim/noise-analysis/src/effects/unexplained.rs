@@ -80,15 +80,6 @@ pub enum Observation {
         /// What shows the fundamental.
         line: LineEvidence,
     },
-    /// A slow signal that is the same every period, and no sinusoid.
-    PeriodicSignal {
-        /// Harmonics that were examined.
-        harmonics: f64,
-        /// Power of the harmonics over the noise.
-        sum: f64,
-        /// Probability at any period by chance.
-        p_value: f64,
-    },
     /// Disturbances that begin at once and decay.
     DecayingDisturbances {
         /// s
@@ -159,13 +150,7 @@ impl Kind for Unexplained {
         let tau = self.tau_s().map(|of| ("tau", of.parameter("s")));
         let frequency = self.frequency_hz().map(|of| ("frequency", of.parameter("Hz")));
         let excess = self.excess_percent.map(|of| ("excess_percent", of.parameter("%")));
-        let harmonics = match self.observation {
-            Observation::PeriodicSignal { harmonics, .. } => {
-                Some(("harmonics", BoundedEstimate::exact(harmonics).parameter("")))
-            }
-            _ => None,
-        };
-        [tau, frequency, excess, harmonics].into_iter().flatten().collect()
+        [tau, frequency, excess].into_iter().flatten().collect()
     }
 
     fn sizes(&self) -> Vec<BoundedEstimate> {

@@ -2,7 +2,7 @@
 //! frequency runs, and disturbances that begin at once and decay; and the lines of the spectrum beside them.
 
 use crate::bounds::BoundedEstimate;
-use crate::effects::{Chirp, MarkovProcess, Observation, Unexplained, UnexplainedPlace};
+use crate::effects::{Chirp, MarkovProcess, Observation, Periodic, Unexplained, UnexplainedPlace};
 use crate::rivals::proposal::{Origin, Proposal, Signal};
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::decaying_disturbances::DecayingDisturbances;
@@ -61,21 +61,20 @@ impl SpectrumProposals {
 pub(crate) fn proposal(signal: &Signal, unit: &'static str) -> Proposal {
     let origin = Origin::Signal(signal.clone());
     match signal {
-        Signal::Periodic(periodic) => Proposal::new(periodic_effect(periodic), origin),
+        Signal::Periodic(found) => Proposal::new(periodic(found, unit), origin),
         Signal::Chirp(track) => Proposal::new(chirp(track, unit), origin),
         Signal::Decays(decays) => Proposal::new(decays_effect(decays), origin),
     }
 }
 
-fn periodic_effect(periodic: &PeriodicSignal) -> Unexplained {
-    Unexplained {
-        place: UnexplainedPlace::Frequency(periodic.frequency),
-        excess_percent: Some(periodic.harmonics_percent),
-        observation: Observation::PeriodicSignal {
-            harmonics: periodic.harmonics(),
-            sum: periodic.sum,
-            p_value: periodic.p_value,
-        },
+fn periodic(found: &PeriodicSignal, unit: &'static str) -> Periodic {
+    Periodic {
+        frequency_hz: found.frequency,
+        amplitude: found.amplitude.in_unit(unit),
+        harmonics_percent: found.harmonics_percent,
+        harmonics: found.harmonics.to_vec(),
+        sum: found.sum,
+        p_value: found.p_value,
     }
 }
 
@@ -114,7 +113,7 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
-    use std::f64::consts::TAU;
+    use std::f64::consts::{PI, TAU};
 
     const SAMPLES: usize = 40_000;
     const RATE_HZ: f64 = 100.0;
@@ -132,9 +131,19 @@ mod tests {
     fn a_slow_sawtooth_is_a_periodic_signal() {
         // Harmonics of 40,000/4·(0.3/(πk))², 91/k², over the noise.
         let found = effects(|time_s| 0.3 * (time_s / 40.0).fract());
-        let Some(periodic @ Effect::Unexplained(_)) = found.first() else { panic!("{found:?}") };
+        let Some(Effect::Periodic(periodic)) = found.first() else { panic!("{found:?}") };
         // The resolution is 2.5 mHz, of which the frequency is known to a tenth.
-        assert!((periodic.frequency_hz().expect("one").value - 0.025).abs() < 0.000_25, "{found:?}");
+        assert!((periodic.frequency_hz.value - 0.025).abs() < 0.000_25, "{found:?}");
+        // A sawtooth of height 0.3 has the amplitudes 0.3/(πk): of the first one 0.0955, and of the second to the eighth the root of
+        // the sum of 1/k², 0.726, of that.
+        let amplitude = periodic.amplitude.estimate();
+        assert!((amplitude.low..=amplitude.high).contains(&(0.3 / PI)), "{periodic:?}");
+        let percent = periodic.harmonics_percent;
+        assert!((percent.low..=percent.high).contains(&72.6), "{periodic:?}");
+        // The noise of one amplitude is √(2/40,000), 0.007.
+        for (number, amplitude) in (2..).map(f64::from).zip(&periodic.harmonics) {
+            assert!((amplitude - 0.3 / (PI * number)).abs() < 4.0 * 0.007, "{number}: {periodic:?}");
+        }
     }
 
     #[test]

@@ -280,7 +280,7 @@ pub static RIVALRIES: [Rivalry; 45] = [
         "a sawtooth falls by π times the amplitude of its fundamental",
         Rule::Channel(|of| of.periodic().is_some_and(|periodic| match of.effect() {
             Effect::LinearDrift(_) => true,
-            Effect::LevelStep(step) => least(step.size.estimate()) < PI * periodic.amplitude,
+            Effect::LevelStep(step) => least(step.size.estimate()) < PI * periodic.amplitude.value,
             _ => false,
         }))),
     row("level of the noise by temperature", "spikes", "always", "the limit of a spike is that of a constant level",

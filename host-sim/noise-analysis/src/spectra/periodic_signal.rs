@@ -51,7 +51,9 @@ pub(crate) struct PeriodicSignal {
     /// Of the fundamental, Hz.
     pub frequency: BoundedEstimate,
     /// Amplitude of the fundamental, in the unit of the series.
-    pub amplitude: f64,
+    pub amplitude: BoundedEstimate,
+    /// Amplitudes of the second to the last harmonic: 0 of one that has less than the noise.
+    pub harmonics: [f64; HARMONICS - 1],
     /// Deviation of the harmonics over that of the fundamental, %.
     pub harmonics_percent: BoundedEstimate,
     /// Sum of the ordinates of the harmonics without the fundamental, over the noise.
@@ -129,11 +131,15 @@ impl PeriodicSignal {
         let p_value = (2.0 * trials * by_chance).min(1.0);
         let percent = 100.0 * (powers.iter().sum::<f64>().max(0.0) / first).sqrt();
         let relative = NORMAL_975 / (2.0 * sum).sqrt();
+        let of_noise = first / noise.density(fundamental);
         // Cramér-Rao bound of the fundamental alone.
-        let error = NORMAL_975 * 1.5f64.sqrt() * resolution
-            / (std::f64::consts::PI * (first / noise.density(fundamental)).sqrt());
+        let error = NORMAL_975 * 1.5f64.sqrt() * resolution / (std::f64::consts::PI * of_noise.sqrt());
+        let amplitude = sine.amplitude();
+        // A sinusoid of this power over the noise, in a resolution, has an amplitude of the relative variance 1/(2·power).
+        let half = NORMAL_975 / (2.0 * of_noise).sqrt();
         Some(Self {
-            amplitude: sine.amplitude(),
+            amplitude: BoundedEstimate::new(amplitude, amplitude * (1.0 - half).max(0.0), amplitude * (1.0 + half)),
+            harmonics: std::array::from_fn(|at| amplitude * (powers[at].max(0.0) / first).sqrt()),
             frequency: BoundedEstimate::new(sine.frequency, sine.frequency - error, sine.frequency + error),
             harmonics_percent: BoundedEstimate::new(
                 percent,
@@ -154,11 +160,6 @@ impl PeriodicSignal {
     /// Whether a frequency, Hz, is between the fundamental, or half an octave below it, and the highest harmonic that was examined.
     pub(crate) fn reaches(&self, frequency: f64) -> bool {
         (std::f64::consts::FRAC_1_SQRT_2..=HARMONICS as f64).contains(&(frequency / self.frequency.value))
-    }
-
-    /// Harmonics that were examined.
-    pub(crate) fn harmonics(&self) -> f64 {
-        HARMONICS as f64
     }
 
     /// Its period, s.

@@ -66,6 +66,15 @@ pub(super) fn examples() -> Vec<Effect> {
             p_value: 1e-9,
         }
         .into(),
+        Periodic {
+            frequency_hz: estimate(),
+            amplitude: size(),
+            harmonics_percent: estimate(),
+            harmonics: vec![0.1; 7],
+            sum: 100.0,
+            p_value: 1e-9,
+        }
+        .into(),
         SquareWave {
             frequency_hz: estimate(),
             amplitude: size(),

@@ -160,7 +160,14 @@ const OF_LEVELS: Origin = Origin::Levels { is_reversible: true };
 
 fn periodic() -> PeriodicSignal {
     let (frequency, harmonics_percent) = (BoundedEstimate::exact(0.025), known(50.0));
-    PeriodicSignal { frequency, amplitude: 0.1, harmonics_percent, sum: 100.0, p_value: 1e-9 }
+    PeriodicSignal {
+        frequency,
+        amplitude: known(0.1),
+        harmonics_percent,
+        harmonics: [0.02; 7],
+        sum: 100.0,
+        p_value: 1e-9,
+    }
 }
 
 /// From 4 to 8 Hz.
@@ -316,14 +323,14 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
         (["unexplained point of the curve", "Markov process"],
             channel([of_term(0, markov(10.0)), of(point(18.9), Origin::Residual)]), vec!["unexplained"]),
         (["slow periodic signal", "Markov process, telegraph noise"],
-            channel([of_term(0, markov(9.0)), of_periodic.clone()]), vec!["unexplained"]),
+            channel([of_term(0, markov(9.0)), of_periodic.clone()]), vec!["periodic"]),
         (["chirp", "Markov process, telegraph noise"], channel([of_term(0, markov(0.05)), of_track.clone()]), vec!["chirp"]),
         (["disturbances that decay", "Markov process, telegraph noise, unexplained octave"],
             channel([of_term(0, markov(5.0)), of(point(9.0), Origin::Residual), of_decays]), vec!["unexplained"]),
         (["slow periodic signal", "line of the curve"],
-            channel([of(resonance(0.05), of_resonance(0.05)), of_periodic.clone()]), vec!["unexplained"]),
+            channel([of(resonance(0.05), of_resonance(0.05)), of_periodic.clone()]), vec!["periodic"]),
         (["chirp", "line of the curve"], channel([of(resonance(6.0), of_resonance(6.0)), of_track]), vec!["chirp"]),
-        (["slow periodic signal", "ramp, step"], channel([of(step.into(), Origin::Samples), of_periodic]), vec!["unexplained"]),
+        (["slow periodic signal", "ramp, step"], channel([of(step.into(), Origin::Samples), of_periodic]), vec!["periodic"]),
         (["level of the noise by temperature", "spikes"],
             channel([of(spikes(), Origin::Samples), of(level, Origin::Level)]), vec!["unexplained"]),
         (["telegraph noise", "spikes"], channel([of(spikes(), Origin::Samples), of(levels(1.0, 1.0), OF_LEVELS)]), vec!["telegraph"]),

@@ -1,0 +1,100 @@
+//! A slow signal that is the same every period and no sinusoid, as of a thermostat or of a load that comes on every minute.
+
+use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
+use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use allan_core::NoiseTerm;
+use allan_core::term::Sinusoid;
+
+/// A signal that repeats.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Periodic {
+    /// Of its fundamental, Hz.
+    pub frequency_hz: BoundedEstimate,
+    /// Amplitude of the fundamental.
+    pub amplitude: ChannelEstimate,
+    /// Deviation of the second to the last harmonic over that of the fundamental, %.
+    pub harmonics_percent: BoundedEstimate,
+    /// Amplitudes of these harmonics, in the unit of the channel: 0 of one that does not show.
+    pub harmonics: Vec<f64>,
+    /// Power of the harmonics over the noise.
+    pub sum: f64,
+    /// Probability at any period by chance.
+    pub p_value: f64,
+}
+
+impl Kind for Periodic {
+    const NAME: &'static str = "periodic";
+
+    fn parameters(&self) -> Vec<(&'static str, Parameter)> {
+        vec![
+            ("frequency", self.frequency_hz.parameter("Hz")),
+            ("amplitude", self.amplitude.parameter()),
+            ("harmonics_percent", self.harmonics_percent.parameter("%")),
+        ]
+    }
+
+    fn sizes(&self) -> Vec<BoundedEstimate> {
+        vec![self.amplitude.estimate()]
+    }
+
+    fn lasting(&self) -> Vec<Option<BoundedEstimate>> {
+        vec![Some(self.frequency_hz), Some(self.amplitude.estimate())]
+    }
+
+    fn occurrence(&self) -> Occurrence {
+        Occurrence::AtFrequency(self.frequency_hz)
+    }
+
+    fn avar(&self, at: &AveragingTime) -> AddedVariance {
+        // Of its harmonics. The models have no term for them.
+        let amplitudes = std::iter::once(self.amplitude.value).chain(self.harmonics.iter().copied());
+        let share = |(number, amplitude): (f64, f64)| {
+            let frequency = number * self.frequency_hz.value;
+            amplitude * amplitude * NoiseTerm::Sinusoid(Sinusoid { frequency }).avar(at.n, at.period_s)
+        };
+        AddedVariance::corrected((1..).map(f64::from).zip(amplitudes).map(share).sum())
+    }
+
+    no_course!();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Periodic;
+    use crate::bounds::BoundedEstimate;
+    use crate::effects::{AveragingTime, Kind};
+    use std::f64::consts::TAU;
+
+    /// The Allan variance of the samples of a period of 20 s with three harmonics, by its definition.
+    #[test]
+    fn the_variance_is_that_of_its_samples() {
+        const SAMPLES: usize = 40_000;
+        const PERIOD_S: f64 = 0.1;
+        let amplitudes = [0.3, 0.2, 0.1];
+        let exact = |value: f64| BoundedEstimate::exact(value);
+        let periodic = Periodic {
+            frequency_hz: exact(0.05),
+            amplitude: exact(amplitudes[0]).in_unit("g"),
+            harmonics_percent: exact(75.0),
+            harmonics: amplitudes[1..].to_vec(),
+            sum: 100.0,
+            p_value: 1e-9,
+        };
+        let sample = |at: usize| {
+            let of = |(number, amplitude): (f64, &f64)| amplitude * (TAU * 0.05 * number * PERIOD_S * at as f64).sin();
+            (1..).map(f64::from).zip(&amplitudes).map(of).sum::<f64>()
+        };
+        let mut sums = vec![0.0];
+        (0..SAMPLES).for_each(|at| sums.push(sums[at] + sample(at)));
+        for n in [1_usize, 4, 16, 64, 256] {
+            let differences = sums.windows(2 * n + 1).map(|of| (of[2 * n] - 2.0 * of[n] + of[0]) / n as f64);
+            let count = (SAMPLES + 1 - 2 * n) as f64;
+            let expected = 0.5 * differences.map(|of| of * of).sum::<f64>() / count;
+            let (n, samples) = (n as u64, SAMPLES as u64);
+            let at = AveragingTime { n, period_s: PERIOD_S, samples, model_avar: 0.0, adev_of: &|_, _| None };
+            let found = periodic.avar(&at).corrected;
+            // The ends of the record do not hold whole periods of the differences.
+            assert!((found / expected - 1.0).abs() < 0.01, "{n}: {found} {expected}");
+        }
+    }
+}
