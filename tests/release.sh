@@ -19,6 +19,8 @@ run() { printf '+ %s\n' "$*"; "$@"; }
 # The libraries; neither needs the other.
 for package in adis16405-driver allan-core; do
     run cargo publish --dry-run --locked --package "$package" --target-dir "$target/publish"
+    # A dry run does not say where its package is.
+    run cargo package --quiet --locked --no-verify --package "$package" --target-dir "$target/publish"
     cp "$target/publish/package/$package-$version.crate" "$out"
 done
 
