@@ -7,9 +7,9 @@ use rand_distr::{Distribution, StandardNormal};
 use std::sync::LazyLock;
 
 fn assert_coverage(records: &SimulatedRecords) {
-    let judged: Vec<usize> = (0..OCTAVES).filter(|&octave| records.dof[octave] >= 3.0).collect();
-    assert!(judged.len() >= 10, "all but the last octave, at least");
-    for octave in judged {
+    let compared: Vec<usize> = (0..OCTAVES).filter(|&octave| records.dof[octave] >= 3.0).collect();
+    assert!(compared.len() >= 10, "all but the last octave, at least");
+    for octave in compared {
         let share = |covered: u32| f64::from(covered) / RECORDS as f64;
         let (known, identified) = (share(records.covered[octave]), share(records.covered_as_identified[octave]));
         println!("n = 2^{octave}: edf {:.1}, coverage {known}, {identified}", records.dof[octave]);

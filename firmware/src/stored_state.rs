@@ -1,4 +1,4 @@
-//! What survives the loss of power, as bytes: the settings that a person has made, and the models that the last epoch has taught.
+//! What is kept without power, as bytes: the settings that a person has made, and the models that were fitted to the last epoch.
 
 use crate::channels::CHANNELS;
 use crate::epoch::Regressor;

@@ -2,7 +2,6 @@
 
 use crate::program::host_sim;
 use serde_json::Value;
-use std::collections::BTreeSet;
 use tempfile::TempDir;
 
 /// What the program prints for half a minute of the virtual sensor.
