@@ -15,7 +15,8 @@
 
 use firmware::microcontroller::stm32f4::bus::Spi1Bus;
 use firmware::microcontroller::stm32f4::port::UsartPort;
-use firmware::microcontroller::stm32f4::start::{SensorWires, Stm32f4};
+use firmware::microcontroller::stm32f4::sensor_wires::SensorWires;
+use firmware::microcontroller::stm32f4::start::Stm32f4;
 #[cfg(feature = "feather-usb")]
 use firmware::microcontroller::stm32f4::usb::{Stm32UsbPort, usb_port};
 use firmware::microcontroller::{BoardParts, BoardSupport, NotConnected, UartQueues};

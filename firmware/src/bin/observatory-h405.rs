@@ -13,7 +13,8 @@
 
 use firmware::microcontroller::stm32f4::bus::Spi1Bus;
 use firmware::microcontroller::stm32f4::port::UsartPort;
-use firmware::microcontroller::stm32f4::start::{SensorWires, Stm32f4};
+use firmware::microcontroller::stm32f4::sensor_wires::SensorWires;
+use firmware::microcontroller::stm32f4::start::Stm32f4;
 use firmware::microcontroller::{BoardParts, BoardSupport, NotConnected, UartQueues};
 use stm32f4xx_hal::gpio::{Input, Output, PA4, PB0, PC12};
 use stm32f4xx_hal::pac::{self, USART2};

@@ -3,6 +3,7 @@
 pub mod bus;
 pub mod flash;
 pub mod port;
+pub mod sensor_wires;
 pub mod start;
 #[cfg(feature = "feather-usb")]
 pub mod usb;

@@ -1,0 +1,83 @@
+//! The sensor's wires to an STM32F4: its bus and the data-ready input, of which and of a start the parts of a board are made.
+
+use super::bus::{Spi1Bus, spi1_bus};
+use super::start::{Started, Stm32f4};
+use crate::board::{BusTiming, DataReadyLine};
+use crate::microcontroller::{BoardParts, BoardSupport, DataReadyPin, UsbParts};
+use stm32f4xx_hal::gpio::{Edge, ExtiPin, Input, Output, PA4, PA5, PA6, PA7, Pin};
+use stm32f4xx_hal::pac::{DMA2, EXTI, SPI1, SYSCFG};
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::rcc::Rcc;
+
+/// How the sensor is wired to a board.
+pub struct SensorWires<const P: char, const N: u8> {
+    /// SPI1, and the controller of its DMA transfers.
+    pub spi: (SPI1, DMA2),
+    /// Chip select, SCK, MISO and MOSI.
+    pub pins: (PA4, PA5, PA6, PA7),
+    /// The pin at DIO1.
+    pub data_ready: Pin<P, N>,
+    /// What makes an edge of that pin an interrupt.
+    pub edges: (EXTI, SYSCFG),
+}
+
+impl Started {
+    /// The parts of a board with these wires, without a reset line.
+    pub fn board<B, const P: char, const N: u8>(
+        self,
+        sensor: SensorWires<P, N>,
+        uart: B::Uart,
+        usb: Option<UsbParts<B::Usb>>,
+        led: B::Led,
+    ) -> BoardParts<B>
+    where
+        Pin<P, N, Input>: ExtiPin,
+        B: BoardSupport<Microcontroller = Stm32f4, DataReady = Pin<P, N, Input>, Bus = Spi1Bus<PA4<Output>>>,
+    {
+        let Self { cause, clock, mut rcc, microcontroller } = self;
+        let bus = spi1_bus(sensor.spi, sensor.pins, &mut rcc, BusTiming::SAFE);
+        let data_ready = data_ready_input(sensor.data_ready, sensor.edges, &mut rcc);
+        let core_hz = rcc.clocks.hclk().raw();
+        BoardParts { cause, clock, core_hz, microcontroller, data_ready, bus, uart, usb, led, reset_line: None }
+    }
+}
+
+/// Makes a pin the data-ready input. It floats: the sensor drives it, with 3.3 V, and a pin tolerates more only without a
+/// pull-up or pull-down (STM32F405 data sheet, table 7, FT).
+fn data_ready_input<const P: char, const N: u8>(
+    pin: Pin<P, N>,
+    (mut exti, syscfg): (EXTI, SYSCFG),
+    rcc: &mut Rcc,
+) -> Pin<P, N, Input>
+where
+    Pin<P, N, Input>: ExtiPin,
+{
+    let mut pin = pin.into_floating_input();
+    pin.make_interrupt_source(&mut syscfg.constrain(rcc));
+    pin.trigger_on_edge(&mut exti, Edge::Rising);
+    pin.enable_interrupt(&mut exti);
+    pin
+}
+
+impl<const P: char, const N: u8> DataReadyPin for Pin<P, N, Input> {
+    fn clear(&mut self) {
+        self.clear_interrupt_pending_bit();
+    }
+}
+
+impl<const P: char, const N: u8> DataReadyLine for Pin<P, N, Input> {
+    fn set_masked(&mut self, masked: bool) {
+        // SAFETY: the line of this pin in a register that the interrupt of the pin alone uses too, which waits meanwhile.
+        let mask = unsafe { (*EXTI::ptr()).imr() };
+        let is_masked = mask.read().bits() >> N & 1 == 0;
+        if masked != is_masked {
+            self.clear_interrupt_pending_bit();
+            // SAFETY: a bit of the mask.
+            mask.modify(|r, w| unsafe { w.bits(r.bits() & !(1 << N) | u32::from(!masked) << N) });
+        }
+    }
+
+    fn is_active(&mut self) -> bool {
+        self.is_high()
+    }
+}
