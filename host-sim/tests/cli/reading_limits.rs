@@ -12,7 +12,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 use tempfile::tempdir;
 
-/// What any command on a file below 1 MB may take.
+/// Processor time and memory that any command on a file below 1 MB may take.
 const MOST_TIME: Duration = Duration::from_secs(20);
 const MOST_KILOBYTES: u64 = 500 * 1024;
 
@@ -41,14 +41,25 @@ fn bounded(arguments: &[&str]) -> (Option<i32>, String) {
         let text = fs::read_to_string(&status).unwrap_or_default();
         let peak = text.lines().find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB")?.parse().ok());
         most = most.max(peak.unwrap_or(0u64));
-        if started.elapsed() > MOST_TIME || most > MOST_KILOBYTES {
+        let time = processor_time(child.id());
+        // A command that waits takes no processor time.
+        if time > MOST_TIME || started.elapsed() > 10 * MOST_TIME || most > MOST_KILOBYTES {
             child.kill().expect("a child");
-            panic!("{arguments:?}: {most} kB after {:?}", started.elapsed());
+            panic!("{arguments:?}: {most} kB, {time:?} of processor time in {:?}", started.elapsed());
         }
         thread::sleep(Duration::from_millis(2));
     }
     let output = child.wait_with_output().expect("a child");
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+/// What a process has used so far; Linux tells it in 1/100 s.
+fn processor_time(process: u32) -> Duration {
+    let text = fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+    // Behind the name, which ends with the last bracket: ten fields after the state come user and system time.
+    let fields = text.rsplit(')').next().unwrap_or_default().split_whitespace();
+    let ticks: u64 = fields.skip(11).take(2).filter_map(|field| field.parse::<u64>().ok()).sum();
+    Duration::from_millis(10 * ticks)
 }
 
 fn zlib(parts: impl Iterator<Item = Vec<u8>>) -> Vec<u8> {
