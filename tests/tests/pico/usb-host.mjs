@@ -6,6 +6,7 @@
 const DEVICE = 1, CONFIGURATION = 2, STRING = 3, ENDPOINT = 5, INTERFACE = 4;
 const ENGLISH = 0x0409, DATA_CLASS = 10, BULK = 2;
 const DELAY_NS = 100_000;
+const PACKET_NS = 52_632; // at most 19 packets of 64 bytes in a frame of 1 ms (USB 2.0, table 5-9)
 const AVAILABLE = 1 << 10; // of a buffer control register (RP2040 data sheet, section 4.1.4)
 
 const read = (type, request, value, index, length) => ({ bytes: [type | 0x80, request, value, index, length], length });
@@ -75,16 +76,15 @@ export const connect = (mcu, clock, readsFrom, found, received) => {
     ready.set(endpoint, size);
     send();
   };
-  // The controller of rp2040js takes a packet as soon as it is there; here it waits until the host reads.
+  // The controller of rp2040js takes a packet as soon as it is there; here it waits until the host reads, and for its place in a frame.
   const updated = usb.DPRAMUpdated.bind(usb);
-  let waiting;
   usb.DPRAMUpdated = (offset, value) => {
-    if (offset === 0x80 + 8 * inEndpoint && value & AVAILABLE && clock.nanos < readsFrom) waiting = [offset, value];
-    else updated(offset, value);
+    if (offset !== 0x80 + 8 * inEndpoint || !(value & AVAILABLE)) updated(offset, value);
+    else if (Number.isFinite(readsFrom)) {
+      const at = Math.max(readsFrom + 1, clock.nanos + PACKET_NS);
+      clock.createAlarm(() => updated(offset, value)).schedule(at - clock.nanos);
+    }
   };
-  if (Number.isFinite(readsFrom) && readsFrom > 0) {
-    clock.createAlarm(() => waiting && updated(...waiting)).schedule(readsFrom + 1);
-  }
   return (keys) => {
     pending.push(...Buffer.from(keys));
     send();
