@@ -50,7 +50,25 @@ macro_rules! no_variance {
     };
 }
 
-pub(super) use {no_course, no_variance};
+/// In a [`Kind`] with a `frequency_hz` and an `amplitude`, both of which last: [`Kind::sizes`], [`Kind::lasting`] and
+/// [`Kind::occurrence`].
+macro_rules! amplitude_at_frequency {
+    () => {
+        fn sizes(&self) -> Vec<$crate::bounds::BoundedEstimate> {
+            vec![self.amplitude.estimate()]
+        }
+
+        fn lasting(&self) -> Vec<Option<$crate::bounds::BoundedEstimate>> {
+            vec![Some(self.frequency_hz), Some(self.amplitude.estimate())]
+        }
+
+        fn occurrence(&self) -> $crate::effects::Occurrence {
+            $crate::effects::Occurrence::AtFrequency(self.frequency_hz)
+        }
+    };
+}
+
+pub(super) use {amplitude_at_frequency, no_course, no_variance};
 
 /// How often a part has an effect, which decides whether two channels show the same one.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,6 @@
 //! A slow signal that is the same every period and no sinusoid, as of a thermostat or of a load that comes on every minute.
 
-use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
+use super::kind::{AddedVariance, AveragingTime, Kind, amplitude_at_frequency, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use allan_core::NoiseTerm;
 use allan_core::term::Sinusoid;
@@ -33,17 +33,7 @@ impl Kind for Periodic {
         ]
     }
 
-    fn sizes(&self) -> Vec<BoundedEstimate> {
-        vec![self.amplitude.estimate()]
-    }
-
-    fn lasting(&self) -> Vec<Option<BoundedEstimate>> {
-        vec![Some(self.frequency_hz), Some(self.amplitude.estimate())]
-    }
-
-    fn occurrence(&self) -> Occurrence {
-        Occurrence::AtFrequency(self.frequency_hz)
-    }
+    amplitude_at_frequency!();
 
     fn avar(&self, at: &AveragingTime) -> AddedVariance {
         // Of its harmonics. The models have no term for them.

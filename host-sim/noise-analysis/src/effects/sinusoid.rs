@@ -1,7 +1,7 @@
 //! A line no wider than the record resolves.
 
 use super::evidence::{LineEvidence, Multiples};
-use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
+use super::kind::{AddedVariance, AveragingTime, Kind, amplitude_at_frequency, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use allan_core::NoiseTerm;
 use allan_core::term::Sinusoid;
@@ -27,17 +27,7 @@ impl Kind for SinusoidalLine {
         own.into_iter().chain(self.multiples.as_ref().map(Multiples::parameter)).collect()
     }
 
-    fn sizes(&self) -> Vec<BoundedEstimate> {
-        vec![self.amplitude.estimate()]
-    }
-
-    fn lasting(&self) -> Vec<Option<BoundedEstimate>> {
-        vec![Some(self.frequency_hz), Some(self.amplitude.estimate())]
-    }
-
-    fn occurrence(&self) -> Occurrence {
-        Occurrence::AtFrequency(self.frequency_hz)
-    }
+    amplitude_at_frequency!();
 
     fn avar(&self, at: &AveragingTime) -> AddedVariance {
         let term = NoiseTerm::Sinusoid(Sinusoid { frequency: self.frequency_hz.value });

@@ -1,7 +1,7 @@
 //! A square wave: a fundamental with its odd harmonics, whose amplitudes fall as 1/k.
 
 use super::evidence::{LineEvidence, Multiples};
-use super::kind::{Kind, Occurrence, no_variance};
+use super::kind::{Kind, amplitude_at_frequency, no_variance};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 
 /// A signal that is switched.
@@ -24,17 +24,7 @@ impl Kind for SquareWave {
         vec![("frequency", self.frequency_hz.parameter("Hz")), ("amplitude", self.amplitude.parameter())]
     }
 
-    fn sizes(&self) -> Vec<BoundedEstimate> {
-        vec![self.amplitude.estimate()]
-    }
-
-    fn lasting(&self) -> Vec<Option<BoundedEstimate>> {
-        vec![Some(self.frequency_hz), Some(self.amplitude.estimate())]
-    }
-
-    fn occurrence(&self) -> Occurrence {
-        Occurrence::AtFrequency(self.frequency_hz)
-    }
+    amplitude_at_frequency!();
 
     no_variance!();
 }
