@@ -23,6 +23,9 @@ const PADDING: usize = 2;
 const LOWEST: usize = 4;
 /// Fewest ordinates by which the frequency runs over the record: a line that keeps its frequency is in the mean over time.
 const FEWEST_ORDINATES: usize = 8;
+/// Ordinates on each side of one whose mean is the noise of a segment there. What drifts over a segment leaks into the frequencies where
+/// there is little noise, and by another amount into each segment: a mean over all frequencies would be that of the leakage alone.
+const NEIGHBOURS: usize = 32;
 /// Largest ordinate over the noise that is counted, more than chance has in a day's record: a short disturbance is no track.
 const LARGEST: f64 = 32.0;
 /// Part of a line's power that is left in the ordinates of a straight track, and its bounds: between two ordinates, and where the track goes
@@ -117,7 +120,7 @@ impl FrequencyTrack {
     }
 }
 
-/// Spectra of equal segments over their mean at each frequency and in each segment.
+/// Spectra of equal segments over their mean at each frequency, and in each segment over the mean of the neighbouring frequencies.
 struct Spectrogram {
     /// Of each segment, from the lowest frequency on.
     rows: Vec<Vec<f32>>,
@@ -153,13 +156,13 @@ impl Spectrogram {
             by_column.iter_mut().zip(row).for_each(|(sum, power)| *sum += power / segments as f32);
         }
         for row in &mut rows {
-            let mut level = 0.0;
             for (power, mean) in row.iter_mut().zip(&by_column) {
                 *power = if *mean > 0.0 { *power / mean } else { 0.0 };
-                level += *power / columns as f32;
             }
-            let scale = if level > 0.0 { level.recip() } else { 0.0 };
-            row.iter_mut().for_each(|power| *power = (*power * scale).min(LARGEST as f32));
+            let levels = means_of_neighbours(row);
+            for (power, level) in row.iter_mut().zip(levels) {
+                *power = if level > 0.0 { (f64::from(*power) / level).min(LARGEST) as f32 } else { 0.0 };
+            }
         }
         Some(Self { rows, means: by_column, size, spacing: 1.0 / ((PADDING * size) as f64 * series.sample_period()) })
     }
@@ -180,6 +183,20 @@ impl Spectrogram {
     fn frequency(&self, column: usize) -> f64 {
         (PADDING * LOWEST + column) as f64 * self.spacing
     }
+}
+
+/// The mean of each value and its [`NEIGHBOURS`] on both sides. Of equally distributed values each is one such mean on average.
+fn means_of_neighbours(values: &[f32]) -> Vec<f64> {
+    let mut sums = vec![0.0];
+    sums.extend(values.iter().scan(0.0, |sum, value| {
+        *sum += f64::from(*value);
+        Some(*sum)
+    }));
+    let mean = |at: usize| {
+        let (from, to) = (at.saturating_sub(NEIGHBOURS), (at + NEIGHBOURS + 1).min(values.len()));
+        (sums[to] - sums[from]) / (to - from) as f64
+    };
+    (0..values.len()).map(mean).collect()
 }
 
 /// A straight line through rows of ordinates.
@@ -295,6 +312,29 @@ mod tests {
         }
         // Three quarters and one in six are expected.
         assert!(found >= 6 && by_segments + 3 <= found, "{found} {by_segments}");
+    }
+
+    /// A Markov process and white noise behind an average over 64 samples, rounded to steps of half its deviation: above the filter's range
+    /// the spectrum of a segment holds the rounding and what leaks of the process.
+    #[test]
+    fn slow_noise_that_leaks_into_a_quiet_range_is_none() {
+        let (time_constant_s, taps, step) = (11.6, 64, 0.058);
+        let decay = (-1.0 / (RATE_HZ * time_constant_s)).exp();
+        for seed in 80..92 {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let mut process = 0.0;
+            let value = |_| {
+                process =
+                    decay * process + 0.7 * (1.0 - decay * decay).sqrt() * random.sample::<f64, _>(StandardNormal);
+                process + 0.7 * random.sample::<f64, _>(StandardNormal)
+            };
+            let input: Vec<f64> = (0..SAMPLES + 2 * taps).map(value).collect();
+            let averaged =
+                |of: &[f64]| -> Vec<f64> { of.windows(taps).map(|of| of.iter().sum::<f64>() / taps as f64).collect() };
+            let filtered = averaged(&averaged(&input));
+            let values = filtered.into_iter().take(SAMPLES).map(|value| (value / step).round() * step).collect();
+            assert_eq!(FrequencyTrack::find(&UniformSeries::new(1.0 / RATE_HZ, values)), None, "{seed}");
+        }
     }
 
     #[test]
