@@ -3,6 +3,7 @@
 use crate::images;
 use crate::microcontroller::{Microcontroller, clear_bits, clear_in_memory, fill_memory_with_noise, read, write};
 use crate::peripherals::{Sensor, Terminal};
+use crate::probe::Probe;
 use link::Health;
 use rigless::cpu::armv7m as cpu;
 use rigless::device::Level;
@@ -221,6 +222,7 @@ struct Plant {
     led_level: u64,
     led_changes: u32,
     registers: BTreeMap<u64, u64>,
+    probe: Option<Probe>,
     events: VecDeque<(u64, Event)>,
     work: Vec<Work>,
 }
@@ -289,6 +291,9 @@ impl Driver<Bench> for Plant {
         if self.work.last().is_none_or(|last| now >= last.at + 1_000_000_000) || now >= self.end {
             self.work.push(Work { at: now, instructions: stop.instruction_count, samples });
         }
+        if let Some(probe) = &mut self.probe {
+            probe.poll(host);
+        }
         let (port, pin) = session.board_mut().wiring.led;
         let led_level = read(session, host, gpio(port, ODR)) >> pin & 1;
         self.led_changes += u32::from(std::mem::replace(&mut self.led_level, led_level) != led_level);
@@ -350,11 +355,21 @@ pub(crate) struct Scenario {
     /// By rising time in s.
     pub(crate) events: Vec<(f64, Event)>,
     pub(crate) seconds: f64,
+    /// A debug probe reads the log.
+    pub(crate) has_probe: bool,
 }
 
 impl Default for Scenario {
     fn default() -> Self {
-        Self { wiring: H405, crystal_fails: false, sensor: None, keys: vec![], events: vec![], seconds: 0.0 }
+        Self {
+            wiring: H405,
+            crystal_fails: false,
+            sensor: None,
+            keys: vec![],
+            events: vec![],
+            seconds: 0.0,
+            has_probe: false,
+        }
     }
 }
 
@@ -371,6 +386,8 @@ pub(crate) struct Outcome {
     pub(crate) led_changes: u32,
     /// Registers at the end, by address: pulls of ports A to C, and those of [`CONFIGURATION`].
     pub(crate) registers: BTreeMap<u64, u64>,
+    /// Bytes that a debug probe has read.
+    pub(crate) log: Vec<u8>,
 }
 
 /// Boots the image and runs it.
@@ -391,20 +408,22 @@ pub(crate) fn run(image: &Path, scenario: Scenario) -> Outcome {
         led_level: 0,
         led_changes: 0,
         registers: BTreeMap::new(),
+        probe: scenario.has_probe.then(Probe::default),
         events: scenario.events.into_iter().map(|(at, event)| (ns(at), event)).collect(),
         work: Vec::new(),
     };
     let session = Session::new(Box::new(bench), 0, VirtualNanos(STRIDE_NS)).expect("the emulator takes the board");
     let images = [Image::read(image, None).expect("the image is an ELF")];
     let finished = emulator::run(session, &Start::new(&images), plant).expect("the emulator runs to the end");
-    let Plant { work, led_changes, registers, .. } = finished.driver;
+    let Plant { work, led_changes, registers, probe, .. } = finished.driver;
+    let log = probe.unwrap_or_default().bytes;
     let mut session = finished.session;
     let diagnostics = diagnostics(&session);
     let part = &mut session.board_mut().microcontroller.part;
     let received =
         part.usart[scenario.wiring.usart].chip_mut::<Terminal>().map(|terminal| std::mem::take(&mut terminal.received));
     let sensor = part.spi[SPI1].chip_mut::<Sensor>(0).cloned();
-    Outcome { sensor, received: received.unwrap_or_default(), diagnostics, work, led_changes, registers }
+    Outcome { sensor, received: received.unwrap_or_default(), diagnostics, work, led_changes, registers, log }
 }
 
 fn diagnostics(session: &Session<Bench>) -> Vec<String> {

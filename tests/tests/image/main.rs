@@ -11,6 +11,7 @@ mod full_speed;
 mod images;
 mod microcontroller;
 mod peripherals;
+mod probe;
 
 use adis16405_driver::GyroRange;
 use bench::{Outcome, Scenario, image, run};
