@@ -10,6 +10,7 @@ use super::markov_spectrum::{MarkovEstimate, MarkovFit, OWN, TERMS, most_likely,
 use super::whittle::SpectralBand;
 use crate::detectors::noise_grid::markov_covariance;
 use crate::samples::uniform_series::UniformSeries;
+use allan_core::NoiseTerm;
 use std::f64::consts::PI;
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -152,6 +153,22 @@ fn noise_shapes() -> &'static [[f64; 3]] {
         let walk = expected_squares(|lag| of_blocks(walk, lag));
         white.into_iter().zip(flicker).zip(walk).map(|((white, flicker), walk)| [white, flicker, walk]).collect()
     })
+}
+
+/// Expected square of the cosine coefficient of flicker noise of this order over its density at the frequency of the cosine: little of
+/// the lower frequencies leaks into the lowest coefficients, and nothing to speak of into others.
+pub(super) fn flicker_leakage(order: f64) -> f64 {
+    static RATIOS: OnceLock<Vec<f64>> = OnceLock::new();
+    let ratios = RATIOS.get_or_init(|| {
+        let single = bands().zip(noise_shapes()).take_while(|(band, _)| band.len() == 1);
+        let ratio = |(band, [_, flicker, _]): (Range<usize>, &[f64; 3])| {
+            // The shape is that of a noise whose covariance is −ln of the lag, π times that of B = 1.
+            let frequency = band.start as f64 / (2 * BLOCKS) as f64;
+            flicker / PI / NoiseTerm::BiasInstability.process().density(frequency, 1.0)
+        };
+        single.map(ratio).collect()
+    });
+    ratios.get((order.round() as usize).saturating_sub(1)).copied().unwrap_or(1.0)
 }
 
 /// A Markov process of variance 1.

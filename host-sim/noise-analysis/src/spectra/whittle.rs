@@ -60,9 +60,20 @@ pub(super) fn fit_mixture<R: AsRef<[f64]>>(
     for _ in 0..MULTIPLICATIVE_ROUNDS {
         multiplicative_step(bands, bases, &is_positive, densities);
     }
+    fit_mixture_with(bands, bases, sign, None, densities)
+}
+
+/// As [`fit_mixture`], from these densities on, with that of the term `held` as it is.
+pub(super) fn fit_mixture_with<R: AsRef<[f64]>>(
+    bands: &[SpectralBand],
+    bases: &[R],
+    sign: Sign,
+    held: Option<usize>,
+    densities: &mut [f64],
+) -> f64 {
     let mut objective = mixture_objective(bands, bases, densities);
     for _ in 0..SCORING_ROUNDS {
-        let Some(next) = weighted_least_squares(bands, bases, sign, densities) else { break };
+        let Some(next) = weighted_least_squares(bands, bases, sign, held, densities) else { break };
         let step = |part: f64| -> Vec<f64> {
             densities.iter().zip(&next).map(|(density, next)| density + part * (next - density)).collect()
         };
@@ -80,12 +91,13 @@ pub(super) fn fit_mixture<R: AsRef<[f64]>>(
 }
 
 /// A round of Fisher's scoring: the densities of that sign whose sum is nearest to the bands, each weighted by the inverse of its
-/// variance under the present `densities`. What is negative and may not be is set to 0, one term after another. `None` if the bands do
-/// not tell the shapes apart.
+/// variance under the present `densities`; that of `held` stays. What is negative and may not be is set to 0, one term after another.
+/// `None` if the bands do not tell the shapes apart.
 fn weighted_least_squares<R: AsRef<[f64]>>(
     bands: &[SpectralBand],
     bases: &[R],
     sign: Sign,
+    held: Option<usize>,
     densities: &[f64],
 ) -> Option<Vec<f64>> {
     let information = information(bands, bases, densities);
@@ -93,13 +105,15 @@ fn weighted_least_squares<R: AsRef<[f64]>>(
     for (band, basis) in bands.iter().zip(bases) {
         let density = mixture_density(basis.as_ref(), densities);
         if density > 0.0 {
-            let towards = band.ordinates * band.density / (density * density);
+            let of_held = held.map_or(0.0, |held| densities[held] * basis.as_ref()[held]);
+            let towards = band.ordinates * (band.density - of_held) / (density * density);
             pull.iter_mut().zip(basis.as_ref()).for_each(|(pull, shape)| *pull += towards * shape);
         }
     }
     // In units in which each term alone is known to 1.
     let scale = information.diagonal().map(f64::sqrt);
     let mut is_left_out: Vec<bool> = scale.iter().map(|scale| *scale == 0.0).collect();
+    held.into_iter().for_each(|held| is_left_out[held] = true);
     loop {
         let entry = |row: usize, column: usize| {
             if is_left_out[row] || is_left_out[column] {
@@ -118,7 +132,9 @@ fn weighted_least_squares<R: AsRef<[f64]>>(
         let (least, value) = solved.argmin();
         if sign == Sign::Any || value >= 0.0 {
             let unscaled = |term: usize| if is_left_out[term] { 0.0 } else { solved[term] / scale[term] };
-            return Some((0..pull.len()).map(unscaled).collect());
+            let mut reached: Vec<f64> = (0..pull.len()).map(unscaled).collect();
+            held.into_iter().for_each(|held| reached[held] = densities[held]);
+            return Some(reached);
         }
         is_left_out[least] = true;
     }
@@ -213,5 +229,23 @@ mod tests {
         fit_mixture(&bands, &bases, Sign::NonNegative, &mut densities);
         let mean = bands.iter().map(|band| band.density).sum::<f64>() / 40.0;
         assert!(densities[1] == 0.0 && (densities[0] - mean).abs() < 1e-3, "{densities:?}, {mean}");
+    }
+
+    /// With one density held where it is not, the others are the nearest mixture to what it leaves.
+    #[test]
+    fn a_density_that_is_held_stays() {
+        let frequencies: Vec<f64> = (1..=40).map(|at| 0.02 * f64::from(at)).collect();
+        let bases: Vec<[f64; 2]> = frequencies.iter().map(|f| [1.0, 1.0 / f]).collect();
+        let band = |f: &f64| SpectralBand { frequency: *f, density: 3.0 + 0.2 / f, ordinates: 50.0 };
+        let bands: Vec<SpectralBand> = frequencies.iter().map(band).collect();
+        let mut densities = [1.0, 0.2];
+        fit_mixture_with(&bands, &bases, Sign::NonNegative, Some(1), &mut densities);
+        assert!(densities[1] == 0.2 && (densities[0] - 3.0).abs() < 1e-4, "{densities:?}");
+        densities = [3.0, 0.1];
+        let objective = fit_mixture_with(&bands, &bases, Sign::NonNegative, Some(1), &mut densities);
+        assert!(densities[1] == 0.1 && densities[0] > 3.0, "{densities:?}");
+        for near in [0.999, 1.001] {
+            assert!(mixture_objective(&bands, &bases, &[near * densities[0], 0.1]) > objective - 1e-6);
+        }
     }
 }

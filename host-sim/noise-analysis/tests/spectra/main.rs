@@ -1,6 +1,7 @@
 //! Spectra of simulated noise: known densities are measured, added lines are found, and pure noise yields none.
 
 mod noise;
+mod sample_likelihood;
 mod white_noise;
 
 use noise::{Output, PAPER, RATE_HZ, gain, resonance, sine};

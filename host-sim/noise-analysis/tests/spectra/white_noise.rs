@@ -20,21 +20,21 @@ fn fit(series: &UniformSeries, reach_of_slow_reading: Option<u32>) -> Option<Whi
 }
 
 /// White noise with N = 1, at `rate` Hz.
-fn white(count: usize, rate: f64, random: &mut ChaCha8Rng) -> Vec<f64> {
+pub(crate) fn white(count: usize, rate: f64, random: &mut ChaCha8Rng) -> Vec<f64> {
     (0..count).map(|_| rate.sqrt() * random.sample::<f64, _>(StandardNormal)).collect()
 }
 
-/// Adds flicker noise B, whose one-sided density is `B²/(πf)`, and a random walk K, as sums.
-fn with_drift(mut values: Vec<f64>, [b, k]: [f64; 2], random: &mut ChaCha8Rng) -> Vec<f64> {
+/// Adds flicker noise B, whose one-sided density is `B²/(πf)`, and a random walk K at `rate` Hz, as sums.
+pub(crate) fn with_drift(mut values: Vec<f64>, [b, k]: [f64; 2], rate: f64, random: &mut ChaCha8Rng) -> Vec<f64> {
     // Random phases and amplitudes at the frequencies of a record of twice the length.
     let length = 2 * values.len();
     let transform = RealFftPlanner::<f64>::new().plan_fft_inverse(length);
     let mut spectrum = transform.make_input_vec();
     let last = spectrum.len() - 1;
     for (at, value) in spectrum.iter_mut().enumerate().take(last).skip(1) {
-        let density = b * b * length as f64 / (PI * at as f64 * RATE_HZ);
+        let density = b * b * length as f64 / (PI * at as f64 * rate);
         // The transform back is a sum without a factor: an ordinate has the variance S·Δf/4 in each part.
-        let deviation = (density * RATE_HZ / length as f64).sqrt() / 2.0;
+        let deviation = (density * rate / length as f64).sqrt() / 2.0;
         value.re = deviation * random.sample::<f64, _>(StandardNormal);
         value.im = deviation * random.sample::<f64, _>(StandardNormal);
     }
@@ -42,14 +42,14 @@ fn with_drift(mut values: Vec<f64>, [b, k]: [f64; 2], random: &mut ChaCha8Rng) -
     transform.process(&mut spectrum, &mut flicker).expect("the planner's own buffers");
     let mut walk = 0.0;
     for (value, flicker) in values.iter_mut().zip(flicker) {
-        walk += k / RATE_HZ.sqrt() * random.sample::<f64, _>(StandardNormal);
+        walk += k / rate.sqrt() * random.sample::<f64, _>(StandardNormal);
         *value += flicker + walk;
     }
     values
 }
 
 /// Two cascaded averages over `taps` values each.
-fn filtered(values: &[f64], taps: usize) -> Vec<f64> {
+pub(crate) fn filtered(values: &[f64], taps: usize) -> Vec<f64> {
     let average = |values: &[f64]| -> Vec<f64> {
         values.windows(taps).map(|window| window.iter().sum::<f64>() / taps as f64).collect()
     };
@@ -89,9 +89,12 @@ fn the_interval_of_n_holds_the_truth_in_95_of_100_records() {
         ("white", share_that_holds(None, |random| white(SAMPLES, RATE_HZ, random))),
         (
             "white, flicker, walk",
-            share_that_holds(None, |random| with_drift(white(SAMPLES, RATE_HZ, random), paper, random)),
+            share_that_holds(None, |random| with_drift(white(SAMPLES, RATE_HZ, random), paper, RATE_HZ, random)),
         ),
-        ("strong drift", share_that_holds(None, |random| with_drift(white(SAMPLES, RATE_HZ, random), strong, random))),
+        (
+            "strong drift",
+            share_that_holds(None, |random| with_drift(white(SAMPLES, RATE_HZ, random), strong, RATE_HZ, random)),
+        ),
         ("4 taps", share_that_holds(None, |random| rounded(filtered(&white(SAMPLES, RATE_HZ, random), 4)))),
         ("16 taps", share_that_holds(None, |random| rounded(filtered(&white(SAMPLES, RATE_HZ, random), 16)))),
         ("read slowly", share_that_holds(Some(1), slow)),
@@ -128,12 +131,12 @@ fn n_is_not_given_where_the_drift_hides_it() {
     // A random walk whose density at half the rate, K²·dt²/2, is ten times that of the white noise.
     let mut random = ChaCha8Rng::seed_from_u64(2);
     let k = 20f64.sqrt() * 2.0 * RATE_HZ;
-    let walk = with_drift(white(SAMPLES, RATE_HZ, &mut random), [0.0, k], &mut random);
+    let walk = with_drift(white(SAMPLES, RATE_HZ, &mut random), [0.0, k], RATE_HZ, &mut random);
     let series = UniformSeries::new(1.0 / RATE_HZ, walk);
     if let Some(found) = fit(&series, None) {
         let n = found.angle_random_walk;
         assert!(n.low <= 1.0 && n.high >= 1.0, "{found:?}");
     }
-    let pure = with_drift(vec![0.0; SAMPLES], [0.0, 1.0], &mut random);
+    let pure = with_drift(vec![0.0; SAMPLES], [0.0, 1.0], RATE_HZ, &mut random);
     assert_eq!(fit(&UniformSeries::new(1.0 / RATE_HZ, pure), None), None);
 }

@@ -4,7 +4,7 @@
 //! ```console
 //! $ cargo run --release -p peers-accuracy
 //! $ python3 -m venv peers && peers/bin/pip install -r tests/peers/accuracy/requirements.txt
-//! $ cargo run --release -p peers-accuracy -- --python peers/bin/python
+//! $ cargo run --release -p peers-accuracy -- --python peers/bin/python --likelihood peers/bin/python
 //! ```
 
 mod case;
@@ -31,14 +31,21 @@ struct Cli {
     /// Interpreter in whose environment requirements.txt is installed; without, the peers in Python are left out.
     #[arg(long)]
     python: Option<String>,
-    /// Only this project's own estimator.
+    /// Interpreter with numpy and scipy, for the exact likelihood of the series, some 2 s each; without, it is left out.
+    #[arg(long, value_name = "PYTHON")]
+    likelihood: Option<String>,
+    /// Only this project's own estimator, beside the exact likelihood if that is asked for.
     #[arg(long)]
     ours: bool,
 }
 
 fn main() -> Result<()> {
     let cli = Cli::parse();
-    let mut python = cli.python.as_deref().map(Python::start).transpose()?;
+    let scripts = [(&cli.python, "peers.py"), (&cli.likelihood, "likelihood.py")];
+    let start = |(interpreter, script): (&Option<String>, &str)| {
+        interpreter.as_deref().map(|interpreter| Python::start(interpreter, script))
+    };
+    let mut scripts = scripts.into_iter().filter_map(start).collect::<Result<Vec<Python>>>()?;
     let batches = cli.series.div_ceil(BATCH) as u64;
     let mut table = Table::new();
     table.load_preset(presets::UTF8_FULL_CONDENSED).set_header(["case", "method", "N", "B", "K"]);
@@ -53,7 +60,7 @@ fn main() -> Result<()> {
                     scores(&mut scored, "imu-calib 0.3.1").add(estimate, case.truth);
                 }
             }
-            if let Some(python) = &mut python {
+            for python in &mut scripts {
                 for answer in python.ask(&batch, &python_terms(case))? {
                     for estimate in answer.coefficients {
                         scores(&mut scored, &answer.method).add(estimate, case.truth);
@@ -72,7 +79,7 @@ fn main() -> Result<()> {
         batches * BATCH as u64
     );
     println!("{table}");
-    if python.is_none() {
+    if cli.python.is_none() {
         println!("not run: the peers in Python (--python)");
     }
     Ok(())
@@ -83,9 +90,13 @@ fn score_own_fit(case: &Case, batch: &[Vec<f64>], scored: &mut Vec<(String, Scor
     for series in batch {
         for (method, kinds) in [("ours, true terms", &true_kinds[..]), ("ours, N, B and K", &NoiseTerm::BASELINE[..])] {
             let model = methods::fitted(case, series, kinds);
-            let scores = scores(scored, method);
-            scores.add(methods::fitted_coefficients(&model), case.truth);
-            scores.add_bounds(methods::covered(case, &model));
+            let by_samples =
+                methods::fitted_to_samples(series, &model).map(|of| (format!("{method}, all samples"), of));
+            for (method, model) in [(method.to_owned(), model)].into_iter().chain(by_samples) {
+                let scores = scores(scored, &method);
+                scores.add(methods::fitted_coefficients(&model), case.truth);
+                scores.add_bounds(methods::covered(case, &model));
+            }
         }
     }
 }

@@ -7,8 +7,11 @@ use allan_core::{Cascade, Model, NoiseTerm, fit::fit};
 use anyhow::{Context, Result, ensure};
 use imu_calib::allan::{AllanConfig, AllanEstimator, Sensor};
 use noise_analysis::report::assessment::record_length::relative_error;
+use noise_analysis::samples::uniform_series::UniformSeries;
+use noise_analysis::spectra::fit_to_samples;
 use serde::Deserialize;
 use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 /// Standard deviation of the white noise in counts. Rounding adds 1/12 count² to its variance, a part in 10⁷.
@@ -22,6 +25,11 @@ pub(crate) fn fitted(case: &Case, series: &[f64], kinds: &[NoiseTerm]) -> Model 
         cascade.push((value / lsb).round() as i32);
     }
     fit(&cascade.curve(SAMPLE_PERIOD), kinds).scaled(lsb)
+}
+
+/// The same model by all samples.
+pub(crate) fn fitted_to_samples(series: &[f64], model: &Model) -> Option<Model> {
+    fit_to_samples(&UniformSeries::new(SAMPLE_PERIOD, series.to_vec()), model)
 }
 
 /// The terms of which the case consists.
@@ -66,7 +74,7 @@ pub(crate) fn imu_calib_coefficients(series: &[f64]) -> Result<Coefficients> {
     Ok([first(result.noise_density_per_axis(Sensor::Gyro)), None, first(result.random_walk_per_axis(Sensor::Gyro))])
 }
 
-/// A running `peers.py`.
+/// A running script of this folder.
 pub(crate) struct Python {
     child: Child,
     series: ChildStdin,
@@ -82,11 +90,10 @@ pub(crate) struct Answer {
 }
 
 impl Python {
-    /// Starts `peers.py` with `interpreter`, in whose environment the peers are installed.
-    pub(crate) fn start(interpreter: &str) -> Result<Self> {
-        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/peers.py");
+    /// Starts a `script` of this folder with `interpreter`, in whose environment its packages are installed.
+    pub(crate) fn start(interpreter: &str, script: &str) -> Result<Self> {
         let mut child = Command::new(interpreter)
-            .arg(script)
+            .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join(script))
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
@@ -105,7 +112,7 @@ impl Python {
         }
         self.series.flush()?;
         let mut line = String::new();
-        ensure!(self.answers.read_line(&mut line)? > 0, "peers.py ended: see its message above");
+        ensure!(self.answers.read_line(&mut line)? > 0, "the script ended: see its message above");
         Ok(serde_json::from_str(&line)?)
     }
 }
