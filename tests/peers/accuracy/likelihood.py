@@ -127,7 +127,7 @@ def main():
         for one in batch.reshape(int(series), int(samples)):
             found = dict(zip(names, np.sqrt(likelihood.estimate(one))))
             coefficients.append([float(found[name]) if name in found else None for name in NAMES])
-        print(json.dumps([{"method": "exact likelihood", "coefficients": coefficients}]), flush=True)
+        print(json.dumps([{"method": "exact covariances", "coefficients": coefficients}]), flush=True)
 
 
 if __name__ == "__main__":

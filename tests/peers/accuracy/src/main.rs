@@ -31,10 +31,10 @@ struct Cli {
     /// Interpreter in whose environment requirements.txt is installed; without, the peers in Python are left out.
     #[arg(long)]
     python: Option<String>,
-    /// Interpreter with numpy and scipy, for the exact likelihood of the series, some 2 s each; without, it is left out.
+    /// Interpreter with numpy and scipy, for the likelihood by exact covariances, 2 s or more a series; without, it is left out.
     #[arg(long, value_name = "PYTHON")]
     likelihood: Option<String>,
-    /// Only this project's own estimator, beside the exact likelihood if that is asked for.
+    /// Only this project's own estimator, beside that likelihood if it is asked for.
     #[arg(long)]
     ours: bool,
 }
