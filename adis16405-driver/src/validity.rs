@@ -329,3 +329,21 @@ impl BurstValidator {
         &self.counters
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counters_stay_at_their_largest_value() {
+        const LAST: u32 = u32::MAX - 1;
+        let mut counters = FaultCounters { bursts: LAST, unusable: LAST, by_cause: [LAST; Faults::CAUSES.len()] };
+        let all = Validity { faults: Faults::all(), refused: ChannelMask::ALL };
+        for _ in 0..3 {
+            counters.add(all);
+        }
+        assert_eq!((counters.bursts, counters.unusable), (u32::MAX, u32::MAX));
+        assert!(counters.by_cause().all(|(_, count)| count == u32::MAX));
+        assert_eq!(counters.get(Faults::all()), u32::MAX);
+    }
+}

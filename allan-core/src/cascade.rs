@@ -8,6 +8,8 @@ pub(crate) mod snapshot;
 use crate::interpolation::Interpolation;
 use crate::moments::{Moments, ROUNDED};
 use core::mem::replace;
+use core::num::Wrapping;
+use core::ops::Sub;
 
 /// Streaming Allan variance at the averaging factors `n = 1, 2, 4 … 2^(OCTAVES−1)` samples.
 ///
@@ -29,9 +31,9 @@ use core::mem::replace;
 ///
 /// # Range
 /// Running sums wrap modulo 2⁶⁴, but their second differences do not: `|d| ≤ n·2³²` stays below `2⁶³` for `n ≤ 2³⁰`.
-/// For samples within ±2²³, `d² ≤ 2⁴⁸·n²`, and 2⁴⁰ samples have at most `2⁴⁴/n` differences with `n ≥ 16`, so for
-/// `n ≤ 2²³` no sum of squares exceeds `2¹¹⁵` and nothing is rounded. If wider samples fill the 127 bits of a sum, it
-/// stays at its maximum and [`is_saturated`](Self::is_saturated) returns true. The fourth powers are summed in 127 bits
+/// For samples within ±2²³, `d² ≤ 2⁴⁸·n²`, and 2⁴⁰ samples have at most `2⁴⁴/n` differences with `n ≥ 16`, one every
+/// `n/OVERLAP` samples, so for `n ≤ 2²³` no sum of squares exceeds `2¹¹⁵` and nothing is rounded. If wider samples fill the 127 bits
+/// of a sum, it stays at its maximum and [`is_saturated`](Self::is_saturated) returns true. The fourth powers are summed in 127 bits
 /// too, with differences at `n > 2¹⁰` rounded to `√(n/512)` counts. Where such a sum is full the kurtosis is `None`;
 /// within 2⁴⁰ samples that takes white noise above 2¹⁷ counts rms, or averages over `n = 2²³` samples that differ by
 /// more than 2¹⁰ counts throughout.
@@ -349,13 +351,14 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// The second difference of sums of `2^octave` samples that the newest sample completed, if it completed one and no
     /// gap is in it that the octave does not bridge.
     ///
-    /// [`Coupling`](crate::Coupling) multiplies these of two channels. `octave` must be below `OCTAVES`.
+    /// [`Coupling`](crate::Coupling) multiplies these of two channels. `None` beyond the last octave.
     #[inline]
     #[must_use]
     pub fn newest_difference(&self, octave: usize) -> Option<i64> {
         let level = octave.saturating_sub(Self::FINE);
         let n = 1 << (octave - level);
-        (self.ends_stride(level) && self.span(octave) >= 2 << octave)
+        let span = self.elapsed - self.octaves.get(octave)?.resumed;
+        (self.ends_stride(level) && span >= 2 << octave)
             .then(|| second_difference(self.sum, self.sum_before(level, n), self.sum_before(level, 2 * n)))
     }
 
@@ -386,10 +389,12 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
             (level, back) = (level - 1, 2 * back);
         }
         let slot = Self::slot((self.elapsed >> level).wrapping_sub(back));
+        // Callers have a level below LEVELS; without the bound the code for an index's panic would be linked.
+        let octave = &self.octaves[Self::FINE + level.min(Self::LEVELS - 1)];
         match back / OVERLAP as u64 {
             0 => self.recent[slot],
-            1 => self.octaves[level + Self::FINE].line[slot],
-            _ => self.octaves[level + Self::FINE].oldest,
+            1 => octave.line[slot],
+            _ => octave.oldest,
         }
     }
 
@@ -414,5 +419,44 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Default for Cascade<OCTAVES, OV
 /// Second difference of three running sums: exact although the sums wrap, because the true difference fits.
 #[inline]
 pub(crate) fn second_difference(newest: i64, middle: i64, oldest: i64) -> i64 {
-    newest.wrapping_sub(middle).wrapping_sub(middle.wrapping_sub(oldest))
+    wrapped_second_difference(Wrapping(newest), Wrapping(middle), Wrapping(oldest)).0
+}
+
+/// [`second_difference`] in words of any width `w`, which hold the sums modulo `2ʷ`.
+///
+/// A word holds what is congruent to its true sum modulo `2ʷ`, and congruences may be subtracted. So the result `r` is congruent to
+/// the true difference `d = b − a` of the sums `b` and `a` of the newest `n` samples and of the `n` before them, wherever the running
+/// sum began. Both lie in `−2ʷ⁻¹ ..= 2ʷ⁻¹ − 1` if `|d| < 2ʷ⁻¹`, where no two numbers are congruent: `r = d`.
+///
+/// Samples of `w/2` bits lie in `−2^(w/2−1) ..= 2^(w/2−1) − 1`, so `|b − a| ≤ n·(2^(w/2) − 1)`, which is below `2ʷ⁻¹` for
+/// `n ≤ 2^(w/2−1)`; with `w = 64` for `n ≤ 2³¹`, and the longest octave has `n = 2³⁰`.
+#[inline]
+fn wrapped_second_difference<W: Sub<Output = W> + Copy>(newest: W, middle: W, oldest: W) -> W {
+    newest - middle - (middle - oldest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every sum that samples of 4 bits can have, from every start of a running sum of 8 bits: the widths are those of the cascade,
+    /// 32 and 64 bits, divided by 8.
+    #[test]
+    fn second_differences_of_wrapped_sums_are_exact_up_to_the_longest_averaging_time() {
+        let word = |sum: i32| Wrapping(sum as i8);
+        let mut wrong = 0;
+        for n in 1..=8 {
+            let sums = || -8 * n..=7 * n;
+            for (oldest, earlier, later) in
+                (-128..128).flat_map(|start| sums().flat_map(move |a| sums().map(move |b| (start, a, b))))
+            {
+                let (middle, newest) = (oldest + earlier, oldest + earlier + later);
+                let difference = wrapped_second_difference(word(newest), word(middle), word(oldest));
+                wrong += usize::from(i32::from(difference.0) != later - earlier);
+            }
+            assert_eq!(wrong, 0, "n = {n}");
+        }
+        // At n = 9 the largest difference, 9·15, has more than 7 bits.
+        assert_ne!(i32::from(wrapped_second_difference(word(-9), word(-72), word(0)).0), 135);
+    }
 }

@@ -4,7 +4,7 @@
 //! [`DataReadyMonitor`] runs behind the queue: sample rate, lost and spurious edges, a suspect sensor.
 
 use adis16405_driver::{BURST_BYTES, Burst, SamplePeriod};
-use heapless::spsc;
+use spsc_queue::spsc;
 
 /// Slots of the burst queue, one of which stays empty: room for 38 ms at 819.2 samples a second.
 pub const QUEUE_SLOTS: usize = 32;
@@ -22,6 +22,10 @@ const SUSPECT: u32 = 8;
 
 /// The queue from the sampling interrupts to the estimators.
 pub type BurstQueue = spsc::Queue<TimedBurst, QUEUE_SLOTS>;
+/// Its end in the sampling interrupts.
+pub type BurstProducer<'q> = spsc::Producer<'q, TimedBurst, QUEUE_SLOTS>;
+/// Its end at the estimators.
+pub type BurstConsumer<'q> = spsc::Consumer<'q, TimedBurst, QUEUE_SLOTS>;
 
 /// The burst that was read at one data-ready edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,7 +70,7 @@ pub struct SamplingActivity {
 
 /// Decides at each data-ready edge whether a burst is read, and queues the bursts. It never blocks.
 pub struct Sampler<'q> {
-    queue: spsc::Producer<'q, TimedBurst>,
+    queue: BurstProducer<'q>,
     enabled: bool,
     /// Time of the edge whose burst is being transferred.
     reading: Option<u64>,
@@ -78,7 +82,7 @@ pub struct Sampler<'q> {
 
 impl<'q> Sampler<'q> {
     /// A sampler that ignores edges until it is [enabled](Self::set_enabled).
-    pub fn new(queue: spsc::Producer<'q, TimedBurst>) -> Self {
+    pub fn new(queue: BurstProducer<'q>) -> Self {
         Self { queue, enabled: false, reading: None, dropped: 0, activity: SamplingActivity::default(), edges: (0, 0) }
     }
 
@@ -248,7 +252,8 @@ impl DataReadyMonitor {
     }
 
     fn mean_period_q8(&self) -> u64 {
-        if self.periods < SETTLED_PERIODS { self.period_q8 } else { (self.elapsed_us << 8) / self.periods }
+        // At least 1: times may be equal.
+        if self.periods < SETTLED_PERIODS { self.period_q8 } else { (self.elapsed_us << 8) / self.periods }.max(1)
     }
 
     fn silence_us(&self) -> u64 {

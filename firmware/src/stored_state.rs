@@ -80,3 +80,70 @@ fn decode_model(rest: &[u8]) -> Option<(EpochModel, &[u8])> {
     let is_channel = |regressor: &Regressor| regressor.covariate < CHANNELS.len();
     model.regressors.iter().all(is_channel).then_some((model, later))
 }
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::*;
+    use std::vec;
+    use std::vec::Vec;
+
+    const SETTINGS: StoredSettings = StoredSettings {
+        smpl_prd: 0x81,
+        sens_avg: 0x0402,
+        epoch_s: 3_600,
+        interval_s: 60,
+        prod_id: 16_400,
+        raw_stream: true,
+    };
+
+    /// What format 1 is, by the rules of postcard: integers of more than 8 bits in groups of 7, the lowest first; then the models of the
+    /// channels: that of the first with N, B and K, a term and a regressor, the others without any. Devices in use have it in their flash.
+    fn kept() -> Vec<u8> {
+        let mut bytes = vec![1, 0x81, 0x82, 0x08, 0x90, 0x1C, 0x3C, 0x90, 0x80, 0x01, 1];
+        bytes.push(1);
+        for coefficient in [0.5_f64, 0.25, 0.125] {
+            bytes.extend(coefficient.to_le_bytes());
+        }
+        bytes.extend([1, 1]); // one term, angle random walk
+        bytes.extend(0.75_f64.to_le_bytes());
+        bytes.extend([1, 6]); // one regressor, temperature
+        for value in [-0.01_f64, 0.001, 25.0] {
+            bytes.extend(value.to_le_bytes());
+        }
+        bytes.extend([0; 3 * (INERTIAL - 1)]);
+        bytes
+    }
+
+    #[test]
+    fn the_kept_bytes_are_read_and_written_as_ever() {
+        let (settings, rest) =
+            decode_settings(&kept()).map(|(settings, rest)| (settings, rest.to_vec())).expect("format 1");
+        assert_eq!(settings, SETTINGS);
+        let mut models = [const { EpochModel::EMPTY }; INERTIAL];
+        assert!(decode_models(&rest, &mut models));
+        let (term, regressor) = (models[0].added_terms().count(), models[0].regressors[0]);
+        assert_eq!(
+            (term, regressor.covariate, regressor.value, regressor.error, regressor.reference),
+            (0, 6, -0.01, 0.001, 25.0)
+        );
+        let mut record = [0; 512];
+        assert_eq!(encode(&settings, &models, &mut record), Some(kept().as_slice()));
+    }
+
+    #[test]
+    fn another_format_and_damaged_models_are_not_taken() {
+        let mut models = [const { EpochModel::EMPTY }; INERTIAL];
+        let other: Vec<u8> = kept().into_iter().enumerate().map(|(at, byte)| if at == 0 { 2 } else { byte }).collect();
+        assert!(decode_settings(&other).is_none() && decode_settings(&[]).is_none());
+        // The covariate of the regressor, which has to be a channel.
+        let mut damaged = kept()[11..].to_vec();
+        damaged[1 + 24 + 2 + 8 + 1] = CHANNELS.len() as u8;
+        assert!(!decode_models(&damaged, &mut models));
+        for end in 11..kept().len() {
+            assert!(!decode_models(&kept()[11..end], &mut models), "{end} bytes");
+            assert!(models.iter().all(|model| *model == EpochModel::EMPTY));
+        }
+    }
+}

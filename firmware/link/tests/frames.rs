@@ -15,9 +15,7 @@ fn log(text: &str) -> Message {
 }
 
 fn frame(encoder: &mut Encoder, message: &Message) -> Vec<u8> {
-    let mut frame = Vec::new();
-    encoder.encode(message.into(), &mut |bytes| frame.extend(bytes));
-    frame
+    encoder.encode(message.into()).to_vec()
 }
 
 fn decode(stream: &[u8]) -> (Vec<Received>, DecoderCounters) {

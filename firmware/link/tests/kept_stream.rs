@@ -52,7 +52,7 @@ fn messages_are_encoded_as_in_the_kept_stream() {
     let mut encoder = Encoder::new();
     let mut stream: Vec<u8> = Vec::new();
     for message in &messages {
-        encoder.encode(message.into(), &mut |bytes| stream.extend(bytes));
+        stream.extend(encoder.encode(message.into()));
     }
     assert_eq!(stream, VERSION_4);
 }
