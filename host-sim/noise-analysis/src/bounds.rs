@@ -74,6 +74,12 @@ impl BoundedEstimate {
         ChannelEstimate { value: self.value, low: self.low, high: self.high, unit }
     }
 
+    /// One over it; nothing bounds it from above where it may be 0.
+    #[must_use]
+    pub fn inverse(self) -> Self {
+        Self::new(1.0 / self.value, 1.0 / self.high, 1.0 / self.low)
+    }
+
     /// All three times `factor`, which is positive.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {

@@ -18,6 +18,7 @@ mod first_order_filter;
 mod kind;
 mod knock;
 mod markov_process;
+mod modulated_line;
 mod motion;
 mod noise_below_count;
 mod output_filter;
@@ -51,6 +52,7 @@ pub use first_order_filter::FirstOrderFilter;
 pub(crate) use kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 pub use knock::NoisyInterval;
 pub use markov_process::{MarkovEvidence, MarkovProcess};
+pub use modulated_line::{ModulatedLine, ModulationEvidence};
 pub use motion::{MotionInterval, MotionScale};
 pub use noise_below_count::NoiseBelowCount;
 pub use output_filter::OutputFilter;
@@ -85,6 +87,8 @@ pub enum Effect {
     SinusoidalLine(SinusoidalLine),
     /// A line with a width.
     ResonantLine(ResonantLine),
+    /// A line whose amplitude or phase goes to and fro.
+    ModulatedLine(ModulatedLine),
     /// A line whose frequency runs.
     Chirp(Chirp),
     /// A slow signal that repeats and is no sinusoid.
@@ -199,6 +203,7 @@ kinds!(
     FirstOrderFilter,
     SinusoidalLine,
     ResonantLine,
+    ModulatedLine,
     Chirp,
     Periodic,
     SquareWave,

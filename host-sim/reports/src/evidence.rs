@@ -3,8 +3,8 @@
 use crate::formatting::enumerated;
 use crate::rounding::{quantity_digits, significant};
 use noise_analysis::effects::{
-    BandMismatch, CurveEvidence, Effect, LineEvidence, LineSource, LinearDriftEvidence, MarkovEvidence, MotionScale,
-    Multiples, Observation, OutputFilter, Refutation, TelegraphEvidence, Unexplained,
+    BandMismatch, CurveEvidence, Effect, LineEvidence, LineSource, LinearDriftEvidence, MarkovEvidence, ModulatedLine,
+    ModulationEvidence, MotionScale, Multiples, Observation, OutputFilter, Refutation, TelegraphEvidence, Unexplained,
 };
 use noise_analysis::report::Finding;
 
@@ -105,6 +105,7 @@ impl Wording {
             ),
             Effect::SinusoidalLine(of) => self.harmonic(of.multiples.as_ref(), &of.evidence),
             Effect::ResonantLine(of) => self.harmonic(of.multiples.as_ref(), &of.evidence),
+            Effect::ModulatedLine(of) => self.modulated(of),
             Effect::Chirp(of) => text(
                 format!(
                     "a line whose frequency runs from {:.2} to {:.2} Hz over the record, {:+.0} % of the noise of short spectra, by \
@@ -343,6 +344,35 @@ impl Wording {
     }
 
     /// A line by itself.
+    fn modulated(&self, of: &ModulatedLine) -> EvidenceText {
+        let (frequency_hz, period_s) = (of.frequency_hz.value, of.period_s.value);
+        match &of.evidence {
+            ModulationEvidence::Envelope { sigmas } => {
+                let (changes, depth) = if of.of_phase {
+                    ("its phase goes to and fro", format!("{:.2} rad", of.depth.value))
+                } else {
+                    ("its amplitude swells and fades", format!("{:.0} %", 100.0 * of.depth.value))
+                };
+                text(
+                    format!(
+                        "a line at {frequency_hz:.4} Hz, {sigmas:.0} sigma, whose sidebands are {:.4} Hz away: {changes} by {depth} \
+                         every {period_s:.0} s",
+                        1.0 / period_s
+                    ),
+                    ", which no sinusoid does",
+                )
+            }
+            ModulationEvidence::Sidebands(line) => text(
+                format!(
+                    "a line at {frequency_hz:.4} Hz between two equal ones {:.4} Hz away: its amplitude swells and fades every \
+                     {period_s:.0} s, which no sinusoid of one amplitude does",
+                    1.0 / period_s
+                ),
+                format!("; {}", self.line(line).sentence()),
+            ),
+        }
+    }
+
     fn line(&self, line: &LineEvidence) -> EvidenceText {
         let meaning = if line.has_width {
             "a narrow band: a mechanical resonance or an unsteady vibration"
@@ -408,30 +438,6 @@ impl Wording {
                     "",
                 )
             }
-            Observation::ModulatedLine { sigmas, sideband_hz, depth, of_phase } => {
-                let (changes, depth) = if *of_phase {
-                    ("its phase goes to and fro", format!("{depth:.2} rad"))
-                } else {
-                    ("its amplitude swells and fades", format!("{:.0} %", 100.0 * depth))
-                };
-                text(
-                    format!(
-                        "a line at {frequency_hz:.4} Hz, {sigmas:.0} sigma, whose sidebands are {sideband_hz:.4} Hz away: {changes} by \
-                         {depth} every {:.0} s, which no sinusoid does",
-                        1.0 / sideband_hz
-                    ),
-                    "",
-                )
-            }
-            Observation::EqualSidebands { distance_hz, line } => text(
-                format!(
-                    "a line at {frequency_hz:.4} Hz between two equal ones {:.4} Hz away: its amplitude swells and fades every {:.0} s, \
-                     which no sinusoid of one amplitude does",
-                    0.5 * distance_hz,
-                    2.0 / distance_hz
-                ),
-                format!("; {}", self.line(line).sentence()),
-            ),
             Observation::Sawtooth { multiples, line } => text(
                 format!(
                     "{} of one signal, even and odd ones with amplitudes that fall with their number: it rises evenly and jumps back \

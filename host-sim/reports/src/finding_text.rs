@@ -192,6 +192,26 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
                 format!("; stiffen the mount or notch the band.{}", off()),
             ),
         ),
+        Effect::ModulatedLine(of) => {
+            let (changes, depth) = if of.of_phase {
+                ("phase goes to and fro", of.depth.parameter("rad"))
+            } else {
+                ("amplitude swells and fades", of.depth.scaled(100.0).parameter("%"))
+            };
+            (
+                format!(
+                    "A vibration or hum at {}{reaches}: a line of {} whose {changes} by {} every {}.",
+                    hertz(of.frequency_hz),
+                    size(of.amplitude),
+                    amount(&depth),
+                    seconds(of.period_s)
+                ),
+                Advice::new(
+                    "Look for a machine whose load changes at this period, or for two that run at nearly one speed",
+                    format!(".{}", off()),
+                ),
+            )
+        }
         Effect::Chirp(of) => (
             format!(
                 "A line whose frequency runs from {} to {}, by {}{reaches}: an amplitude of {}.",

@@ -55,24 +55,6 @@ pub enum Observation {
         /// What contradicts a resonance.
         mismatch: BandMismatch,
     },
-    /// A line whose amplitude or phase goes to and fro.
-    ModulatedLine {
-        /// Significance, standard deviations.
-        sigmas: f64,
-        /// Distance of the sidebands, Hz.
-        sideband_hz: f64,
-        /// Amplitude of the change over that of the line, or of the phase in rad.
-        depth: f64,
-        /// Whether the phase changes, and not the amplitude.
-        of_phase: bool,
-    },
-    /// A line between two equal ones.
-    EqualSidebands {
-        /// Distance of the outer ones, Hz.
-        distance_hz: f64,
-        /// What shows the line between them.
-        line: LineEvidence,
-    },
     /// A signal that rises evenly and jumps back.
     Sawtooth {
         /// Its lines.

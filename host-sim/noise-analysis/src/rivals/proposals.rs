@@ -8,9 +8,10 @@ use crate::distributions::ROUNDING;
 use crate::effects::findings::SIGNIFICANCE;
 use crate::effects::{
     AccelerationSensitivity, AngleQuantization, BandMismatch, CommonMode, CurveEvidence, Effect, FirstOrderFilter,
-    LineEvidence, LineSource, LinearDrift, LinearDriftEvidence, MarkovEvidence, MarkovProcess, Observation,
-    OutputFilter, Refutation, ResonantLine, SharedDrift, SinusoidalLine, SpectrumEvidence, SupplySensitivity,
-    TelegraphEvidence, TelegraphNoise, TemperatureSensitivity, Unexplained, UnexplainedPlace,
+    LineEvidence, LineSource, LinearDrift, LinearDriftEvidence, MarkovEvidence, MarkovProcess, ModulatedLine,
+    ModulationEvidence, Observation, OutputFilter, Refutation, ResonantLine, SharedDrift, SinusoidalLine,
+    SpectrumEvidence, SupplySensitivity, TelegraphEvidence, TelegraphNoise, TemperatureSensitivity, Unexplained,
+    UnexplainedPlace,
 };
 use crate::fit::channel_fit::{ChannelFit, DITHERED_OCTAVES};
 use crate::fit::noise_terms::{filter_length_s, is_white, line_frequency};
@@ -29,7 +30,7 @@ use allan_core::telegraph::{self, KurtosisRatio};
 use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm, Shape};
 use allan_core::{AllanPoint, Curve, Model};
 use measurement::{ChannelProfile, Quantity, SensorProfile};
-use std::f64::consts::PI;
+use std::f64::consts::{PI, SQRT_2};
 
 /// Longest time constant, in samples, of a Markov process that is named a low-pass filter.
 const MAX_LOW_PASS_SAMPLES: f64 = 64.0;
@@ -398,7 +399,7 @@ fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &'static str) -> Effec
         return unexplained_band(line, model, BandMismatch::Curve);
     }
     if let Some(modulation) = &line.modulation {
-        return modulated_line(line, modulation);
+        return modulated_line(line, modulation, unit);
     }
     let frequency_hz = normal_bounds(line.frequency);
     let evidence = |has_width: bool| LineEvidence {
@@ -417,31 +418,19 @@ fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &'static str) -> Effec
         return ResonantLine { frequency_hz, bandwidth_hz, deviation, multiples: None, evidence: evidence(true) }
             .into();
     }
-    let MeasuredValue { value, error } = line.deviation;
-    let root = 2f64.sqrt();
-    let amplitude = normal_bounds(MeasuredValue { value: root * value, error: root * error }).in_unit(unit);
+    let amplitude = normal_bounds(line.deviation).scaled(SQRT_2).in_unit(unit);
     SinusoidalLine { frequency_hz, amplitude, multiples: None, evidence: evidence(false) }.into()
 }
 
 /// A line whose amplitude or phase changes.
-fn modulated_line(line: &MergedLine, modulation: &Modulation) -> Effect {
-    // The part of the deviation that is in the sidebands: the amplitude of either is half the depth of that of the line.
-    let percent = |depth: f64| 100.0 * depth / (2.0 + depth * depth).sqrt();
-    let MeasuredValue { value, error } = modulation.depth;
-    let excess_percent = BoundedEstimate::new(
-        percent(value),
-        percent((value - NORMAL_975 * error).max(0.0)),
-        percent(value + NORMAL_975 * error),
-    );
-    Unexplained {
-        place: UnexplainedPlace::Frequency(normal_bounds(line.frequency)),
-        excess_percent: Some(excess_percent),
-        observation: Observation::ModulatedLine {
-            sigmas: line.statistic.sqrt(),
-            sideband_hz: modulation.frequency,
-            depth: value,
-            of_phase: modulation.of_phase,
-        },
+fn modulated_line(line: &MergedLine, modulation: &Modulation, unit: &'static str) -> Effect {
+    ModulatedLine {
+        frequency_hz: normal_bounds(line.frequency),
+        amplitude: normal_bounds(line.deviation).scaled(SQRT_2 * modulation.of_line).in_unit(unit),
+        depth: normal_bounds(modulation.depth),
+        period_s: normal_bounds(modulation.frequency).inverse(),
+        of_phase: modulation.of_phase,
+        evidence: ModulationEvidence::Envelope { sigmas: line.statistic.sqrt() },
     }
     .into()
 }

@@ -10,7 +10,7 @@ use super::periodogram::taper;
 use crate::bounds::MeasuredValue;
 use crate::samples::uniform_series::UniformSeries;
 use realfft::num_complex::Complex;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// Blocks of the record in whose sums the changes are sought, at least: the sums lose `(π·32/512)²/3`, 1.3 %, of the power of the
 /// fastest change.
@@ -28,6 +28,9 @@ const FALSE_ALARM: f64 = 0.01;
 /// they are fast: one line alone on one side of another is half a change of either.
 const LARGEST_OTHER: f64 = 0.25;
 
+/// Distances of the three points, in ordinates, the vertex of whose parabola is the maximum, one after the other.
+const AROUND: [f64; 3] = [0.5, 0.15, 0.05];
+
 /// Distance in resolutions within which a line is a sideband of a change.
 const SAME: f64 = 1.5;
 
@@ -35,7 +38,9 @@ const SAME: f64 = 1.5;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Modulation {
     /// Hz.
-    pub frequency: f64,
+    pub frequency: MeasuredValue,
+    /// Deviation of the line alone over that of all the lines that were merged with it.
+    pub of_line: f64,
     /// Amplitude of the change over that of the line, or of the phase in rad.
     pub depth: MeasuredValue,
     /// Whether the phase changes, and not the amplitude.
@@ -45,7 +50,7 @@ pub struct Modulation {
 impl Modulation {
     /// Whether a line at a distance from the modulated one is one of the sidebands, in a record of `duration` s; both in Hz.
     pub(super) fn is_sideband(&self, distance: f64, duration: f64) -> bool {
-        (distance.abs() - self.frequency).abs() < SAME / duration
+        (distance.abs() - self.frequency.value).abs() < SAME / duration
     }
 
     /// The change of `sine` that `rest`, the record without the sine, shows most clearly; `None` if it may be noise of the one-sided
@@ -65,8 +70,8 @@ impl Modulation {
         });
         let turned = Complex::cis(sine.phase());
         blocks.iter_mut().for_each(|block| *block *= turned);
-        let turns = |ordinate: usize| ordinate as f64 / (PADDING * length) as f64;
-        let sums = |ordinate: usize| {
+        let turns = |ordinate: f64| ordinate / (PADDING * length) as f64;
+        let sums = |ordinate: f64| {
             // From the middle of a block to that of the next one. Over a thousand blocks the phasor loses ten bits.
             let turn = Complex::cis(-TAU * turns(ordinate) * size as f64);
             let mut phasor = Complex::cis(-TAU * turns(ordinate) * 0.5 * size as f64);
@@ -76,25 +81,36 @@ impl Modulation {
                 quadrature += phasor * block.im;
                 phasor *= turn;
             }
-            (in_phase, quadrature)
+            (in_phase.norm_sqr(), quadrature.norm_sqr())
         };
         let ordinates = PADDING..=PADDING * most;
         let trials = 2.0 * ordinates.clone().count() as f64;
         let candidates = ordinates.flat_map(|ordinate| {
-            let (in_phase, quadrature) = sums(ordinate);
-            let (in_phase, quadrature) = (in_phase.norm_sqr(), quadrature.norm_sqr());
+            let (in_phase, quadrature) = sums(ordinate as f64);
             [(ordinate, false, in_phase, quadrature), (ordinate, true, quadrature, in_phase)]
         });
         let (ordinate, of_phase, power, other) = candidates.max_by(|a, b| a.2.total_cmp(&b.2))?;
         // Each part has half the power of the noise on both sides of the line.
         let ratio = 2.0 * power * 2.0 * rest.sample_period() / squares / density;
-        let frequency = turns(ordinate) / rest.sample_period();
+        let frequency = turns(ordinate as f64) / rest.sample_period();
         let has_line = others.iter().any(|distance| (distance.abs() - frequency).abs() < SAME / rest.duration());
         if trials * (-ratio).exp() > FALSE_ALARM || (has_line && other > LARGEST_OTHER * power) {
             return None;
         }
-        let depth = 4.0 * power.sqrt() / (weights * sine.amplitude());
-        Some(Self { frequency, depth: MeasuredValue { value: depth, error: depth / (2.0 * ratio).sqrt() }, of_phase })
+        let power = |ordinate: f64| if of_phase { sums(ordinate).1 } else { sums(ordinate).0 };
+        let to_vertex = |at: f64, step: f64| {
+            let [left, middle, right] = [at - step, at, at + step].map(power);
+            let curvature = 2.0 * middle - left - right;
+            if curvature > 0.0 { at + (0.5 * step * (right - left) / curvature).clamp(-step, step) } else { at }
+        };
+        let ordinate = AROUND.into_iter().fold(ordinate as f64, to_vertex);
+        let depth = 4.0 * power(ordinate).sqrt() / (weights * sine.amplitude());
+        let relative = 1.0 / (2.0 * ratio).sqrt();
+        let frequency = MeasuredValue {
+            value: turns(ordinate) / rest.sample_period(),
+            error: 3f64.sqrt() / (PI * rest.duration()) * relative,
+        };
+        Some(Self { frequency, of_line: 1.0, depth: MeasuredValue { value: depth, error: depth * relative }, of_phase })
     }
 }
 
@@ -128,8 +144,10 @@ mod tests {
                 // Expected ratio 0.09·20,000/8·0.25 = 56, of which the taper and the distance to the ordinate leave 47: the depth is known
                 // to 10 %, and 10 % too low.
                 let found = found(seed, amplitude, phase).expect("47 times the noise");
-                assert!((found.frequency * 400.0 - 5.3).abs() < 0.6, "{found:?}");
+                assert!((found.frequency.value * 400.0 - 5.3).abs() < 0.6, "{found:?}");
                 assert!((found.depth.value / 0.5 - 1.0).abs() < 0.5, "{found:?}");
+                // Rife and Boorstyn: √3/(π·400 s) of that.
+                assert!((found.frequency.error * 400.0 / (0.1 * 3f64.sqrt() / PI) - 1.0).abs() < 0.5, "{found:?}");
                 assert_eq!(found.of_phase, phase > 0.0, "{found:?}");
             }
         }

@@ -144,8 +144,8 @@ fn markov_background(model: &Model, frequency: f64) -> f64 {
 }
 
 /// The change of the amplitude of the strongest of `peaks`, if the first two sinusoids beside it are at equal distances on either
-/// side, beyond the side lobes of the taper, and equally strong.
-fn sidebands(peaks: &[spectra::SpectralLine], duration_s: f64) -> Option<spectra::Modulation> {
+/// side, beyond the side lobes of the taper, and equally strong. All peaks have this `deviation`.
+fn sidebands(peaks: &[spectra::SpectralLine], deviation: f64, duration_s: f64) -> Option<spectra::Modulation> {
     let [strongest, one, other, ..] = peaks else { return None };
     let distance = |peak: &spectra::SpectralLine| peak.frequency.value - strongest.frequency.value;
     let is_symmetric = (distance(one) + distance(other)).abs() < SIDEBAND_TOLERANCE / duration_s;
@@ -158,7 +158,11 @@ fn sidebands(peaks: &[spectra::SpectralLine], duration_s: f64) -> Option<spectra
     // Each sideband has half the depth of the amplitude of the line.
     let over_line = 2.0 / strongest.deviation.value;
     (is_symmetric && is_beside && is_equal && are_sinusoids).then(|| spectra::Modulation {
-        frequency: 0.5 * (distance(one) - distance(other)).abs(),
+        frequency: MeasuredValue {
+            value: 0.5 * (distance(one) - distance(other)).abs(),
+            error: 0.5 * one.frequency.error.hypot(other.frequency.error),
+        },
+        of_line: strongest.deviation.value / deviation,
         depth: MeasuredValue { value: over_line * mean, error: 0.5 * over_line * error },
         of_phase: false,
     })
@@ -190,7 +194,7 @@ impl MergedLine {
             statistic: peaks.iter().map(|peak| peak.statistic).fold(0.0, f64::max),
             p_value: peaks.iter().map(|peak| peak.p_value).fold(1.0, f64::min),
             shape_p_value: strongest.shape_p_value,
-            modulation: sidebands(peaks, duration_s).or(strongest.modulation),
+            modulation: sidebands(peaks, total.sqrt(), duration_s).or(strongest.modulation),
             is_resonance: strongest.width.is_some(),
             duration_s,
         }
@@ -289,7 +293,7 @@ mod tests {
         // Frequencies are known to a fraction of the resolution of 0.0025 Hz.
         assert!((frequency - 7.3).abs() < 0.0025, "{frequency}");
         let modulation = modulation.expect("two sidebands of a quarter of the amplitude");
-        assert!((modulation.frequency - 5.0 / 400.0).abs() < 0.0025, "{modulation:?}");
+        assert!((modulation.frequency.value - 5.0 / 400.0).abs() < 0.0025, "{modulation:?}");
         // The amplitude of each sideband is known to a fiftieth of that of the line.
         assert!((modulation.depth.value - 0.5).abs() < 0.1, "{modulation:?}");
         assert_eq!(of(0.0).map(|(_, modulation)| modulation), Some(None));

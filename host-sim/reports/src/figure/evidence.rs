@@ -8,7 +8,8 @@ use crate::finding_text::channel_list;
 use crate::formatting::words;
 use crate::rounding::{quantity_digits, span, unit};
 use noise_analysis::effects::{
-    Effect, MotionInterval, NoisyInterval, Periodic, ResonantLine, SinusoidalLine, SquareWave, UnexplainedPlace,
+    Effect, ModulatedLine, MotionInterval, NoisyInterval, Periodic, ResonantLine, SinusoidalLine, SquareWave,
+    UnexplainedPlace,
 };
 use noise_analysis::report::{ChannelReport, Finding, Report};
 
@@ -25,6 +26,7 @@ pub(crate) fn evidence(report: &Report, index: usize) -> Option<Plot> {
     let plot = match &finding.effect {
         Effect::SinusoidalLine(SinusoidalLine { frequency_hz, .. })
         | Effect::ResonantLine(ResonantLine { frequency_hz, .. })
+        | Effect::ModulatedLine(ModulatedLine { frequency_hz, .. })
         | Effect::Periodic(Periodic { frequency_hz, .. })
         | Effect::SquareWave(SquareWave { frequency_hz, .. }) => line_in_spectrum(report, channel, frequency_hz.value),
         Effect::Chirp(_) | Effect::OutputFilter(_) | Effect::FirstOrderFilter(_) | Effect::ClockDeviation(_) => {

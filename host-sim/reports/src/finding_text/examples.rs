@@ -41,6 +41,17 @@ fn filter(decimation: f64) -> OutputFilter {
     }
 }
 
+fn modulated(of_phase: bool) -> ModulatedLine {
+    ModulatedLine {
+        frequency_hz: estimate(),
+        amplitude: size(),
+        depth: estimate(),
+        period_s: estimate(),
+        of_phase,
+        evidence: ModulationEvidence::Envelope { sigmas: 9.0 },
+    }
+}
+
 fn unexplained(place: UnexplainedPlace, excess_percent: Option<BoundedEstimate>) -> Unexplained {
     Unexplained { place, excess_percent, observation: Observation::PointOfCurve { p_value: 1e-9 } }
 }
@@ -57,6 +68,8 @@ pub(super) fn examples() -> Vec<Effect> {
         line(0.12).into(),
         resonance(20.5).into(),
         resonance(0.12).into(),
+        modulated(false).into(),
+        modulated(true).into(),
         Chirp {
             start_hz: estimate(),
             end_hz: estimate(),

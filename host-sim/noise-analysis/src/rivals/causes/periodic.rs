@@ -13,7 +13,7 @@ use super::waveform::{
 };
 use crate::bounds::{BoundedEstimate, ChannelEstimate};
 use crate::distributions::NORMAL_975;
-use crate::effects::{Effect, Observation, Unexplained, UnexplainedPlace};
+use crate::effects::{Effect, ModulatedLine, ModulationEvidence};
 use crate::rivals::cause::{Cause, Shown};
 use std::collections::BTreeMap;
 
@@ -92,20 +92,27 @@ fn has_equal_sidebands([below, line, above]: [&Frequency; 3]) -> bool {
     })
 }
 
-/// A line whose amplitude changes, by the three lines of [`modulated_line`]: no effect that has a name.
+/// A line whose amplitude changes, by the three lines of [`modulated_line`].
 fn modulated_cause(lines: Vec<Frequency>) -> Cause {
     let [below, line, above] = [0, 1, 2].map(|place| lines[place].best());
-    let lacking = |of: fn(&ChannelEstimate) -> f64| {
-        let [below, above] = [below, above].map(|line| of(&line.amplitude));
-        100.0 * below.hypot(above) / line.amplitude.value.max(f64::MIN_POSITIVE)
+    // The amplitude of either sideband is half the depth of that of the line.
+    let depth = |of: fn(&ChannelEstimate) -> f64| {
+        (of(&below.amplitude) + of(&above.amplitude)) / line.amplitude.value.max(f64::MIN_POSITIVE)
     };
-    let effect = Effect::from(Unexplained {
-        place: UnexplainedPlace::Frequency(line.frequency_hz),
-        excess_percent: Some(BoundedEstimate::new(lacking(|of| of.value), lacking(|of| of.low), lacking(|of| of.high))),
-        observation: Observation::EqualSidebands {
-            distance_hz: above.frequency - below.frequency,
-            line: line.evidence,
-        },
+    let change_hz = |[above, below]: [f64; 2]| 0.5 * (above - below);
+    let [upper, lower] = [above.frequency_hz, below.frequency_hz];
+    let change_hz = BoundedEstimate::new(
+        change_hz([upper.value, lower.value]),
+        change_hz([upper.low, lower.high]).max(0.0),
+        change_hz([upper.high, lower.low]),
+    );
+    let effect = Effect::from(ModulatedLine {
+        frequency_hz: line.frequency_hz,
+        amplitude: line.amplitude,
+        depth: BoundedEstimate::new(depth(|of| of.value), depth(|of| of.low), depth(|of| of.high)),
+        period_s: change_hz.inverse(),
+        of_phase: false,
+        evidence: ModulationEvidence::Sidebands(line.evidence),
     });
     let mut by_channel: BTreeMap<usize, Vec<Effect>> = BTreeMap::new();
     for line in lines.iter().flat_map(|frequency| &frequency.lines) {

@@ -189,11 +189,15 @@ fn sidebands_belong_to_their_line_and_other_lines_do_not() {
 }
 
 #[test]
-fn a_line_whose_amplitude_changes_is_unexplained() {
+fn a_line_whose_amplitude_changes_is_modulated() {
     // (1 + 0.5·sin 2π·0.05t)·sin 2π·12t has lines of a quarter of the amplitude at 12 ± 0.05 Hz.
     let steady = |frequency: f64, amplitude: f64| sinusoid(estimate(frequency, 5e-5), amplitude);
     let modulated = vec![steady(12.0, 1.0), steady(11.95, 0.25), steady(12.05, 0.25)];
-    assert_eq!(causes(std::slice::from_ref(&modulated)), [("unexplained", vec![0])]);
+    assert_eq!(causes(std::slice::from_ref(&modulated)), [("modulated_line", vec![0])]);
+    let cause = &merged(&[("g", &modulated)], DURATION_S)[0];
+    let Effect::ModulatedLine(of) = &cause.shown[0].effect else { panic!("{:?}", cause.shown[0].effect) };
+    let parameters = [of.frequency_hz.value, of.amplitude.value, of.depth.value, of.period_s.value];
+    assert!(parameters.iter().zip([12.0, 1.0, 0.5, 20.0]).all(|(found, of)| (found - of).abs() < 1e-9), "{of:?}");
     // Sidebands of unequal strength, or at unequal distances, are lines of their own.
     let unequal = vec![steady(12.0, 1.0), steady(11.95, 0.25), steady(12.05, 0.05)];
     assert_eq!(causes(&[unequal]).len(), 3);
