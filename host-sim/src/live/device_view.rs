@@ -109,7 +109,7 @@ impl LatestMessages {
         };
         let first = self.channels.values().find(|report| report.channel == Channel::GyroX as u8);
         let samples = first.map_or(0, |report| report.samples);
-        let length = span((samples + first.map_or(0, |report| report.missing)) as f64 / rate_hz(hello));
+        let length = span(samples.saturating_add(first.map_or(0, |report| report.missing)) as f64 / rate_hz(hello));
         let rate = plain(hello.sample_rate_hz, 4);
         let epoch = match hello.epoch_s {
             0 => "The epoch has no end: no model is learned. e 3600 makes epochs of an hour.".to_owned(),
@@ -301,5 +301,72 @@ fn is_shared(one: &Effect, other: &Effect) -> bool {
         (Effect::SinusoidalLine(one), Effect::SinusoidalLine(other)) => is_near(one.frequency_hz, other.frequency_hz),
         (Effect::ResonantLine(one), Effect::ResonantLine(other)) => is_near(one.frequency_hz, other.frequency_hz),
         _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use link::Decoder;
+    use ratatui::Terminal;
+    use ratatui::backend::TestBackend;
+    use reports::live::CurveGroup;
+
+    /// One message of each kind, with all its fields.
+    const KEPT: &[u8] = include_bytes!("../../../firmware/link/tests/kept_stream/version-4.bin");
+    const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
+    /// The message, one on a channel as that of gyro x, whose samples and losses are shown.
+    fn received(body: &[u8]) -> Option<Received> {
+        let content = [body, &CRC.checksum(body).to_le_bytes()].concat();
+        let mut decoder = Decoder::new();
+        let bytes = [&[0], cobs::encode_vec(&content).as_slice(), &[0]].concat();
+        let mut received = bytes.into_iter().filter_map(|byte| decoder.push(byte)).next();
+        if let Some(Received::Message { message: Message::Channel(report), .. }) = &mut received {
+            report.channel = Channel::GyroX as u8;
+        }
+        received
+    }
+
+    /// A number of a device may be none, and an integer as large as it can be: at every place of every message eight bytes are replaced by
+    /// such a number, or an integer of any length by the largest (LEB128), with the checksum that belongs to them.
+    #[test]
+    fn any_number_of_a_device_is_shown() {
+        let bodies = KEPT.split(|byte| *byte == 0).filter(|frame| !frame.is_empty()).map(|frame| {
+            let mut content = frame.to_vec();
+            let length = cobs::decode_in_place(&mut content).expect("COBS") - 4;
+            content.truncate(length);
+            content
+        });
+        let bodies: Vec<Vec<u8>> = bodies.collect();
+        let numbers = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, -f64::MAX, 5e-324, 0.0];
+        let largest = |bits: u32| [vec![0xFF; bits as usize / 7], vec![(1 << (bits % 7)) - 1]].concat();
+        let integer = |of: &[u8]| of.iter().position(|byte| *byte < 0x80).map_or(of.len(), |last| last + 1);
+        let mut terminal = Terminal::new(TestBackend::new(80, 24)).expect("a terminal in memory");
+        let (mut taken, mut drawn) = (0, 0);
+        for (changed, body) in bodies.iter().enumerate() {
+            for at in 2..body.len() {
+                let (before, after) = body.split_at(at);
+                let with = |new: &[u8], old: usize| [before, new, &after[old..]].concat();
+                let floats = numbers.iter().filter(|_| after.len() >= 8).map(|number| with(&number.to_le_bytes(), 8));
+                let integers = [16, 32, 64].into_iter().map(|bits| with(&largest(bits), integer(after)));
+                for hostile in floats.chain(integers).filter_map(|body| received(&body)) {
+                    let mut messages = LatestMessages::default();
+                    let of_kind =
+                        bodies.iter().enumerate().map(|(index, body)| (index != changed).then(|| received(body)));
+                    for message in of_kind.flatten().flatten().chain([hostile]) {
+                        messages.take(message);
+                    }
+                    let view = messages.view();
+                    taken += 1;
+                    // Drawing costs a hundred times as much.
+                    if taken % 16 == 0 {
+                        drawn += 1;
+                        terminal.draw(|frame| view.draw(frame, CurveGroup::default(), false)).expect("a frame");
+                    }
+                }
+            }
+        }
+        assert!(taken > 1000 && drawn > 60, "{taken} {drawn}");
     }
 }
