@@ -74,15 +74,22 @@ impl<F: NorFlash> SettingsStore<F> {
             return self.erase();
         }
         let mut buffer = RecordBuffer([0; _]);
-        let written = match complete(self.map.store_item(&mut buffer.0, &KEY, &record)) {
-            Some(Err(sequential_storage::Error::Corrupted { .. })) => {
-                self.erase()?;
-                complete(self.map.store_item(&mut buffer.0, &KEY, &record))
+        for was_erased in [false, true] {
+            let written = complete(self.map.store_item(&mut buffer.0, &KEY, &record));
+            let found = complete(self.map.fetch_item::<&[u8]>(&mut buffer.0, &KEY)).and_then(Result::ok).flatten();
+            let is_ring = match written {
+                Some(Ok(())) if found == Some(record) => return Ok(()),
+                // Flash that takes nothing leaves the record before.
+                Some(Ok(())) => found.is_some(),
+                Some(Err(sequential_storage::Error::Storage { .. })) | None => true,
+                Some(Err(_)) => false,
+            };
+            if is_ring || was_erased {
+                break;
             }
-            written => written,
-        };
-        let found = complete(self.map.fetch_item::<&[u8]>(&mut buffer.0, &KEY)).and_then(Result::ok).flatten();
-        if matches!(written, Some(Ok(()))) && found == Some(record) { Ok(()) } else { Err(StoreError::Flash) }
+            self.erase()?;
+        }
+        Err(StoreError::Flash)
     }
 
     fn erase(&mut self) -> Result<(), StoreError> {

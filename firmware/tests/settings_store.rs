@@ -177,6 +177,20 @@ fn foreign_contents_are_no_record() {
     assert_eq!(store.into_flash().read_record(), None);
 }
 
+/// Pages that are taken for a ring, in which nothing that is written is found again.
+#[test]
+fn contents_that_hide_what_is_written_are_erased() {
+    let contents = include_bytes!("../../tests/fuzz/corpus/settings/item-that-hides-others");
+    let mut flash = MockFlash::<4096, 2>::new();
+    let (first, second) = contents.split_at(contents.len() / 2);
+    for (page, bytes) in flash.bytes.chunks_mut(4096).zip([first, second]) {
+        page.iter_mut().zip(bytes).for_each(|(old, new)| *old = *new);
+    }
+    let (flash, done) = flash.write_record(&record(1));
+    assert!(done);
+    assert_eq!(flash.read_record(), Some(record(1)));
+}
+
 /// Flash that does not take what is written, as that of a part whose store the debugger has locked, or that of an emulator.
 #[test]
 fn what_is_not_there_afterwards_is_not_called_written() {

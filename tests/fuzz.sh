@@ -1,0 +1,40 @@
+#!/usr/bin/env bash
+# Has libFuzzer look for bytes that break a promise: tests/fuzz.sh [SECONDS] [TARGET...], of all targets if none is named, each for 5 s.
+#
+# Needs a C++ compiler. The crates of this workspace are compiled with counters of the edges of their code, by flags that stable Rust has;
+# those of others as the tests compile them. Each target begins with the bytes that are kept, in `tests/fuzz/corpus`; what is found is left in
+# `target/fuzz`, in `TARGET/` what reached new code, as `TARGET-crash-…` what broke a promise. Ends with an error if there is such a thing.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+seconds=${1-5}
+shift $(($# ? 1 : 0))
+targets=("$@")
+[ $# -gt 0 ] || mapfile -t targets < <(ls tests/fuzz/corpus)
+TARGET=$(realpath "${CARGO_TARGET_DIR:-target}")
+mkdir -p "$TARGET/fuzz"
+
+# Called in the place of rustc for the crates of the workspace. What runs while they are compiled is not searched.
+cat >"$TARGET/fuzz/rustc" <<'WRAPPER'
+#!/bin/sh
+case " $* " in *" --crate-name build_script_"* | *" proc-macro "*) exec "$@" ;; esac
+exec "$@" -C passes=sancov-module -C llvm-args=-sanitizer-coverage-level=3 -C llvm-args=-sanitizer-coverage-inline-8bit-counters \
+    -C llvm-args=-sanitizer-coverage-pc-table -C llvm-args=-sanitizer-coverage-trace-compares
+WRAPPER
+chmod +x "$TARGET/fuzz/rustc"
+RUSTC_WORKSPACE_WRAPPER=$TARGET/fuzz/rustc cargo build --locked --workspace --ignore-rust-version --example fuzz --features \
+    fuzz/libfuzzer,adis16405-driver/async,adis16405-driver/defmt,adis16405-driver/serde,allan-core/serde,allan-core/defmt
+cp "$TARGET/debug/examples/fuzz" "$TARGET/fuzz/fuzz"
+
+# The kept bytes are copied: libFuzzer adds what it finds to the first folder.
+fuzz() {
+    local found=$TARGET/fuzz/$1
+    mkdir -p "$found"
+    FUZZ_TARGET=$1 "$TARGET/fuzz/fuzz" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=1000 -max_len=8192 -print_final_stats=1 \
+        -artifact_prefix="$found-" "$found" "tests/fuzz/corpus/$1" >"$found.log" 2>&1 || { tail -n 40 "$found.log"; echo "$1: a finding"; return 1; }
+    printf '%-10s %9s runs, %5s edges\n' "$1" "$(sed -n 's/^stat::number_of_executed_units: *//p' "$found.log")" \
+        "$(sed -n 's/.* cov: \([0-9]*\) .*/\1/p' "$found.log" | tail -n 1)"
+}
+export -f fuzz
+export TARGET seconds
+printf '%s\n' "${targets[@]}" | xargs -P 2 -I{} bash -c 'fuzz {}'
