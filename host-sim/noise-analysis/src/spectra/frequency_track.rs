@@ -23,9 +23,11 @@ const PADDING: usize = 2;
 const LOWEST: usize = 4;
 /// Fewest ordinates by which the frequency runs over the record: a line that keeps its frequency is in the mean over time.
 const FEWEST_ORDINATES: usize = 8;
-/// Ordinates on each side of one whose mean is the noise of a segment there. What drifts over a segment leaks into the frequencies where
-/// there is little noise, and by another amount into each segment: a mean over all frequencies would be that of the leakage alone.
-const NEIGHBOURS: usize = 32;
+/// Ordinates on each side of one whose mean is the noise of a segment there, and the nearest of them, which have the line itself and are left
+/// out. What drifts over a segment leaks into the frequencies where there is little noise, and by another amount into each segment: a mean
+/// over all frequencies would be that of the leakage alone.
+const NEIGHBOURS: usize = 64;
+const NEAREST: usize = 4;
 /// Largest ordinate over the noise that is counted, more than chance has in a day's record: a short disturbance is no track.
 const LARGEST: f64 = 32.0;
 /// Part of a line's power that is left in the ordinates of a straight track, and its bounds: between two ordinates, and where the track goes
@@ -159,7 +161,7 @@ impl Spectrogram {
             for (power, mean) in row.iter_mut().zip(&by_column) {
                 *power = if *mean > 0.0 { *power / mean } else { 0.0 };
             }
-            let levels = means_of_neighbours(row);
+            let levels = levels_of_neighbours(row);
             for (power, level) in row.iter_mut().zip(levels) {
                 *power = if level > 0.0 { (f64::from(*power) / level).min(LARGEST) as f32 } else { 0.0 };
             }
@@ -167,7 +169,7 @@ impl Spectrogram {
         Some(Self { rows, means: by_column, size, spacing: 1.0 / ((PADDING * size) as f64 * series.sample_period()) })
     }
 
-    /// Amplitude of a sinusoid that exceeds the mean of the ordinates along a line by this part of them.
+    /// Amplitude of a sinusoid that exceeds the noise along a line by this part of it.
     ///
     /// A sinusoid of amplitude A has `(A·size/2)²`. The mean at a frequency has the line too, in two ordinates of each segment that lies
     /// there; steady lines that the track crosses are no part of its median.
@@ -175,7 +177,8 @@ impl Spectrogram {
         let mut crossed = self.means[line.first..=(line.first + line.drift).min(self.means.len() - 1)].to_vec();
         crossed.sort_by(f32::total_cmp);
         let own = PADDING as f64 / (line.drift + 1) as f64;
-        let power = f64::from(crossed[crossed.len() / 2]) * excess.max(0.0) / (1.0 - own);
+        let excess = excess.max(0.0);
+        let power = f64::from(crossed[crossed.len() / 2]) * excess / (1.0 + own * excess);
         2.0 * power.sqrt() / self.size as f64
     }
 
@@ -185,18 +188,24 @@ impl Spectrogram {
     }
 }
 
-/// The mean of each value and its [`NEIGHBOURS`] on both sides. Of equally distributed values each is one such mean on average.
-fn means_of_neighbours(values: &[f32]) -> Vec<f64> {
+/// The noise at each ordinate by its neighbours, so that an exponential variable over it is 1 on average: over the mean of n others it is
+/// n/(n − 1).
+fn levels_of_neighbours(ordinates: &[f32]) -> Vec<f64> {
     let mut sums = vec![0.0];
-    sums.extend(values.iter().scan(0.0, |sum, value| {
-        *sum += f64::from(*value);
+    sums.extend(ordinates.iter().scan(0.0, |sum, power| {
+        *sum += f64::from(*power);
         Some(*sum)
     }));
-    let mean = |at: usize| {
-        let (from, to) = (at.saturating_sub(NEIGHBOURS), (at + NEIGHBOURS + 1).min(values.len()));
-        (sums[to] - sums[from]) / (to - from) as f64
+    let around = |at: usize, distance: usize| {
+        let (from, to) = (at.saturating_sub(distance), (at + distance + 1).min(ordinates.len()));
+        (sums[to] - sums[from], (to - from) as f64)
     };
-    (0..values.len()).map(mean).collect()
+    let level = |at: usize| {
+        let ((sum, count), (nearest, near)) = (around(at, NEIGHBOURS), around(at, NEAREST));
+        let independent = (count - near) / PADDING as f64;
+        (sum - nearest) / (count - near) * independent / (independent - 1.0)
+    };
+    (0..ordinates.len()).map(level).collect()
 }
 
 /// A straight line through rows of ordinates.
