@@ -4,7 +4,7 @@
 //! [`DataReadyMonitor`] runs behind the queue: sample rate, lost and spurious edges, a suspect sensor.
 
 use adis16405_driver::{BURST_BYTES, Burst, SamplePeriod};
-use spsc_queue::spsc;
+use heapless::spsc;
 
 /// Slots of the burst queue, one of which stays empty: room for 38 ms at 819.2 samples a second.
 pub const QUEUE_SLOTS: usize = 32;
@@ -22,10 +22,6 @@ const SUSPECT: u32 = 8;
 
 /// The queue from the sampling interrupts to the estimators.
 pub type BurstQueue = spsc::Queue<TimedBurst, QUEUE_SLOTS>;
-/// Its end in the sampling interrupts.
-pub type BurstProducer<'q> = spsc::Producer<'q, TimedBurst, QUEUE_SLOTS>;
-/// Its end at the estimators.
-pub type BurstConsumer<'q> = spsc::Consumer<'q, TimedBurst, QUEUE_SLOTS>;
 
 /// The burst that was read at one data-ready edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,7 +66,7 @@ pub struct SamplingActivity {
 
 /// Decides at each data-ready edge whether a burst is read, and queues the bursts. It never blocks.
 pub struct Sampler<'q> {
-    queue: BurstProducer<'q>,
+    queue: spsc::Producer<'q, TimedBurst>,
     enabled: bool,
     /// Time of the edge whose burst is being transferred.
     reading: Option<u64>,
@@ -82,7 +78,7 @@ pub struct Sampler<'q> {
 
 impl<'q> Sampler<'q> {
     /// A sampler that ignores edges until it is [enabled](Self::set_enabled).
-    pub fn new(queue: BurstProducer<'q>) -> Self {
+    pub fn new(queue: spsc::Producer<'q, TimedBurst>) -> Self {
         Self { queue, enabled: false, reading: None, dropped: 0, activity: SamplingActivity::default(), edges: (0, 0) }
     }
 
@@ -252,8 +248,7 @@ impl DataReadyMonitor {
     }
 
     fn mean_period_q8(&self) -> u64 {
-        // At least 1: times may be equal.
-        if self.periods < SETTLED_PERIODS { self.period_q8 } else { (self.elapsed_us << 8) / self.periods }.max(1)
+        if self.periods < SETTLED_PERIODS { self.period_q8 } else { (self.elapsed_us << 8) / self.periods }
     }
 
     fn silence_us(&self) -> u64 {

@@ -7,8 +7,8 @@ use crate::settings_store::StoreError;
 use crate::transmit::TransmitQueue;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
+use heapless::spsc;
 use rtic_core::Mutex;
-use spsc_queue::spsc;
 
 /// Time before the first frame after a burst in µs: the sensor's longest stall time, that of its low-power mode.
 const STALL_US: u32 = 75;
@@ -179,22 +179,12 @@ impl HostPort {
     pub const COUNT: usize = 2;
 }
 
-/// Slots of a queue of received bytes, one of which stays empty.
-const RECEIVE_SLOTS: usize = 64;
-
-/// The bytes from a serial port to the application.
-pub type ReceiveBuffer = spsc::Queue<u8, RECEIVE_SLOTS>;
-/// Its end in the port.
-pub type ReceiveProducer<'q> = spsc::Producer<'q, u8, RECEIVE_SLOTS>;
-/// Its end in the application.
-pub type ReceiveConsumer<'q> = spsc::Consumer<'q, u8, RECEIVE_SLOTS>;
-
 /// The queues of received bytes.
 pub struct ReceivedBytes<'q> {
     /// From the UART.
-    pub uart: ReceiveConsumer<'q>,
+    pub uart: spsc::Consumer<'q, u8>,
     /// From the USB port of a board that has one.
-    pub usb: Option<ReceiveConsumer<'q>>,
+    pub usb: Option<spsc::Consumer<'q, u8>>,
 }
 
 impl ReceivedBytes<'_> {

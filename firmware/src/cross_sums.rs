@@ -88,34 +88,29 @@ impl CrossSums {
             self.take_back(counts, refused);
         }
         // All channels with a sample are at the same time, so the same octaves are due in them.
-        let mut used = estimators.iter().enumerate().filter(|&(index, _)| !refused.contains(index));
-        let due = used.next().map_or(0, |(_, estimator)| estimator.octaves_due());
-        for octave in FIRST_CROSS_OCTAVE..due.min(FIRST_CROSS_OCTAVE + CROSS_OCTAVES) {
-            let mut newest = [None; CHANNELS.len()];
-            for (index, (difference, estimator)) in newest.iter_mut().zip(estimators).enumerate() {
-                *difference = estimator.newest_difference(octave).filter(|_| !refused.contains(index));
-            }
-            self.add_products(octave - FIRST_CROSS_OCTAVE, &newest);
+        let due =
+            (0..CHANNELS.len()).find(|&index| !refused.contains(index)).map(|index| estimators[index].octaves_due());
+        for octave in FIRST_CROSS_OCTAVE..due.unwrap_or(0).min(FIRST_CROSS_OCTAVE + CROSS_OCTAVES) {
+            let newest =
+                |index: usize| estimators[index].newest_difference(octave).filter(|_| !refused.contains(index));
+            self.add_products(octave - FIRST_CROSS_OCTAVE, &core::array::from_fn(newest));
         }
     }
 
     /// Takes refused counts out of the totals again. Not inlined: they are rare.
     #[inline(never)]
     fn take_back(&mut self, counts: [i32; CHANNELS.len()], refused: ChannelSet) {
-        for (index, ((total, lacking), count)) in self.totals.iter_mut().zip(&mut self.lacking).zip(counts).enumerate()
-        {
+        for (index, (total, lacking)) in self.totals.iter_mut().zip(&mut self.lacking).enumerate() {
             if refused.contains(index) {
-                (*total, *lacking) = (*total - i64::from(count), *lacking + 1);
+                (*total, *lacking) = (*total - i64::from(counts[index]), *lacking + 1);
             }
         }
     }
 
     fn add_products(&mut self, row: usize, differences: &[Option<i64>; CHANNELS.len()]) {
-        let rows = (self.low.get_mut(row), self.high.get_mut(row), self.counts.get_mut(row));
-        let (Some(low), Some(high), Some(counts)) = rows else { return };
-        let difference = |index: usize| differences.get(index).copied().flatten();
-        for (((low, high), count), (a, b)) in low.iter_mut().zip(high).zip(counts).zip(PAIRS) {
-            if let (Some(a), Some(b)) = (difference(a), difference(b)) {
+        let sums = self.low[row].iter_mut().zip(&mut self.high[row]).zip(&mut self.counts[row]);
+        for (((low, high), count), (a, b)) in sums.zip(PAIRS) {
+            if let (Some(a), Some(b)) = (differences[a], differences[b]) {
                 let sum = wide(*low, *high) + i128::from(a) * i128::from(b);
                 (*low, *high) = (sum as u64, (sum >> 64) as i32);
                 *count = count.saturating_add(1);

@@ -79,11 +79,11 @@ mod task_monitor;
 mod transmit;
 pub mod usb_port;
 
-pub use acquisition::{BurstConsumer, BurstProducer, BurstQueue, EdgeAction, Sampler, SamplingActivity, TimedBurst};
+pub use acquisition::{BurstQueue, EdgeAction, Sampler, SamplingActivity, TimedBurst};
 pub use app::{App, Start, run};
 pub use board::{
     Board, BoardContext, BoardMeters, BrownOutLevel, BusTiming, Chip, DataReadyLine, FrameTimes, HostPort, Locks,
-    ReceiveBuffer, ReceiveConsumer, ReceiveProducer, ReceivedBytes, SelectTiming, SensorBus, Uptime, WatchdogExtension,
+    ReceivedBytes, SelectTiming, SensorBus, Uptime, WatchdogExtension,
 };
 pub use bus_frame::{BusFault, MicrosecondCounter};
 pub use crash_record::CrashRecord;
@@ -93,4 +93,4 @@ pub use retained::RetainedRam;
 pub use sample_intake::{Estimators, estimate};
 pub use scale::ReportScale;
 pub use statistics::{CHANNELS, ChannelEstimator, ChannelSums, OCTAVES, OVERLAP, Statistics};
-pub use transmit::{TransmitBuffer, TransmitConsumer, TransmitProducer, TransmitQueue};
+pub use transmit::{TransmitBuffer, TransmitQueue};

@@ -12,11 +12,9 @@ pub mod settings_flash;
 #[cfg(feature = "stm32f4")]
 pub mod stm32f4;
 
-use crate::board::{
-    BrownOutLevel, DataReadyLine, ReceiveBuffer, ReceiveConsumer, ReceiveProducer, SensorBus, WatchdogExtension,
-};
+use crate::board::{BrownOutLevel, DataReadyLine, SensorBus, WatchdogExtension};
 use crate::bus_frame::MicrosecondCounter;
-use crate::transmit::{TransmitBuffer, TransmitConsumer, TransmitProducer};
+use crate::transmit::TransmitBuffer;
 use crate::usb_port::{UsbIdentity, UsbPort};
 use adis16405_driver::BURST_BYTES;
 use core::convert::Infallible;
@@ -24,16 +22,20 @@ use core::fmt::Write;
 use defmt_rtt as _;
 use embedded_hal::digital::OutputPin;
 use heapless::String;
+use heapless::spsc::{Consumer, Producer, Queue};
 use link::{BootCause, ClockSource};
 use settings_flash::FlashMemory;
 use usb_device::bus::{UsbBus, UsbBusAllocator};
 
+/// The bytes from the serial port to the application.
+pub type ReceiveBuffer = Queue<u8, 64>;
+
 /// The UART's ends of the queues to and from the application.
 pub struct UartQueues {
     /// Bytes to be sent.
-    pub transmit: TransmitConsumer<'static>,
+    pub transmit: Consumer<'static, u8>,
     /// Bytes received.
-    pub receive: ReceiveProducer<'static>,
+    pub receive: Producer<'static, u8>,
 }
 
 /// A USB port, and the application's ends of its queues.
@@ -41,9 +43,9 @@ pub struct UsbParts<U> {
     /// The port.
     pub port: U,
     /// Bytes to be sent.
-    pub transmit: TransmitProducer<'static>,
+    pub transmit: Producer<'static, u8>,
     /// Bytes received.
-    pub receive: ReceiveConsumer<'static>,
+    pub receive: Consumer<'static, u8>,
 }
 
 impl<B: UsbBus> UsbParts<UsbPort<'static, B>> {
@@ -75,9 +77,7 @@ impl<B: UsbBus> ServedPort for UsbPort<'static, B> {
 impl<U> UsbParts<U> {
     /// Port and queues of a board that has them.
     #[must_use]
-    pub fn split(
-        parts: Option<Self>,
-    ) -> (Option<U>, Option<TransmitProducer<'static>>, Option<ReceiveConsumer<'static>>) {
+    pub fn split(parts: Option<Self>) -> (Option<U>, Option<Producer<'static, u8>>, Option<Consumer<'static, u8>>) {
         parts.map_or((None, None, None), |Self { port, transmit, receive }| (Some(port), Some(transmit), Some(receive)))
     }
 }

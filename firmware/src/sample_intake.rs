@@ -1,6 +1,6 @@
 //! The path of every sample: data-ready monitor, burst validation, statistics; and the counters of samples not used.
 
-use crate::acquisition::{BurstConsumer, DataReadyMonitor, DrdyEdge, TimedBurst};
+use crate::acquisition::{DataReadyMonitor, DrdyEdge, TimedBurst};
 use crate::channel_validity::{is_frame_sound, is_marked, refused_channels};
 use crate::channels::ChannelSet;
 use crate::gross_error_gate::{FIRST_BLOCK, GrossErrorGate};
@@ -8,6 +8,7 @@ use crate::scale::ReportScale;
 use crate::statistics::{CHANNELS, ChannelEstimator, ChannelSums, SampleLosses, Statistics};
 use crate::transmit::{RawStream, TransmitQueue};
 use adis16405_driver::{Burst, BurstValidator, ChannelMask, Config, Faults};
+use heapless::spsc;
 use link::{Health, MessageRef};
 
 /// Unusable bursts in a row from which on the sensor is in trouble. Every usable burst makes up for half an unusable one.
@@ -369,7 +370,7 @@ fn add(counter: &mut u32, more: u32) {
 pub fn estimate(
     estimators: &mut Estimators<'_>,
     transmit_queue: &mut TransmitQueue<'_>,
-    bursts: &mut BurstConsumer<'_>,
+    bursts: &mut spsc::Consumer<'_, TimedBurst>,
 ) {
     while let Some(timed) = bursts.dequeue() {
         let full = estimators.process(timed, bursts.len());

@@ -1,9 +1,8 @@
 //! Transmission to the host: the queues that the serial ports empty, and the packing of bursts into raw messages.
 
 use adis16405_driver::Burst;
-use heapless::Vec;
+use heapless::{Vec, spsc};
 use link::{Encoder, MAX_FRAME, MAX_RAW_FRAME, MAX_TEXT, MessageRef, RawBurst, RawMessage, TextLine, wire_bytes};
-use spsc_queue::spsc;
 
 /// Slots of the transmit buffer, one of which stays empty: the longest message, the reserve, and a text line with its
 /// enclosing bytes.
@@ -11,10 +10,6 @@ const BUFFER_SLOTS: usize = MAX_FRAME + RAW_RESERVE + MAX_TEXT + 8;
 
 /// The bytes from the application to a serial port.
 pub type TransmitBuffer = spsc::Queue<u8, BUFFER_SLOTS>;
-/// Its end in the application.
-pub type TransmitProducer<'q> = spsc::Producer<'q, u8, BUFFER_SLOTS>;
-/// Its end in the port.
-pub type TransmitConsumer<'q> = spsc::Consumer<'q, u8, BUFFER_SLOTS>;
 
 /// Room in bytes that reports leave for the raw stream: two raw messages.
 const RAW_RESERVE: usize = 2 * MAX_RAW_FRAME;
@@ -26,20 +21,20 @@ const RAW_RESERVE: usize = 2 * MAX_RAW_FRAME;
 /// dropped there alone, and counted: a host that does not read costs what it does not read.
 pub struct TransmitQueue<'q> {
     encoder: Encoder,
-    uart: TransmitProducer<'q>,
-    usb: Option<TransmitProducer<'q>>,
+    uart: spsc::Producer<'q, u8>,
+    usb: Option<spsc::Producer<'q, u8>>,
     usb_dropped: u32,
 }
 
 impl<'q> TransmitQueue<'q> {
     /// A queue to a UART alone, whose first message has the sequence number 0.
-    pub fn new(uart: TransmitProducer<'q>) -> Self {
+    pub fn new(uart: spsc::Producer<'q, u8>) -> Self {
         Self { encoder: Encoder::new(), uart, usb: None, usb_dropped: 0 }
     }
 
     /// Copies everything to a USB port too, if there is one.
     #[must_use]
-    pub fn with_usb(self, usb: Option<TransmitProducer<'q>>) -> Self {
+    pub fn with_usb(self, usb: Option<spsc::Producer<'q, u8>>) -> Self {
         Self { usb, ..self }
     }
 
@@ -64,11 +59,14 @@ impl<'q> TransmitQueue<'q> {
         };
         let fits = free(&self.uart) >= longest;
         if fits {
-            let frame = self.encoder.encode(message);
-            put(&mut self.uart, frame);
-            if let Some(usb) = room(&mut self.usb, longest, &mut self.usb_dropped) {
-                put(usb, frame);
-            }
+            let mut usb = room(&mut self.usb, longest, &mut self.usb_dropped);
+            let uart = &mut self.uart;
+            self.encoder.encode(message, &mut |bytes| {
+                put(uart, bytes);
+                if let Some(usb) = &mut usb {
+                    put(usb, bytes);
+                }
+            });
         } else {
             self.encoder.skip();
         }
@@ -89,16 +87,16 @@ impl<'q> TransmitQueue<'q> {
     }
 }
 
-fn free(queue: &TransmitProducer<'_>) -> usize {
+fn free(queue: &spsc::Producer<'_, u8>) -> usize {
     queue.capacity() - queue.len()
 }
 
 /// The queue if it has room for `length` bytes; counts what is dropped otherwise.
 fn room<'a, 'q>(
-    queue: &'a mut Option<TransmitProducer<'q>>,
+    queue: &'a mut Option<spsc::Producer<'q, u8>>,
     length: usize,
     dropped: &mut u32,
-) -> Option<&'a mut TransmitProducer<'q>> {
+) -> Option<&'a mut spsc::Producer<'q, u8>> {
     let queue = queue.as_mut()?;
     if free(queue) >= length {
         return Some(queue);
@@ -107,7 +105,7 @@ fn room<'a, 'q>(
     None
 }
 
-fn put(buffer: &mut TransmitProducer<'_>, bytes: &[u8]) {
+fn put(buffer: &mut spsc::Producer<'_, u8>, bytes: &[u8]) {
     for &byte in bytes {
         let _room_was_checked = buffer.enqueue(byte);
     }

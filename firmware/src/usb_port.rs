@@ -3,9 +3,8 @@
 //! Nothing here waits: [`UsbPort::serve`] moves what can be moved and returns. A host that is absent, suspended or does not read
 //! leaves bytes in the transmit queue, whose other end then [drops and counts](crate::TransmitQueue).
 
-use crate::board::ReceiveProducer;
-use crate::transmit::TransmitConsumer;
 use heapless::Vec;
+use heapless::spsc::{Consumer, Producer};
 use usb_device::bus::{UsbBus, UsbBusAllocator};
 use usb_device::device::{StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbDeviceState, UsbVidPid};
 use usbd_serial::{SerialPort, USB_CLASS_CDC};
@@ -33,8 +32,8 @@ pub struct UsbIdentity<'a> {
 pub struct UsbPort<'a, B: UsbBus> {
     device: UsbDevice<'a, B>,
     serial: SerialPort<'a, B>,
-    transmit: TransmitConsumer<'a>,
-    receive: ReceiveProducer<'a>,
+    transmit: Consumer<'a, u8>,
+    receive: Producer<'a, u8>,
     /// Bytes from the transmit queue that the endpoint has not taken yet.
     waiting: Vec<u8, PACKET>,
     /// A terminal has opened the port.
@@ -46,7 +45,7 @@ impl<'a, B: UsbBus> UsbPort<'a, B> {
     pub fn new(
         bus: &'a UsbBusAllocator<B>,
         identity: UsbIdentity<'a>,
-        (transmit, receive): (TransmitConsumer<'a>, ReceiveProducer<'a>),
+        (transmit, receive): (Consumer<'a, u8>, Producer<'a, u8>),
     ) -> Option<Self> {
         let serial = SerialPort::new(bus);
         let strings =

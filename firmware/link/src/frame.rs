@@ -30,17 +30,18 @@ struct Envelope<M> {
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 /// Numbers messages and encodes them as frames.
+///
+/// A frame is emitted in pieces while it is encoded: the device has no buffer for a whole one.
 #[derive(Debug, Default)]
 pub struct Encoder {
     sequence: u16,
-    frame: Vec<u8, MAX_FRAME>,
 }
 
 impl Encoder {
     /// An encoder whose first frame has the sequence number 0.
     #[must_use]
     pub const fn new() -> Self {
-        Self { sequence: 0, frame: Vec::new() }
+        Self { sequence: 0 }
     }
 
     /// Uses up a sequence number for a message that is dropped, so that the receiver counts it as missing.
@@ -48,65 +49,58 @@ impl Encoder {
         self.sequence = self.sequence.wrapping_add(1);
     }
 
-    /// The frame of a message.
-    pub fn encode(&mut self, message: MessageRef<'_>) -> &[u8] {
+    /// Passes the frame of a message to `output`, in pieces.
+    pub fn encode(&mut self, message: MessageRef<'_>, output: &mut dyn FnMut(&[u8])) {
+        output(&[0]);
+        let mut block = Vec::new();
+        let cobs = CobsFlavor { state: EncoderState::default(), block: &mut block, output };
+        let with_crc = CrcModifier::new(cobs, CRC.digest());
         let envelope = Envelope { version: VERSION, sequence: self.sequence, message };
+        // The flavor accepts every byte, so serialisation does not fail.
+        let _ = postcard::serialize_with_flavor(&envelope, with_crc);
         self.skip();
-        self.frame.clear();
-        // There is room for the longest frame, so that it does not fail.
-        let _ = Cobs::begin(&mut self.frame)
-            .and_then(|cobs| postcard::serialize_with_flavor(&envelope, CrcModifier::new(cobs, CRC.digest())));
-        &self.frame
     }
 }
 
-/// Appends bytes in the COBS code to a frame, which begins with a zero byte.
-struct Cobs<'a> {
+/// COBS encoder: every block of bytes without a zero is emitted as soon as it is complete, after its length byte.
+struct CobsFlavor<'a> {
     state: EncoderState,
-    frame: &'a mut Vec<u8, MAX_FRAME>,
+    block: &'a mut Vec<u8, 254>,
+    output: &'a mut dyn FnMut(&[u8]),
 }
 
-impl<'a> Cobs<'a> {
-    /// Begins a frame with its zero byte and the place of the first length.
-    fn begin(frame: &'a mut Vec<u8, MAX_FRAME>) -> postcard::Result<Self> {
-        frame.extend_from_slice(&[0, 0]).map_err(|_| postcard::Error::SerializeBufferFull)?;
-        Ok(Self { state: EncoderState::default(), frame })
-    }
-
+impl CobsFlavor<'_> {
     fn add(&mut self, byte: u8) -> postcard::Result<()> {
-        self.frame.push(byte).map_err(|_| postcard::Error::SerializeBufferFull)
+        self.block.push(byte).map_err(|_| postcard::Error::SerializeBufferFull)
     }
 
-    /// Writes the length of a block to its place, which is counted from the byte after the zero byte.
-    fn end_block(&mut self, place: usize, length: u8) {
-        if let Some(byte) = self.frame.get_mut(1 + place) {
-            *byte = length;
-        }
+    fn end_block(&mut self, length: u8) {
+        (self.output)(&[length]);
+        (self.output)(self.block);
+        self.block.clear();
     }
 }
 
-impl Flavor for Cobs<'_> {
+impl Flavor for CobsFlavor<'_> {
     type Output = ();
 
     fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
         match self.state.push(byte) {
-            PushResult::AddSingle(byte) => self.add(byte),
-            PushResult::ModifyFromStartAndSkip((place, length)) => {
-                self.end_block(place, length);
-                self.add(0)
-            }
-            PushResult::ModifyFromStartAndPushAndSkip((place, length, byte)) => {
-                self.end_block(place, length);
+            PushResult::AddSingle(byte) => self.add(byte)?,
+            PushResult::ModifyFromStartAndSkip((_, length)) => self.end_block(length),
+            PushResult::ModifyFromStartAndPushAndSkip((_, length, byte)) => {
                 self.add(byte)?;
-                self.add(0)
+                self.end_block(length);
             }
         }
+        Ok(())
     }
 
     fn finalize(mut self) -> postcard::Result<()> {
-        let (place, length) = self.state.clone().finalize();
-        self.end_block(place, length);
-        self.add(0)
+        let (_, length) = self.state.clone().finalize();
+        self.end_block(length);
+        (self.output)(&[0]);
+        Ok(())
     }
 }
 

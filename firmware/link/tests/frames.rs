@@ -15,7 +15,9 @@ fn log(text: &str) -> Message {
 }
 
 fn frame(encoder: &mut Encoder, message: &Message) -> Vec<u8> {
-    encoder.encode(message.into()).to_vec()
+    let mut frame = Vec::new();
+    encoder.encode(message.into(), &mut |bytes| frame.extend(bytes));
+    frame
 }
 
 fn decode(stream: &[u8]) -> (Vec<Received>, DecoderCounters) {

@@ -52,7 +52,7 @@ fn messages_are_encoded_as_in_the_kept_stream() {
     let mut encoder = Encoder::new();
     let mut stream: Vec<u8> = Vec::new();
     for message in &messages {
-        stream.extend(encoder.encode(message.into()));
+        encoder.encode(message.into(), &mut |bytes| stream.extend(bytes));
     }
     assert_eq!(stream, VERSION_4);
 }

@@ -49,7 +49,7 @@ pub fn record_fault(frame: Option<&ExceptionFrame>) {
 ///
 /// `board` implements [`BoardSupport`](crate::microcontroller::BoardSupport) for the peripherals of `device`. The interrupts are those of
 /// the data-ready edge, of the end of a burst, of the UART, of USB if the board has it, and, for the estimators, one whose
-/// peripheral is not used. The board's package needs the crates `rtic` and `cortex-m-rt`, and their features
+/// peripheral is not used. The board's package needs the crates `rtic`, `heapless` and `cortex-m-rt`, and their features
 /// of this one.
 ///
 /// | priority | interrupt |
@@ -74,17 +74,18 @@ macro_rules! observatory {
         mod app {
             use super::*;
             use $($device)::+::Interrupt;
+            use heapless::spsc::Consumer;
             use $crate::microcontroller::image::restore;
             use $crate::microcontroller::processor::{
                 Blinker, ESTIMATOR_CYCLES, Interrupts, Processor, SAMPLING_CYCLES, count_lost_bytes, measure,
             };
             use $crate::microcontroller::{
-                BoardParts, BoardSupport, BurstBus as _, BurstEnd, DataReadyPin as _, Microcontroller,
+                BoardParts, BoardSupport, BurstBus as _, BurstEnd, DataReadyPin as _, Microcontroller, ReceiveBuffer,
                 ServedPort as _, UartQueues, UsbParts,
             };
             use $crate::{
-                BoardContext, BurstConsumer, BurstQueue, DataReadyLine as _, EdgeAction, Estimators, FIRST_CONFIG, FinishedEpoch, HostPort, Locks, MicrosecondCounter as _, ReceiveBuffer, ReceivedBytes, Sampler, Start,
-                Statistics, TransmitBuffer, TransmitQueue, Uptime, WatchdogExtension, estimate, run,
+                BoardContext, BurstQueue, DataReadyLine as _, EdgeAction, Estimators, FIRST_CONFIG, FinishedEpoch, HostPort, Locks, MicrosecondCounter as _, ReceivedBytes, Sampler, Start,
+                Statistics, TimedBurst, TransmitBuffer, TransmitQueue, Uptime, WatchdogExtension, estimate, run,
             };
 
             type Mcu = <$board as BoardSupport>::Microcontroller;
@@ -101,7 +102,7 @@ macro_rules! observatory {
 
             #[local]
             struct Local {
-                bursts: BurstConsumer<'static>,
+                bursts: Consumer<'static, TimedBurst>,
                 uart: <$board as BoardSupport>::Uart,
                 usb: Option<<$board as BoardSupport>::Usb>,
                 processor: Processor<Mcu, <$board as BoardSupport>::ResetLine>,

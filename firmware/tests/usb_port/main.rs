@@ -4,7 +4,8 @@
 mod host;
 
 use firmware::usb_port::{PRODUCT, UsbIdentity, UsbPort};
-use firmware::{ReceiveBuffer, ReceiveConsumer, TransmitBuffer, TransmitConsumer, TransmitQueue};
+use firmware::{TransmitBuffer, TransmitQueue};
+use heapless::spsc::{Consumer, Queue};
 use host::MockBus;
 use link::{Decoder, MessageRef, Received, text_line};
 use usb_device::bus::UsbBusAllocator;
@@ -31,8 +32,8 @@ struct Bench {
     bus: MockBus,
     port: UsbPort<'static, MockBus>,
     queue: TransmitQueue<'static>,
-    uart: TransmitConsumer<'static>,
-    received: ReceiveConsumer<'static>,
+    uart: Consumer<'static, u8>,
+    received: Consumer<'static, u8>,
 }
 
 fn leak<T>(value: T) -> &'static mut T {
@@ -45,7 +46,7 @@ impl Bench {
         let allocator = leak(UsbBusAllocator::new(bus.clone()));
         let (to_uart, uart) = leak(TransmitBuffer::new()).split();
         let (to_usb, usb) = leak(TransmitBuffer::new()).split();
-        let (receive, received) = leak(ReceiveBuffer::new()).split();
+        let (receive, received) = leak(Queue::<u8, 64>::new()).split();
         let port = UsbPort::new(allocator, IDENTITY, (usb, receive)).expect("enough endpoints");
         Self { bus, port, queue: TransmitQueue::new(to_uart).with_usb(Some(to_usb)), uart, received }
     }

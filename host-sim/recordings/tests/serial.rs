@@ -42,7 +42,7 @@ fn messages(encoder: &mut Encoder, first: u64, at_us: u64, count: u64) -> VecDeq
         let mut bursts = heapless::Vec::new();
         bursts.push(RawBurst { after_us: 0, periods: 0, words: [[0x80, 1]; 12] }).expect("room");
         let raw = RawMessage { first: first + number, at_us: at_us + 10_000 * number, sens_avg: 0x0402, bursts };
-        bytes.extend(encoder.encode(MessageRef::Raw(&raw)));
+        encoder.encode(MessageRef::Raw(&raw), &mut |sent| bytes.extend(sent));
     }
     bytes
 }

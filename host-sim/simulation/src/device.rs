@@ -6,10 +6,10 @@ use embedded_hal::spi::SpiDevice;
 use firmware::retained::{RetainedMemory, blank_memory};
 use firmware::settings_store::StoreError;
 use firmware::{
-    App, Board, BoardMeters, BurstConsumer, BurstQueue, BusTiming, EdgeAction, Estimators, FIRST_CONFIG, FinishedEpoch,
-    HostPort, RetainedRam, Sampler, SamplingActivity, Start, Statistics, TransmitBuffer, TransmitConsumer,
-    TransmitQueue, estimate,
+    App, Board, BoardMeters, BurstQueue, BusTiming, EdgeAction, Estimators, FIRST_CONFIG, FinishedEpoch, HostPort,
+    RetainedRam, Sampler, SamplingActivity, Start, Statistics, TimedBurst, TransmitBuffer, TransmitQueue, estimate,
 };
+use heapless::spsc::Consumer;
 use link::{Boot, BootCause};
 use std::cell::RefMut;
 use std::collections::VecDeque;
@@ -46,9 +46,9 @@ struct SimulatedBoard {
     now_us: u64,
     sampler: Sampler<'static>,
     estimators: Estimators<'static>,
-    arrivals: BurstConsumer<'static>,
+    arrivals: Consumer<'static, TimedBurst>,
     transmit_queue: TransmitQueue<'static>,
-    outgoing: TransmitConsumer<'static>,
+    outgoing: Consumer<'static, u8>,
     sent: Vec<u8>,
     received: VecDeque<u8>,
     restarts: u32,

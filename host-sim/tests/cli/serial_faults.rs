@@ -153,7 +153,7 @@ fn escape_sequences_of_a_device_do_not_reach_the_terminal() {
     while program.try_wait().expect("a status").is_none() {
         let mut bytes = Vec::new();
         for message in &hostile_messages() {
-            bytes.extend(encoder.encode(message.into()));
+            encoder.encode(message.into(), &mut |sent| bytes.extend(sent));
         }
         let _ = near.write_all(&bytes);
         std::thread::sleep(Duration::from_millis(50));

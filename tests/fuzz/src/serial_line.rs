@@ -9,7 +9,8 @@ pub(crate) fn stream(bytes: &[u8]) {
     for received in bytes.iter().filter_map(|&byte| decoder.push(byte)) {
         let Received::Message { message, .. } = received else { continue };
         let mut again = Decoder::new();
-        let frame = encoder.encode((&message).into());
+        let mut frame = Vec::new();
+        encoder.encode((&message).into(), &mut |bytes| frame.extend_from_slice(bytes));
         let received: Vec<Received> = frame.iter().filter_map(|&byte| again.push(byte)).collect();
         let [Received::Message { message: again, .. }] = received.as_slice() else {
             panic!("{message:?}: {received:?}")

@@ -12,7 +12,6 @@ mod images;
 mod microcontroller;
 mod peripherals;
 mod probe;
-mod sampling_path;
 
 use adis16405_driver::GyroRange;
 use bench::{Outcome, Scenario, image, run};

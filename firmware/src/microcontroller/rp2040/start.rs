@@ -11,7 +11,7 @@ use link::BootCause;
 use rp2040_hal::clocks::{ClocksManager, InitError, init_clocks_and_plls};
 use rp2040_hal::fugit::ExtU32;
 use rp2040_hal::gpio::{FunctionSioInput, Interrupt, Pin, PinId, PullNone};
-use rp2040_hal::pac::{CLOCKS, IO_BANK0, PLL_SYS, PLL_USB, RESETS, TIMER, VREG_AND_CHIP_RESET, WATCHDOG, XOSC};
+use rp2040_hal::pac::{CLOCKS, PLL_SYS, PLL_USB, RESETS, TIMER, VREG_AND_CHIP_RESET, WATCHDOG, XOSC};
 use rp2040_hal::{Timer, Watchdog};
 
 /// Crystal of the Pico.
@@ -22,10 +22,6 @@ const WATCHDOG_MS: u32 = 8_300;
 /// channel: with 20 points it takes 118 million instructions (tests/instructions, thumbv6m) and up to three of them follow
 /// one another, 2.5 s in the emulator with 12 points; slow flash may double that.
 const EXTENSION_S: u32 = 30;
-/// Pins of a register of the interrupts of the pins, each with four bits, of which the highest is that of the rising edge (RP2040
-/// data sheet, section 2.19.6.1).
-const PINS_PER_REGISTER: usize = 8;
-const EDGE_HIGH: u32 = 1 << 3;
 /// Feedings by the main loop.
 static FEEDINGS: AtomicU32 = AtomicU32::new(0);
 /// Readings of the flag of the crystal, each of at least three cycles of at most 12 MHz: 100 ms. It is set 1 ms after the
@@ -167,16 +163,9 @@ impl<I: PinId> DataReadyPin for Pin<I, FunctionSioInput, PullNone> {
 
 impl<I: PinId> DataReadyLine for Pin<I, FunctionSioInput, PullNone> {
     fn set_masked(&mut self, masked: bool) {
-        // By the register of core 0, on which the image runs: the HAL asks which core it is, and panics at a third.
-        let number = usize::from(self.id().num);
-        // SAFETY: bits of this pin, which only this value changes.
-        let bank = unsafe { &*IO_BANK0::ptr() };
-        let Some(enables) = bank.proc0_inte_iter().nth(number / PINS_PER_REGISTER) else { return };
-        let edge = EDGE_HIGH << (4 * (number % PINS_PER_REGISTER));
-        if (enables.read().bits() & edge == 0) != masked {
+        if self.is_interrupt_enabled(Interrupt::EdgeHigh) == masked {
             self.clear_interrupt(Interrupt::EdgeHigh);
-            // SAFETY: as above.
-            enables.modify(|read, w| unsafe { w.bits(read.bits() ^ edge) });
+            self.set_interrupt_enabled(Interrupt::EdgeHigh, !masked);
         }
     }
 
