@@ -26,7 +26,7 @@ const FEWEST_ORDINATES: usize = 8;
 /// Ordinates on each side of one whose mean is the noise of a segment there, and the nearest of them, which have the line itself and are left
 /// out. What drifts over a segment leaks into the frequencies where there is little noise, and by another amount into each segment: a mean
 /// over all frequencies would be that of the leakage alone.
-const NEIGHBOURS: usize = 64;
+const NEIGHBOURS: usize = 32;
 const NEAREST: usize = 4;
 /// Largest ordinate over the noise that is counted, more than chance has in a day's record: a short disturbance is no track.
 const LARGEST: f64 = 32.0;
