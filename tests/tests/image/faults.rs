@@ -12,6 +12,8 @@ use link::{BootCause, Health, Hello, Message};
 const RATE_HZ: f64 = 204.8;
 /// Upper bound on the time that a report takes.
 const REPORT_S: f64 = 2.5;
+/// The sample period that is programmed, a divisor: 8 ticks of 1/1638.4 s in 1/256 us.
+pub(crate) const PERIOD: u64 = 8 * 156_250;
 
 /// Random bytes for the serial line from a linear congruential generator (Knuth's MMIX constants).
 fn noise(count: usize) -> Vec<u8> {
@@ -195,7 +197,6 @@ fn the_watchdog_ends_a_hang() {
 /// divisor.
 #[test]
 fn a_panic_is_recorded_with_its_place() {
-    const PERIOD: u64 = 8 * 156_250; // 8 ticks of 1/1638.4 s in 1/256 us
     let (hello, _) = report_after(Event::ClearInMemory(PERIOD), 0.25, 4.0);
     assert_eq!((hello.boot.cause, hello.boot.starts), (BootCause::Software, 2));
     let record = hello.boot.crash_record.as_str();

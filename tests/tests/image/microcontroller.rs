@@ -13,7 +13,7 @@ use rigless::soc::{Bus, Error, Width};
 use rigless::time::VirtualNanos;
 
 /// RM0090 section 2.3.1: SRAM1 and SRAM2, and the core-coupled memory.
-const RAM: std::ops::Range<u64> = 0x2000_0000..0x2002_0000;
+pub(crate) const RAM: std::ops::Range<u64> = 0x2000_0000..0x2002_0000;
 const CORE_COUPLED: std::ops::Range<u64> = 0x1000_0000..0x1001_0000;
 const LINES: usize = 5;
 /// Position of EXTI0 among the interrupts that the emulator's table gives the instance; EXTI1 and so on follow it.

@@ -2,14 +2,14 @@
 
 use crate::bench::{Event, Outcome, Scenario, image, run};
 use crate::decoded::Decoded;
+use crate::faults::PERIOD;
+use crate::microcontroller::RAM;
 use crate::peripherals::Sensor;
 use defmt_decoder::{DecodeError, Table};
 use rigless::emulator::Host;
 use rigless::soc::Width;
 use std::path::Path;
 
-/// RM0090 section 2.3.1: SRAM1 and SRAM2.
-const RAM: std::ops::Range<u64> = 0x2000_0000..0x2002_0000;
 /// The first words of the block by which a probe finds the buffers: "SEGGER R".
 const IDENTIFIER: [u64; 2] = [0x4747_4553, 0x5220_5245];
 /// Offsets of the first buffer of bytes from the target in the block: its address, its size, and the offsets to which the target has
@@ -103,8 +103,6 @@ fn a_probe_reads_what_the_sensor_and_the_recovery_do() {
 /// The last words of a panic: an error, with its place.
 #[test]
 fn a_probe_reads_a_panic() {
-    /// 8 ticks of 1/1638.4 s in 1/256 us, a divisor.
-    const PERIOD: u64 = 8 * 156_250;
     let events = vec![(0.25, Event::ClearInMemory(PERIOD))];
     let sensor = Some(Sensor::published(31));
     let scenario = Scenario { sensor, events, seconds: 1.5, has_probe: true, ..Scenario::default() };
