@@ -77,19 +77,29 @@ impl<F: NorFlash> SettingsStore<F> {
         for was_erased in [false, true] {
             let written = complete(self.map.store_item(&mut buffer.0, &KEY, &record));
             let found = complete(self.map.fetch_item::<&[u8]>(&mut buffer.0, &KEY)).and_then(Result::ok).flatten();
-            let is_ring = match written {
+            // Flash that takes nothing leaves the record before, or stays blank.
+            let erasing_helps = match written {
                 Some(Ok(())) if found == Some(record) => return Ok(()),
-                // Flash that takes nothing leaves the record before.
-                Some(Ok(())) => found.is_some(),
-                Some(Err(sequential_storage::Error::Storage { .. })) | None => true,
-                Some(Err(_)) => false,
+                Some(Ok(())) => found.is_none() && !self.is_blank(&mut buffer),
+                Some(Err(sequential_storage::Error::Storage { .. })) | None => false,
+                Some(Err(_)) => !self.is_blank(&mut buffer),
             };
-            if is_ring || was_erased {
+            if !erasing_helps || was_erased {
                 break;
             }
             self.erase()?;
         }
         Err(StoreError::Flash)
+    }
+
+    /// Whether all pages are as an erasure leaves them, which need not be erased again: that takes seconds, in which no sample is read.
+    fn is_blank(&mut self, buffer: &mut RecordBuffer) -> bool {
+        const CHUNK: usize = 256;
+        let (range, chunk) = (self.map.flash_range(), &mut buffer.0[..CHUNK]);
+        range.step_by(CHUNK).all(|at| {
+            complete(self.map.flash().read(at, chunk)).is_some_and(|read| read.is_ok())
+                && chunk.iter().all(|byte| *byte == 0xFF)
+        })
     }
 
     fn erase(&mut self) -> Result<(), StoreError> {
