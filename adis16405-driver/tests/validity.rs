@@ -170,6 +170,33 @@ fn a_burst_shifted_by_up_to_a_byte_has_the_cause_shifted() {
 }
 
 /// Bursts without new data are not taken for shifted ones, and random words only as often as chance has it.
+/// Words that would be those of a sensor after a shift by a byte: bit 7 of the first six is set, bit 6 of none. The supply of a burst
+/// that is shifted is implausible too, and one of its words has no new data; neither alone makes a shift of them.
+#[test]
+fn a_shift_takes_an_implausible_supply_and_a_word_without_new_data() {
+    let words = |supply| burst(|counts| *counts = [supply, 128, 128, 128, 128, 128, 0, 0, 0, 0, 0, 0]);
+    let in_range = words(0b111_1011_0010); // 1970
+    assert_eq!(in_range.faults(), Faults::empty());
+    let above = words(0b1000_1001_1000); // 2200, 5.32 V
+    assert_eq!(above.faults(), Faults::SUPPLY);
+    let stale = |mut burst: Burst| {
+        burst.words[6].0 &= 0x7FFF;
+        burst.faults()
+    };
+    assert_eq!(stale(in_range), Faults::NO_NEW_DATA);
+    assert_eq!(stale(above), Faults::SUPPLY | Faults::NO_NEW_DATA | Faults::SHIFTED);
+}
+
+#[test]
+fn a_set_of_channels_contains_those_that_were_added() {
+    for channel in Channel::ALL {
+        assert!(!ChannelMask::EMPTY.contains(channel) && ChannelMask::ALL.contains(channel));
+        assert_eq!(ChannelMask::INERTIAL.contains(channel), Channel::INERTIAL.contains(&channel));
+        let only = ChannelMask::EMPTY.with(channel);
+        assert!(Channel::ALL.into_iter().all(|other| only.contains(other) == (other == channel)), "{channel:?}");
+    }
+}
+
 #[test]
 fn stale_bursts_are_not_shifted_and_random_ones_by_chance_only() {
     let mut stale = burst(|_| ());

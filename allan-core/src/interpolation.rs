@@ -195,3 +195,37 @@ impl<F: Real> BridgedGaps<F> {
         AddedVariance { variance: if variance > none { variance } else { none }, replaced: self.replaced / periods }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WHITE: f64 = 110.0;
+
+    fn added(gaps: Interpolation, n: u64) -> AddedVariance {
+        let mut bridged = BridgedGaps::new(WHITE);
+        bridged.add(&gaps, n, 8);
+        bridged.added_variance(Difference::Second, n, 900)
+    }
+
+    fn assert_close(found: f64, expected: f64) {
+        assert!((found / expected - 1.0).abs() < 1e-14, "{found}, expected {expected}");
+    }
+
+    /// A sample that is replaced by the mean of its two neighbours is off by its own noise and by half of theirs: `3/2 σ²`.
+    #[test]
+    fn gaps_without_a_test_are_off_as_white_noise_would_be() {
+        let AddedVariance { variance, replaced } = added(Interpolation::new(100, 0, 0), 64);
+        assert_close(variance, 100.0 * 1.5 * WHITE / 64.0 / 1_000.0);
+        assert_close(replaced, 0.1);
+    }
+
+    /// Of the gaps that the octave of 64 samples bridges first, with more than 4 and at most 8 samples, 6 in the middle, each sum adds
+    /// its squared error less `2·6/64` of it; of single ones, in the octave of 8, `2/8`.
+    #[test]
+    fn what_a_gap_adds_becomes_less_with_its_length() {
+        let tested = Interpolation::new(100, 50, 7_000);
+        assert_close(added(tested, 64).variance, 14_000.0 * (1.0 - 12.0 / 64.0) / 64.0 / 1_000.0);
+        assert_close(added(tested, 8).variance, 14_000.0 * (1.0 - 2.0 / 8.0) / 8.0 / 1_000.0);
+    }
+}

@@ -212,3 +212,151 @@ fn the_variance_of_one_octave_is_that_of_the_curve() {
     assert_eq!(lossy.allan_variance(OCTAVES), None);
     assert_eq!(Cascade::<OCTAVES, 8>::new().allan_variance(0), None);
 }
+
+/// A sample that is lost when too few are known to test its replacement: it is off by its own noise and half of that of its two
+/// neighbours, which the second and third differences over it share among all samples.
+#[test]
+fn a_gap_without_a_test_adds_what_white_noise_would() {
+    let lossy = Estimators::new(&record(0.0, 2), std::slice::from_ref(&(2..3)));
+    let curve = lossy.cascade.curve(1.0);
+    let allan = curve.points().iter().map(|point| (point.n, point.interpolation));
+    let hadamard = lossy.hadamard.points(&lossy.cascade, 1.0);
+    let added = allan.chain(hadamard.iter().map(|point| (point.n, point.interpolation)));
+    for (n, added) in added.filter(|&(n, _)| n >= 8) {
+        let expected = 1.5 * curve.points()[0].avar / n as f64 / SAMPLES as f64;
+        assert!((added / expected - 1.0).abs() < 1e-6, "n = {n}: {added}, expected {expected}");
+    }
+}
+
+/// A record in which the missing samples have been replaced, as [`Cascade`] says, without a delay line: all samples are kept.
+struct Filled<const OVERLAP: usize> {
+    /// Running sums: of no sample, of the first, of the first two…
+    sums: Vec<i64>,
+    /// Samples before the first that an octave may use, and before the first after the last gap.
+    resumed: [usize; OCTAVES],
+    last_gap: usize,
+    /// Sums of squares, numbers of differences; replaced and tested samples and squared errors of the tests.
+    octaves: [(u128, u64); OCTAVES],
+    interpolations: [(u32, u32, u128); OCTAVES],
+}
+
+impl<const OVERLAP: usize> Filled<OVERLAP> {
+    /// Octave from which on single missing samples are bridged: the first at which they are at most 1/8 of the averaging time and an
+    /// octave takes no more than one difference within.
+    const SHORTEST: usize = if OVERLAP == 16 { 4 } else { 3 };
+
+    fn new() -> Self {
+        let (octaves, interpolations) = ([(0, 0); OCTAVES], [(0, 0, 0); OCTAVES]);
+        Self { sums: vec![0], resumed: [0; OCTAVES], last_gap: 0, octaves, interpolations }
+    }
+
+    fn elapsed(&self) -> usize {
+        self.sums.len() - 1
+    }
+
+    /// Sum of the samples of these numbers.
+    fn sum(&self, samples: Range<usize>) -> i64 {
+        self.sums[samples.end] - self.sums[samples.start]
+    }
+
+    /// Takes a sample, in the octaves from `first` on: one second difference at every multiple of the stride, `OVERLAP` in an
+    /// averaging time.
+    fn push(&mut self, sample: i64, first: usize) {
+        self.sums.push(self.sums[self.elapsed()] + sample);
+        let time = self.elapsed();
+        for k in first..OCTAVES {
+            let n = 1 << k;
+            if time.is_multiple_of((n / OVERLAP).max(1)) && time >= self.resumed[k] + 2 * n {
+                let difference = self.sum(time - n..time) - self.sum(time - 2 * n..time - n);
+                self.octaves[k].0 += u128::from(difference.unsigned_abs()).pow(2);
+                self.octaves[k].1 += 1;
+            }
+        }
+    }
+
+    /// Replaces `missing` samples before `next`.
+    fn gap(&mut self, missing: usize, next: i64) {
+        let (start, known) = (self.elapsed(), self.elapsed() - self.last_gap);
+        let class = Self::SHORTEST + missing.next_power_of_two().ilog2() as usize;
+        let bridging = if known > 0 { class.min(OCTAVES) } else { OCTAVES };
+        self.resumed[..bridging].fill(start + missing);
+        self.last_gap = start + missing;
+        let mut replaced = 0;
+        if bridging < OCTAVES {
+            self.test(missing, bridging, start - known);
+            // As many samples before as are missing on both sides, but for the one after; from where a sum is kept: each line has
+            // twice the stride of the one before.
+            let (mut before, mut stride) = (known.min(2 * missing - 1), 1);
+            while before >= 2 * OVERLAP * stride {
+                stride *= 2;
+            }
+            before = start - (start - before).next_multiple_of(stride);
+            let sum = self.sum(start - before..start) + next;
+            replaced = (i128::from(sum) * missing as i128).div_euclid(before as i128 + 1) as i64;
+        }
+        let each = replaced.div_euclid(missing as i64);
+        for index in 1..=missing {
+            self.push(if index < missing { each } else { replaced - each * (missing as i64 - 1) }, bridging);
+        }
+    }
+
+    /// Replaces samples that are known, with the same number on both sides where there is a sample for each, else in multiples of the
+    /// least power of two with which twenty of them are not too few, with twice as many before.
+    fn test(&mut self, missing: usize, bridging: usize, first_known: usize) {
+        self.interpolations[bridging].0 += missing as u32;
+        let mut stride = 1;
+        while (missing + stride / 2) / stride > (2 * OVERLAP - 1) / 3 {
+            stride *= 2;
+        }
+        let (width, newest) = ((missing + stride / 2) / stride * stride, self.elapsed() / stride * stride);
+        if width == 0 || newest < first_known + 3 * width {
+            return;
+        }
+        let (end, after) = if stride == 1 { (newest - 1, self.sum(newest - 1..newest)) } else { (newest, 0) };
+        let around = self.sum(newest - 3 * width..end - width) + after;
+        let error = around.div_euclid(2) - self.sum(end - width..end);
+        self.interpolations[bridging].1 += width as u32;
+        self.interpolations[bridging].2 += u128::from(error.unsigned_abs()).pow(2);
+    }
+}
+
+fn assert_filled<const OVERLAP: usize>(gaps: &[Range<usize>], seed: u64) {
+    let record = record(54.0, seed);
+    let (mut cascade, mut filled) = (Cascade::<OCTAVES, OVERLAP>::new(), Filled::<OVERLAP>::new());
+    let mut next = 0;
+    for gap in gaps.iter().chain([&(record.len()..record.len())]) {
+        cascade.push_slice(&record[next..gap.start]);
+        record[next..gap.start].iter().for_each(|&sample| filled.push(sample.into(), 0));
+        next = gap.end;
+        if let Some(&sample) = record.get(next) {
+            cascade.gap(gap.len() as u32);
+            filled.gap(gap.len(), sample.into());
+        }
+    }
+    for k in 0..OCTAVES {
+        let found = cascade.octave_sums(k).expect("an octave");
+        assert_eq!((found.squares, found.count), filled.octaves[k], "overlap {OVERLAP}, seed {seed}, octave {k}");
+        let gaps = found.interpolation;
+        let gaps = (gaps.replaced(), gaps.tested(), gaps.squared_error());
+        assert_eq!(gaps, filled.interpolations[k], "overlap {OVERLAP}, seed {seed}, gaps of octave {k}");
+    }
+}
+
+/// The sums over a record with gaps are, bit for bit, those of the record with the missing samples replaced by the mean of as many
+/// around them: single gaps, gaps with few samples between, gaps of all lengths up to those that every octave leaves out.
+#[test]
+fn the_sums_are_those_of_the_filled_record() {
+    for seed in 0..8 {
+        let gaps = [
+            losses(0.02, 1..2, 1, seed),
+            losses(0.1, 1..9, 1, seed),
+            losses(0.003, 1..70, 1, seed),
+            losses(0.0005, 1..3_000, 2, seed),
+        ];
+        for gaps in &gaps {
+            assert_filled::<1>(gaps, seed);
+            assert_filled::<8>(gaps, seed);
+            assert_filled::<16>(gaps, seed);
+        }
+    }
+}

@@ -199,6 +199,8 @@ fn a_time_stamp_that_is_not_later_is_refused_and_leaves_the_estimator_alone() {
     assert_eq!(stamps.missing(1_001 << 32), Err(TimeStampError::TooLate));
     assert_eq!(stamps.missing(u64::MAX / 2 + 10_000), Err(TimeStampError::NotLater));
     assert_eq!([TimeStamps::new(0), TimeStamps::new(u64::MAX)], [None, None]);
+    let mut half = TimeStamps::new(10).unwrap();
+    assert_eq!([100, 104, 105].map(|time| half.missing(time)), [Ok(0), Err(TimeStampError::NotLater), Ok(0)]);
     stamps.restart();
     assert_eq!(stamps.last(), None);
     assert_eq!(stamps.missing(0), Ok(0));

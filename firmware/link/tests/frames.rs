@@ -274,6 +274,15 @@ fn a_text_line_is_printable() {
     assert_eq!(line.as_slice(), b"\x000.05 ??/s??\r\n\0");
 }
 
+/// The longest line, a zero byte on either side, and its end: 124 bytes, for which there is just the memory.
+#[test]
+fn the_longest_text_line_is_sent_whole() {
+    let line = "x".repeat(MAX_TEXT);
+    let bytes = wire_bytes(&line.as_str().try_into().unwrap());
+    assert_eq!(bytes.as_slice(), format!("\0{line}\r\n\0").as_bytes());
+    assert!(bytes.len() == 124 && bytes.is_full());
+}
+
 #[test]
 fn a_text_line_is_cut_between_two_characters() {
     assert_eq!(text_line(format_args!("{:°>200}", "")).len(), MAX_TEXT);
