@@ -1,7 +1,8 @@
 //! The firmware's application on the host: the same code as in the image, with the virtual sensor, in virtual time.
 
 use crate::fault_injector::{FaultEnd, FaultyBus, InjectedFaults};
-use adis16405_driver::{BURST_BYTES, BURST_REQUEST};
+use crate::sample_audit::{Received, SampleAudit, lengths};
+use adis16405_driver::{BURST_BYTES, BURST_REQUEST, Burst};
 use embedded_hal::spi::SpiDevice;
 use firmware::retained::{RetainedMemory, blank_memory};
 use firmware::settings_store::StoreError;
@@ -61,6 +62,7 @@ struct SimulatedBoard {
     usable_us: u64,
     /// Data-ready edges that have raised an interrupt.
     edges: u64,
+    audit: SampleAudit,
     /// What is kept without power.
     record: Option<Vec<u8>>,
 }
@@ -120,6 +122,11 @@ impl Device {
         self.board.usable_us
     }
 
+    /// What became of the samples since the last call.
+    pub fn take_audit(&mut self) -> SampleAudit {
+        std::mem::take(&mut self.board.audit)
+    }
+
     /// Data-ready edges that have raised an interrupt.
     pub fn edges(&self) -> u64 {
         self.board.edges
@@ -143,8 +150,9 @@ impl Device {
             let next_us = ready_us.min(self.board.now_us + WAKE_US).min(until_us);
             let before = self.board.bus.bus().part().samples();
             self.board.advance_to(next_us);
-            if self.board.bus.bus().part().samples() > before && !self.faults().no_data_ready {
-                self.board.data_ready();
+            if self.board.bus.bus().part().samples() > before {
+                let edges = self.faults().edges();
+                (0..edges).for_each(|_| self.board.data_ready());
             }
             self.turn();
         }
@@ -211,6 +219,7 @@ impl SimulatedBoard {
             reset_line: false,
             usable_us: 0,
             edges: 0,
+            audit: SampleAudit::default(),
             record: None,
         }
     }
@@ -220,8 +229,8 @@ impl SimulatedBoard {
         let fresh = Self::new(self.bus.clone(), self.now_us);
         let (sent, received) = (std::mem::take(&mut self.sent), std::mem::take(&mut self.received));
         let record = self.record.take();
-        let Self { restarts, fixed_clock, reset_line, usable_us, edges, .. } = *self;
-        *self = Self { sent, received, restarts, fixed_clock, reset_line, usable_us, edges, record, ..fresh };
+        let Self { restarts, fixed_clock, reset_line, usable_us, edges, audit, .. } = *self;
+        *self = Self { sent, received, restarts, fixed_clock, reset_line, usable_us, edges, audit, record, ..fresh };
         let start = Start {
             boot: Boot { cause, ..Boot::default() },
             retained: RetainedRam::open(memory),
@@ -250,14 +259,22 @@ impl SimulatedBoard {
 
     /// The two sampling interrupts and the one of the estimators.
     fn data_ready(&mut self) {
+        let mut received = None;
         if self.edge() == EdgeAction::StartBurst {
+            let (sent, sample) = (*self.bus.bus().part().counts(), self.bus.bus().part().samples());
             let mut answer = [0; BURST_BYTES];
             let Ok(()) = self.bus.transfer(&mut answer, &BURST_REQUEST);
-            self.sampler.transfer_ended(Some(&answer));
+            let fails = self.bus.faults().borrow_mut().fails_transfer();
+            self.sampler.transfer_ended((!fails).then_some(&answer));
             self.follow_part();
+            let burst = (!fails).then(|| Burst::from_bytes(&answer));
+            received = burst.map(|burst| Received { sent, sample, burst, lengths: lengths(&self.estimators) });
         }
         if !self.bus.faults().borrow().no_estimators {
             estimate(&mut self.estimators, &mut self.transmit_queue, &mut self.arrivals);
+            if let Some(received) = received {
+                self.audit.add(&received, self.now_us, &self.estimators);
+            }
         }
     }
 

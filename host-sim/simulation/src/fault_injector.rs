@@ -1,11 +1,12 @@
 //! Faults between the virtual sensor and the application: a bus that damages frames and answers, and switches of the board.
 
+use crate::line_fault::{LineFault, RandomFault};
 use adis16405_driver::BURST_BYTES;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use std::cell::RefCell;
 use std::convert::Infallible;
 use std::rc::Rc;
-use virtual_sensor::EmulatedBus;
+use virtual_sensor::{DiagnosisFlag, EmulatedBus};
 
 /// Read of DIAG_STAT, register 0x3C.
 const READ_DIAG_STAT: u8 = 0x3C;
@@ -78,9 +79,22 @@ pub struct InjectedFaults {
     pub no_estimators: bool,
     /// The serial port sends nothing.
     pub no_transmission: bool,
+    /// A fault that comes at random.
+    pub random: Option<RandomFault>,
 }
 
 impl InjectedFaults {
+    /// Whether the random fault has the transfer of a burst fail.
+    pub(crate) fn fails_transfer(&mut self) -> bool {
+        self.random.as_mut().is_some_and(|random| random.meets(LineFault::Failed))
+    }
+
+    /// Number of data-ready edges that come in the place of one.
+    pub(crate) fn edges(&mut self) -> u32 {
+        let mut meets = |fault| self.random.as_mut().is_some_and(|random| random.meets(fault));
+        if self.no_data_ready || meets(LineFault::LostEdge) { 0 } else { 1 + u32::from(meets(LineFault::DoubledEdge)) }
+    }
+
     /// Whether an observer who knew everything could not use the sensor's present samples.
     pub(crate) fn hide_samples(&self) -> bool {
         let harmless = |fault| fault == FrameFault::LowSupply;
@@ -100,12 +114,14 @@ pub struct FaultyBus {
     latest: Rc<RefCell<u8>>,
     /// The burst that a frozen sensor repeats.
     frozen: Rc<RefCell<Option<[u8; BURST_BYTES]>>>,
+    /// The latest burst as the sensor sent it.
+    sent: Rc<RefCell<[u8; BURST_BYTES]>>,
 }
 
 impl FaultyBus {
     /// A bus without faults.
     pub(crate) fn new(bus: EmulatedBus) -> Self {
-        Self { bus, faults: Rc::default(), latest: Rc::default(), frozen: Rc::default() }
+        Self { bus, faults: Rc::default(), latest: Rc::default(), frozen: Rc::default(), sent: Rc::default() }
     }
 
     /// The bus and the part on it.
@@ -186,6 +202,37 @@ impl FaultyBus {
         }
     }
 
+    /// The transaction on the bus, with the random fault if it meets it.
+    fn transact(&mut self, operations: &mut [Operation<'_, u8>]) {
+        let mut faults = self.faults.borrow_mut();
+        let Some(random) = faults.random.as_mut() else {
+            let Ok(()) = self.bus.transaction(operations);
+            return;
+        };
+        if let [Operation::Transfer(answer, request)] = operations {
+            let (mut request, mut sent) = (request.to_vec(), self.sent.borrow_mut());
+            random.damage_request(&mut request);
+            let is_burst = answer.len() == BURST_BYTES;
+            let ended_after = if is_burst { random.shortened() } else { None };
+            let (taken, rest) = answer.split_at_mut(ended_after.unwrap_or(request.len()));
+            let Ok(()) = self.bus.transaction(&mut [Operation::Transfer(taken, &request[..taken.len()])]);
+            rest.fill(0xFF); // no part drives the line
+            if ended_after.is_some() && random.fault() == LineFault::Reset {
+                self.bus.part_mut().power_off();
+                self.bus.part_mut().power_on();
+            }
+            let before = *sent;
+            if let Ok(burst) = <&[u8; BURST_BYTES]>::try_from(&**answer) {
+                *sent = *burst;
+            }
+            if random.damage_answer(answer, is_burst.then_some(&before)) {
+                self.bus.part_mut().latch_flag(DiagnosisFlag::SpiCommunication);
+            }
+        } else {
+            let Ok(()) = self.bus.transaction(operations);
+        }
+    }
+
     fn damage_frame(&self, answer: &mut [u8; 2], requested: u8) {
         let mut faults = self.faults.borrow_mut();
         if requested == READ_DIAG_STAT {
@@ -208,7 +255,7 @@ impl SpiDevice<u8> for FaultyBus {
             Operation::Transfer(_, write) | Operation::Write(write) => Some([write[0], write[1]]),
             _ => None,
         });
-        let Ok(()) = self.bus.transaction(operations);
+        self.transact(operations);
         let requested = std::mem::replace(&mut *self.latest.borrow_mut(), sent.map_or(0, |[address, _]| address));
         for operation in operations.iter_mut() {
             match operation {

@@ -1,0 +1,236 @@
+//! Faults of the lines between sensor and microcontroller, a table of kinds, rates and seeds, from the virtual sensor to the report
+//! that the host decodes: how many words arrive wrong, how many of them are used all the same, how many right ones are refused, how
+//! long no sample is used, and by how much N, B and K shift; and damage on the serial port.
+
+use link::{ChannelMessage, Decoder, Message, Received};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use simulation::LineFault::{self, *};
+use simulation::{Device, RandomFault, SampleAudit};
+use statrs::distribution::{ContinuousCDF, Normal};
+use virtual_sensor::{NoiseModel, VirtualAdis16405};
+
+const RATE_HZ: f64 = 204.8;
+/// Bits of a temperature; the other words have 14.
+const TEMPERATURE: (u8, i32) = (10, 12);
+
+fn device(seed: u64) -> Device {
+    // Flicker noise of longer times is hidden by the random walk.
+    let model = NoiseModel { longest_tau_s: 300.0, ..NoiseModel::paper() };
+    Device::new(VirtualAdis16405::new(model, seed), Device::blank_memory()).with_restarts()
+}
+
+fn run_until(device: &mut Device, end_s: f64) -> Vec<u8> {
+    device.run_until((end_s * 1e6) as u64)
+}
+
+/// What a run has come to.
+struct Run {
+    audit: SampleAudit,
+    longest_gap_s: f64,
+    recoveries: u32,
+    restarts: u32,
+    channels: Vec<ChannelMessage>,
+}
+
+/// A device with the fault for `seconds`, then without it for three, and its report. In the third all samples are used.
+fn run(fault: Option<RandomFault>, seconds: f64, seed: u64) -> Run {
+    let mut device = device(seed);
+    device.press(b"i0\r");
+    run_until(&mut device, 10.0); // the sensor settles, and the gate learns the noise
+    device.take_audit();
+    device.faults().random = fault;
+    run_until(&mut device, seconds);
+    device.faults().random = None;
+    run_until(&mut device, seconds + 2.0);
+    let audit = device.take_audit();
+    let longest_gap_s = audit.longest_gap_us(device.bus().part().now() / 1000) as f64 * 1e-6;
+    run_until(&mut device, seconds + 3.0);
+    let after = device.take_audit();
+    assert!(after.words as f64 > 8.0 * 0.98 * RATE_HZ, "{after:?} in the third second after the fault");
+    assert_eq!((after.wrong, after.needless), (0, 0));
+    device.press(b"r");
+    let mut decoder = Decoder::new();
+    let (mut channels, mut recoveries) = (Vec::new(), 0);
+    let sent = run_until(&mut device, seconds + 4.0);
+    for message in sent.into_iter().filter_map(|byte| decoder.push(byte)).filter_map(Received::message) {
+        match message {
+            Message::Channel(channel) => channels.push(channel),
+            Message::Health(health) => recoveries = health.recoveries,
+            _ => {}
+        }
+    }
+    assert_eq!(channels.len(), 8);
+    Run { audit, longest_gap_s, recoveries, restarts: device.restarts(), channels }
+}
+
+/// The largest shifts of N, B and K of gyros and accelerometers against the same sensor without the fault, in half-widths of their
+/// 95 % bounds.
+fn shifts(run: &Run, sound: &Run) -> [f64; 3] {
+    std::array::from_fn(|term| {
+        let shift = |(found, sound): (&ChannelMessage, &ChannelMessage)| {
+            let (found, sound) = (found.coefficients.get(term)?, sound.coefficients.get(term)?);
+            assert_eq!(found.term, sound.term);
+            Some((found.value - sound.value) / ((sound.high - sound.low) / 2.0))
+        };
+        let larger = |most: f64, shift: f64| if shift.abs() > most.abs() { shift } else { most };
+        let shifts: Vec<f64> = run.channels.iter().zip(&sound.channels).filter_map(shift).collect();
+        assert_eq!(shifts.len(), 6);
+        shifts.into_iter().fold(0.0, larger)
+    })
+}
+
+/// The share of inverted data bits that a plausible size and the samples around cannot tell from noise: a bit changes a sample by a
+/// power of two, and what differs from the sample before by less than seven times the rms difference of two samples, and three counts,
+/// is used. The mean squared difference of two samples is that of the second differences of their sum at one sample.
+fn undetectable_share(sound: &Run) -> f64 {
+    let (mut undetectable, mut bits) = (0.0, 0);
+    for channel in &sound.channels {
+        let first = channel.octaves.first().expect("a curve");
+        assert_eq!(first.n, 1);
+        let rms = (first.sum as f64 / first.count as f64).sqrt();
+        let (limit, noise) = (7.0 * rms + 3.0, Normal::new(0.0, rms).expect("noise"));
+        let passes = |bit: i32| noise.cdf(limit - f64::from(1 << bit)) - noise.cdf(-limit - f64::from(1 << bit));
+        let width = if channel.channel == TEMPERATURE.0 { TEMPERATURE.1 } else { 14 };
+        undetectable += (0..width).map(passes).sum::<f64>();
+        bits += width;
+    }
+    assert_eq!(bits, 110);
+    undetectable / f64::from(bits)
+}
+
+/// Runs and prints the cells with the seeds `1..=seeds`, each for so many seconds, and checks what holds for all of their kind.
+fn grid(cells: &[(LineFault, f64)], seeds: u64, seconds: f64) {
+    for seed in 1..=seeds {
+        let (sound, runs) = std::thread::scope(|scope| {
+            let sound = scope.spawn(move || run(None, seconds, seed));
+            let start = |&(fault, rate): &(LineFault, f64)| {
+                scope.spawn(move || run(Some(RandomFault::new(fault, rate, 1000 + seed)), seconds, seed))
+            };
+            let threads: Vec<_> = cells.iter().map(start).collect();
+            let runs = threads.into_iter().map(|thread| thread.join().expect("no panic"));
+            (sound.join().expect("no panic"), runs.collect::<Vec<_>>())
+        });
+        // Without a fault nothing is refused: the gate's false alarms are 1e-11 of the samples.
+        assert_eq!((sound.audit.wrong, sound.audit.needless, sound.recoveries), (0, 0, 0), "{:?}", sound.audit);
+        let undetectable = undetectable_share(&sound);
+        println!("seed {seed}: {undetectable:.3} of the inverted bits are within the noise");
+        println!(
+            "fault                     rate     words   wrong   used  worst gyro  refused right  longest gap  losses  shift of N       B       K"
+        );
+        for (&(fault, rate), run) in cells.iter().zip(&runs) {
+            let (audit, [n, b, k]) = (&run.audit, shifts(run, &sound));
+            println!(
+                "{:<24} {rate:5.0e}  {:8}  {:6}  {:5}  {:10}  {:13}  {:9.3} s  {:6}  {n:10.2}  {b:6.2}  {k:6.2}",
+                format!("{fault:?}"),
+                audit.words,
+                audit.wrong,
+                audit.undetected,
+                audit.worst_gyro,
+                audit.needless,
+                run.longest_gap_s,
+                run.recoveries,
+            );
+            check(fault, rate, run, [n, b, k], undetectable);
+        }
+    }
+}
+
+/// No cell restarts the microcontroller or goes without samples for longer than two steps of recovery take. Whole frames that are lost,
+/// and bits that are inverted, leave N, B and K within their bounds; so do damaged bursts as long as no two come in a row, of which the
+/// second confirms the first as a step.
+fn check(fault: LineFault, rate: f64, run: &Run, shifts: [f64; 3], undetectable: f64) {
+    assert_eq!(run.restarts, 0, "{fault:?} at {rate:e}");
+    assert!(run.longest_gap_s < 2.5, "{fault:?} at {rate:e}: {} s", run.longest_gap_s);
+    let is_lost = matches!(fault, LostEdge | DoubledEdge | Failed);
+    let is_bit = matches!(fault, AnswerBits | RequestBits) && rate <= 1e-5;
+    // The noise after a reset is not that of the sensor that was not reset.
+    let alone = rate <= 1e-4 && !matches!(fault, Reset | AnswerBits | RequestBits);
+    if is_lost || is_bit || alone {
+        assert!(shifts.iter().all(|shift| shift.abs() < 1.0), "{fault:?} at {rate:e}: {shifts:?}");
+    }
+    if is_lost {
+        assert_eq!(run.audit.undetected, 0, "{fault:?} at {rate:e}");
+    }
+    if fault == AnswerBits && rate <= 1e-5 {
+        let (used, wrong) = (run.audit.undetected as f64, run.audit.wrong as f64);
+        // Four standard deviations.
+        let tolerance = 4.0 * (wrong * undetectable * (1.0 - undetectable)).sqrt();
+        assert!((used - wrong * undetectable).abs() <= tolerance, "{used} of {wrong} used, {undetectable} expected");
+    }
+}
+
+const BURST_FAULTS: [LineFault; 11] = [
+    AnswerRun,
+    StuckFrom { high: false },
+    StuckFrom { high: true },
+    MissingClock,
+    ExtraClock,
+    Repeated,
+    ShortSelect,
+    Reset,
+    Failed,
+    LostEdge,
+    DoubledEdge,
+];
+
+fn cells(bit_rates: &[f64], burst_rates: &[f64]) -> Vec<(LineFault, f64)> {
+    let all = |faults: &[LineFault], rates: &[f64]| -> Vec<(LineFault, f64)> {
+        faults.iter().flat_map(|&fault| rates.iter().map(move |&rate| (fault, rate))).collect()
+    };
+    let bursts = all(&BURST_FAULTS, burst_rates).into_iter().filter(|&(fault, rate)| fault != Reset || rate <= 1e-4);
+    all(&[AnswerBits, RequestBits], bit_rates).into_iter().chain(bursts).collect()
+}
+
+#[test]
+fn sixteen_minutes_with_each_fault() {
+    grid(&cells(&[1e-6, 1e-5], &[1e-4, 1e-2]), 1, 960.0);
+}
+
+#[test]
+#[ignore = "long: 150 simulated hours take minutes; run with --long"]
+fn an_hour_with_each_fault() {
+    grid(&cells(&[1e-7, 1e-6, 1e-5, 1e-4], &[1e-5, 1e-4, 1e-3, 1e-2]), 3, 3_600.0);
+}
+
+/// Bytes of the serial port that are lost, or inverted in a bit. A byte between two frames belongs to both: each costs two messages at
+/// most. No message arrives with another content: the checksum has 32 bits.
+#[test]
+fn damage_on_the_serial_port_costs_messages_and_falsifies_none() {
+    let mut device = device(1);
+    device.press(b"i 1\r");
+    let sent = run_until(&mut device, 120.0);
+    let decode = |bytes: &[u8]| -> Vec<(u16, Message)> {
+        let mut decoder = Decoder::new();
+        let message = |received| match received {
+            Received::Message { sequence, message } => Some((sequence, message)),
+            Received::Text(_) => None,
+        };
+        bytes.iter().filter_map(|&byte| decoder.push(byte)).filter_map(message).collect()
+    };
+    let messages = decode(&sent);
+    assert!(
+        messages.len() > 1_000 && messages.iter().enumerate().all(|(at, (sequence, _))| at == usize::from(*sequence))
+    );
+    println!("serial port      rate  bytes damaged  messages  received");
+    for (loses, rate, seed) in
+        [false, true].into_iter().flat_map(|loses| [(loses, 1e-5, 1), (loses, 1e-4, 2), (loses, 1e-3, 3)])
+    {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let (mut damaged, mut received) = (0, Vec::new());
+        for &byte in &sent {
+            let hit = random.random_bool(rate);
+            damaged += usize::from(hit);
+            match (hit, loses) {
+                (false, _) => received.push(byte),
+                (true, false) => received.push(byte ^ 1 << random.random_range(0..8)),
+                (true, true) => {}
+            }
+        }
+        let found = decode(&received);
+        let kind = if loses { "lost bytes" } else { "inverted bits" };
+        println!("{kind:<13} {rate:7.0e}  {damaged:13}  {:8}  {:8}", messages.len(), found.len());
+        assert!(found.iter().all(|(sequence, message)| messages[usize::from(*sequence)].1 == *message));
+        assert!(damaged > 0 && found.len() + 2 * damaged >= messages.len());
+    }
+}
