@@ -116,3 +116,55 @@ pub(crate) fn solve<F: Real>(a: &mut [F], x: &mut [F], set: usize) -> Option<()>
     x.iter_mut().zip(scale).enumerate().filter(|(i, _)| chosen(i)).for_each(|(_, (x, scale))| *x = *x * scale);
     Some(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const N: usize = 4;
+
+    /// Solves the equations of the unknowns in `set` by elimination; `None` unless all are positive.
+    fn positive(a: &[[f64; N]; N], b: &[f64; N], set: usize) -> Option<[f64; N]> {
+        let (mut a, mut x) = (*a, *b);
+        let chosen = |i: &usize| set >> i & 1 == 1;
+        for pivot in (0..N).filter(chosen) {
+            for row in (0..N).filter(chosen).filter(|&row| row != pivot) {
+                let factor = a[row][pivot] / a[pivot][pivot];
+                (0..N).for_each(|column| a[row][column] -= factor * a[pivot][column]);
+                x[row] -= factor * x[pivot];
+            }
+        }
+        let solution = core::array::from_fn(|i| if chosen(&i) { x[i] / a[i][i] } else { 0.0 });
+        (0..N).filter(chosen).all(|i| solution[i] > 0.0).then_some(solution)
+    }
+
+    /// The minimum over non-negative unknowns is that over those of some set, with the others 0: all sixteen sets are tried, with
+    /// matrices of neighbours that are alike, from every kind of start.
+    #[test]
+    fn the_minimum_is_the_least_of_all_sets() {
+        let mut state = 1_u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        for case in 0..2_000 {
+            let rows: [[f64; N]; N] = core::array::from_fn(|_| core::array::from_fn(|_| uniform()));
+            let dot = |i: usize, j: usize| (0..N).map(|k| rows[i][k] * rows[j][k]).sum::<f64>();
+            let full = core::array::from_fn(|i| core::array::from_fn(|j| dot(i, j) + if i == j { 0.01 } else { 0.0 }));
+            let b: [f64; N] = core::array::from_fn(|_| uniform());
+            let objective = |x: &[f64; N]| -> f64 {
+                let along = |i: usize| (0..N).map(|j| full[i][j] * x[j]).sum::<f64>();
+                (0..N).map(|i| x[i] * (along(i) / 2.0 - b[i])).sum()
+            };
+            let full: [[f64; N]; N] = full;
+            let least =
+                (0..1 << N).filter_map(|set| positive(&full, &b, set)).map(|x| objective(&x)).fold(0.0, f64::min);
+            let mut a = [0.0; triangle(N)];
+            (0..N).for_each(|i| (0..=i).for_each(|j| a[entry(i, j)] = full[i][j]));
+            let mut x: [f64; N] = core::array::from_fn(|_| uniform().max(0.0) * 10.0);
+            non_negative(&a, &b, N, &mut x);
+            assert!(x.iter().all(|&x| x >= 0.0), "case {case}: {x:?}");
+            assert!(objective(&x) - least <= 1e-9, "case {case}: {x:?}, {} above the minimum", objective(&x) - least);
+        }
+    }
+}
