@@ -50,7 +50,7 @@ pub use line_envelope::Modulation;
 pub use lines::find_lines;
 pub(crate) use lines::{find_lines_over, without_sines, without_slow_sines};
 pub(crate) use markov_spectrum::MarkovEstimate;
-pub use sample_likelihood::fit_to_samples;
+pub use sample_likelihood::{fit_to_means, fit_to_samples};
 pub use smooth_shape::SpectralShape;
 pub use welch::Welch;
 pub use white_noise::{FilterSpectrum, KnownShapes, WhiteNoiseFit, fit_white_noise};

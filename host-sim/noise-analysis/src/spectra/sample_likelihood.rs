@@ -1,17 +1,23 @@
 //! The coefficients of a model by all samples: Whittle's likelihood of the discrete cosine transform of a record.
 //!
 //! ```text
-//! samples ─► cosine transform ─► squares, averaged over bands ─► likeliest densities ─► profile likelihood ─► 95 % bounds
+//! samples ─► cosine transform ─► squares, averaged over bands ─┐
+//! means   ─► cosine transform ─► the lower half of the bands ──┼─► likeliest densities ─► profile likelihood ─► 95 % bounds
+//! samples ─► Welch's spectrum ─► the bands above them ─────────┘
 //! ```
 //!
 //! The even continuation of a record has no jump at its ends. The cosines are the principal components of white noise and of a random
 //! walk whose first value is unknown: their coefficients are independent, with the variance `S(k/2T)/dt` of the two-sided density `S`, so
 //! that the likelihood of white noise with a random walk is exact, without a taper. That of flicker noise has the expected squares of
 //! its lowest coefficients, which [`flicker_leakage`] gives.
+//!
+//! Of a record whose means alone are kept, the coefficients of the means have the density of the samples, weighted by what a mean lets
+//! through and with its aliases, and the averaged spectrum of the samples has what is above.
 
 use super::cosine_spectrum::flicker_leakage;
 use super::line_models::Sine;
 use super::transforms;
+use super::welch::Welch;
 use super::whittle::{Sign, SpectralBand, fit_mixture, fit_mixture_with};
 use crate::distributions::NORMAL_975;
 use crate::samples::uniform_series::UniformSeries;
@@ -28,10 +34,19 @@ const MOST_INTERPOLATED: f64 = 1e-3;
 /// Relative width of a band, and the number of equal bands at which its growth ends: narrow enough for the nulls of a filter.
 const BANDS_PER_E_FOLD: usize = 16;
 const BANDS: usize = 512;
-/// Frequencies in a band at which the densities are evaluated, at most.
+/// Frequencies in a band at which the densities are evaluated, at most: of samples, and of means, which have no null of a filter.
 const POINTS_IN_BAND: usize = 8;
-/// Coefficients on either side of a line that are left out.
+const POINTS_IN_BAND_OF_MEANS: usize = 2;
+/// Coefficients, and points of Welch's spectrum, on either side of a line that are left out.
 const LINE_COEFFICIENTS: f64 = 8.0;
+const LINE_POINTS: f64 = 4.0;
+/// Part of the rate of means up to which their coefficients are used, and the lowest point of Welch's spectrum: below, the window
+/// spreads drift over several points.
+const OF_MEANS: f64 = 0.25;
+const LOWEST_POINT: f64 = 8.0;
+/// Weights of a point of Welch's spectrum and of its neighbours in what the density is averaged over: the squares of the transform of a
+/// Hann window.
+const HANN: [(f64, f64); 3] = [(-1.0, 1.0 / 6.0), (0.0, 2.0 / 3.0), (1.0, 1.0 / 6.0)];
 /// Largest part of the density of filtered white noise that the ends of the record may leak.
 const MOST_LEAKAGE: f64 = 0.1;
 /// Factor by which a bound is bracketed, and relative width at which its search ends.
@@ -42,57 +57,22 @@ const PRECISION: f64 = 1e-3;
 /// lines, whose frequencies are left out.
 ///
 /// A bound is where the likelihood, with all other coefficients at their likeliest, is `exp(−1.96²/2)` of its maximum. Flicker noise and
-/// random walks pass the filter of the model. `None` if more than a thousandth of the samples is missing, or a long gap, if there are
-/// fewer than 1,024, or if the model has a ramp.
+/// random walks pass the filter of the model; where white noise beside it is not one of the terms, that of rounding is, of known size.
+/// `None` if more than a thousandth of the samples is missing, or a long gap, if there are fewer than 1,024, or if the model has a ramp.
 #[must_use]
 pub fn fit_to_samples(series: &UniformSeries, model: &Model) -> Option<Model> {
-    if model.terms().iter().any(|term| term.kind == NoiseTerm::RateRamp) {
-        return None;
-    }
-    let (filled, replaced) = series.interpolated();
-    let mut filled = filled.into_owned();
-    for term in model.terms() {
-        if let NoiseTerm::Sinusoid(line) = term.kind {
-            filled = Sine::fit_near(&filled, line.frequency, 0.5 / series.duration()).subtracted_from(&filled);
-        }
-    }
-    let values = filled.values();
-    let is_whole = values.len() >= LEAST_SAMPLES && values.iter().all(|value| value.is_finite());
-    if !is_whole || replaced > MOST_INTERPOLATED {
-        return None;
-    }
-    let period = series.sample_period();
-    let resolution = 0.5 / series.duration();
-    let is_noise = |term: &&FittedTerm| !matches!(term.kind, NoiseTerm::Sinusoid(_));
-    let kinds: Vec<NoiseTerm> = model.terms().iter().filter(is_noise).map(|term| term.kind).collect();
-    let is_line = |order: usize| {
-        model.terms().iter().any(|term| match term.kind {
-            NoiseTerm::Sinusoid(line) => (order as f64 - line.frequency / resolution).abs() < LINE_COEFFICIENTS,
-            _ => false,
-        })
-    };
-    let squares = squared_coefficients(values, series.mean());
-    let shapes = Shapes { kinds: &kinds, filtered: FilteredNoise::find(&kinds, period), period, resolution };
-    let is_kept = |orders: &Range<usize>| !orders.clone().any(is_line) && !shapes.is_leakage(orders, values.len());
-    let orders = bands(squares.len()).filter(is_kept);
-    let (bands, bases): (Vec<SpectralBand>, Vec<Vec<f64>>) = orders
-        .map(|orders| {
-            let density = period * squares[orders.clone()].iter().sum::<f64>() / orders.len() as f64;
-            let frequency = resolution * (orders.start + orders.end - 1) as f64 / 2.0;
-            // One real number has half the degrees of freedom of an ordinate of a Fourier transform.
-            let band = SpectralBand { frequency, density, ordinates: 0.5 * orders.len() as f64 };
-            (band, shapes.in_band(&orders, values.len()))
-        })
-        .unzip();
-    let mut densities = vec![0.0; kinds.len()];
-    let objective = fit_mixture(&bands, &bases, Sign::NonNegative, &mut densities);
-    let profile = Profile { bands: &bands, bases: &bases, densities: &densities, objective };
-    let mut fitted = (0..kinds.len()).map(|term| profile.coefficient(term));
-    let terms = model.terms().iter().map(|term| {
-        let (value, low, high) = if is_noise(&term) { fitted.next()? } else { (term.value, term.low, term.high) };
-        Some(FittedTerm { value, low, high, ..*term })
-    });
-    Some(Model::new(model.sample_period(), terms.collect::<Option<Vec<FittedTerm>>>()?))
+    let shapes = Shapes::new(model, series, 1)?;
+    shapes.fitted(model, shapes.cosine_bands(series, f64::INFINITY)?)
+}
+
+/// The same of a series of means of so many samples each, and of the spectrum of the samples.
+#[must_use]
+pub fn fit_to_means(means: &UniformSeries, samples_per_mean: u64, spectrum: &Welch, model: &Model) -> Option<Model> {
+    let shapes = Shapes::new(model, means, samples_per_mean)?;
+    let below = OF_MEANS / means.sample_period();
+    let mut evidence = shapes.cosine_bands(means, below)?;
+    evidence.extend(shapes.spectrum_bands(spectrum, below.max(LOWEST_POINT * spectrum.resolution())));
+    shapes.fitted(model, evidence)
 }
 
 /// Squares of the coefficients of the cosine transform of `values` around `mean`, of the orders 1, 2, 3 …, normalised so that those of
@@ -136,9 +116,9 @@ struct FilteredNoise {
 }
 
 impl FilteredNoise {
-    fn find(kinds: &[NoiseTerm], period: f64) -> Option<Self> {
-        let filter = kinds.iter().find_map(|kind| match kind {
-            NoiseTerm::Filtered(filter) => Some(*filter),
+    fn find(mut kinds: impl Iterator<Item = NoiseTerm>, period: f64) -> Option<Self> {
+        let filter = kinds.find_map(|kind| match kind {
+            NoiseTerm::Filtered(filter) => Some(filter),
             _ => None,
         })?;
         let reach = (f64::from(filter.stages) * f64::from(filter.taps) / filter.decimation) as u32;
@@ -161,44 +141,164 @@ impl FilteredNoise {
     }
 }
 
-/// The densities of the terms of a model.
-struct Shapes<'a> {
-    kinds: &'a [NoiseTerm],
+/// A band of a spectrum with the mean density of each shape in it.
+type Evidence = Vec<(SpectralBand, Vec<f64>)>;
+
+/// The densities of the noise terms of a model, each for the coefficient 1.
+struct Shapes {
+    kinds: Vec<NoiseTerm>,
+    /// Frequencies of its lines, Hz.
+    lines: Vec<f64>,
     filtered: Option<FilteredNoise>,
+    /// Density of rounding, where no term has it.
+    rounding: Option<f64>,
+    /// Seconds between samples, and samples of a mean.
     period: f64,
+    samples_per_mean: u64,
     /// Frequency of the coefficient of order 1, Hz.
     resolution: f64,
 }
 
-impl Shapes<'_> {
+impl Shapes {
+    /// `None` if the model has a term whose size is no density.
+    fn new(model: &Model, series: &UniformSeries, samples_per_mean: u64) -> Option<Self> {
+        let kinds = || model.terms().iter().map(|term| term.kind);
+        if kinds().any(|kind| kind == NoiseTerm::RateRamp) {
+            return None;
+        }
+        let period = model.sample_period();
+        let filtered = FilteredNoise::find(kinds(), period);
+        let has_white = kinds().any(|kind| kind == NoiseTerm::AngleRandomWalk);
+        // One-sided there.
+        let rounding = (filtered.is_some() && !has_white).then(|| series.rounding_density() / 2.0);
+        Some(Self {
+            kinds: kinds().filter(|kind| line_frequency(kind).is_none()).collect(),
+            lines: kinds().filter_map(|kind| line_frequency(&kind)).collect(),
+            filtered,
+            rounding: rounding.filter(|density| *density > 0.0),
+            period,
+            samples_per_mean,
+            resolution: 0.5 / series.duration(),
+        })
+    }
+
+    /// The bands of the coefficients of `series` below a frequency.
+    fn cosine_bands(&self, series: &UniformSeries, below: f64) -> Option<Evidence> {
+        let (filled, replaced) = series.interpolated();
+        let mut filled = filled.into_owned();
+        let period = series.sample_period();
+        // The means show a line at its alias.
+        let shown: Vec<f64> = self.lines.iter().map(|line| (line - (line * period).round() / period).abs()).collect();
+        for &line in shown.iter().filter(|line| **line > self.resolution) {
+            filled = Sine::fit_near(&filled, line, self.resolution).subtracted_from(&filled);
+        }
+        let values = filled.values();
+        let is_whole = values.len() >= LEAST_SAMPLES && values.iter().all(|value| value.is_finite());
+        if !is_whole || replaced > MOST_INTERPOLATED {
+            return None;
+        }
+        let squares = squared_coefficients(values, series.mean());
+        let is_line =
+            |order: usize| shown.iter().any(|line| (order as f64 - line / self.resolution).abs() < LINE_COEFFICIENTS);
+        let is_kept = |orders: &Range<usize>| {
+            (orders.end as f64) * self.resolution < below
+                && !orders.clone().any(is_line)
+                && !self.is_leakage(orders, values.len())
+        };
+        let band = |orders: Range<usize>| {
+            let density = period * squares[orders.clone()].iter().sum::<f64>() / orders.len() as f64;
+            let frequency = self.resolution * (orders.start + orders.end - 1) as f64 / 2.0;
+            // One real number has half the degrees of freedom of an ordinate of a Fourier transform.
+            let band = SpectralBand { frequency, density, ordinates: 0.5 * orders.len() as f64 };
+            (band, self.in_band(&orders, values.len()))
+        };
+        Some(bands(squares.len()).filter(is_kept).map(band).collect())
+    }
+
+    /// The bands of the `spectrum` of the samples above a frequency.
+    fn spectrum_bands(&self, spectrum: &Welch, above: f64) -> Evidence {
+        let reach = LINE_POINTS * spectrum.resolution();
+        let is_line = |frequency: f64| self.lines.iter().any(|line| (frequency - line).abs() < reach);
+        let lowest = (above / spectrum.resolution()).ceil() as usize;
+        let band = |points: &Vec<usize>| {
+            let average = spectrum.average(points);
+            let bases = self.terms().map(|kind| {
+                let of_point = |point: &usize| {
+                    let at = |(beside, weight): (f64, f64)| {
+                        weight * self.density(&kind, (*point as f64 + beside) * spectrum.resolution())
+                    };
+                    HANN.map(at).iter().sum::<f64>()
+                };
+                points.iter().map(of_point).sum::<f64>() / points.len() as f64
+            });
+            // Two-sided.
+            (SpectralBand { density: average.density / 2.0, ..average }, bases.collect())
+        };
+        spectrum.band_points(lowest, is_line).iter().map(band).collect()
+    }
+
+    /// The terms, with white noise for that of rounding as the last one.
+    fn terms(&self) -> impl Iterator<Item = NoiseTerm> {
+        self.kinds.iter().copied().chain(self.rounding.map(|_| NoiseTerm::AngleRandomWalk))
+    }
+
     /// The mean of each in a band of the coefficients of `count` samples.
     fn in_band(&self, indices: &Range<usize>, count: usize) -> Vec<f64> {
-        let points = indices.len().min(POINTS_IN_BAND);
+        let most = if self.samples_per_mean == 1 { POINTS_IN_BAND } else { POINTS_IN_BAND_OF_MEANS };
+        let points = indices.len().min(most);
         let order = |point: usize| {
             let part = (point as f64 + 0.5) / points as f64;
             0.5 + indices.start as f64 + part * indices.len() as f64
         };
         let mean =
-            |kind: &NoiseTerm| (0..points).map(|at| self.at(kind, order(at), count)).sum::<f64>() / points as f64;
-        self.kinds.iter().map(mean).collect()
+            |kind: NoiseTerm| (0..points).map(|at| self.at(&kind, order(at), count)).sum::<f64>() / points as f64;
+        self.terms().map(mean).collect()
     }
 
     /// That of a term at a coefficient of this order.
     fn at(&self, kind: &NoiseTerm, order: f64, count: usize) -> f64 {
         let frequency = order * self.resolution;
-        let density = || kind.process().density(frequency, self.period);
         match (kind, &self.filtered) {
-            (NoiseTerm::Filtered(_), Some(filtered)) => filtered.expected(order, count),
-            (NoiseTerm::BiasInstability, _) => density() * self.gain(frequency) * flicker_leakage(order),
-            (NoiseTerm::RateRandomWalk | NoiseTerm::Markov(_), _) => density() * self.gain(frequency),
-            _ => density(),
+            (NoiseTerm::Filtered(_), Some(filtered)) if self.samples_per_mean == 1 => filtered.expected(order, count),
+            (NoiseTerm::BiasInstability, _) => self.density_of_means(kind, frequency) * flicker_leakage(order),
+            _ => self.density_of_means(kind, frequency),
+        }
+    }
+
+    /// The density of the means: what they let through, with its aliases.
+    fn density_of_means(&self, kind: &NoiseTerm, frequency: f64) -> f64 {
+        let count = self.samples_per_mean as f64;
+        let rate = 1.0 / (count * self.period);
+        let alias = |order: f64| {
+            let frequency = frequency + order * rate;
+            let half = PI * frequency * self.period;
+            let gain = if half == 0.0 { 1.0 } else { (count * half).sin() / (count * half.sin()) };
+            gain * gain * self.density(kind, frequency)
+        };
+        match kind {
+            _ if self.samples_per_mean == 1 => self.density(kind, frequency),
+            // Means of means are means over their whole time.
+            NoiseTerm::BiasInstability => kind.process().density(frequency, 1.0 / rate) * self.gain(frequency),
+            NoiseTerm::AngleRandomWalk => 1.0,
+            _ => (0..self.samples_per_mean).map(|order| alias(order as f64)).sum(),
+        }
+    }
+
+    /// The density of the samples.
+    fn density(&self, kind: &NoiseTerm, frequency: f64) -> f64 {
+        let density = kind.process().density(frequency, self.period);
+        match kind {
+            NoiseTerm::BiasInstability | NoiseTerm::RateRandomWalk | NoiseTerm::Markov(_) => {
+                density * self.gain(frequency)
+            }
+            _ => density,
         }
     }
 
     /// Whether the ends of the record leak into the first, the middle or the last coefficient of a band behind the filter: few
     /// numbers make what is seen there, so that it scatters more than an average of independent coefficients.
     fn is_leakage(&self, indices: &Range<usize>, count: usize) -> bool {
-        let Some(filtered) = &self.filtered else { return false };
+        let Some(filtered) = self.filtered.as_ref().filter(|_| self.samples_per_mean == 1) else { return false };
         [indices.start + 1, indices.start.midpoint(indices.end) + 1, indices.end].into_iter().any(|order| {
             let density = filtered.filter.density(order as f64 * self.resolution, self.period);
             (filtered.expected(order as f64, count) - density).abs() > MOST_LEAKAGE * density
@@ -214,6 +314,34 @@ impl Shapes<'_> {
         let ratio = (f64::from(taps) * half).sin() / (f64::from(taps) * half.sin());
         ratio.powi(2 * i32::from(stages))
     }
+
+    /// `model` with what makes this `evidence` likeliest.
+    fn fitted(&self, model: &Model, evidence: Evidence) -> Option<Model> {
+        let (bands, bases): (Vec<SpectralBand>, Vec<Vec<f64>>) = evidence.into_iter().unzip();
+        let mut densities = vec![0.0; self.terms().count()];
+        let mut objective = fit_mixture(&bands, &bases, Sign::NonNegative, &mut densities);
+        let rounding = self.rounding.map(|_| self.kinds.len());
+        if let Some((at, density)) = rounding.zip(self.rounding) {
+            densities[at] = density;
+            objective = fit_mixture_with(&bands, &bases, Sign::NonNegative, &[at], &mut densities);
+        }
+        let profile = Profile { bands: &bands, bases: &bases, densities: &densities, objective, rounding };
+        let mut fitted = (0..self.kinds.len()).map(|term| profile.coefficient(term));
+        let terms = model.terms().iter().map(|term| {
+            let is_noise = line_frequency(&term.kind).is_none();
+            let (value, low, high) = if is_noise { fitted.next()? } else { (term.value, term.low, term.high) };
+            Some(FittedTerm { value, low, high, ..*term })
+        });
+        Some(Model::new(model.sample_period(), terms.collect::<Option<Vec<FittedTerm>>>()?))
+    }
+}
+
+/// The frequency of a sinusoid, Hz.
+fn line_frequency(kind: &NoiseTerm) -> Option<f64> {
+    match kind {
+        NoiseTerm::Sinusoid(line) => Some(line.frequency),
+        _ => None,
+    }
 }
 
 /// The likelihood around its maximum.
@@ -223,6 +351,8 @@ struct Profile<'a> {
     /// At the maximum.
     densities: &'a [f64],
     objective: f64,
+    /// Position of what is known, the rounding.
+    rounding: Option<usize>,
 }
 
 impl Profile<'_> {
@@ -258,7 +388,8 @@ impl Profile<'_> {
     fn is_within(&self, term: usize, density: f64) -> bool {
         let mut densities = self.densities.to_vec();
         densities[term] = density;
-        let objective = fit_mixture_with(self.bands, self.bases, Sign::NonNegative, Some(term), &mut densities);
+        let held: Vec<usize> = std::iter::once(term).chain(self.rounding).collect();
+        let objective = fit_mixture_with(self.bands, self.bases, Sign::NonNegative, &held, &mut densities);
         objective - self.objective < NORMAL_975 * NORMAL_975 / 2.0
     }
 }
@@ -290,7 +421,7 @@ mod tests {
     fn coefficients_of_filtered_noise_have_the_squares_of_its_covariance() {
         let covariances = [44.0, 40.0, 31.0, 20.0, 10.0, 4.0, 1.0].map(|of| of / 256.0);
         let kinds = [NoiseTerm::Filtered(MovingAverageFilter::bartlett(4))];
-        let filtered = FilteredNoise::find(&kinds, 0.01).expect("a filter");
+        let filtered = FilteredNoise::find(kinds.into_iter(), 0.01).expect("a filter");
         let count = 40;
         for order in 1..count {
             let pair = |a: usize, b: usize| {

@@ -60,15 +60,15 @@ pub(super) fn fit_mixture<R: AsRef<[f64]>>(
     for _ in 0..MULTIPLICATIVE_ROUNDS {
         multiplicative_step(bands, bases, &is_positive, densities);
     }
-    fit_mixture_with(bands, bases, sign, None, densities)
+    fit_mixture_with(bands, bases, sign, &[], densities)
 }
 
-/// As [`fit_mixture`], from these densities on, with that of the term `held` as it is.
+/// As [`fit_mixture`], from these densities on, with those of the terms `held` as they are.
 pub(super) fn fit_mixture_with<R: AsRef<[f64]>>(
     bands: &[SpectralBand],
     bases: &[R],
     sign: Sign,
-    held: Option<usize>,
+    held: &[usize],
     densities: &mut [f64],
 ) -> f64 {
     let mut objective = mixture_objective(bands, bases, densities);
@@ -91,13 +91,13 @@ pub(super) fn fit_mixture_with<R: AsRef<[f64]>>(
 }
 
 /// A round of Fisher's scoring: the densities of that sign whose sum is nearest to the bands, each weighted by the inverse of its
-/// variance under the present `densities`; that of `held` stays. What is negative and may not be is set to 0, one term after another.
+/// variance under the present `densities`; those of `held` stay. What is negative and may not be is set to 0, one term after another.
 /// `None` if the bands do not tell the shapes apart.
 fn weighted_least_squares<R: AsRef<[f64]>>(
     bands: &[SpectralBand],
     bases: &[R],
     sign: Sign,
-    held: Option<usize>,
+    held: &[usize],
     densities: &[f64],
 ) -> Option<Vec<f64>> {
     let information = information(bands, bases, densities);
@@ -105,7 +105,7 @@ fn weighted_least_squares<R: AsRef<[f64]>>(
     for (band, basis) in bands.iter().zip(bases) {
         let density = mixture_density(basis.as_ref(), densities);
         if density > 0.0 {
-            let of_held = held.map_or(0.0, |held| densities[held] * basis.as_ref()[held]);
+            let of_held: f64 = held.iter().map(|&held| densities[held] * basis.as_ref()[held]).sum();
             let towards = band.ordinates * (band.density - of_held) / (density * density);
             pull.iter_mut().zip(basis.as_ref()).for_each(|(pull, shape)| *pull += towards * shape);
         }
@@ -113,7 +113,7 @@ fn weighted_least_squares<R: AsRef<[f64]>>(
     // In units in which each term alone is known to 1.
     let scale = information.diagonal().map(f64::sqrt);
     let mut is_left_out: Vec<bool> = scale.iter().map(|scale| *scale == 0.0).collect();
-    held.into_iter().for_each(|held| is_left_out[held] = true);
+    held.iter().for_each(|&held| is_left_out[held] = true);
     loop {
         let entry = |row: usize, column: usize| {
             if is_left_out[row] || is_left_out[column] {
@@ -133,7 +133,7 @@ fn weighted_least_squares<R: AsRef<[f64]>>(
         if sign == Sign::Any || value >= 0.0 {
             let unscaled = |term: usize| if is_left_out[term] { 0.0 } else { solved[term] / scale[term] };
             let mut reached: Vec<f64> = (0..pull.len()).map(unscaled).collect();
-            held.into_iter().for_each(|held| reached[held] = densities[held]);
+            held.iter().for_each(|&held| reached[held] = densities[held]);
             return Some(reached);
         }
         is_left_out[least] = true;
@@ -239,10 +239,10 @@ mod tests {
         let band = |f: &f64| SpectralBand { frequency: *f, density: 3.0 + 0.2 / f, ordinates: 50.0 };
         let bands: Vec<SpectralBand> = frequencies.iter().map(band).collect();
         let mut densities = [1.0, 0.2];
-        fit_mixture_with(&bands, &bases, Sign::NonNegative, Some(1), &mut densities);
+        fit_mixture_with(&bands, &bases, Sign::NonNegative, &[1], &mut densities);
         assert!(densities[1] == 0.2 && (densities[0] - 3.0).abs() < 1e-4, "{densities:?}");
         densities = [3.0, 0.1];
-        let objective = fit_mixture_with(&bands, &bases, Sign::NonNegative, Some(1), &mut densities);
+        let objective = fit_mixture_with(&bands, &bases, Sign::NonNegative, &[1], &mut densities);
         assert!(densities[1] == 0.1 && densities[0] > 3.0, "{densities:?}");
         for near in [0.999, 1.001] {
             assert!(mixture_objective(&bands, &bases, &[near * densities[0], 0.1]) > objective - 1e-6);
