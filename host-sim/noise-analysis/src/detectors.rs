@@ -1,10 +1,12 @@
 //! Detectors of effects in the samples of one channel, which the Allan curve shows badly or not at all.
 //!
 //! ```text
-//! Series ─┬► noise_levels ─► knocks                        stretches that are louder than those around them
+//! Series ─┬► noise_levels ─┬► knocks                       stretches that are louder than those around them
+//!         │                └► level_change                 a level that becomes another one
 //!         ├► spikes                                        single samples
 //!         ├► effective_lsb                                 values rounded to several counts
 //!         ├► output_range                                  values that are cut off, and noise below a count
+//!         ├► stuck_output                                  an output that stays at one value
 //!         └► block_means, noise_grid ─► gls_regression ─► bias
 //!                                                          steps, ramps, covariates of the bias: thermal_response,
 //!                                                          vibration_rectification (bias_response)
@@ -20,11 +22,13 @@ pub mod block_means;
 pub(crate) mod effective_lsb;
 pub mod gls_regression;
 pub(crate) mod knocks;
+pub(crate) mod level_change;
 pub mod noise_grid;
 mod noise_levels;
 pub(crate) mod output_range;
 pub(crate) mod random_telegraph;
 pub(crate) mod spikes;
+pub(crate) mod stuck_output;
 mod telegraph_models;
 mod thermal_response;
 pub(crate) mod vibration_rectification;

@@ -17,6 +17,7 @@ pub mod findings;
 mod first_order_filter;
 mod kind;
 mod knock;
+mod level_change;
 mod markov_process;
 mod modulated_line;
 mod motion;
@@ -33,6 +34,7 @@ mod shared_drift;
 mod sinusoid;
 mod spikes;
 mod square_wave;
+mod stuck_output;
 mod telegraph;
 mod temperature_curvature;
 mod thermal_lag;
@@ -51,6 +53,7 @@ pub use evidence::{CurveEvidence, LineEvidence, LineSource, Multiples, SpectrumE
 pub use first_order_filter::FirstOrderFilter;
 pub(crate) use kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 pub use knock::NoisyInterval;
+pub use level_change::LevelChange;
 pub use markov_process::{MarkovEvidence, MarkovProcess};
 pub use modulated_line::{ModulatedLine, ModulationEvidence};
 pub use motion::{MotionInterval, MotionScale};
@@ -67,6 +70,7 @@ pub use shared_drift::SharedDrift;
 pub use sinusoid::SinusoidalLine;
 pub use spikes::Spikes;
 pub use square_wave::SquareWave;
+pub use stuck_output::StuckOutput;
 pub use telegraph::{TelegraphEvidence, TelegraphNoise};
 pub use temperature_curvature::TemperatureCurvature;
 pub use thermal_lag::ThermalLag;
@@ -129,10 +133,14 @@ pub enum Effect {
     Spikes(Spikes),
     /// A time in which the noise is larger.
     NoisyInterval(NoisyInterval),
+    /// A level of the noise that becomes another one.
+    LevelChange(LevelChange),
     /// A motion of the platform.
     MotionInterval(MotionInterval),
     /// Values that are cut off.
     Saturation(Saturation),
+    /// An output that stays at one value.
+    StuckOutput(StuckOutput),
     /// Samples that never arrived.
     DroppedSamples(DroppedSamples),
     /// Samples that were read twice.
@@ -224,8 +232,10 @@ kinds!(
     NoiseBelowCount,
     Spikes,
     NoisyInterval,
+    LevelChange,
     MotionInterval,
     Saturation,
+    StuckOutput,
     DroppedSamples,
     RepeatedSamples,
     ClockDeviation,

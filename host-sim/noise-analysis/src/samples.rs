@@ -4,6 +4,7 @@ pub(crate) mod epoch_ranges;
 pub(crate) mod exclusion;
 pub(crate) mod gapped_cascade;
 pub(crate) mod interpolation;
+pub(crate) mod neighbouring_gaps;
 pub mod series;
 pub(crate) mod streamed_curves;
 pub mod uniform_series;

@@ -96,6 +96,109 @@ fn long_gaps_are_no_lines() {
     }
 }
 
+/// An offset is in no difference, in a record of which all samples are kept or only means. 100,000 samples know N to 0.3 %.
+#[test]
+fn an_offset_of_many_counts_changes_no_coefficient() {
+    for samples in [100_000, 300_000] {
+        for offset in [0, 150_000_000, 1_000_000_000] {
+            let counts = white(1, samples, 20.0).into_iter().map(|count| offset + count).collect();
+            let report = analyze(&gyro(counts));
+            let what = format!("{samples} samples around {offset}");
+            assert!(kinds(&report).is_empty(), "{what}: {:?}", only(&report).effects);
+            let channel = only(&report);
+            for model in [&channel.before, &channel.after, &channel.refitted] {
+                let of = coefficient(model, "angle_random_walk");
+                assert!((of.value / N - 1.0).abs() < 0.02, "{what}: {of:?}");
+            }
+        }
+    }
+}
+
+/// So many that neighbouring gaps are closed with the same samples. Of 40 intervals of 95 %, 38 hold; at three standard deviations 34. The
+/// lower bound of B is above 0 in one of 40.
+#[test]
+fn samples_lost_at_random_are_neither_a_filter_nor_flicker_noise() {
+    let (mut held, mut with_flicker) = (0, 0);
+    for lost in [0.3, 0.4, 0.5, 0.7, 0.85] {
+        for seed in 0..8 {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let slots: Vec<u64> = (0..60_000).filter(|slot| *slot == 0 || !random.random_bool(lost)).collect();
+            let counts = white(100 + seed, slots.len(), 20.0);
+            let report = analyze(&recording("gyro_x", RATE_HZ, slots, counts));
+            let what = format!("{lost} lost, seed {seed}");
+            assert_eq!(kinds(&report), ["dropped_samples"], "{what}: {:?}", only(&report).effects);
+            let [n, b] =
+                ["angle_random_walk", "bias_instability"].map(|kind| coefficient(&only(&report).refitted, kind));
+            held += usize::from((n.low..=n.high).contains(&N));
+            with_flicker += usize::from(b.low > 0.0);
+        }
+    }
+    assert!(held >= 34, "{held} of 40 intervals of N hold it");
+    assert!(with_flicker <= 4, "flicker noise in {with_flicker} of 40");
+}
+
+/// A quarter and a half of the samples, in a record of which all samples are kept or only means. 150,000 other samples know N to 0.3 %.
+#[test]
+fn an_output_that_stays_at_its_value_is_told_and_left_out() {
+    for samples in [40_000, 300_000] {
+        for part in [4, 2] {
+            let mut counts = white(5, samples, 20.0);
+            let (from, to) = (samples / 4, samples / 4 + samples / part);
+            let value = counts[from];
+            counts[from..to].fill(value);
+            let report = analyze(&gyro(counts));
+            let what = format!("one of {part} of {samples} samples");
+            let [ChannelEffect { effect: Effect::StuckOutput(stuck), .. }] = &only(&report).effects[..] else {
+                panic!("{what}: {:?}", only(&report).effects)
+            };
+            // A few before and behind may have the same count by chance.
+            assert!((stuck.fraction.value * part as f64 - 1.0).abs() < 1e-3, "{what}: {stuck:?}");
+            assert!((stuck.from_s.value - from as f64 / RATE_HZ).abs() < 0.1, "{what}: {stuck:?}");
+            let of = |kind: &str| coefficient(&only(&report).refitted, kind);
+            assert!((of("angle_random_walk").value / N - 1.0).abs() < 0.02, "{what}: {:?}", of("angle_random_walk"));
+            assert_eq!((of("bias_instability").low, of("rate_random_walk").low), (0.0, 0.0), "{what}");
+        }
+    }
+}
+
+/// At half time, in a record of which all samples are kept or only means: told, and nothing else is.
+#[test]
+fn a_change_of_the_noise_level_is_told() {
+    for samples in [40_000, 400_000] {
+        for ratio in [1.5, 2.0, 3.0, 4.0, 0.25] {
+            let counts = white(8, samples, 20.0);
+            let change = |(at, count): (usize, &i32)| {
+                if at < samples / 2 { *count } else { (ratio * f64::from(*count)).round() as i32 }
+            };
+            let report = analyze(&gyro(counts.iter().enumerate().map(change).collect()));
+            let what = format!("{ratio} in {samples} samples");
+            let [ChannelEffect { effect: Effect::LevelChange(change), .. }] = &only(&report).effects[..] else {
+                panic!("{what}: {:?}", only(&report).effects)
+            };
+            // 20,000 samples know a deviation to 0.6 %, without the largest tenth of their differences, which are correlated, to 1.2 %.
+            assert!((change.ratio.value / ratio - 1.0).abs() < 0.06, "{what}: {change:?}");
+            let half_s = samples as f64 / 2.0 / RATE_HZ;
+            assert!((change.time_s.value / half_s - 1.0).abs() < 0.01, "{what}: {change:?}");
+        }
+    }
+}
+
+/// Behind a filter over 64 samples neighbours are equal for long, and so are those of half a count.
+#[test]
+fn equal_neighbours_of_filtered_or_small_noise_are_not_stuck() {
+    for seed in 0..12 {
+        let noise = white(seed, 60_064, 20_000.0);
+        for (what, deviation) in [("filtered", 2.0), ("filtered", 10.0)] {
+            let average =
+                |at: usize| noise[at..at + 64].iter().map(|of| f64::from(*of)).sum::<f64>() / (8.0 * 20_000.0);
+            let counts = (0..60_000).map(|at| (deviation * average(at)).round() as i32).collect();
+            assert!(!kinds(&analyze(&gyro(counts))).contains(&"stuck"), "{what}, {deviation} counts, seed {seed}");
+        }
+        let report = analyze(&gyro(white(seed, 60_000, 0.5)));
+        assert!(!kinds(&report).contains(&"stuck"), "half a count, seed {seed}");
+    }
+}
+
 /// Fewer octaves than terms determine no term.
 #[test]
 fn a_few_samples_have_no_effect_and_no_narrow_bounds() {
@@ -129,8 +232,10 @@ fn stretches_of_a_few_samples_have_no_effect_and_no_narrow_bounds() {
             assert_eq!(kinds(&report), ["dropped_samples"], "{what}");
             let of = coefficient(&only(&report).refitted, "angle_random_walk");
             assert!(of.low <= 1.02 * N && of.high >= 0.98 * N, "{what}: {of:?}");
-            let of = coefficient(&only(&report).refitted, "rate_random_walk");
-            assert!(of.high > of.value && of.low == 0.0, "{what}: {of:?}");
+            // Of so few samples a walk is without bounds, or those include none.
+            let walk = only(&report).refitted.terms.iter().find(|term| term.kind() == "rate_random_walk");
+            let is_wide = |of: Parameter| of.high > of.value && of.low == 0.0;
+            assert!(walk.is_none_or(|term| is_wide(term.coefficient())), "{what}: {walk:?}");
         }
     }
 }

@@ -203,6 +203,17 @@ impl Wording {
                 ),
                 "; a mechanical or thermal shock, or a fault that begins",
             ),
+            Effect::LevelChange(of) => text(
+                format!(
+                    "the deviation of neighbours' differences changes by the factor {:.3} at {:.1} s and stays, which explains {:.0} % of \
+                     the changes of its level, by chance anywhere {}",
+                    of.ratio.value,
+                    of.time_s.value,
+                    100.0 * of.explained,
+                    self.chance(of.p_value)
+                ),
+                "; a machine that is switched on, or a setting of the sensor",
+            ),
             Effect::TemperatureSensitivity(of) => text(
                 format!("follows the measured temperature, {:.0} sigma", of.sigmas),
                 "; a bias that drifts with temperature",
@@ -317,6 +328,13 @@ impl Wording {
                     of.most_of_others
                 ),
                 "",
+            ),
+            Effect::StuckOutput(of) => text(
+                format!(
+                    "{} of {} samples are in {} runs of equal values that noise does not make, the longest from {:.2} s to {:.2} s",
+                    of.stuck, of.samples, of.runs, of.from_s.value, of.to_s.value
+                ),
+                "; they are left out",
             ),
             Effect::DroppedSamples(of) => text(
                 format!("{} of {} samples never arrived, in {} gaps", of.missing, of.samples, of.gaps),

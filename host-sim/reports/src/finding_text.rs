@@ -282,6 +282,17 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
                 "; cut the record there.",
             ),
         ),
+        Effect::LevelChange(of) => (
+            format!(
+                "From {} on the noise is {} times as large as before.",
+                span(of.time_s.value),
+                amount(&of.ratio.parameter(""))
+            ),
+            Advice::new(
+                "Look for what was switched on or off at that time",
+                "; N is that of both levels together: cut the record there.",
+            ),
+        ),
         Effect::TemperatureSensitivity(of) => (
             format!("The bias follows the temperature with {}.", per(of.sensitivity, "degC")),
             Advice::new("Subtract this sensitivity times the change of temperature", format!(".{}", off())),
@@ -364,6 +375,10 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         Effect::Saturation(of) => (
             format!("The channel reached the end of its range in {} of the samples.", part_in_percent(of.fraction)),
             Advice::new("Use a larger range", "; what was cut off makes the noise look too small."),
+        ),
+        Effect::StuckOutput(of) => (
+            format!("The output stayed at one value in {} of the samples.", part_in_percent(of.fraction)),
+            Advice::new("Look for a reader or a filter that repeats its last value", "; these samples are left out."),
         ),
         Effect::DroppedSamples(of) => (
             format!("{} of the samples never arrived.", part_in_percent(of.fraction)),

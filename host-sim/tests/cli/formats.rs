@@ -350,7 +350,9 @@ fn saturated_and_stuck_channels_are_told() {
     let report: Value =
         serde_json::from_slice(&json_of(&dir, &["analyze", file.to_str().expect("UTF-8")])).expect("JSON");
     assert_eq!(report["flagged"]["saturated"], 50);
-    assert_eq!(report["flagged"]["stuck"], 50 + 100, "the samples at full scale do not change either");
+    let findings = report["findings"].as_array().expect("findings");
+    let stuck = findings.iter().find(|finding| finding["kind"] == "stuck").expect("a stuck output");
+    assert_eq!(stuck["parameters"]["share"]["value"], 100.0 / 5000.0, "at full scale it is no stuck output");
     let notes = String::from_utf8(host_sim(&["analyze", file.to_str().expect("UTF-8")]).stderr).expect("UTF-8");
     assert!(notes.contains("gyro_x: 50 samples at full scale, the first of them row 1001"), "{notes}");
 }

@@ -112,6 +112,9 @@ fn find_on_common_samples(
     accelerations: &[Acceleration],
     grids: &NoiseGrids,
 ) -> BiasChanges {
+    // Beside a large bias the squares of its changes would be lost.
+    let (first, bias) = series.slots.first().copied().zip(series.values.first().copied()).unwrap_or_default();
+    let series = &series.clone().lowered_from(first, bias);
     let Some(blocks) = BlockMeans::from_series(series) else { return BiasChanges::default() };
     let grid = grids.get(&blocks);
     let series_of = |index: usize| regressors.iter().find(|(of, _)| *of == index).map(|(_, series)| *series);

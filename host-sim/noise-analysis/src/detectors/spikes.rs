@@ -4,6 +4,7 @@
 //! the data. In white noise that is their mean; in filtered noise, on a sinusoid or in drift it is far more precise. The
 //! interpolation error is normal, so the threshold for N samples comes from N times the normal tail.
 
+use super::noise_levels::median;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, density, poisson_bounds, poisson_tail, quantile, upper_tail};
 use crate::effects::Spikes;
@@ -42,6 +43,8 @@ const LEAST_DETECTED: f64 = 0.05;
 pub(crate) struct SpikeRule {
     interpolation: Interpolation,
     threshold: f64,
+    /// Median distance of neighbouring samples, in the channel's unit.
+    difference: f64,
 }
 
 /// What a rule finds in samples of its channel.
@@ -140,7 +143,7 @@ impl SpikeRule {
         }
         let interpolation = Interpolation::fit(series)?;
         let threshold = interpolation.deviation * quantile(0.5 * SIGNIFICANCE / samples as f64);
-        Some(Self { interpolation, threshold })
+        Some(Self { interpolation, threshold, difference: median_difference(series) })
     }
 
     /// Sample periods of the spikes in a part of the same channel, in ascending order; none if jumps of the bias are at least
@@ -150,7 +153,7 @@ impl SpikeRule {
         if found.are_spikes() { found.slots } else { Vec::new() }
     }
 
-    /// What there is in a part of the same channel, whose bias may be another one.
+    /// What there is in a part of the same channel, whose bias may be another one. Where its noise is larger, so is a spike.
     pub(crate) fn find(&self, series: &Series) -> FoundSpikes {
         self.find_around(series, series.values.iter().sum::<f64>() / series.values.len().max(1) as f64)
     }
@@ -160,7 +163,8 @@ impl SpikeRule {
             return FoundSpikes::default();
         }
         let interpolation = Interpolation { mean, ..self.interpolation };
-        let (mut spikes, jumps) = interpolation.spikes(series, self.threshold);
+        let louder = median_difference(series) / self.difference;
+        let (mut spikes, jumps) = interpolation.spikes(series, self.threshold * louder.max(1.0));
         spikes.sort_by_key(|spike| spike.position);
         FoundSpikes {
             slots: spikes.iter().map(|spike| series.slots[spike.position]).collect(),
@@ -254,7 +258,7 @@ impl SpikeRule {
         if !found.are_spikes() {
             return None;
         }
-        let Self { interpolation, threshold } = self;
+        let Self { interpolation, threshold, .. } = self;
         let sizes = &found.sizes_of_events(samples);
         let largest = sizes.iter().copied().fold(0.0, f64::max);
         let size = SpikeSize::estimate(sizes, *threshold, interpolation.deviation);
@@ -418,6 +422,12 @@ impl Interpolation {
         }
         (spikes, jumps)
     }
+}
+
+/// Median distance of neighbouring samples, at least half a count as the deviation of an interpolation is.
+fn median_difference(series: &Series) -> f64 {
+    let distances = series.values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    median(distances.collect()).max(0.5 * series.resolution)
 }
 
 /// Standard deviation of the non-zero entries of `errors`, without those above [`CLIP`] standard deviations.

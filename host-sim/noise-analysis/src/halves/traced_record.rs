@@ -1,5 +1,6 @@
 //! What all of a recording shows: the effects in the samples of each channel, and the models of the whole.
 
+use crate::detectors::level_change;
 use crate::detectors::noise_grid::NoiseGrids;
 use crate::effects::Effect;
 use crate::fit::noise_terms::filter_length_s;
@@ -106,7 +107,9 @@ impl<'a> TracedRecord<'a> {
         let temperature = measurement.of_quantity(Quantity::Temperature).next();
         let level = temperature.and_then(|of| unexplained::level_by_temperature(own, &self.series[of]));
         let level = level.map(|level| Proposal::new(level, Origin::Level));
-        let proposals = moved.chain(of_samples).chain(of_model).chain(of_signals).chain(level).collect();
+        let change = level_change::find(own).map(|change| Proposal::new(change, Origin::Level));
+        let levels = level.into_iter().chain(change);
+        let proposals = moved.chain(of_samples).chain(of_model).chain(of_signals).chain(levels).collect();
         table::standing(proposals, &ChannelFacts { slope_of_ends: Some(slope_of_ends(own)), ..facts })
     }
 

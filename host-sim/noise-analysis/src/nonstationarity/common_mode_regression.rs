@@ -59,10 +59,10 @@ impl CommonModeRegression {
         let period = measurement.period_s();
         let [first, second, unseen] = quarters_and_second_half(measurement, channels);
         let fitted = first.clone().followed_by(&second);
-        let longest = fitted.cascade(0).len() / 8;
+        let longest = fitted.cascade(0).cascade().len() / 8;
         let covariances = |part: &CoupledEstimators, n: u64| part.covariances(n.ilog2() as usize);
         let edf = |n: u64| {
-            let (_, count) = fitted.cascade(0).sum_of_squares(n.ilog2() as usize).unwrap_or_default();
+            let (_, count) = fitted.cascade(0).cascade().sum_of_squares(n.ilog2() as usize).unwrap_or_default();
             allan_core::confidence::edf(
                 n,
                 count,

@@ -1,6 +1,7 @@
 //! A recording as it is analysed: the means of as many samples in a row as leave few enough of them, and what is known of the samples
 //! beside. A short recording has one sample a mean.
 
+use crate::detectors::stuck_output;
 use crate::effects::Effect;
 use crate::parallel::per_channel;
 use crate::record::sample_curves::SampleCurves;
@@ -49,7 +50,9 @@ pub(crate) struct CondensedChannel {
 impl<'a> CondensedRecord<'a> {
     /// A record all of whose samples are kept.
     pub(crate) fn of_samples(measurement: Cow<'a, Measurement>) -> Self {
+        let (measurement, stuck) = stuck_output::screened(measurement);
         let shown = SampleEffects::detect(&measurement);
+        let (samples, period_s) = (measurement.len() as u64, measurement.period_s());
         let channel = |id: ChannelId| {
             let channel = &measurement[id];
             let counts_per_step = shown.counts_per_step(id);
@@ -59,7 +62,7 @@ impl<'a> CondensedRecord<'a> {
                 counts_per_step,
                 can_show_spikes: channel.profile.quantity.is_inertial() && !shown.is_saturated(id),
                 faster_lines: Vec::new(),
-                effects: shown.of(id).cloned().collect(),
+                effects: shown.of(id).cloned().chain(stuck[id.position()].effect(samples, period_s)).collect(),
                 effects_of_first_half: Vec::new(),
                 screened: Vec::new(),
                 refused: channel.refused.iter().map(|(&cause, of)| (cause, of.len() as u64)).collect(),

@@ -4,6 +4,7 @@
 //! All channels are on one time grid. A sample that one channel lacks is missing in that channel alone; products of two
 //! channels are taken where both have a sample.
 
+use crate::OCTAVES;
 use crate::parallel::in_parallel;
 use crate::record::condensed_record::CondensedRecord;
 use crate::record::preprocessing::Preprocessing;
@@ -11,9 +12,8 @@ use crate::record::sample_curves::SampleCurves;
 use crate::samples::exclusion::Exclusion;
 use crate::samples::gapped_cascade::GappedCascade;
 use crate::samples::streamed_curves::STEPS_PER_COUNT;
-use crate::{OCTAVES, OVERLAP};
 use allan_core::regression::CovarianceCurve;
-use allan_core::{Cascade, Coupling, Curve};
+use allan_core::{Coupling, Curve};
 use measurement::{ChannelId, ChannelProfile, MeasuredChannel, Measurement, PerChannel, Quantity};
 use nalgebra::DMatrix;
 
@@ -66,8 +66,8 @@ impl CoupledEstimators {
     }
 
     /// The cascade of a channel.
-    pub(crate) fn cascade(&self, channel: usize) -> &Cascade<OCTAVES, OVERLAP> {
-        self.cascades[channel].cascade()
+    pub(crate) fn cascade(&self, channel: usize) -> &GappedCascade {
+        &self.cascades[channel]
     }
 
     /// Covariances of the second differences of all channels at one octave, up to a common factor, 0 of channels that are not coupled;
@@ -161,7 +161,15 @@ fn half(record: &CondensedRecord, preprocessing: &Preprocessing, exclusion: Excl
             let channel = &measurement[id];
             let excluded = preprocessing.excluded(id, exclusion);
             let is_corrected = preprocessing.corrects(id, exclusion);
-            RecordedSamples { id, channel, is_excluded: positions(measurement, channel, &excluded), is_corrected }
+            // An offset of all samples is in no difference, and large ones would leave no room for steps.
+            let origin = channel.used_samples(&measurement.slots).next().map_or(0, |(_, count)| count);
+            RecordedSamples {
+                id,
+                channel,
+                origin,
+                is_excluded: positions(measurement, channel, &excluded),
+                is_corrected,
+            }
         })
         .collect();
     let middle = measurement.middle();
@@ -177,7 +185,8 @@ fn half(record: &CondensedRecord, preprocessing: &Preprocessing, exclusion: Excl
         estimators.gap(measurement.missing_before(position).min(own));
         estimators.push(recorded.iter().map(|of| {
             (!of.is_excluded[position]).then(|| {
-                let steps = f64::from(of.channel.counts[position]) * STEPS_PER_COUNT;
+                let counts = f64::from(of.channel.counts[position]) - f64::from(of.origin);
+                let steps = counts * STEPS_PER_COUNT;
                 if !of.is_corrected {
                     return steps as i32;
                 }
@@ -208,6 +217,8 @@ enum Half {
 struct RecordedSamples<'a> {
     id: ChannelId,
     channel: &'a MeasuredChannel,
+    /// Counts from which its samples are counted.
+    origin: i32,
     is_excluded: Vec<bool>,
     /// Whether an offset is subtracted from any of them.
     is_corrected: bool,
@@ -286,7 +297,7 @@ impl RecordPart {
     /// Samples of a channel that were replaced because they are missing.
     pub(crate) fn replaced(&self, channel: ChannelId) -> u64 {
         match self.samples_per_mean {
-            1 => self.estimators.cascade(channel.position()).replaced(),
+            1 => self.estimators.cascade(channel.position()).cascade().replaced(),
             _ => self.shorter[channel].1,
         }
     }

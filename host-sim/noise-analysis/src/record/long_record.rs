@@ -16,6 +16,7 @@
 
 use crate::detectors::output_range::ValueCounts;
 use crate::detectors::spikes::SpikeRule;
+use crate::detectors::stuck_output::{self, StuckRuns, StuckScreen};
 use crate::effects::Effect;
 use crate::parallel::{self, in_parallel};
 use crate::record::condensed_record::{CondensedChannel, CondensedRecord};
@@ -25,7 +26,7 @@ use crate::record::sample_screen::SampleScreen;
 use crate::record::sampling_faults;
 use crate::samples::epoch_ranges::epochs;
 use crate::samples::series::Series;
-use crate::samples::streamed_curves::{STEPS_PER_COUNT, StreamedCurves};
+use crate::samples::streamed_curves::StreamedCurves;
 use crate::spectra::epoch_spectra::{EpochSpectra, PartSpectra};
 use crate::spectra::spectral_lines::{self, MergedLine};
 use crate::spectra::stacked_spectrum::StackedSpectrum;
@@ -52,8 +53,8 @@ const STRETCH_PERIODS: u64 = 1 << 16;
 /// Steps into which a count is divided for a mean, as a power of two: the rounding of the means of 256 samples is then a 16th of the
 /// deviation of the mean of their roundings, `1/√(12·256)` of a count.
 const MEAN_STEPS_LOG2: u32 = 8;
-/// Largest mean in steps, which the estimators divide further.
-const LARGEST_MEAN: f64 = (i32::MAX as f64) / STEPS_PER_COUNT;
+/// Largest mean in steps.
+const LARGEST_MEAN: f64 = i32::MAX as f64;
 /// Least part of the samples of a mean that is there.
 const LEAST_FILL: f64 = 0.5;
 /// Means are rates of at least this many times the highest frequency at which a line is sought in them.
@@ -68,6 +69,9 @@ pub struct LongRecordReader {
     samples_per_mean: u64,
     /// First sample period of the second half.
     middle: u64,
+    stuck: StuckScreen,
+    /// What is stuck in the first half.
+    stuck_in_first_half: Option<Vec<StuckRuns>>,
     screen: SampleScreen,
     channels: Vec<LongChannel>,
     fast: Vec<FastFindings>,
@@ -156,6 +160,8 @@ impl LongRecordReader {
     #[must_use]
     pub fn new(description: RecordingDescription, beginning: &Measurement) -> Self {
         let first = beginning.before(FIRST_PERIODS);
+        let stuck = StuckScreen::new(&first, description.samples);
+        let first = stuck_output::screened(Cow::Owned(first)).0.into_owned();
         let samples_per_mean = description.periods.div_ceil(MOST_MEANS).next_power_of_two();
         let means = description.periods / samples_per_mean;
         let halves = [means / 2 / 2, means / 2].map(|start| start * samples_per_mean);
@@ -195,7 +201,20 @@ impl LongRecordReader {
         };
         let channels = description.channels.iter().zip(&fast).zip(&of_first).map(channel).collect();
         let [_, middle] = halves;
-        Self { description, first, samples_per_mean, middle, screen, channels, fast, last: None, gaps: 0 }
+        let (stuck_in_first_half, last) = (None, None);
+        Self {
+            description,
+            first,
+            samples_per_mean,
+            middle,
+            stuck,
+            stuck_in_first_half,
+            screen,
+            channels,
+            fast,
+            last,
+            gaps: 0,
+        }
     }
 
     /// Takes the next samples, the channels on as many threads as there are cores.
@@ -204,27 +223,40 @@ impl LongRecordReader {
             self.gaps += usize::from(self.last.is_some_and(|last| slot > last + 1));
             self.last = Some(slot);
         }
+        if block.slots.last().is_some_and(|&last| last >= self.middle) {
+            self.stuck_in_first_half.get_or_insert_with(|| self.stuck.found());
+        }
+        let block = self.stuck.screen(block);
         parallel::for_each_pair(&mut self.channels, &block.channels, |of, channel| {
             of.recorded.push(&block.slots, channel);
             channel.used_samples(&block.slots).for_each(|(_, count)| of.values.push(count));
         });
         let channels = &mut self.channels;
-        self.screen.push(block, |screened| push_screened(channels, screened));
+        self.screen.push(&block, |screened| push_screened(channels, screened));
     }
 
     /// The recording, all of which was read.
     #[must_use]
     pub fn finish(mut self) -> CondensedRecord<'static> {
         push_screened(&mut self.channels, &self.screen.finish());
+        let found = self.stuck.found();
+        let of_first_half = self.stuck_in_first_half.unwrap_or_else(|| found.clone());
         let Self { description, first, samples_per_mean, middle, screen, channels, fast, gaps, .. } = self;
         let lost = sampling_faults::lost_samples(description.samples, &description.dropped, gaps);
         let period_s = description.period_s();
         let means = measurement_of_means(&description, samples_per_mean, &channels);
         let faster_lines = in_parallel(&channels, |of| of.faster_lines(&description, samples_per_mean));
         let screened: Vec<Vec<(u64, f64)>> = screen.found_before(middle).collect();
-        let [events, of_first_half] = [description.periods, middle].map(|periods| screen.effects(periods, period_s));
+        let [events, events_of_half] =
+            [(description.periods, found), (middle, of_first_half)].map(|(periods, stuck)| {
+                let share = periods as f64 / description.periods as f64;
+                let samples = (share * description.samples as f64) as u64;
+                let stuck = stuck.into_iter().map(move |runs| runs.effect(samples, period_s));
+                let events = screen.effects(periods, period_s).into_iter();
+                events.zip(stuck).map(|(events, stuck)| events.into_iter().chain(stuck).collect::<Vec<Effect>>())
+            });
         let mut condensed = Vec::new();
-        let events = events.into_iter().zip(of_first_half).zip(screened);
+        let events = events.zip(events_of_half).zip(screened);
         for ((((channel, fast), profile), faster_lines), ((events, events_of_first_half), screened)) in
             channels.into_iter().zip(fast).zip(&description.channels).zip(faster_lines).zip(events)
         {

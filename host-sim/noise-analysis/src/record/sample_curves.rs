@@ -6,7 +6,7 @@ use crate::samples::streamed_curves::{STEPS_PER_COUNT, joined};
 use crate::spectra::Welch;
 use crate::spectra::epoch_spectra::PartSpectra;
 use crate::{OCTAVES, OVERLAP};
-use allan_core::{Cascade, Curve};
+use allan_core::Curve;
 use measurement::{ChannelId, Measurement};
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ use std::ops::Range;
 const LEAST_FACTOR: u64 = OVERLAP as u64;
 
 /// Estimators of parts of the record that follow each other, each with its first sample period.
-pub(crate) type Parts = Vec<(u64, Cascade<OCTAVES, OVERLAP>)>;
+pub(crate) type Parts = Vec<(u64, GappedCascade)>;
 
 /// The curves of the samples of a channel; of one all of whose samples are kept, only the whole curve.
 #[derive(Clone)]
@@ -113,14 +113,14 @@ impl SampleCurves {
 
     /// Samples that were replaced because they are missing.
     pub(crate) fn replaced(&self, exclusion: Exclusion) -> u64 {
-        self.parts(exclusion).iter().map(|(_, part)| part.replaced()).sum()
+        self.parts(exclusion).iter().map(|(_, part)| part.cascade().replaced()).sum()
     }
 
     fn parts(&self, exclusion: Exclusion) -> &Parts {
         if exclusion == Exclusion::None { &self.recorded } else { &self.screened }
     }
 
-    fn curve<'p>(&self, parts: impl IntoIterator<Item = &'p (u64, Cascade<OCTAVES, OVERLAP>)>) -> Curve<OCTAVES> {
+    fn curve<'p>(&self, parts: impl IntoIterator<Item = &'p (u64, GappedCascade)>) -> Curve<OCTAVES> {
         joined(parts.into_iter().map(|(_, part)| part)).curve(self.period_s).scaled(self.lsb / STEPS_PER_COUNT)
     }
 }

@@ -116,7 +116,7 @@ const fn row(
 
 /// The rows, in their order.
 #[rustfmt::skip]
-pub static RIVALRIES: [Rivalry; 45] = [
+pub static RIVALRIES: [Rivalry; 47] = [
     // Lines and signals of the spectrum.
     row("line above half the rate of the means", "line of the means", "at its alias, and as wide", "means sample it too slowly",
         Rule::Line(|of| of.faster.iter().any(|faster| is_alias(of.line, faster, of.period_s)))),
@@ -283,7 +283,15 @@ pub static RIVALRIES: [Rivalry; 45] = [
             Effect::LevelStep(step) => least(step.size.estimate()) < PI * periodic.amplitude.value,
             _ => false,
         }))),
-    row("level of the noise by temperature", "spikes", "always", "the limit of a spike is that of a constant level",
+    row("level of the noise by temperature", "change of the level of the noise", "where it explains more of its changes",
+        "a temperature that rises once takes the level with it",
+        Rule::Channel(|of| matches!((of.effect(), of.level_by_temperature()), (Effect::LevelChange(change), Some(by_temperature))
+            if change.explained <= by_temperature))),
+    row("change of the level of the noise", "level of the noise by temperature", "otherwise",
+        "a temperature that differs before and after it follows by chance",
+        Rule::Channel(|of| of.others().any(|other| matches!(other.effect, Effect::LevelChange(_)))
+            && matches!((of.origin(), of.effect()), (Origin::Level, Effect::Unexplained(_))))),
+    row("level of the noise that changes", "spikes", "always", "the limit of a spike is that of a constant level",
         Rule::Channel(|of| matches!(of.effect(), Effect::Spikes(_))
             && of.others().any(|other| matches!(other.origin, Origin::Level)))),
     row("telegraph noise", "spikes", "no more frequent than visits of one sample to a level, and no larger",
@@ -486,6 +494,16 @@ impl<'a> Claim<'a> {
 
     fn periodic(&self) -> Option<&'a PeriodicSignal> {
         self.signal(|signal| if let Signal::Periodic(of) = signal { Some(of) } else { None })
+    }
+
+    /// The part of the changes of the noise's level that the temperature explains.
+    fn level_by_temperature(&self) -> Option<f64> {
+        self.others().find_map(|other| match &other.effect {
+            Effect::Unexplained(Unexplained {
+                observation: Observation::LevelByTemperature { explained, .. }, ..
+            }) => Some(*explained),
+            _ => None,
+        })
     }
 
     fn track(&self) -> Option<&'a FrequencyTrack> {

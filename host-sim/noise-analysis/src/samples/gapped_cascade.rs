@@ -1,5 +1,6 @@
 //! A cascade that counts the samples that are missing until the next one.
 
+use crate::samples::neighbouring_gaps::NeighbouringGaps;
 use crate::samples::series::Series;
 use crate::{OCTAVES, OVERLAP};
 use allan_core::{Cascade, Curve};
@@ -11,6 +12,7 @@ use std::ops::Range;
 pub(crate) struct GappedCascade {
     cascade: Cascade<OCTAVES, OVERLAP>,
     missing: u32,
+    gaps: NeighbouringGaps,
 }
 
 impl GappedCascade {
@@ -21,7 +23,9 @@ impl GappedCascade {
 
     /// Its curve, in counts.
     pub(crate) fn curve(&self, period_s: f64) -> Curve<OCTAVES> {
-        self.cascade.curve(period_s)
+        let mut curve = self.cascade.curve(period_s);
+        self.gaps.take_off(&mut curve, self.cascade.len() + self.cascade.missing());
+        curve
     }
 
     /// Whether the sample of the latest sample period is there.
@@ -31,20 +35,28 @@ impl GappedCascade {
 
     /// Takes samples that follow each other.
     pub(crate) fn push(&mut self, counts: &[i32]) {
-        if self.missing > 0 && !counts.is_empty() {
-            self.cascade.gap(std::mem::take(&mut self.missing));
+        if !counts.is_empty() {
+            self.close_gap();
         }
         self.cascade.push_slice(counts);
+        self.gaps.push(counts.len() as u64);
+    }
+
+    /// Tells the estimator of the samples that are missing before the next one.
+    fn close_gap(&mut self) {
+        if self.missing > 0 {
+            self.gaps.close(self.missing.into());
+            self.cascade.gap(std::mem::take(&mut self.missing));
+        }
     }
 
     /// Takes the next sample, if there is one.
     pub(crate) fn push_one(&mut self, count: Option<i32>) {
         match count {
             Some(count) => {
-                if self.missing > 0 {
-                    self.cascade.gap(std::mem::take(&mut self.missing));
-                }
+                self.close_gap();
                 self.cascade.push(count);
+                self.gaps.push(1);
             }
             None => self.miss(1),
         }
@@ -91,5 +103,6 @@ impl GappedCascade {
     /// The estimator of these samples followed, after a gap, by those of `later`.
     pub(crate) fn merge(&mut self, later: &Self) {
         self.cascade.merge(&later.cascade);
+        self.gaps.merge(&later.gaps);
     }
 }

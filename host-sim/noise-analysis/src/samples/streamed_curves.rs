@@ -2,8 +2,6 @@
 //! time.
 
 use crate::samples::gapped_cascade::GappedCascade;
-use crate::{OCTAVES, OVERLAP};
-use allan_core::Cascade;
 use measurement::MeasuredChannel;
 use std::collections::BTreeMap;
 
@@ -19,6 +17,9 @@ pub(crate) struct StreamedCurves {
     parts: Vec<GappedCascade>,
     /// First sample period of each part but the first.
     boundaries: Vec<u64>,
+    /// The first count, from which the steps of the parts are counted: an offset is in no difference, and a large one would leave no
+    /// room for them.
+    origin: Option<i32>,
     /// Sample period of the last sample.
     last: Option<u64>,
     /// Samples that are refused in this channel alone, by cause.
@@ -26,7 +27,7 @@ pub(crate) struct StreamedCurves {
 }
 
 /// The estimator of parts that follow each other, with a gap between them.
-pub(crate) fn joined<'a>(parts: impl IntoIterator<Item = &'a Cascade<OCTAVES, OVERLAP>>) -> Cascade<OCTAVES, OVERLAP> {
+pub(crate) fn joined<'a>(parts: impl IntoIterator<Item = &'a GappedCascade>) -> GappedCascade {
     let mut parts = parts.into_iter();
     let mut joined = parts.next().cloned().unwrap_or_default();
     parts.for_each(|later| joined.merge(later));
@@ -40,20 +41,21 @@ impl StreamedCurves {
             whole: GappedCascade::default(),
             parts: vec![GappedCascade::default(); boundaries.len() + 1],
             boundaries: boundaries.to_vec(),
+            origin: None,
             last: None,
             refused: BTreeMap::new(),
         }
     }
 
     /// The estimator of the whole record, in counts.
-    pub(crate) fn whole(&self) -> &Cascade<OCTAVES, OVERLAP> {
-        self.whole.cascade()
+    pub(crate) const fn whole(&self) -> &GappedCascade {
+        &self.whole
     }
 
     /// The first sample period of each part and its estimator, in steps of a count ([`STEPS_PER_COUNT`]).
-    pub(crate) fn parts(&self) -> impl Iterator<Item = (u64, &Cascade<OCTAVES, OVERLAP>)> {
+    pub(crate) fn parts(&self) -> impl Iterator<Item = (u64, &GappedCascade)> {
         let starts = std::iter::once(0).chain(self.boundaries.iter().copied());
-        starts.zip(self.parts.iter().map(GappedCascade::cascade))
+        starts.zip(&self.parts)
     }
 
     /// The estimator of the part of this number, in steps of a count.
@@ -66,7 +68,10 @@ impl StreamedCurves {
         for (&cause, positions) in &channel.refused {
             *self.refused.entry(cause).or_insert(0) += positions.len() as u64;
         }
-        let steps: Vec<i32> = channel.counts.iter().map(|count| count.saturating_mul(STEPS_PER_COUNT as i32)).collect();
+        self.origin = self.origin.or_else(|| channel.used_samples(slots).next().map(|(_, count)| count));
+        let origin = self.origin.unwrap_or(0);
+        let in_steps = |count: &i32| count.saturating_sub(origin).saturating_mul(STEPS_PER_COUNT as i32);
+        let steps: Vec<i32> = channel.counts.iter().map(in_steps).collect();
         let mut refused = channel.refused_positions().into_iter().peekable();
         let mut first = 0;
         while first < slots.len() {

@@ -82,9 +82,11 @@ pub(crate) fn step(values: &[f64]) -> Option<(f64, f64)> {
     let stride = values.len().div_ceil(EXAMINED).max(1);
     let mut examined: Vec<f64> = values.iter().copied().step_by(stride).filter(|value| value.is_finite()).collect();
     examined.sort_by(f64::total_cmp);
-    // Half a unit in the last place of a number in single or double precision; decimal texts are read as doubles.
+    // Half a unit in the last place of a number in single or double precision; decimal texts are read as doubles. Whole numbers are exact.
     let is_single = examined.iter().all(|&value| f64::from(value as f32) == value);
-    let rounding = largest * if is_single { f64::from(f32::EPSILON) } else { 2.0 * f64::EPSILON } / 2.0;
+    let is_whole = examined.iter().all(|value| value.fract() == 0.0);
+    let precision = if is_single { f64::from(f32::EPSILON) } else { 2.0 * f64::EPSILON };
+    let rounding = if is_whole { 0.0 } else { 0.5 * largest * precision };
     examined.dedup_by(|one, other| (*one - *other).abs() <= 4.0 * rounding);
     if examined.len() < MIN_DISTINCT {
         return None;
@@ -206,6 +208,9 @@ mod tests {
             (9.80665 / 4096.0, 4096.0, 2.0, false),
             (1e-6, 500.0, 300.0, false),
             (2.0, 0.0, 40.0, false),
+            // Whole numbers that single precision has room for, and others.
+            (1.0, 1e7, 3.0, false),
+            (1.0, 5e8, 3.0, false),
         ] {
             let counts: Vec<i32> = noise.iter().map(|x| (mean + deviation * x).round() as i32).collect();
             let written = |count: &i32| {

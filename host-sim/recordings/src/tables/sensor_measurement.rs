@@ -1,6 +1,6 @@
 //! From the rows of any sensor to the [`Measurement`] that is analysed: time base, counts, and what the channels show.
 
-use crate::tables::channel_health::ChannelHealth;
+use crate::tables::channel_health::saturated;
 use crate::tables::quantizer::Quantizer;
 use crate::tables::sensor_table::{SensorTable, TableColumn};
 use crate::time_base::EstimatedTimeBase;
@@ -39,12 +39,12 @@ pub(crate) fn time_base(
     // The rows that were left out are between the others and are missing there.
     let left_out = dropped.get("time_backwards").copied().unwrap_or(0);
     dropped.insert("gap", base.never_arrived.saturating_sub(left_out));
-    let mut health = BTreeMap::from([("saturated", BTreeSet::new()), ("stuck", BTreeSet::new())]);
+    let mut at_full_scale = BTreeSet::new();
     let mut channels = Vec::with_capacity(columns.len());
     let (mut rounded, mut unusable_values) = (Vec::new(), BTreeMap::new());
     for column in columns {
         let unusable = format!("{} ({}) has no usable value and is left out", column.profile.name, column.label);
-        match channel(column, &mut health, &mut notes, &mut rounded) {
+        match channel(column, &mut at_full_scale, &mut notes, &mut rounded) {
             Ok(channel) => channels.push(channel),
             Err(refused) => {
                 notes.push(unusable);
@@ -60,8 +60,8 @@ pub(crate) fn time_base(
         dropped.extend(unusable_values);
         return Err(TimeBaseError::TooShort { used: 0, dropped });
     }
-    let mut flagged: BTreeMap<&'static str, u64> =
-        health.into_iter().map(|(cause, rows)| (cause, rows.len() as u64)).filter(|(_, count)| *count > 0).collect();
+    let mut flagged = BTreeMap::new();
+    flagged.extend(Some(("saturated", at_full_scale.len() as u64)).filter(|(_, count)| *count > 0));
     flagged.extend(base.stamps.iter().flat_map(StampQuality::warnings));
     let measurement = Measurement {
         profile: sensor.clone(),
@@ -126,7 +126,7 @@ pub(crate) fn rounding_note<'a>(channels: impl Iterator<Item = (&'a ChannelProfi
 /// One channel as counts; the positions of the values that are refused, by cause, where all are.
 fn channel(
     column: TableColumn,
-    health: &mut BTreeMap<&'static str, BTreeSet<usize>>,
+    at_full_scale: &mut BTreeSet<usize>,
     notes: &mut Vec<String>,
     rounded: &mut Vec<(ChannelProfile, Quantizer)>,
 ) -> Result<MeasuredChannel, BTreeMap<&'static str, Vec<usize>>> {
@@ -151,20 +151,12 @@ fn channel(
         refused.values_mut().for_each(|positions| positions.sort_unstable());
     }
     rounded.push((profile, quantizer));
-    let mut seen = ChannelHealth::examine(&counts, profile.range.map(|range| range / lsb));
-    if !profile.quantity.is_inertial() {
-        // A temperature or a supply may well stay where it is.
-        seen.stuck.clear();
+    let saturated = saturated(&counts, profile.range.map(|range| range / lsb));
+    if let Some(first) = saturated.first() {
+        let count = saturated.len();
+        notes.push(format!("{}: {count} samples at full scale, the first of them row {}", profile.name, first + 1));
     }
-    for (cause, positions, what) in [
-        ("saturated", seen.saturated, "samples at full scale"),
-        ("stuck", seen.stuck, "samples in runs of equal values that chance does not make: a stuck output"),
-    ] {
-        if let Some(first) = positions.first() {
-            notes.push(format!("{}: {} {what}, the first of them row {}", profile.name, positions.len(), first + 1));
-        }
-        health.entry(cause).or_default().extend(positions);
-    }
+    at_full_scale.extend(saturated);
     let counts = counts.into_iter().map(Option::unwrap_or_default).collect();
     Ok(MeasuredChannel { profile: ChannelProfile { lsb, ..profile }, counts, refused })
 }

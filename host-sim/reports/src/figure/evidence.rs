@@ -8,8 +8,8 @@ use crate::finding_text::channel_list;
 use crate::formatting::words;
 use crate::rounding::{quantity_digits, span, unit};
 use noise_analysis::effects::{
-    Effect, ModulatedLine, MotionInterval, NoisyInterval, Periodic, ResonantLine, SinusoidalLine, SquareWave,
-    UnexplainedPlace,
+    Effect, LevelChange, LevelStep, ModulatedLine, MotionInterval, NoisyInterval, Periodic, ResonantLine,
+    SinusoidalLine, SquareWave, StuckOutput, UnexplainedPlace,
 };
 use noise_analysis::report::{ChannelReport, Finding, Report};
 
@@ -32,11 +32,12 @@ pub(crate) fn evidence(report: &Report, index: usize) -> Option<Plot> {
         Effect::Chirp(_) | Effect::OutputFilter(_) | Effect::FirstOrderFilter(_) | Effect::ClockDeviation(_) => {
             spectrum_plot(report, channel)
         }
-        Effect::LevelStep(of) => {
-            let at = of.time_s.value;
+        Effect::LevelStep(LevelStep { time_s, .. }) | Effect::LevelChange(LevelChange { time_s, .. }) => {
+            let at = time_s.value;
             in_time(report, channel, finding, Some(TimePlace { label: span(at), from_s: at, to_s: at }))
         }
         Effect::NoisyInterval(NoisyInterval { from_s, to_s, .. })
+        | Effect::StuckOutput(StuckOutput { from_s, to_s, .. })
         | Effect::MotionInterval(MotionInterval { from_s, to_s, .. }) => {
             let (from_s, to_s) = (from_s.value, to_s.value);
             let label = format!("{} … {}", span(from_s), span(to_s));

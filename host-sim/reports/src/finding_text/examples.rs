@@ -174,6 +174,16 @@ pub(super) fn examples() -> Vec<Effect> {
             most_of_others: 20,
         }
         .into(),
+        LevelChange { time_s: estimate(), ratio: estimate(), explained: 0.9, p_value: 1e-9 }.into(),
+        StuckOutput {
+            fraction: BoundedEstimate::exact(0.003),
+            from_s: estimate(),
+            to_s: estimate(),
+            runs: 2,
+            stuck: 300,
+            samples: 100_000,
+        }
+        .into(),
         DroppedSamples { fraction: estimate(), missing: 12.0, samples: 1e5, gaps: 3 }.into(),
         RepeatedSamples { fraction: estimate(), equal: 12, samples: 1e5, by_chance: 0.1, channels: 6 }.into(),
         ClockDeviation { rate_hz: estimate(), nominal_hz: 819.2, sigmas: 9.0 }.into(),

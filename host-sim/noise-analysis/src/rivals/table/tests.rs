@@ -240,7 +240,10 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
     let response = ResponseVariance::from_means(&[0.0, 1.0, 0.0, 1.0], 1);
     let lag = ThermalLag { sensitivity: size(1.0), time_constant_s: known(100.0), p_value: 1e-9, response };
     let point = |tau_s: f64| unexplained(tau_s, Observation::PointOfCurve { p_value: 1e-9 });
-    let level = unexplained(0.01, Observation::LevelByTemperature { range_degc: [20.0, 30.0], explained: 0.9 });
+    let by_temperature = |explained| unexplained(0.01, Observation::LevelByTemperature { range_degc: [20.0, 30.0], explained });
+    let level_change = |explained| -> Effect {
+        LevelChange { time_s: known(500.0), ratio: known(2.0), explained, p_value: 1e-9 }.into()
+    };
     let quantization = AngleQuantization { coefficient: size(1.0), evidence: CURVE };
     let of_quantization = Origin::Term { number: 0, kind: NoiseTerm::Quantization, low: 0.9 };
     let low_pass = FirstOrderFilter { bandwidth_hz: known(1.0), time_constant_s: 0.16, evidence: CURVE };
@@ -331,8 +334,12 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
             channel([of(resonance(0.05), of_resonance(0.05)), of_periodic.clone()]), vec!["periodic"]),
         (["chirp", "line of the curve"], channel([of(resonance(6.0), of_resonance(6.0)), of_track]), vec!["chirp"]),
         (["slow periodic signal", "ramp, step"], channel([of(step.into(), Origin::Samples), of_periodic]), vec!["periodic"]),
-        (["level of the noise by temperature", "spikes"],
-            channel([of(spikes(), Origin::Samples), of(level, Origin::Level)]), vec!["unexplained"]),
+        (["level of the noise by temperature", "change of the level of the noise"],
+            channel([of(level_change(0.8), Origin::Level), of(by_temperature(0.9), Origin::Level)]), vec!["unexplained"]),
+        (["change of the level of the noise", "level of the noise by temperature"],
+            channel([of(level_change(0.9), Origin::Level), of(by_temperature(0.8), Origin::Level)]), vec!["level_change"]),
+        (["level of the noise that changes", "spikes"],
+            channel([of(spikes(), Origin::Samples), of(level_change(0.9), Origin::Level)]), vec!["level_change"]),
         (["telegraph noise", "spikes"], channel([of(spikes(), Origin::Samples), of(levels(1.0, 1.0), OF_LEVELS)]), vec!["telegraph"]),
         (["line in common", "drift in common"],
             Claims::Cause { effect: common_mode(10.0), shown_by: None, periodic: vec![Cause { shown: vec![shown(0), shown(1)] }] },
