@@ -199,6 +199,26 @@ fn equal_neighbours_of_filtered_or_small_noise_are_not_stuck() {
     }
 }
 
+/// The differences of an angle in steps of its own, behind two averages over 64 samples: neighbours are less often equal than samples
+/// further away, because the error of rounding an angle makes one difference larger and the next one smaller.
+#[test]
+fn differences_of_a_rounded_angle_are_not_stuck() {
+    let averaged = |of: &[f64]| -> Vec<f64> { of.windows(64).map(|of| of.iter().sum::<f64>() / 64.0).collect() };
+    for seed in 0..4 {
+        let rates: Vec<f64> = white(seed, 60_126, 20_000.0).into_iter().map(|of| f64::from(of) / 1_200.0).collect();
+        let mut angle = 0.0;
+        let angles: Vec<f64> = averaged(&averaged(&rates))
+            .into_iter()
+            .map(|rate| {
+                angle += rate;
+                angle
+            })
+            .collect();
+        let counts = angles.windows(2).map(|of| (of[1].round() - of[0].round()) as i32).collect();
+        assert!(!kinds(&analyze(&gyro(counts))).contains(&"stuck"), "seed {seed}");
+    }
+}
+
 /// Fewer octaves than terms determine no term.
 #[test]
 fn a_few_samples_have_no_effect_and_no_narrow_bounds() {

@@ -1,8 +1,9 @@
 //! Outputs that stay at one value: runs of equal samples that are longer than noise makes them.
 //!
-//! Samples are independent from a lag `g` on at which they are no more often equal than at `2g`. One that is independent of those before
-//! has the most frequent value with a probability `p`. A run of `L` samples has `L/g` independent ones, so that chance makes one among
-//! `n` samples with a probability of no more than `n·p^(L/g − 1)`.
+//! Samples are independent from a lag `g` on from which they are no more often equal than at twice the lag: differences of a rounded
+//! angle are less often equal to their neighbours than to samples further away, and more often to these than to those behind the filter.
+//! A sample that is independent of those before has the most frequent value with a probability `p`. A run of `L` samples has `L/g`
+//! independent ones, so that chance makes one among `n` samples with a probability of no more than `n·p^(L/g − 1)`.
 
 use crate::bounds::BoundedEstimate;
 use crate::effects::findings::SIGNIFICANCE;
@@ -16,8 +17,10 @@ const CAUSE: &str = "stuck";
 const TOGETHER: usize = 1 << 14;
 /// Longest lag at which samples are compared: filters average 64 samples, once or twice.
 const LONGEST_LAG: usize = 512;
-/// How many times more often than at twice the lag samples that are independent may be equal by the scatter of their numbers.
+/// How many times more often than at twice the lag samples that are independent may be equal, beyond so many standard deviations of the
+/// difference.
 const ALIKE: f64 = 1.1;
+const SCATTER: f64 = 4.0;
 /// Fewest samples behind a change of the value from which `p` is estimated, to a tenth of itself or of 1.
 const FEWEST_CHANGES: usize = 100;
 /// Largest `p`: 0.683 of noise of half a count around a whole one. Of smaller noise a bias between two counts decides how often it is
@@ -37,6 +40,8 @@ pub(crate) struct StuckScreen {
 
 /// What is known of an inertial channel.
 struct StuckChannel {
+    /// Lag from which on samples are independent: the filter's, which does not change.
+    lag: Option<usize>,
     /// Samples of a run that chance makes with a probability of [`SIGNIFICANCE`]; `None` where that is not known.
     shortest: Option<u64>,
     /// Smallest and largest count: what stays there is cut off.
@@ -68,8 +73,10 @@ impl StuckScreen {
         let channel = |of: &MeasuredChannel| {
             of.profile.quantity.is_inertial().then(|| {
                 let counts: Vec<i32> = of.used_samples(&beginning.slots).map(|(_, count)| count).collect();
+                let lag = independent_lag(&counts);
                 StuckChannel {
-                    shortest: shortest_run(&counts, samples),
+                    lag,
+                    shortest: lag.and_then(|lag| shortest_run(&counts, lag, samples)),
                     extremes: counts.iter().min().copied().zip(counts.iter().max().copied()),
                     last: None,
                     run: Run::default(),
@@ -154,11 +161,10 @@ impl StuckChannel {
     fn take(&mut self, slots: &[u64], samples: &[(usize, i32)], of_recording: u64) -> Vec<usize> {
         let counts: Vec<i32> = samples.iter().map(|(_, count)| *count).collect();
         // Of noise that has become smaller neighbours are equal more often.
-        self.shortest = if changes(&counts, 1).count() < FEWEST_CHANGES {
-            self.shortest
-        } else {
-            shortest_run(&counts, of_recording)
-        };
+        if changes(&counts, 1).count() >= FEWEST_CHANGES {
+            self.lag = self.lag.or_else(|| independent_lag(&counts));
+            self.shortest = self.lag.and_then(|lag| shortest_run(&counts, lag, of_recording));
+        }
         let mut stuck = Vec::new();
         for &(at, count) in samples {
             let (least, largest) = self.extremes.get_or_insert((count, count));
@@ -205,32 +211,61 @@ impl StuckRuns {
     }
 }
 
-/// The samples that differ from the one a lag before, and whether the one a lag after them is equal to them. However long a channel is
-/// stuck, that is one of them.
-fn changes(counts: &[i32], lag: usize) -> impl Iterator<Item = (i32, bool)> + '_ {
-    let changed = counts.windows(2 * lag + 1).filter(move |of| of[0] != of[lag]);
-    changed.map(move |of| (of[lag], of[lag] == of[2 * lag]))
+/// A sample that differs from the one a lag before.
+struct Change {
+    position: usize,
+    count: i32,
+    /// Whether the sample a lag after it is equal to it. However long a channel is stuck, there are no more such changes than a lag has
+    /// samples.
+    is_kept: bool,
+}
+
+fn changes(counts: &[i32], lag: usize) -> impl Iterator<Item = Change> + '_ {
+    let changed = counts.windows(2 * lag + 1).enumerate().filter(move |(_, of)| of[0] != of[lag]);
+    changed.map(move |(position, of)| Change { position, count: of[lag], is_kept: of[lag] == of[2 * lag] })
 }
 
 /// The part of some changes that are followed by an equal sample: a probability of which nothing was seen is one of so many. `None`
 /// for too few.
-fn share(changes: impl Iterator<Item = bool>) -> Option<f64> {
-    let (all, equal) = changes.fold((0, 0), |(all, equal), is_equal| (all + 1, equal + usize::from(is_equal)));
-    (all >= FEWEST_CHANGES).then(|| (equal as f64 + 1.0) / (all as f64 + 1.0))
+fn share(changes: &[Change]) -> Option<f64> {
+    let kept = changes.iter().filter(|change| change.is_kept).count();
+    (changes.len() >= FEWEST_CHANGES).then(|| (kept as f64 + 1.0) / (changes.len() as f64 + 1.0))
 }
 
-/// Samples of the shortest run that chance does not make among `samples` samples with the noise of `counts`.
-fn shortest_run(counts: &[i32], samples: u64) -> Option<u64> {
-    let at = |lag: usize| share(changes(counts, lag).map(|(_, is_equal)| is_equal));
-    let is_independent =
-        |lag: &usize| matches!((at(*lag), at(2 * lag)), (Some(own), Some(twice)) if own <= ALIKE * twice);
-    let mut lags = std::iter::successors(Some(1), |lag| Some(2 * lag)).take_while(|lag| *lag <= LONGEST_LAG);
-    let lag = lags.find(is_independent)?;
-    let mut by_value: Vec<(i32, bool)> = changes(counts, lag).collect();
-    by_value.sort_unstable();
-    let of_values = by_value.chunk_by(|one, other| one.0 == other.0);
-    let of_values = of_values.filter_map(|of| share(of.iter().map(|(_, is_equal)| *is_equal)));
-    let most = of_values.chain(at(lag)).fold(0.0, f64::max);
+/// That part at a lag, and its variance by the scatter from one stretch as long as the lag to the next: within a stretch one stuck output
+/// makes all changes alike.
+fn share_at(counts: &[i32], lag: usize) -> Option<(f64, f64)> {
+    let changes: Vec<Change> = changes(counts, lag).collect();
+    let share = share(&changes)?;
+    let stretches = changes.chunk_by(|one, other| one.position / lag == other.position / lag);
+    let beyond = |of: &[Change]| of.iter().map(|change| f64::from(u8::from(change.is_kept)) - share).sum::<f64>();
+    let scatter: f64 = stretches.map(|of| beyond(of).powi(2)).sum();
+    Some((share, scatter / (changes.len() as f64).powi(2)))
+}
+
+/// Smallest lag from which on samples are no more often equal than at twice the lag. `None` where that is longer than [`LONGEST_LAG`], and
+/// for too few samples.
+fn independent_lag(counts: &[i32]) -> Option<usize> {
+    let counts = &counts[..counts.len().min(TOGETHER)];
+    let lags = std::iter::successors(Some(1), |lag| Some(2 * lag)).take_while(|lag| *lag <= 2 * LONGEST_LAG);
+    let shares: Vec<(usize, (f64, f64))> = lags.map_while(|lag| Some((lag, share_at(counts, lag)?))).collect();
+    let is_dependent = |pair: &&[(usize, (f64, f64))]| {
+        let [(_, (own, variance)), (_, (twice, of_twice))] = [pair[0], pair[1]];
+        own > ALIKE * twice + SCATTER * (variance + of_twice).sqrt()
+    };
+    let (first, _) = *shares.first()?;
+    let lag = shares.windows(2).rfind(is_dependent).map_or(first, |pair| pair[1].0);
+    (lag <= LONGEST_LAG).then_some(lag)
+}
+
+/// Samples of the shortest run that chance does not make among `samples` samples with the noise of `counts`,
+/// where they are independent from a lag on.
+fn shortest_run(counts: &[i32], lag: usize, samples: u64) -> Option<u64> {
+    let mut by_count: Vec<Change> = changes(counts, lag).collect();
+    let of_all = share(&by_count);
+    by_count.sort_unstable_by_key(|change| change.count);
+    let of_counts = by_count.chunk_by(|one, other| one.count == other.count).filter_map(share);
+    let most = of_counts.chain(of_all).reduce(f64::max)?;
     let independent = 1.0 + (SIGNIFICANCE / samples as f64).ln() / most.ln();
     (most < MOST_EQUAL).then(|| (lag as f64 * independent).ceil().max(FEWEST_SAMPLES) as u64)
 }
