@@ -102,6 +102,7 @@ pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Rep
     let (first_half, epochs) = FirstHalf::fit(&whole);
     whole.part.take_terms_that_held(&first_half.part, &whole.estimators.ruled[1]);
     whole.part.add_lines_of_spectrum();
+    whole.part.take_coefficients_of_samples();
     watch(Stage::Effects);
     let effects = whole.effects();
     // What the first half shows by itself, to compare with what the whole record shows.
@@ -210,6 +211,7 @@ impl Assessed {
         // Models that are assessed by samples that still have the share of the covariates.
         let models = AssessedModels {
             refitted: trace.fit.after(),
+            coefficients_from: trace.fit.coefficients_from,
             uncompensated: trace.fit.with_covariates(),
             of_first_half: half.fit.with_covariates(),
         };

@@ -9,4 +9,5 @@ pub(crate) mod minimum;
 pub(crate) mod noise_terms;
 pub(crate) mod octave_covariance;
 pub(crate) mod part_filter;
+pub mod sample_coefficients;
 pub(crate) mod traced_model;

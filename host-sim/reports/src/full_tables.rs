@@ -6,8 +6,8 @@ use crate::evidence::{EvidenceText, NumberStyle};
 use crate::explanation;
 use crate::finding_text::FindingText;
 use crate::formatting::{
-    TextTable, capital, count, duration, filter_consistency, interval, missing_samples, number, optional,
-    parameter_name, percent, recording_advice, words, worst_deviations, wrap,
+    TextTable, capital, coefficients_source, count, duration, filter_consistency, interval, missing_samples, number,
+    optional, parameter_name, percent, recording_advice, words, worst_deviations, wrap,
 };
 use crate::rounding::{NONE, Scale, bounded_quantity, parameter_magnitude, probability, quantity_digits, unit};
 use crate::summary;
@@ -225,6 +225,9 @@ fn curve_table(channel: &ChannelReport) -> TextTable {
 fn write_assessment(assessment: &Assessment, out: &mut impl Write) -> io::Result<()> {
     if !assessment.coefficients.is_empty() {
         writeln!(out, "{}", unit_table(&assessment.coefficients))?;
+    }
+    if let Some(text) = coefficients_source(assessment.coefficients_from) {
+        writeln!(out, "{}", wrap(&format!("• {text}."), WIDTH.into()))?;
     }
     if !assessment.drift.is_empty() {
         writeln!(out, "{}", drift_table(&assessment.drift))?;

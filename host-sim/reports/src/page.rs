@@ -8,8 +8,8 @@ use crate::explanation;
 use crate::figure::{self, Plot};
 use crate::finding_text::{FindingText, describe};
 use crate::formatting::{
-    capital, count, filter_consistency, interval, missing_samples, number, parameter_name, recording_advice, words,
-    worst_deviations,
+    capital, coefficients_source, count, filter_consistency, interval, missing_samples, number, parameter_name,
+    recording_advice, words, worst_deviations,
 };
 use crate::rounding::{bounded_quantity, probability, unit};
 use crate::summary;
@@ -268,6 +268,7 @@ fn assessment(assessment: &Assessment) -> Markup {
         @if !assessment.coefficients.is_empty() { (tables::units(&assessment.coefficients)) }
         @if !assessment.drift.is_empty() { (tables::drift(&assessment.drift)) }
         ul {
+            @if let Some(text) = coefficients_source(assessment.coefficients_from) { li { (text) "." } }
             @if let Some(innovations) = &assessment.innovations {
                 li { b { "Kalman filter of the model" } ", unseen half: " (filter_consistency(innovations)) "."
                     span.parameter { (count(innovations.count as u64)) " innovations, " (number(innovations.normalised))

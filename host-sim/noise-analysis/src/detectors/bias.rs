@@ -136,6 +136,7 @@ fn find_on_common_samples(
     {
         accepted.push(next);
     }
+    accepted.extend(linear_part(&blocks, &grid, &covariates, &accepted));
     let mut changes = BiasChanges::default();
     let (mut linear, mut lagged, mut squared) = (None, None, None);
     for (at, Accepted { candidate, regressor, p_value }) in accepted.iter().enumerate() {
@@ -161,19 +162,32 @@ fn find_on_common_samples(
             }
         }
     }
-    if let Some((index, course)) = &covariates.temperature {
-        // A curved response has a sensitivity at the mean temperature, be it significant or not.
-        let beside = || {
-            let known: Vec<DVector<f64>> = accepted.iter().map(|accepted| accepted.regressor.clone()).collect();
-            let (_, temperature) = covariates.regressors.iter().find(|(of, _)| of == index)?;
-            GlsRegression::new(&blocks, &grid, &known).estimate(temperature)
-        };
-        let linear = if squared.is_some() { linear.or_else(beside) } else { linear };
+    if let Some((_, course)) = &covariates.temperature {
         let curved = squared.map(|estimate| course.squared_response(linear.as_ref(), &estimate, series.unit));
         let behind_lag = lagged.map(|(lag, estimate)| course.lag_response(lag, &estimate, series.unit));
         changes.responses.extend(behind_lag.or(curved));
     }
     changes
+}
+
+/// The response to the temperature at its mean that belongs to an accepted curvature, be it significant or not: of a square about another
+/// temperature it is a part. `None` where it is accepted, and without a curvature.
+fn linear_part(
+    blocks: &BlockMeans,
+    grid: &NoiseGrid,
+    covariates: &Covariates,
+    accepted: &[Accepted],
+) -> Option<Accepted> {
+    let (temperature, _) = covariates.temperature.as_ref()?;
+    let is_curved = accepted.iter().any(|of| matches!(of.candidate, Candidate::Squared));
+    let is_known = |of: &Accepted| matches!(of.candidate, Candidate::Regressor(index) if index == *temperature);
+    if !is_curved || accepted.iter().any(is_known) {
+        return None;
+    }
+    let (index, regressor) = covariates.regressors.iter().find(|(index, _)| index == temperature)?;
+    let known: Vec<DVector<f64>> = accepted.iter().map(|accepted| accepted.regressor.clone()).collect();
+    let RegressionEstimate { p_value, .. } = GlsRegression::new(blocks, grid, &known).estimate(regressor)?;
+    Some(Accepted { candidate: Candidate::Regressor(*index), regressor: regressor.clone(), p_value })
 }
 
 /// Whether the block means of a regressor span at least one count. Within a count, they show how its values were rounded.

@@ -5,6 +5,7 @@ use crate::bounds::BoundedEstimate;
 use crate::fit::covariates::CovariateFit;
 use crate::fit::noise_terms::{filter_length_s, is_filter, is_line, is_white, line_frequency};
 use crate::fit::part_filter::PartFilter;
+use crate::fit::sample_coefficients::{CoefficientsFrom, SamplesOfCurve, by_samples};
 use crate::fit::traced_model::{Addition, PlannedTerm, Shapes, TracedModel, residual, within_measured};
 use crate::record::estimators::RecordEstimators;
 use crate::spectra::MarkovEstimate;
@@ -48,13 +49,29 @@ pub(crate) struct ChannelFit {
     recent: Option<Curve<OCTAVES>>,
     /// Lines of the spectrum with which the model fits the curve worse.
     refuted: Vec<NoiseTerm>,
+    /// What the coefficients of the model with added terms are fitted to.
+    pub coefficients_from: CoefficientsFrom,
+}
+
+/// The models of a channel with the coefficients by all samples, or what else they are from.
+pub(crate) struct ModelsBySamples {
+    before: Result<Model, CoefficientsFrom>,
+    after: Result<Model, CoefficientsFrom>,
 }
 
 impl ChannelFit {
     fn new(covariates: CovariateFit, trace: Trace) -> Self {
         let traced = TracedModel::new(&trace, &covariates.curve);
         let before = within_measured(&trace.before, &covariates.curve);
-        Self { covariates, before, traced, markov_by_spectrum: None, recent: None, refuted: Vec::new() }
+        Self {
+            covariates,
+            before,
+            traced,
+            markov_by_spectrum: None,
+            recent: None,
+            refuted: Vec::new(),
+            coefficients_from: CoefficientsFrom::Octaves,
+        }
     }
 
     /// The baseline model alone.
@@ -303,6 +320,27 @@ impl ChannelFit {
             (traced, with_lines) = without;
         }
         self.traced = with_lines;
+    }
+
+    /// Both models with the coefficients by the samples. A model of the latest stretch of the part has none.
+    pub(crate) fn by_samples(&self, samples: SamplesOfCurve) -> ModelsBySamples {
+        let of = |model: &Model| by_samples(&self.covariates.curve, model, samples);
+        let after = if self.recent.is_some() { Err(CoefficientsFrom::Octaves) } else { of(self.after()) };
+        ModelsBySamples { before: of(&self.before), after }
+    }
+
+    /// Takes these, where the samples have given them.
+    pub(crate) fn take(&mut self, models: ModelsBySamples) {
+        if let Ok(before) = models.before {
+            self.before = before;
+        }
+        match models.after {
+            Ok(after) => {
+                self.traced = self.traced.clone().with_coefficients(&self.covariates.curve, after);
+                self.coefficients_from = CoefficientsFrom::Samples;
+            }
+            Err(other) => self.coefficients_from = other,
+        }
     }
 
     /// Whether the curve contradicts a line of the spectrum.

@@ -198,6 +198,11 @@ impl TracedModel {
         Some(Self { goodness: goodness(curve, &model), model, additions, decimation: self.decimation })
     }
 
+    /// With the coefficients and the bounds of `model`, which has the same terms.
+    pub(crate) fn with_coefficients(self, curve: &Curve<OCTAVES>, model: Model) -> Self {
+        Self { goodness: goodness(curve, &model), model, ..self }
+    }
+
     /// Without the term at a position; the others are as they were, to be fitted [with lines](Self::with_lines).
     pub(crate) fn before_lines_without(&self, removed: usize) -> Self {
         let is_kept = |at: &usize| *at != removed;

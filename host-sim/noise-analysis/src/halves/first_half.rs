@@ -4,6 +4,7 @@ use crate::OCTAVES;
 use crate::fit::channel_fit::ChannelFit;
 use crate::fit::covariates::CovariateFit;
 use crate::fit::event_share::EventShare;
+use crate::fit::sample_coefficients::{SamplesOfCurve, by_samples};
 use crate::halves::traced_part::{BiasByBlocks, PartData, PartSamples, TracedPart};
 use crate::halves::traced_record::TracedRecord;
 use crate::nonstationarity::{self, ChannelEpochs, EpochCurves, Nonstationarity, TracedChannel};
@@ -16,6 +17,7 @@ use crate::report::{
 };
 use crate::samples::exclusion::Exclusion;
 use crate::samples::series::Series;
+use crate::samples::uniform_series::UniformSeries;
 use allan_core::{AllanPoint, Curve, Model};
 use measurement::{ChannelId, PerChannel, SensorProfile};
 
@@ -55,16 +57,6 @@ impl FirstHalf {
         let data = PartData { profile, curves: &estimators.ruled[0], samples: Some(samples) };
         // The filter of the whole record is the one that is reported.
         let mut part = TracedPart::fit(&data);
-        let has_rules = series.ids().any(|of| record.has_rules(of));
-        let raw = per_channel(series.ids(), |channel| {
-            if !has_rules {
-                return part.channels[channel].fit.before.clone();
-            }
-            let bias = &biases[channel];
-            let raw = &estimators.raw[0];
-            let covariates = CovariateFit::estimate(raw, channel, bias.has_ramp, |to| bias.sensitivity(to));
-            ChannelFit::fit_baseline(covariates).before
-        });
         let events = per_channel(series.ids(), |channel| {
             if !record.has_rules(channel) {
                 return EventShare::default();
@@ -92,6 +84,23 @@ impl FirstHalf {
                 trace.fit.fit_to(&recent);
             }
         }
+        part.take_coefficients_of_samples();
+        let has_rules = series.ids().any(|of| record.has_rules(of));
+        let raw = per_channel(series.ids(), |channel| {
+            if !has_rules {
+                return part.channels[channel].fit.before.clone();
+            }
+            let bias = &biases[channel];
+            let curves = &estimators.raw[0];
+            let covariates = CovariateFit::estimate(curves, channel, bias.has_ramp, |to| bias.sensitivity(to));
+            let own = preprocessing.series(record.measurement(), channel, Exclusion::None).before(middle);
+            let rest = covariates.compensated_series(&own, &halves).unwrap_or(own);
+            let ChannelFit { covariates, before, .. } = ChannelFit::fit_baseline(covariates);
+            let is_screened = record.record.channels[channel].samples.is_screened;
+            let spectrum = record.record.spectrum_within(channel, 0..middle).filter(|_| !is_screened);
+            let samples = SamplesOfCurve { rest: &UniformSeries::from_series(&rest), spectrum: spectrum.as_ref() };
+            by_samples(&covariates.curve, &before, samples).unwrap_or(before)
+        });
         (Self { part, raw, events }, Epochs { series, channels })
     }
 

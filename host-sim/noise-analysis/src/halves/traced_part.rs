@@ -8,6 +8,7 @@ use crate::fit::channel_fit::{ChannelFit, DITHERED_OCTAVES};
 use crate::fit::contradiction::Contradiction;
 use crate::fit::covariates::CovariateFit;
 use crate::fit::part_filter::{self, FilteredChannel, PartFilter, Unidentified};
+use crate::fit::sample_coefficients::SamplesOfCurve;
 use crate::parallel::per_channel;
 use crate::record::condensed_record::CondensedRecord;
 use crate::record::estimators::RecordPart;
@@ -20,6 +21,7 @@ use crate::rivals::table::standing_in_spectrum;
 use crate::rivals::unexplained;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
+use crate::spectra::Welch;
 use crate::spectra::cosine_spectrum::CosineSpectrum;
 use crate::spectra::spectral_lines::MergedLine;
 use allan_core::model::FittedTerm;
@@ -71,6 +73,8 @@ pub(crate) struct ChannelTrace {
     /// Signals that no term of the model has.
     pub signals: Vec<Signal>,
     slowest: Option<CosineSpectrum>,
+    /// The spectrum of the samples where their means alone are kept.
+    spectrum: Option<Welch>,
 }
 
 impl BiasByBlocks {
@@ -111,6 +115,19 @@ impl TracedPart {
         for trace in &mut self.channels {
             let lines: Vec<FittedTerm> = trace.lines.iter().map(MergedLine::fitted_term).collect();
             trace.fit.add_lines_of_spectrum(&lines);
+        }
+    }
+
+    /// Gives the models the coefficients by all samples.
+    pub(crate) fn take_coefficients_of_samples(&mut self) {
+        let of = |channel: ChannelId| {
+            let trace = &self.channels[channel];
+            let samples = |rest| SamplesOfCurve { rest, spectrum: trace.spectrum.as_ref() };
+            trace.rest.as_ref().map(|rest| trace.fit.by_samples(samples(rest)))
+        };
+        let models = per_channel(self.channels.ids(), of);
+        for (trace, models) in self.channels.iter_mut().zip(models) {
+            models.into_iter().for_each(|models| trace.fit.take(models));
         }
     }
 
@@ -158,7 +175,7 @@ impl ChannelTrace {
     }
 
     fn without_samples(fit: ChannelFit) -> Self {
-        Self { fit, lines: Vec::new(), rest: None, telegraph: None, signals: Vec::new(), slowest: None }
+        Self { fit, lines: Vec::new(), rest: None, telegraph: None, signals: Vec::new(), slowest: None, spectrum: None }
     }
 
     fn fit_with_samples(
@@ -181,7 +198,8 @@ impl ChannelTrace {
             let found = standing_in_spectrum(SpectrumProposals::find(&rest, lines, fit.bands()));
             (lines, signals) = found.into_lines_and_signals();
         }
-        Self { fit, lines, telegraph, slowest: CosineSpectrum::new(&rest), rest: Some(rest), signals }
+        let spectrum = samples.record.spectrum_within(channel, own.span.clone());
+        Self { fit, lines, telegraph, slowest: CosineSpectrum::new(&rest), rest: Some(rest), signals, spectrum }
     }
 }
 

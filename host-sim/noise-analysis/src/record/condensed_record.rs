@@ -6,10 +6,12 @@ use crate::effects::Effect;
 use crate::parallel::per_channel;
 use crate::record::sample_curves::SampleCurves;
 use crate::record::sample_effects::SampleEffects;
+use crate::spectra::Welch;
 use crate::spectra::spectral_lines::MergedLine;
 use measurement::{ChannelId, Measurement, PerChannel, RecordingDescription};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// A recording, condensed.
 pub struct CondensedRecord<'a> {
@@ -102,6 +104,12 @@ impl<'a> CondensedRecord<'a> {
     /// The first samples, or all of them.
     pub(crate) fn first_samples(&self) -> &Measurement {
         self.first.as_ref().unwrap_or(&self.means)
+    }
+
+    /// The spectrum of the samples of a channel in some means; `None` where all samples are kept, or have none.
+    pub(crate) fn spectrum_within(&self, channel: ChannelId, means: Range<u64>) -> Option<Welch> {
+        let samples = &self.channels[channel].samples;
+        (self.samples_per_mean > 1).then(|| samples.spectrum_within(samples.slots_of(means))).flatten()
     }
 
     /// Whether effects are traced in a channel: in the inertial ones.

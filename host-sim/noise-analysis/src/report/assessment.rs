@@ -11,6 +11,7 @@ pub use innovations::Innovations;
 
 use crate::bounds::{BoundedEstimate, Parameter};
 use crate::fit::noise_terms::is_white;
+pub use crate::fit::sample_coefficients::CoefficientsFrom;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::{Welch, correlation_time};
@@ -35,6 +36,8 @@ pub struct Assessment {
     /// Why there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coefficients_note: Option<String>,
+    /// What that model was fitted to.
+    pub coefficients_from: CoefficientsFrom,
     /// Error of the integrated channel without aiding.
     pub drift: Vec<NavigationDrift>,
     /// Of a Kalman filter built from the model, on the second half of the record.
@@ -96,6 +99,8 @@ pub struct RecordLength {
 pub struct AssessedModels<'a> {
     /// Fitted to the whole record: the model that people use.
     pub refitted: &'a Model,
+    /// What its coefficients are from.
+    pub coefficients_from: CoefficientsFrom,
     /// As `refitted`, with the share of the covariates, which the samples still have.
     pub uncompensated: &'a Model,
     /// Fitted to the first half alone, with the share of the covariates: the second half is a test of it.
@@ -107,7 +112,7 @@ impl Assessment {
     /// the samples and the smallest distance of two of them.
     #[must_use]
     pub fn new(series: &Series, samples: Option<(&Welch, f64)>, models: AssessedModels) -> Self {
-        let AssessedModels { refitted, uncompensated, of_first_half } = models;
+        let AssessedModels { refitted, coefficients_from, uncompensated, of_first_half } = models;
         let whole = UniformSeries::from_series(series);
         let halfway = whole.values().len() / 2;
         let unseen = UniformSeries::new(whole.sample_period(), whole.values()[halfway..].to_vec());
@@ -127,6 +132,7 @@ impl Assessment {
         Self {
             coefficients: coefficients(refitted, series.unit),
             coefficients_note: None,
+            coefficients_from,
             drift: drift(&of_series(uncompensated), series.unit, &unseen),
             innovations: filter_innovations(&of_series(of_first_half), &unseen),
             angle_random_walk_by_spectrum: by_spectrum.angle_random_walk,

@@ -5,7 +5,9 @@ use allan_core::model::FittedTerm;
 use allan_core::term::Sinusoid;
 use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::effects::{CurveEvidence, LineEvidence, LineSource, SinusoidalLine};
-use noise_analysis::report::assessment::{Assessment, Coefficient, Innovations, NavigationDrift, RecordLength};
+use noise_analysis::report::assessment::{
+    Assessment, Coefficient, CoefficientsFrom, Innovations, NavigationDrift, RecordLength,
+};
 use noise_analysis::report::*;
 use std::collections::BTreeMap;
 use std::f64::consts::{LN_2, PI};
@@ -160,6 +162,7 @@ fn assessment(scale: f64) -> Assessment {
             whiteness_p: 0.4321,
         }),
         angle_random_walk_by_spectrum: Some(parameter(0.036_77, "deg/sqrt(s)")),
+        coefficients_from: CoefficientsFrom::OctavesAgainstSamples,
         angle_random_walk_by_spectrum_note: Some("+1.9 % from the fit".to_owned()),
         markov_time_by_autocorrelation: Some(parameter(2.1, "s")),
         record: [("bias_instability", Some(7.5)), ("rate_random_walk", None)]
