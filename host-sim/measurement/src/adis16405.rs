@@ -212,6 +212,7 @@ mod tests {
         let slow: Vec<(u16, f64)> =
             profile.filters_read_at(100.0)[6..].iter().map(|of| (of.taps, of.decimation)).collect();
         assert_eq!(slow, [(8, 8.192), (16, 8.192), (32, 8.192), (64, 8.192)]);
+        assert_eq!([819.2, 816.4, 409.6, 204.0, 91.02, 100.0].map(|rate| profile.read_every(rate)), [1, 1, 2, 4, 9, 1]);
     }
 
     #[test]

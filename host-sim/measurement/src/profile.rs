@@ -17,6 +17,8 @@ pub(crate) const DITHERED_AVAR_COUNTS2: f64 = 0.3;
 /// Ratio of the sensor's nominal clock to a sample rate up to which both may be the same clock: a crystal-less oscillator is
 /// off by some percent.
 const SAME_CLOCK: f64 = 1.1;
+/// Relative distance from a whole number up to which the clocks of sensor and reader may differ.
+const WHOLE: f64 = 0.01;
 
 /// Physical quantity that a channel measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -257,6 +259,15 @@ impl SensorProfile {
         let slow = self.filters.iter().filter(is_correlated);
         let slow = slow.map(|filter| MovingAverageFilter { decimation, ..*filter });
         self.filters.iter().copied().chain(slow).collect()
+    }
+
+    /// Values of the sensor's clock from one sample to the next where a reader at `rate_hz` takes each so many-th; 1 where that is no
+    /// whole number to [`WHOLE`].
+    #[must_use]
+    pub fn read_every(&self, rate_hz: f64) -> u32 {
+        let decimation = self.internal_rate_hz / rate_hz;
+        let is_whole = (decimation - decimation.round()).abs() <= WHOLE * decimation;
+        if is_whole { (decimation.round() as u32).max(1) } else { 1 }
     }
 
     /// The native rate that is nearest to `rate_hz`, Hz; `None` where the profile names none.

@@ -74,6 +74,18 @@ fn all_channels_have_the_filter_and_the_clock_of_the_part() {
     }
 }
 
+/// The spectrum behind a filter of which each so many-th value is read is folded at half the sample rate, where it has a null.
+#[test]
+fn a_folded_spectrum_has_no_lines() {
+    for (taps, rate_hz, seed) in [(4, CLOCK_HZ / 2.0, 5), (8, CLOCK_HZ / 4.0, 6)] {
+        let report = analyze(&recorded(taps, rate_hz, false, seed));
+        for channel in noisy(&report) {
+            let kinds: Vec<&str> = channel.effects.iter().map(|shown| shown.effect.name()).collect();
+            assert_eq!(kinds, ["filter_bandwidth"], "{taps} taps at {rate_hz} Hz: {}", channel.name);
+        }
+    }
+}
+
 /// N of the samples is the deviation times the root of the sample period: the filter passes low frequencies unchanged.
 #[test]
 fn one_channel_has_one_n() {

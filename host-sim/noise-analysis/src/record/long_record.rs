@@ -184,8 +184,9 @@ impl LongRecordReader {
         });
         let screen = SampleScreen::new(&description.channels, rules, !repeated.is_empty());
         let period_s = description.period_s();
+        let read_every = description.profile.read_every(1.0 / period_s);
         let spectra = |fast: &FastFindings| SampleSpectra {
-            stacked: StackedSpectrum::new(period_s, STRETCH_PERIODS as usize, fast.resolution),
+            stacked: StackedSpectrum::new(period_s, STRETCH_PERIODS as usize, fast.resolution, read_every),
             epochs: EpochSpectra::new(period_s, &epochs),
         };
         let channel = |((profile, fast), of_first): ((&ChannelProfile, &FastFindings), &Option<ChannelId>)| {

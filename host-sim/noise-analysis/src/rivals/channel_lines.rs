@@ -4,7 +4,7 @@ use crate::fit::channel_fit::ChannelFit;
 use crate::fit::covariates::CovariateFit;
 use crate::rivals::table::{LineClaim, stands_as_line};
 use crate::samples::series::Series;
-use crate::spectra::spectral_lines::{self, MergedLine, before_averaging};
+use crate::spectra::spectral_lines::{self, MergedLine, before_averaging, is_read_slowly};
 use allan_core::Model;
 use allan_core::term::NoiseTerm;
 use measurement::SensorProfile;
@@ -22,8 +22,9 @@ pub(crate) fn fit_with_lines(
     (samples_per_mean, faster): (u64, &[MergedLine]),
 ) -> (ChannelFit, Vec<MergedLine>) {
     let rate_error = profile.sample_rate_error;
+    let read_every = if samples_per_mean > 1 { 1 } else { profile.read_every(1.0 / series.period_s) };
     let find = |series: &Series, known: Option<&Model>| {
-        let mut lines = spectral_lines::find(series, known, rate_error);
+        let mut lines = spectral_lines::find(series, known, rate_error, read_every);
         lines.retain(|line| stands_as_line(&LineClaim { faster, ..LineClaim::new(line, series.period_s) }));
         lines.iter_mut().for_each(|line| line.deviation = before_averaging(line, series.period_s, samples_per_mean));
         lines
@@ -37,8 +38,11 @@ pub(crate) fn fit_with_lines(
     let kinds = |lines: &[MergedLine]| lines.iter().map(MergedLine::kind).collect::<Vec<NoiseTerm>>();
     let filters = profile.filters_read_at(1.0 / covariates.curve.sample_period());
     let mut fit = ChannelFit::fit_traced(covariates, &kinds(&lines), &filters);
-    if fit.correlation_times().next().is_some() && lines.iter().any(MergedLine::is_broad) {
-        // A broad line may be a part of a Markov process, which the background of the first search has no form for.
+    let is_shaped =
+        fit.correlation_times().next().is_some() || fit.after().terms().iter().any(|of| is_read_slowly(&of.kind));
+    if is_shaped && lines.iter().any(MergedLine::is_broad) {
+        // A broad line may be a part of a Markov process or the edge of a null of a filter that is read slowly, which the background of
+        // the first search has no form for.
         lines.retain(|line| !line.is_broad());
         lines.extend(find(series, Some(fit.after())).into_iter().filter(MergedLine::is_broad));
         lines.extend(faster.iter().filter(|line| line.is_broad()));

@@ -14,6 +14,8 @@ pub struct UniformSeries {
     values: Vec<f64>,
     /// One-sided density of the error of rounding the samples that the values are made of, unit²/Hz.
     rounding_density: f64,
+    /// Values of the sensor for each of these.
+    read_every: u32,
 }
 
 /// Gaps of up to so many samples never split a series.
@@ -26,7 +28,7 @@ impl UniformSeries {
     /// `values` taken every `sample_period` seconds; a value that is not finite counts as missing.
     #[must_use]
     pub fn new(sample_period: f64, values: Vec<f64>) -> Self {
-        Self { sample_period, values, rounding_density: 0.0 }
+        Self { sample_period, values, rounding_density: 0.0, read_every: 1 }
     }
 
     /// The samples of a channel over the whole span of its record, with a `NaN` for each missing one.
@@ -65,6 +67,16 @@ impl UniformSeries {
     /// values are not known to be rounded.
     pub(crate) fn rounding_density(&self) -> f64 {
         self.rounding_density
+    }
+
+    /// The same values, each of them one of so many of the sensor.
+    pub(crate) fn with_one_of(self, read_every: u32) -> Self {
+        Self { read_every, ..self }
+    }
+
+    /// Of how many values of the sensor each sample is one; 1 where they are means, or where that is not known.
+    pub(crate) fn read_every(&self) -> u32 {
+        self.read_every
     }
 
     /// The series with other values at the same times.
@@ -209,6 +221,7 @@ impl UniformSeries {
             values: self.values.chunks_exact(size).map(average).collect(),
             // An average has less of the error, at a lower rate.
             rounding_density: self.rounding_density,
+            read_every: if size > 1 { 1 } else { self.read_every },
         }
     }
 }

@@ -20,23 +20,31 @@ pub struct SpectralShape {
     sample_period: f64,
     /// Taps of each of the filter's two cascaded averages; 1 for no filter.
     pub taps: u32,
+    /// Autocorrelation behind the filter where not every value of it is read.
+    read_slowly: Option<Vec<f64>>,
     /// Densities at 1 Hz of the filtered white, 1/f and 1/f² noise, and of the floor, unit²/Hz.
     pub densities: [f64; TERMS],
 }
 
 impl SpectralShape {
-    /// The likeliest shape over all lengths of the filter, without a filter if `bands` is empty.
+    /// The likeliest shape over all lengths of the filter, without a filter if `bands` is empty. Where each sample is one of `read_every`
+    /// values, a filter of which only these are read is a candidate: it resembles one that is as long in samples and of which every value
+    /// is read, but in its nulls.
     #[must_use]
-    pub fn fit(bands: &[SpectralBand], sample_period: f64) -> Self {
-        let candidates = (0..=LARGEST_TAPS_LOG2).map(|log2| Self::fit_with_taps(bands, sample_period, 1 << log2));
-        let likeliest = candidates.min_by(|(_, a), (_, b)| a.total_cmp(b));
-        likeliest.map_or(Self { sample_period, taps: 1, densities: [0.0; TERMS] }, |(shape, _)| shape)
+    pub fn fit(bands: &[SpectralBand], sample_period: f64, read_every: u32) -> Self {
+        let fit = |taps: u32, decimation: u32| Self::fit_with_filter(bands, sample_period, (taps, decimation));
+        let own_rate = (0..=LARGEST_TAPS_LOG2).map(|log2| fit(1 << log2, 1));
+        let Some((shape, objective)) = own_rate.min_by(|(_, a), (_, b)| a.total_cmp(b)) else {
+            return Self { sample_period, taps: 1, read_slowly: None, densities: [0.0; TERMS] };
+        };
+        let slow = (read_every > 1).then(|| fit(shape.taps * read_every, read_every));
+        slow.filter(|slow| slow.1 < objective).map_or(shape, |(shape, _)| shape)
     }
 
     /// Density at `frequency` in Hz, unit²/Hz.
     #[must_use]
     pub fn density(&self, frequency: f64) -> f64 {
-        mixture_density(&shape_basis(frequency, self.sample_period, self.taps), &self.densities)
+        mixture_density(&self.basis(frequency), &self.densities)
     }
 
     /// N in unit·√s: the root of half the density of the white noise before the filter. Only of a spectrum that is known to
@@ -56,8 +64,7 @@ impl SpectralShape {
         if present.first() != Some(&0) {
             return None;
         }
-        let basis = |band: &SpectralBand| shape_basis(band.frequency, self.sample_period, self.taps);
-        let bases: Vec<[f64; TERMS]> = bands.iter().map(basis).collect();
+        let bases: Vec<[f64; TERMS]> = bands.iter().map(|band| self.basis(band.frequency)).collect();
         let of_densities = information(bands, &bases, &self.densities);
         let entry = |row: usize, column: usize| {
             let (row, column) = (present[row], present[column]);
@@ -68,22 +75,45 @@ impl SpectralShape {
         Some(variance.sqrt() / 2.0)
     }
 
-    /// The likeliest shape with a filter of this length, and its objective.
-    fn fit_with_taps(bands: &[SpectralBand], sample_period: f64, taps: u32) -> (Self, f64) {
-        let basis = |band: &SpectralBand| shape_basis(band.frequency, sample_period, taps);
-        let bases: Vec<[f64; TERMS]> = bands.iter().map(basis).collect();
-        let mut shape = Self { sample_period, taps, densities: [0.0; TERMS] };
+    /// The likeliest shape with a filter of these taps and decimation, and its objective.
+    fn fit_with_filter(bands: &[SpectralBand], sample_period: f64, (taps, decimation): (u32, u32)) -> (Self, f64) {
+        let read_slowly = (decimation > 1).then(|| autocorrelation_read_slowly(taps, decimation));
+        let mut shape = Self { sample_period, taps, read_slowly, densities: [0.0; TERMS] };
+        let bases: Vec<[f64; TERMS]> = bands.iter().map(|band| shape.basis(band.frequency)).collect();
         let objective = fit_mixture(bands, &bases, Sign::NonNegative, &mut shape.densities);
         (shape, objective)
     }
+
+    /// Values of the terms for a density of 1 at 1 Hz. Without a filter the floor is the same as the white noise, and left out.
+    fn basis(&self, frequency: f64) -> [f64; TERMS] {
+        let gain = self.gain(frequency);
+        let walk = walk_amplitude(frequency, self.sample_period);
+        [gain, gain / frequency, gain * walk * walk, if self.taps > 1 { 1.0 } else { 0.0 }]
+    }
+
+    /// Power gain of the filter. Of one that is read slowly it has what of white noise is folded down: the transform of the
+    /// autocorrelation, of which few lags are left.
+    fn gain(&self, frequency: f64) -> f64 {
+        let Some(autocorrelation) = &self.read_slowly else {
+            let sine = (PI * frequency * self.sample_period).sin();
+            return filter_gain(frequency, self.sample_period, self.taps, sine);
+        };
+        // Clenshaw's sum of cosines.
+        let twice = 2.0 * (2.0 * PI * frequency * self.sample_period).cos();
+        let (zero, lags) = autocorrelation.split_first().unwrap_or((&0.0, &[]));
+        let step = |(next, after): (f64, f64), lag: &f64| (2.0 * lag + twice * next - after, next);
+        let (next, after) = lags.iter().rev().fold((0.0, 0.0), step);
+        zero + 0.5 * twice * next - after
+    }
 }
 
-/// Values of the terms for a density of 1 at 1 Hz. Without a filter the floor is the same as the white noise, and left out.
-fn shape_basis(frequency: f64, sample_period: f64, taps: u32) -> [f64; TERMS] {
-    let sine = (PI * frequency * sample_period).sin();
-    let gain = filter_gain(frequency, sample_period, taps, sine);
-    let walk = PI * sample_period / sine;
-    [gain, gain / frequency, gain * walk * walk, if taps > 1 { 1.0 } else { 0.0 }]
+/// Autocorrelation at lags of whole samples of white noise behind two averages over `taps` values, of which each of `decimation` is read.
+/// It sums to 1 over all lags where the taps are a multiple of the decimation.
+fn autocorrelation_read_slowly(taps: u32, decimation: u32) -> Vec<f64> {
+    let (taps, decimation) = (taps as usize, decimation as usize);
+    let weights: Vec<f64> = (1..2 * taps).map(|at| at.min(2 * taps - at) as f64 / (taps * taps) as f64).collect();
+    let at = |lag: usize| weights.iter().zip(&weights[lag..]).map(|(one, other)| one * other).sum::<f64>();
+    (0..weights.len()).step_by(decimation).map(|lag| decimation as f64 * at(lag)).collect()
 }
 
 /// Square root of the density of a sampled random walk: 1/f² with its aliases, `(π·dt/sin(πf·dt))²`.
@@ -140,7 +170,7 @@ impl<'a> Background<'a> {
         looks: f64,
         known: &'a dyn Fn(f64) -> f64,
         resolution: f64,
-        sample_period: f64,
+        (sample_period, read_every): (f64, u32),
     ) -> Option<Self> {
         let bands: Vec<SpectralBand> = background_bands(density.len())
             .map(|range| {
@@ -156,7 +186,7 @@ impl<'a> Background<'a> {
         let enough = bands.len() >= 8 && bands.iter().all(|band| band.density > 0.0);
         enough.then(|| Self {
             known,
-            shape: SpectralShape::fit(&bands, sample_period),
+            shape: SpectralShape::fit(&bands, sample_period, read_every),
             floor: FLOOR * median(&mut bands.iter().map(|band| band.density).collect::<Vec<f64>>()),
             resolution,
             ordinates: density.len(),

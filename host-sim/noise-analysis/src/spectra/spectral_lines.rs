@@ -87,12 +87,14 @@ pub(crate) fn is_alias(line: &MergedLine, of: &MergedLine, period_s: f64) -> boo
 }
 
 /// The lines of a series, the strongest first, over the background of the model `known`, or without a model over any sum
-/// of white, flicker and random-walk noise.
-pub(crate) fn find(series: &Series, known: Option<&Model>, rate_error: f64) -> Vec<MergedLine> {
+/// of white, flicker and random-walk noise. Each sample is one of `read_every` values of the sensor.
+pub(crate) fn find(series: &Series, known: Option<&Model>, rate_error: f64, read_every: u32) -> Vec<MergedLine> {
     let duration_s = series.duration_s();
-    let grid = UniformSeries::from_series(series);
+    let grid = UniformSeries::from_series(series).with_one_of(read_every);
     let peaks = match known {
-        Some(model) => spectra::find_lines_over(&grid, |frequency| markov_background(model, frequency)),
+        Some(model) => {
+            spectra::find_lines_over(&grid, |frequency| background(model, frequency, grid.rounding_density()))
+        }
         None => spectra::find_lines(&grid),
     };
     merged(peaks, duration_s, duration_s, rate_error)
@@ -131,16 +133,27 @@ fn width(peak: &spectra::SpectralLine) -> f64 {
     peak.width.map_or(0.0, |width| width.value)
 }
 
-/// Density of a model's noise without its lines, over that without its Markov processes either.
-fn markov_background(model: &Model, frequency: f64) -> f64 {
-    let density_of = |is_included: &dyn Fn(&NoiseTerm) -> bool| {
-        let terms = model.terms().iter().copied().filter(|term| is_included(&term.kind));
-        Model::new(model.sample_period(), terms).density(frequency)
-    };
-    let markov = density_of(&|kind| matches!(kind, NoiseTerm::Markov(_)));
-    let noise =
-        density_of(&|kind| !matches!(kind, NoiseTerm::Markov(_) | NoiseTerm::Resonance(_) | NoiseTerm::Sinusoid(_)));
-    1.0 + markov / noise.max(MIN_NOISE * markov)
+/// Density of a model's noise without its lines over what of it is white, flicker and random-walk noise: Markov processes are not, and
+/// white noise behind a filter that is read slowly is not folded as that at the samples' own rate. What remains in its nulls is the
+/// rounding to counts, of this one-sided density.
+fn background(model: &Model, frequency: f64, rounding: f64) -> f64 {
+    let (mut all, mut power_laws) = (0.0, 0.0);
+    for FittedTerm { kind, value, .. } in model.terms() {
+        let density = value * value * kind.process().density(frequency, model.sample_period());
+        let (own, of_power_laws) = match kind {
+            NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_) => (0.0, 0.0),
+            NoiseTerm::Markov(_) => (density, 0.0),
+            kind if is_read_slowly(kind) => (density + 0.5 * rounding, value * value + 0.5 * rounding),
+            _ => (density, density),
+        };
+        (all, power_laws) = (all + own, power_laws + of_power_laws);
+    }
+    all / power_laws.max(MIN_NOISE * all)
+}
+
+/// Whether a term is noise behind a filter of which not every value is read.
+pub(crate) fn is_read_slowly(kind: &NoiseTerm) -> bool {
+    matches!(kind, NoiseTerm::Filtered(filter) if filter.decimation > 1.0)
 }
 
 /// The change of the amplitude of the strongest of `peaks`, if the first two sinusoids beside it are at equal distances on either
@@ -288,7 +301,7 @@ mod tests {
     #[test]
     fn a_line_that_swells_and_fades_has_sidebands() {
         let of =
-            |depth: f64| find(&series(depth), None, 0.0).first().map(|line| (line.frequency.value, line.modulation));
+            |depth: f64| find(&series(depth), None, 0.0, 1).first().map(|line| (line.frequency.value, line.modulation));
         let (frequency, modulation) = of(0.5).expect("100 times the noise at its frequency");
         // Frequencies are known to a fraction of the resolution of 0.0025 Hz.
         assert!((frequency - 7.3).abs() < 0.0025, "{frequency}");

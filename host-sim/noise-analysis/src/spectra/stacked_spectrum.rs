@@ -15,6 +15,8 @@ pub(crate) struct StackedSpectrum {
     sample_period: f64,
     /// Smallest distance of two values, in the channel's unit.
     resolution: f64,
+    /// Values of the sensor for each sample.
+    read_every: u32,
     /// The samples of the stretch of this number that were taken, `NaN` where one is missing.
     stretch: Vec<f64>,
     number: u64,
@@ -25,10 +27,11 @@ pub(crate) struct StackedSpectrum {
 }
 
 impl StackedSpectrum {
-    /// For stretches of `length` samples that are `sample_period` s apart; two values of the channel differ by `resolution` or more.
-    pub(crate) fn new(sample_period: f64, length: usize, resolution: f64) -> Self {
+    /// For stretches of `length` samples that are `sample_period` s apart; two values of the channel differ by `resolution` or more,
+    /// and each sample is one of `read_every` values of the sensor.
+    pub(crate) fn new(sample_period: f64, length: usize, resolution: f64, read_every: u32) -> Self {
         let stretch = vec![f64::NAN; length];
-        Self { sample_period, resolution, stretch, number: 0, mean: None, levels: [0.0; 2] }
+        Self { sample_period, resolution, read_every, stretch, number: 0, mean: None, levels: [0.0; 2] }
     }
 
     /// Takes the next sample, which was taken in the sample period `slot`. What is left over at the end is in no stretch.
@@ -49,7 +52,8 @@ impl StackedSpectrum {
     fn end_stretch(&mut self) {
         let missing = vec![f64::NAN; self.stretch.len()];
         let values = std::mem::replace(&mut self.stretch, missing);
-        let stretch = UniformSeries::new(self.sample_period, values).rounded_to(self.resolution);
+        let stretch =
+            UniformSeries::new(self.sample_period, values).rounded_to(self.resolution).with_one_of(self.read_every);
         if 2 * stretch.present() <= stretch.values().len() {
             return;
         }
@@ -114,7 +118,7 @@ mod tests {
     /// Lines in 64 stretches of white noise of deviation 1 at 100 Hz with what `signal` adds.
     fn lines(seed: u64, mut signal: impl FnMut(f64) -> f64) -> Vec<SpectralLine> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mut stacked = StackedSpectrum::new(0.01, STRETCH, 0.0);
+        let mut stacked = StackedSpectrum::new(0.01, STRETCH, 0.0, 1);
         for slot in 0..64 * STRETCH as u64 {
             // One sample in a hundred is missing, and half of the stretch before the last.
             let is_missing = slot % 100 == 7 || slot * 2 / STRETCH as u64 == 124;

@@ -190,6 +190,6 @@ impl Welch {
     #[must_use]
     pub fn shape(&self, is_line: impl Fn(f64) -> bool) -> (SpectralShape, Vec<SpectralBand>) {
         let bands = self.bands(is_line);
-        (SpectralShape::fit(&bands, self.sample_period), bands)
+        (SpectralShape::fit(&bands, self.sample_period, 1), bands)
     }
 }

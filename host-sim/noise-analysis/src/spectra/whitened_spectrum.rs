@@ -46,6 +46,8 @@ pub(super) struct Spectrum {
     pub periodogram: Periodogram,
     /// Of the samples, s.
     pub sample_period: f64,
+    /// Values of the sensor for each sample.
+    read_every: u32,
     /// Independent exponential variables of mean 1 whose mean varies as an ordinate over its density does.
     pub independent: f64,
     /// Least density of the background: that of the rounding to counts, below which a spectrum shows the rounding itself.
@@ -58,6 +60,7 @@ impl Spectrum {
         Some(Self {
             periodogram: Periodogram::new(series)?,
             sample_period: series.sample_period(),
+            read_every: series.read_every(),
             independent: independent_part(series),
             floor: series.rounding_density(),
         })
@@ -134,7 +137,7 @@ impl<'a> WhitenedSpectrum<'a> {
         resonances: &[Resonance],
         kept: Option<usize>,
     ) -> Option<Self> {
-        let &Spectrum { ref periodogram, sample_period, independent, floor } = spectrum;
+        let &Spectrum { ref periodogram, sample_period, read_every, independent, floor } = spectrum;
         let looks = periodogram.looks();
         let bin = |at: usize| at as f64 / PADDING as f64;
         let others = resonances.iter().enumerate().filter(|(index, _)| Some(*index) != kept);
@@ -147,7 +150,8 @@ impl<'a> WhitenedSpectrum<'a> {
         if let Some(kept) = kept.and_then(|kept| resonances.get(kept)) {
             density.iter_mut().enumerate().for_each(|(bin, ordinate)| *ordinate *= kept.lorentz.deflation(bin as f64));
         }
-        let background = Background::fit(&density, looks, known, periodogram.resolution(), sample_period)?;
+        let background =
+            Background::fit(&density, looks, known, periodogram.resolution(), (sample_period, read_every))?;
         let over_shape = |(at, (ordinate, deflation)): (usize, (&f64, &f64))| match at {
             0 => 0.0,
             at => ordinate * deflation / background.shape_at(bin(at)),
