@@ -1,6 +1,6 @@
 //! Recordings whose time stamps, gaps, formats or names mislead: the report says so, or one line refuses them.
 
-use crate::program::{gzip, host_sim, json_of, write};
+use crate::program::{gzip, host_sim, json_of, with_default_signals, write};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use recordings::frame_log::FrameLogReader;
@@ -192,16 +192,8 @@ fn an_interrupted_simulation_leaves_a_log_that_can_be_read() {
     let dir = tempdir().expect("a folder");
     for (signal, file) in [("INT", "a.csv.gz"), ("HUP", "b.csv.gz"), ("KILL", "c.csv")] {
         let log = dir.path().join(file);
-        // A shell in the background lets its children ignore interrupts, and nohup hang-ups.
-        let mut record = Command::new("env")
-            .args([
-                "--default-signal=INT,HUP",
-                env!("CARGO_BIN_EXE_host-sim"),
-                "record",
-                name(&log),
-                "--seconds",
-                "50000",
-            ])
+        let mut record = with_default_signals()
+            .args(["record", name(&log), "--seconds", "50000"])
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()

@@ -1,6 +1,6 @@
 //! Files that the program writes: none is a file that it reads, under whatever name, and each is complete or as it was.
 
-use crate::program::{host_sim, write};
+use crate::program::{host_sim, with_default_signals, write};
 use std::fs::{self, File};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -115,7 +115,7 @@ fn a_signal_leaves_the_old_file_and_nothing_beside_it() {
     for signal in ["-TERM", "-HUP", "-INT"] {
         let dir = tempdir().expect("a folder");
         let log = write(&dir, "log.csv", b"an old log\n");
-        let mut program = Command::new(PROGRAM)
+        let mut program = with_default_signals()
             .args(["simulate", name(&log), "--format", "frames", "--seconds", "80000"])
             .stdout(Stdio::null())
             .stderr(Stdio::null())

@@ -12,6 +12,13 @@ pub(crate) fn host_sim(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_host-sim")).args(arguments).output().expect("the program starts")
 }
 
+/// The program as a terminal starts it: a shell in the background lets what it starts ignore interrupts, and `nohup` hang-ups.
+pub(crate) fn with_default_signals() -> Command {
+    let mut command = Command::new("env");
+    command.args(["--default-signal=INT,HUP,TERM", env!("CARGO_BIN_EXE_host-sim")]);
+    command
+}
+
 /// Runs the program with `--json` and returns the bytes of the report.
 pub(crate) fn json_of(dir: &TempDir, arguments: &[&str]) -> Vec<u8> {
     let out = dir.path().join("report.json");

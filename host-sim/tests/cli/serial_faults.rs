@@ -1,6 +1,6 @@
 //! Recordings over a serial port that end early, and a device that is silent.
 
-use crate::program::host_sim;
+use crate::program::{host_sim, with_default_signals};
 use serialport::{SerialPort, TTYPort};
 use simulation::Device;
 use std::io::{Read, Write};
@@ -26,7 +26,7 @@ fn record(log: &Path, fault: Fault) -> (Output, String) {
     let (mut near, far) = TTYPort::pair().expect("a pseudo-terminal");
     let port = far.name().expect("a name");
     near.set_timeout(Duration::from_millis(1)).expect("a timeout");
-    let mut program = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+    let mut program = with_default_signals()
         .args(["record", log.to_str().expect("UTF-8"), "--port", &port, "--seconds", "20"])
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
