@@ -101,7 +101,7 @@ fn curves_and_baseline_models_without_time_stamps_are_those_of_the_whole_analysi
         let (by_samples, by_octaves) = (white(whole), white(quick));
         let number = |of: &Value, name: &str| of[name].as_f64().expect("a number");
         for (one, other) in [(&by_samples, &by_octaves), (&by_octaves, &by_samples)] {
-            let interval = number(one, "low")..number(one, "high");
+            let interval = number(one, "low")..=number(one, "high");
             assert!(interval.contains(&number(other, "value")), "{}: {one} {other}", whole["name"]);
         }
         assert_eq!(whole["read_off"], quick["read_off"], "{}", whole["name"]);
