@@ -4,7 +4,6 @@
 //! the data. In white noise that is their mean; in filtered noise, on a sinusoid or in drift it is far more precise. The
 //! interpolation error is normal, so the threshold for N samples comes from N times the normal tail.
 
-use super::noise_levels::median;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, density, poisson_bounds, poisson_tail, quantile, upper_tail};
 use crate::effects::Spikes;
@@ -43,7 +42,7 @@ const LEAST_DETECTED: f64 = 0.05;
 pub(crate) struct SpikeRule {
     interpolation: Interpolation,
     threshold: f64,
-    /// Median distance of neighbouring samples, in the channel's unit.
+    /// Mean of most of the distances of neighbouring samples, in the channel's unit.
     difference: f64,
 }
 
@@ -143,7 +142,7 @@ impl SpikeRule {
         }
         let interpolation = Interpolation::fit(series)?;
         let threshold = interpolation.deviation * quantile(0.5 * SIGNIFICANCE / samples as f64);
-        Some(Self { interpolation, threshold, difference: median_difference(series) })
+        Some(Self { interpolation, threshold, difference: typical_difference(series) })
     }
 
     /// Sample periods of the spikes in a part of the same channel, in ascending order; none if jumps of the bias are at least
@@ -163,7 +162,7 @@ impl SpikeRule {
             return FoundSpikes::default();
         }
         let interpolation = Interpolation { mean, ..self.interpolation };
-        let louder = median_difference(series) / self.difference;
+        let louder = typical_difference(series) / self.difference;
         let (mut spikes, jumps) = interpolation.spikes(series, self.threshold * louder.max(1.0));
         spikes.sort_by_key(|spike| spike.position);
         FoundSpikes {
@@ -424,10 +423,16 @@ impl Interpolation {
     }
 }
 
-/// Median distance of neighbouring samples, at least half a count as the deviation of an interpolation is.
-fn median_difference(series: &Series) -> f64 {
-    let distances = series.values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-    median(distances.collect()).max(0.5 * series.resolution)
+/// Mean of the smaller three quarters of the distances of neighbouring samples, at least half a count as the deviation of an interpolation
+/// is. The median of coarse counts is one count or two, and not between.
+fn typical_difference(series: &Series) -> f64 {
+    let mut distances: Vec<f64> = series.values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+    let smaller = distances.len() * 3 / 4;
+    if smaller == 0 {
+        return 0.5 * series.resolution;
+    }
+    distances.select_nth_unstable_by(smaller, f64::total_cmp);
+    (distances[..smaller].iter().sum::<f64>() / smaller as f64).max(0.5 * series.resolution)
 }
 
 /// Standard deviation of the non-zero entries of `errors`, without those above [`CLIP`] standard deviations.
