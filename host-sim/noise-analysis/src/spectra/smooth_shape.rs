@@ -4,12 +4,16 @@
 //! lines hardly move.
 
 use super::whittle::{Sign, SpectralBand, fit_mixture, information, mixture_density};
+use allan_core::term::{MovingAverageFilter, Process};
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
 use std::ops::Range;
 
 /// Longest filter that is tried: two cascaded averages of `2^6` samples each, the largest setting of the ADIS16405.
 const LARGEST_TAPS_LOG2: u32 = 6;
+
+/// Most taps of a filter that is read slowly: those of a [`MovingAverageFilter`].
+const MOST_TAPS: u32 = 128;
 
 /// White, 1/f and 1/f² noise behind the filter, and an unfiltered floor.
 const TERMS: usize = 4;
@@ -20,8 +24,8 @@ pub struct SpectralShape {
     sample_period: f64,
     /// Taps of each of the filter's two cascaded averages; 1 for no filter.
     pub taps: u32,
-    /// Autocorrelation behind the filter where not every value of it is read.
-    read_slowly: Option<Vec<f64>>,
+    /// The filter where not every value of it is read.
+    read_slowly: Option<MovingAverageFilter>,
     /// Densities at 1 Hz of the filtered white, 1/f and 1/f² noise, and of the floor, unit²/Hz.
     pub densities: [f64; TERMS],
 }
@@ -37,7 +41,8 @@ impl SpectralShape {
         let Some((shape, objective)) = own_rate.min_by(|(_, a), (_, b)| a.total_cmp(b)) else {
             return Self { sample_period, taps: 1, read_slowly: None, densities: [0.0; TERMS] };
         };
-        let slow = (read_every > 1).then(|| fit(shape.taps * read_every, read_every));
+        let taps = shape.taps.saturating_mul(read_every);
+        let slow = (read_every > 1 && taps <= MOST_TAPS).then(|| fit(taps, read_every));
         slow.filter(|slow| slow.1 < objective).map_or(shape, |(shape, _)| shape)
     }
 
@@ -77,7 +82,8 @@ impl SpectralShape {
 
     /// The likeliest shape with a filter of these taps and decimation, and its objective.
     fn fit_with_filter(bands: &[SpectralBand], sample_period: f64, (taps, decimation): (u32, u32)) -> (Self, f64) {
-        let read_slowly = (decimation > 1).then(|| autocorrelation_read_slowly(taps, decimation));
+        let slow = MovingAverageFilter { decimation: decimation.into(), ..MovingAverageFilter::bartlett(taps as u16) };
+        let read_slowly = (decimation > 1).then_some(slow);
         let mut shape = Self { sample_period, taps, read_slowly, densities: [0.0; TERMS] };
         let bases: Vec<[f64; TERMS]> = bands.iter().map(|band| shape.basis(band.frequency)).collect();
         let objective = fit_mixture(bands, &bases, Sign::NonNegative, &mut shape.densities);
@@ -91,29 +97,16 @@ impl SpectralShape {
         [gain, gain / frequency, gain * walk * walk, if self.taps > 1 { 1.0 } else { 0.0 }]
     }
 
-    /// Power gain of the filter. Of one that is read slowly it has what of white noise is folded down: the transform of the
-    /// autocorrelation, of which few lags are left.
+    /// Power gain of the filter. Of one that is read slowly it has what of white noise is folded down.
     fn gain(&self, frequency: f64) -> f64 {
-        let Some(autocorrelation) = &self.read_slowly else {
-            let sine = (PI * frequency * self.sample_period).sin();
-            return filter_gain(frequency, self.sample_period, self.taps, sine);
-        };
-        // Clenshaw's sum of cosines.
-        let twice = 2.0 * (2.0 * PI * frequency * self.sample_period).cos();
-        let (zero, lags) = autocorrelation.split_first().unwrap_or((&0.0, &[]));
-        let step = |(next, after): (f64, f64), lag: &f64| (2.0 * lag + twice * next - after, next);
-        let (next, after) = lags.iter().rev().fold((0.0, 0.0), step);
-        zero + 0.5 * twice * next - after
+        match &self.read_slowly {
+            Some(filter) => filter.density(frequency, self.sample_period),
+            None => {
+                let sine = (PI * frequency * self.sample_period).sin();
+                filter_gain(frequency, self.sample_period, self.taps, sine)
+            }
+        }
     }
-}
-
-/// Autocorrelation at lags of whole samples of white noise behind two averages over `taps` values, of which each of `decimation` is read.
-/// It sums to 1 over all lags where the taps are a multiple of the decimation.
-fn autocorrelation_read_slowly(taps: u32, decimation: u32) -> Vec<f64> {
-    let (taps, decimation) = (taps as usize, decimation as usize);
-    let weights: Vec<f64> = (1..2 * taps).map(|at| at.min(2 * taps - at) as f64 / (taps * taps) as f64).collect();
-    let at = |lag: usize| weights.iter().zip(&weights[lag..]).map(|(one, other)| one * other).sum::<f64>();
-    (0..weights.len()).step_by(decimation).map(|lag| decimation as f64 * at(lag)).collect()
 }
 
 /// Square root of the density of a sampled random walk: 1/f² with its aliases, `(π·dt/sin(πf·dt))²`.
