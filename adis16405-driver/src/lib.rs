@@ -94,9 +94,10 @@
 //!
 //! | fault | condition | refuses | remedy |
 //! |---|---|---|---|
-//! | [`STUCK_LOW`](Faults::STUCK_LOW), [`STUCK_HIGH`](Faults::STUCK_HIGH) | all bits 0, or all bits 1 | all | check wiring and power; then [`start_up`](Adis16405::start_up) |
+//! | [`STUCK_LOW`](Faults::STUCK_LOW), [`STUCK_HIGH`](Faults::STUCK_HIGH) | all bits 0; the last two words all ones | all | check wiring and power; then [`start_up`](Adis16405::start_up) |
 //! | [`SHIFTED`](Faults::SHIFTED) | a valid burst, shifted by 1 to 15 bits | all | check SCK; the next transaction is aligned again |
 //! | [`IMPLAUSIBLE_SUPPLY`](Faults::IMPLAUSIBLE_SUPPLY) | supply below 3.0 V or above 6.0 V | all | check SCK and wiring |
+//! | [`MIXED_ALARM`](Faults::MIXED_ALARM) | the error/alarm flag is set in some words, clear in others | all | check SCK and wiring |
 //! | [`FROZEN`](Faults::FROZEN) | twelve words equal for 512 bursts | all | [`software_reset`](Adis16405::software_reset) |
 //! | [`NO_NEW_DATA`](Faults::NO_NEW_DATA) | the new-data flag of an inertial word is clear | the channel; all if no inertial word is new | wait for data ready |
 //! | [`IMPOSSIBLE_RATE`](Faults::IMPOSSIBLE_RATE) | a gyro beyond ±7000 counts | the channel | a damaged word, or the sign erratum |

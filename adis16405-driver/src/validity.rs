@@ -22,7 +22,9 @@ bitflags::bitflags! {
         const SUPPLY = 1 << 2;
         /// All words are 0x0000: the data line is held low, or no part is connected.
         const STUCK_LOW = 1 << 3;
-        /// All words are 0xFFFF: the data line is held high, or no part is connected.
+        /// The last two words, temperature and auxiliary input, are 0xFFFF: the data line is held high, no part is connected, or the
+        /// burst ended early, after which nothing drives the line. A part sends both only one count below 25 °C with the input at
+        /// full scale and an error flag set, if it sets the two unused bits of a word of 12 bits.
         const STUCK_HIGH = 1 << 4;
         /// The six inertial words equal those of the previous burst. A warning only: where the noise is below one count
         /// or the filter is long, consecutive samples are often equal by chance (45 of 49,425 bursts of a real part; 37
@@ -43,6 +45,10 @@ bitflags::bitflags! {
         /// maximum ratings (data sheet Rev. B, Table 3). The word was not sent by a part, nor were the others. Not set for
         /// a burst that is stuck or shifted, of which it is no surprise.
         const IMPLAUSIBLE_SUPPLY = 1 << 10;
+        /// The error/alarm flag of some words is set and that of others clear. A part sets it in all words of a burst or in
+        /// none, so the bits of some word are not those that it sent. Not set for a shifted burst, in which that is no
+        /// surprise.
+        const MIXED_ALARM = 1 << 11;
     }
 }
 
@@ -64,11 +70,12 @@ impl Faults {
 
     /// Every fault with its name in reports. Where several are present, the one nearest to the root cause comes first, and
     /// the [`WARNINGS`](Self::WARNINGS) last.
-    pub const CAUSES: [(Faults, &'static str); 11] = [
+    pub const CAUSES: [(Faults, &'static str); 12] = [
         (Faults::STUCK_LOW, "stuck_low"),
         (Faults::STUCK_HIGH, "stuck_high"),
         (Faults::SHIFTED, "shifted"),
         (Faults::IMPLAUSIBLE_SUPPLY, "implausible_supply"),
+        (Faults::MIXED_ALARM, "mixed_alarm"),
         (Faults::NO_NEW_DATA, "no_new_data"),
         (Faults::FROZEN, "frozen"),
         (Faults::IMPOSSIBLE_RATE, "impossible_rate"),
@@ -117,7 +124,7 @@ impl Burst {
         faults.set(Faults::ERROR_ALARM, OutputWord(any).error_alarm());
         faults.set(Faults::SUPPLY, !supply_in_range(words[Channel::Supply as usize]));
         faults.set(Faults::STUCK_LOW, any == 0x0000);
-        faults.set(Faults::STUCK_HIGH, all == 0xFFFF);
+        faults.set(Faults::STUCK_HIGH, words[10..].iter().all(|word| word.0 == 0xFFFF));
         faults.set(Faults::IMPOSSIBLE_RATE, !rates_are_possible);
         // A shifted burst also has an implausible supply and, in any of its words, a clear new-data flag.
         let stuck = faults.intersects(Faults::STUCK_LOW | Faults::STUCK_HIGH);
@@ -128,6 +135,8 @@ impl Burst {
             let counts = words[Channel::Supply as usize].counts(Channel::Supply);
             faults.set(Faults::IMPLAUSIBLE_SUPPLY, !PLAUSIBLE_SUPPLY_COUNTS.contains(&counts));
         }
+        let in_some_words = faults.contains(Faults::ERROR_ALARM) && !OutputWord(all).error_alarm();
+        faults.set(Faults::MIXED_ALARM, in_some_words && !faults.contains(Faults::SHIFTED));
         faults
     }
 

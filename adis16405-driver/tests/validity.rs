@@ -111,8 +111,48 @@ fn a_stale_inertial_word_and_an_error_flag_of_any_word_are_faults() {
         assert_eq!(stale.faults(), if inertial { Faults::NO_NEW_DATA } else { Faults::empty() }, "{channel:?}");
         let mut alarmed = burst(|_| ());
         alarmed.words[channel as usize].0 |= 0x4000;
-        assert_eq!(alarmed.faults(), Faults::ERROR_ALARM, "{channel:?}");
+        assert!(alarmed.faults().contains(Faults::ERROR_ALARM), "{channel:?}");
     }
+}
+
+/// The flag says that DIAG_STAT has an error or alarm (data sheet Rev. B, page 11), which is so for all words of a burst.
+#[test]
+fn an_error_flag_of_some_words_alone_refuses_every_channel() {
+    let alarmed = |words: u16| {
+        let mut burst = burst(|_| ());
+        let set = burst.words.iter_mut().enumerate().filter(|(at, _)| words >> at & 1 != 0);
+        set.for_each(|(_, word)| word.0 |= 0x4000);
+        burst
+    };
+    for words in 0..1 << 12 {
+        let validity = BurstValidator::default().validate(&alarmed(words));
+        let (faults, refused) = match words {
+            0 => (Faults::empty(), ChannelMask::EMPTY),
+            0xFFF => (Faults::ERROR_ALARM, ChannelMask::EMPTY),
+            _ => (Faults::ERROR_ALARM | Faults::MIXED_ALARM, ChannelMask::ALL),
+        };
+        assert_eq!((validity.faults, validity.refused), (faults, refused), "{words:#014b}");
+    }
+}
+
+#[test]
+fn a_burst_that_ends_in_ones_has_the_cause_of_a_stuck_line() {
+    // Chip select rises after 2 to 20 bytes of the words, with the error flag set or clear in all of them.
+    for (sent, flag) in (2..=20).flat_map(|sent| [(sent, 0), (sent, 0x4000)]) {
+        let mut whole = burst(|_| ());
+        whole.words.iter_mut().for_each(|word| word.0 |= flag);
+        let mut bytes = whole.to_bytes();
+        bytes[2 + sent..].fill(0xFF);
+        let validity = BurstValidator::default().validate(&Burst::from_bytes(&bytes));
+        assert_eq!(
+            (validity.faults.cause(), validity.refused),
+            (Some("stuck_high"), ChannelMask::ALL),
+            "{sent} {flag:#x}"
+        );
+    }
+    // One count below 25 °C, and an input at full scale, are words of a part.
+    let full = burst(|counts| (counts[10], counts[11]) = (-1, 4095)).faults();
+    assert_eq!(full, Faults::empty());
 }
 
 #[test]

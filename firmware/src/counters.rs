@@ -4,7 +4,7 @@ use crate::bench_log::bench_log;
 use link::{Health, TextLine, text_line};
 
 /// Number of counters in [`Health`].
-const COUNTERS: usize = 47;
+const COUNTERS: usize = 48;
 /// Time between two comparisons, in µs.
 const COMPARE_US: u64 = 1_000_000;
 
@@ -75,6 +75,7 @@ pub(crate) fn counters(health: &Health) -> [Counter; COUNTERS] {
         data_ready_masked,
         gross_errors,
         usb_dropped,
+        mixed_alarm,
     } = *health;
     [
         figure("bursts", bursts),
@@ -124,6 +125,7 @@ pub(crate) fn counters(health: &Health) -> [Counter; COUNTERS] {
         event("data_ready_masked", data_ready_masked),
         event("gross_errors", gross_errors),
         event("usb_dropped", usb_dropped),
+        event("mixed_alarm", mixed_alarm),
     ]
 }
 

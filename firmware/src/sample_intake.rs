@@ -282,6 +282,7 @@ impl<'m> Estimators<'m> {
             x_sign: counters.get(Faults::X_SIGN),
             repeated: counters.get(Faults::REPEATED),
             implausible_supply: counters.get(Faults::IMPLAUSIBLE_SUPPLY),
+            mixed_alarm: counters.get(Faults::MIXED_ALARM),
             ..self.health
         }
     }

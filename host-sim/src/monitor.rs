@@ -187,6 +187,7 @@ pub fn health_text(health: &Health) -> String {
         ("spurious DRDY edges", health.spurious_edges),
         ("suspect", health.suspect),
         ("implausible supply", health.implausible_supply),
+        ("error flag in some words", health.mixed_alarm),
         ("refused in a channel", health.partly_used),
         ("used with a warning", health.marked),
         ("reads of DIAG_STAT", health.diag_reads),

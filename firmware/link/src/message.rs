@@ -4,7 +4,7 @@
 
 use crate::text::MAX_TEXT;
 use heapless::{String, Vec};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// Most averaging factors of a channel: 24 octaves from n = 8 and n = 1, 2, 4 below them.
 pub const MAX_OCTAVES: usize = 28;
@@ -367,7 +367,7 @@ pub struct Health {
     pub supply: u32,
     /// Bursts in which every bit was 0.
     pub stuck_low: u32,
-    /// Bursts in which every bit was 1.
+    /// Bursts whose last two words were all ones.
     pub stuck_high: u32,
     /// Bursts whose bits were shifted by 1 to 15 clocks.
     pub shifted: u32,
@@ -451,4 +451,13 @@ pub struct Health {
     pub gross_errors: u32,
     /// Messages and text lines that were not copied to the USB port, since the host did not read it.
     pub usb_dropped: u32,
+    /// Bursts refused because the error flag was set in some of their words and clear in others, which no sensor sends. Appended to
+    /// version 4: 0 of a device that does not send it.
+    #[serde(deserialize_with = "zero_if_absent")]
+    pub mixed_alarm: u32,
+}
+
+/// A last field that the sender may not know. Nothing else makes it unreadable, since the frame's checksum is right.
+fn zero_if_absent<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    Ok(u32::deserialize(deserializer).unwrap_or_default())
 }

@@ -5,8 +5,11 @@
 use link::{Decoder, DecoderCounters, Encoder, Message, Received};
 
 /// One message of each kind, numbered from 0.
-const VERSION_4: &[u8] = include_bytes!("kept_stream/version-4.bin");
-const VERSION_4_MESSAGES: &str = include_str!("kept_stream/version-4.txt");
+const VERSION_4: &[u8] = include_bytes!("kept_stream/version-4-mixed-alarm.bin");
+const VERSION_4_MESSAGES: &str = include_str!("kept_stream/version-4-mixed-alarm.txt");
+/// The same before `Health` had its last field, `mixed_alarm`, which is 0.
+const FIRST_VERSION_4: &[u8] = include_bytes!("kept_stream/version-4.bin");
+const FIRST_VERSION_4_MESSAGES: &str = include_str!("kept_stream/version-4.txt");
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
@@ -40,10 +43,12 @@ fn frame(body: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn the_kept_stream_says_what_it_said() {
-    let (messages, counters) = decode(VERSION_4);
-    assert_eq!(counters, DecoderCounters { frames: 7, ..DecoderCounters::default() });
-    assert_eq!(format!("{messages:#?}\n"), VERSION_4_MESSAGES);
+fn the_kept_streams_say_what_they_said() {
+    for (stream, said) in [(VERSION_4, VERSION_4_MESSAGES), (FIRST_VERSION_4, FIRST_VERSION_4_MESSAGES)] {
+        let (messages, counters) = decode(stream);
+        assert_eq!(counters, DecoderCounters { frames: 7, ..DecoderCounters::default() });
+        assert_eq!(format!("{messages:#?}\n"), said);
+    }
 }
 
 #[test]

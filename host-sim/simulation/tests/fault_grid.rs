@@ -136,20 +136,18 @@ fn grid(cells: &[(LineFault, f64)], seeds: u64, seconds: f64) {
     }
 }
 
-/// No cell restarts the microcontroller or goes without samples for longer than two steps of recovery take. Whole frames that are lost,
-/// and bits that are inverted, leave N, B and K within their bounds; so do damaged bursts as long as no two come in a row, of which the
-/// second confirms the first as a step.
+/// No cell restarts the microcontroller or goes without samples for longer than two steps of recovery take, and none moves N, B and K
+/// out of their bounds, but for the noise of a sensor that starts again, and bits inverted so often that a burst in forty has one.
 fn check(fault: LineFault, rate: f64, run: &Run, shifts: [f64; 3], undetectable: f64) {
     assert_eq!(run.restarts, 0, "{fault:?} at {rate:e}");
     assert!(run.longest_gap_s < 2.5, "{fault:?} at {rate:e}: {} s", run.longest_gap_s);
-    let is_lost = matches!(fault, LostEdge | DoubledEdge | Failed);
-    let is_bit = matches!(fault, AnswerBits | RequestBits) && rate <= 1e-5;
+    let is_bit = matches!(fault, AnswerBits | RequestBits);
     // The noise after a reset is not that of the sensor that was not reset.
-    let alone = rate <= 1e-4 && !matches!(fault, Reset | AnswerBits | RequestBits);
-    if is_lost || is_bit || alone {
+    if fault != Reset && (!is_bit || rate <= 1e-5) {
         assert!(shifts.iter().all(|shift| shift.abs() < 1.0), "{fault:?} at {rate:e}: {shifts:?}");
     }
-    if is_lost {
+    // A frame that is lost, and a line that reads ones from a bit on, are seen each time.
+    if matches!(fault, LostEdge | DoubledEdge | Failed | ShortSelect) {
         assert_eq!(run.audit.undetected, 0, "{fault:?} at {rate:e}");
     }
     if fault == AnswerBits && rate <= 1e-5 {

@@ -313,7 +313,7 @@ mod tests {
     use reports::live::CurveGroup;
 
     /// One message of each kind, with all its fields.
-    const KEPT: &[u8] = include_bytes!("../../../firmware/link/tests/kept_stream/version-4.bin");
+    const KEPT: &[u8] = include_bytes!("../../../firmware/link/tests/kept_stream/version-4-mixed-alarm.bin");
     const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
     /// The message, one on a channel as that of gyro x, whose samples and losses are shown.
