@@ -5,7 +5,7 @@ use crate::curve::{AllanPoint, CurveView};
 use crate::interpolation::subtraction_factor;
 use crate::math::{Real, abs, clamp, exp, ln, sqrt};
 use crate::noise_type::VarianceFractions;
-use crate::term::{AllTerms, NoiseTerm, Shape, TermSet};
+use crate::term::{AllTerms, MovingAverageFilter, NoiseTerm, Shape, TermSet};
 use core::mem::discriminant;
 use heapless::Vec;
 
@@ -95,6 +95,19 @@ impl Model {
         &mut self.terms
     }
 
+    /// The filter behind which its white noise is, if it has a term of such noise.
+    #[must_use]
+    pub fn filter(&self) -> Option<MovingAverageFilter> {
+        filter_of(self.terms.iter().map(|term| &term.kind))
+    }
+
+    /// The part of a term in the Allan variance at averaging factor `n`; that of flicker noise and of a random walk behind the
+    /// [`filter`](Self::filter).
+    #[must_use]
+    pub fn part(&self, term: &FittedTerm, n: u64) -> f64 {
+        term.value * term.value * term.kind.avar_behind(self.filter().as_ref(), n, self.sample_period)
+    }
+
     /// Modelled Allan variance at averaging factor `n`.
     #[must_use]
     pub fn avar(&self, n: u64) -> f64 {
@@ -104,9 +117,17 @@ impl Model {
     /// Modelled two-sided power spectral density at `frequency` in Hz, in unit²/Hz; deterministic terms contribute nothing.
     #[must_use]
     pub fn density(&self, frequency: f64) -> f64 {
-        let density =
-            |term: &FittedTerm| term.value * term.value * term.kind.process().density(frequency, self.sample_period);
-        self.present().map(density).sum()
+        self.present().map(|term| self.part_of_density(term, frequency)).sum()
+    }
+
+    /// The part of a term in the [`density`](Self::density) at `frequency` in Hz.
+    #[must_use]
+    pub fn part_of_density(&self, term: &FittedTerm, frequency: f64) -> f64 {
+        let density = term.value * term.value * term.kind.process().density(frequency, self.sample_period);
+        match self.filter() {
+            Some(filter) if term.kind.passes_filter() => density * filter.gain(frequency, self.sample_period),
+            _ => density,
+        }
     }
 
     /// Fractions of the modelled variance at averaging factor `n` that are due to each power law. A term that is not a power
@@ -151,8 +172,19 @@ impl Model {
 
     /// Each present term with its Allan variance at averaging factor `n`.
     fn contributions(&self, n: u64) -> impl Iterator<Item = (NoiseTerm, f64)> + '_ {
-        self.present().map(move |term| (term.kind, term.value * term.value * term.kind.avar(n, self.sample_period)))
+        let filter = self.filter();
+        self.present().map(move |term| {
+            (term.kind, term.value * term.value * term.kind.avar_behind(filter.as_ref(), n, self.sample_period))
+        })
     }
+}
+
+/// The filter among these terms.
+pub(crate) fn filter_of<'a>(kinds: impl IntoIterator<Item = &'a NoiseTerm>) -> Option<MovingAverageFilter> {
+    kinds.into_iter().find_map(|kind| match kind {
+        NoiseTerm::Filtered(filter) => Some(*filter),
+        _ => None,
+    })
 }
 
 /// Sum of the variance fractions of the power laws that the terms resemble at averaging factor `n`. Each term comes with

@@ -42,7 +42,7 @@ pub fn kurtosis_ratio<'a>(curve: impl Into<CurveView<'a>>, model: &Model, markov
     let (mut along, mut weight) = (0.0, 0.0);
     for point in curve.points() {
         let Some(measured) = point.kurtosis else { continue };
-        let share = term.value * term.value * term.kind.avar(point.n, curve.sample_period()) / model.avar(point.n);
+        let share = model.part(term, point.n) / model.avar(point.n);
         let expected = share * share * expected(point.tau / markov.time_constant);
         // The variance of the sample kurtosis of so many independent Gaussian values is 24/edf.
         let precision = model.edf(point) / 24.0;

@@ -37,7 +37,7 @@ pub enum NoiseTerm {
     RateRandomWalk,
     /// R: a linear trend, in unit/s.
     RateRamp,
-    /// N after a digital low-pass filter, in unit·√s.
+    /// N after a digital low-pass filter, in unit·√s. In a model with this term B and K have passed the filter too.
     Filtered(MovingAverageFilter),
     /// Exponentially correlated noise; its standard deviation, in the unit itself.
     Markov(Markov),
@@ -191,6 +191,26 @@ impl NoiseTerm {
     #[must_use]
     pub fn avar(&self, n: u64, sample_period: f64) -> f64 {
         with_process!(self, process => process.avar(n, sample_period))
+    }
+
+    /// Whether noise of this kind arises before the filter of a model and passes it: flicker noise and random walks do, rounding and
+    /// what is added to the samples do not. White noise that does is [`Filtered`](Self::Filtered).
+    #[must_use]
+    pub const fn passes_filter(&self) -> bool {
+        matches!(self, Self::BiasInstability | Self::RateRandomWalk)
+    }
+
+    /// Allan variance as [`avar`](Self::avar) has it, of a term that stands in a model with this `filter`, which
+    /// [what arises before it](Self::passes_filter) has passed.
+    #[inline(never)] // linked once
+    pub(crate) fn avar_behind(&self, filter: Option<&MovingAverageFilter>, n: u64, sample_period: f64) -> f64 {
+        match (self, filter) {
+            (_, None) => self.avar(n, sample_period),
+            (_, Some(filter)) if filter.is_short_against(n) => self.avar(n, sample_period),
+            (Self::BiasInstability, Some(filter)) => filter.avar_of_flicker(n),
+            (Self::RateRandomWalk, Some(filter)) => filter.avar_of_walk(n, sample_period),
+            _ => self.avar(n, sample_period),
+        }
     }
 
     /// [`Process::sum_variances`] of the term.

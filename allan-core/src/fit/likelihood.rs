@@ -9,7 +9,9 @@ use super::least_squares::{MOST, entry, non_negative, triangle};
 use crate::confidence::{pure_octave_correlation, roots};
 use crate::curve::{AllanPoint, CurveView};
 use crate::math::{Real, absf, lnf, sqrtf};
-use crate::model::{FittedTerm, FlickerCorrelations, MAX_TERMS, Model, degrees_of_freedom, variance_fractions};
+use crate::model::{
+    FittedTerm, FlickerCorrelations, MAX_TERMS, Model, degrees_of_freedom, filter_of, variance_fractions,
+};
 use crate::noise_type::VarianceFractions;
 use crate::term::{NoiseTerm, TermSet};
 use core::f32::consts::LN_2;
@@ -145,13 +147,21 @@ impl<T: TermSet> Problem<T> {
     /// Sets the terms to the first [`MAX_TERMS`] of `kinds`. Terms that are unchanged keep their columns and amounts.
     #[inline(never)] // here and below: so that stack frames do not add up in the caller
     pub(super) fn set_terms(&mut self, points: &Points, kinds: &[NoiseTerm]) {
-        self.kinds.truncate(kinds.iter().filter(|kind| T::contains(kind)).count());
-        for (term, &kind) in kinds.iter().filter(|kind| T::contains(kind)).enumerate().take(MAX_TERMS) {
-            if self.kinds.get(term) != Some(&kind) {
-                // The vector has room for MAX_TERMS.
-                let _ = if term == self.kinds.len() { self.kinds.push(kind) } else { Ok(()) };
+        let before = filter_of(&self.kinds);
+        let mut is_known = [false; MAX_TERMS];
+        let given = || kinds.iter().filter(|kind| T::contains(kind)).take(MAX_TERMS);
+        is_known
+            .iter_mut()
+            .zip(self.kinds.iter().zip(given()))
+            .for_each(|(is_known, (own, new))| *is_known = own == new);
+        self.kinds = given().copied().collect();
+        let is_same_filter = filter_of(&self.kinds) == before;
+        for (term, is_known) in is_known.into_iter().enumerate().take(self.kinds.len()) {
+            if !is_known {
                 self.amounts[term] = 0.0;
-                self.set_kind(points, term, kind);
+            }
+            if !is_known || (!is_same_filter && self.kinds[term].passes_filter()) {
+                self.set_column(points, term);
             }
         }
     }
@@ -159,10 +169,9 @@ impl<T: TermSet> Problem<T> {
     /// Sets the terms and the coefficients to those of a model, and the points' confidence to that under it.
     #[inline(never)]
     pub(super) fn fill_from_model(&mut self, points: &mut Points, model: &Model) {
-        for (term, &FittedTerm { kind, value, .. }) in model.terms().iter().enumerate() {
-            // A model has at most MAX_TERMS.
-            let _ = self.kinds.push(kind);
-            self.set_kind(points, term, kind);
+        self.kinds = model.kinds();
+        for (term, &FittedTerm { value, .. }) in model.terms().iter().enumerate() {
+            self.set_column(points, term);
             self.amounts[term] = (value * value / self.units[term]) as f32;
         }
         self.set_confidence(points);
@@ -203,9 +212,23 @@ impl<T: TermSet> Problem<T> {
     #[inline(never)]
     pub(super) fn set_kind(&mut self, points: &Points, term: usize, kind: NoiseTerm) {
         self.kinds[term] = kind;
+        self.set_column(points, term);
+        if let NoiseTerm::Filtered(_) = kind {
+            for other in 0..self.kinds.len() {
+                if self.kinds[other].passes_filter() {
+                    self.set_column(points, other);
+                }
+            }
+        }
+    }
+
+    /// Sets the contributions of a term to the points; its coefficient stays.
+    #[inline(never)]
+    fn set_column(&mut self, points: &Points, term: usize) {
+        let (kind, filter) = (self.kinds[term], filter_of(&self.kinds));
         let mut largest = 0.0_f64;
         for (known, point) in (0..MAX_POINTS).zip(points.all()) {
-            let share = T::avar(&kind, point.n, points.curve.sample_period()) / point.avar;
+            let share = T::avar(&kind, filter.as_ref(), point.n, points.curve.sample_period()) / point.avar;
             let column = &mut self.columns[term];
             if share > largest {
                 let shrink = (largest / share) as f32;

@@ -5,7 +5,7 @@
 
 use super::likelihood::{MAX_PARAMETERS, MAX_POINTS, Points, Problem};
 use crate::math::{absf, exp, sqrtf};
-use crate::model::MAX_TERMS;
+use crate::model::{MAX_TERMS, filter_of};
 use crate::term::{MAX_SHAPE, NoiseTerm, TermSet};
 use heapless::Vec;
 
@@ -155,14 +155,15 @@ impl<T: TermSet> Problem<T> {
         let mut parameters: Vec<_, MAX_PARAMETERS> = (0..self.kinds.len()).map(Parameter::Amount).collect();
         let is_free = |(term, kind): &(usize, &NoiseTerm)| self.amounts[*term] > 0.0 && free.has::<T>(kind);
         for (term, kind) in self.kinds.iter().enumerate().filter(is_free) {
-            let square = self.square(term);
+            // What passes a filter hardly changes with its decimation.
+            let (square, filter) = (self.square(term), filter_of(&self.kinds));
             for index in T::free_parameters(kind) {
                 let Some(column) = self.columns.get_mut(parameters.len()) else { return parameters };
                 for (entry, point) in column.iter_mut().zip(points.all()) {
                     let at = |factor: f64| {
                         let mut shape = kind.shape().values();
                         shape[index] *= factor;
-                        T::avar(&kind.with_shape(shape), point.n, points.curve.sample_period())
+                        T::avar(&kind.with_shape(shape), filter.as_ref(), point.n, points.curve.sample_period())
                     };
                     *entry = (square * (at(1.0 + STEP) - at(1.0 - STEP)) / (2.0 * STEP) / point.avar) as f32;
                 }

@@ -1,6 +1,6 @@
 //! Sets of terms that a fit can contain: the code of the other terms is not linked.
 
-use super::NoiseTerm;
+use super::{MovingAverageFilter, NoiseTerm};
 use crate::confidence::{NORMAL_975, chi_square_quantile};
 use crate::math::{Real, lnf, sqrt, sqrt_in_single, sqrtf};
 use crate::noise_type::VarianceFractions;
@@ -15,8 +15,8 @@ pub(crate) trait TermSet {
     /// The terms of `kinds` that are in the set.
     fn contains(kind: &NoiseTerm) -> bool;
 
-    /// [`NoiseTerm::avar`].
-    fn avar(kind: &NoiseTerm, n: u64, sample_period: f64) -> f64;
+    /// [`NoiseTerm::avar_behind`].
+    fn avar(kind: &NoiseTerm, filter: Option<&MovingAverageFilter>, n: u64, sample_period: f64) -> f64;
 
     /// [`NoiseTerm::sum_variances`] at strides of `n/overlap` samples.
     fn sum_variances(kind: &NoiseTerm, n: u64, overlap: u32, sample_period: f64, table: &mut [Self::Real]);
@@ -53,8 +53,8 @@ impl TermSet for AllTerms {
         true
     }
 
-    fn avar(kind: &NoiseTerm, n: u64, sample_period: f64) -> f64 {
-        kind.avar(n, sample_period)
+    fn avar(kind: &NoiseTerm, filter: Option<&MovingAverageFilter>, n: u64, sample_period: f64) -> f64 {
+        kind.avar_behind(filter, n, sample_period)
     }
 
     fn sum_variances(kind: &NoiseTerm, n: u64, overlap: u32, sample_period: f64, table: &mut [f64]) {
@@ -100,7 +100,7 @@ impl TermSet for PowerLawTerms {
         )
     }
 
-    fn avar(kind: &NoiseTerm, n: u64, sample_period: f64) -> f64 {
+    fn avar(kind: &NoiseTerm, _: Option<&MovingAverageFilter>, n: u64, sample_period: f64) -> f64 {
         // The closed forms of the processes, without a sum in double precision.
         let tau = n as f64 * sample_period;
         let n = n as f32;

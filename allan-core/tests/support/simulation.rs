@@ -144,7 +144,7 @@ pub(crate) fn autocovariance(kind: &NoiseTerm, j: usize) -> f64 {
     }
 }
 
-fn impulse_response(filter: &MovingAverageFilter) -> Vec<f64> {
+pub(crate) fn impulse_response(filter: &MovingAverageFilter) -> Vec<f64> {
     let average = vec![1.0 / f64::from(filter.taps); usize::from(filter.taps)];
     if filter.stages == 1 { average } else { convolve(&average, &average) }
 }

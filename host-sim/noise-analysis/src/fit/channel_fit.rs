@@ -247,12 +247,19 @@ impl ChannelFit {
             let other = with_filter(curve, &again, common);
             best = if other.cost() < best.cost() { other } else { best };
         }
-        // White noise is never absent: where it is not known to a half, other terms may stand in for it.
-        let bounded = best.clone().bounded(curve, None);
-        if bounded.model().terms().first().is_none_or(|filter| filter.low <= KNOWN_WHITE * filter.value) {
-            let other = with_filter(curve, &traced_behind(curve, common.filter), common);
-            best = if other.cost() < best.cost() + MAX_DEVIANCE_RISE { other } else { best };
-        }
+        // So may those without which the noise behind the filter and that of rounding describe the curve; and, as white noise is never
+        // absent, those that leave it unknown to a half.
+        let plain = with_rounding(curve, &behind(common.filter).map(|kind| (kind, None)));
+        let is_unknown = |model: &TracedModel| {
+            let bounded = model.clone().bounded(curve, None);
+            bounded.model().terms().first().is_none_or(|filter| filter.low <= KNOWN_WHITE * filter.value)
+        };
+        let other = if plain.goodness.p_value > POOR_FIT {
+            Some(plain)
+        } else {
+            is_unknown(&best).then(|| with_filter(curve, &traced_behind(curve, common.filter), common))
+        };
+        best = other.filter(|other| other.cost() < best.cost() + MAX_DEVIANCE_RISE).unwrap_or(best);
         if !had && best.cost() > self.traced.cost() + MAX_DEVIANCE_RISE {
             return;
         }
@@ -416,11 +423,15 @@ fn with_rounding(curve: &Curve<OCTAVES>, terms: &[PlannedTerm]) -> TracedModel {
     if is_shown && more.goodness.deviance < plain.goodness.deviance { more } else { plain }
 }
 
-/// What a model of white noise behind `filter`, bias instability and random walk lacks of a curve.
+/// White noise behind `filter`, bias instability and random walk.
+fn behind(filter: MovingAverageFilter) -> [NoiseTerm; 3] {
+    [NoiseTerm::Filtered(filter), NoiseTerm::BiasInstability, NoiseTerm::RateRandomWalk]
+}
+
+/// What the noise [`behind`] a filter lacks of a curve.
 fn traced_behind(curve: &Curve<OCTAVES>, filter: MovingAverageFilter) -> TracedModel {
     let mut traced = Trace::baseline(curve);
-    let kinds = [NoiseTerm::Filtered(filter), NoiseTerm::BiasInstability, NoiseTerm::RateRandomWalk];
-    traced.after = fit(curve, &kinds);
+    traced.after = fit(curve, &behind(filter));
     traced.after_goodness = allan_core::fit::goodness(curve, &traced.after);
     let _ = trace_while(&mut traced, curve, LineCandidates::Curve, &[], &mut || true);
     TracedModel::new(&traced, curve)

@@ -91,10 +91,7 @@ pub(crate) fn with_bounds_behind_a_filter(
     let points: Vec<&AllanPoint> =
         curve.points().iter().filter(|point| point.avar > 0.0 && model.avar(point.n) > 0.0).collect();
     let present: Vec<&FittedTerm> = model.terms().iter().filter(|term| term.value > 0.0).collect();
-    let share = |point: usize, term: usize| {
-        let FittedTerm { kind, value, .. } = present[term];
-        value * value * kind.avar(points[point].n, model.sample_period()) / model.avar(points[point].n)
-    };
+    let share = |point: usize, term: usize| model.part(present[term], points[point].n) / model.avar(points[point].n);
     let shares = DMatrix::from_fn(points.len(), present.len(), share);
     let weights = DVector::from_iterator(points.len(), points.iter().map(|point| model.edf(point) / 2.0));
     let weighted = DMatrix::from_diagonal(&weights) * &shares;

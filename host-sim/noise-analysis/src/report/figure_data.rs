@@ -7,6 +7,7 @@ use crate::report::{BiasOverTime, ChannelReport, DataSheetReport, FigureData, Re
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::Welch;
+use allan_core::Model;
 use measurement::{ChannelId, DataSheetNoise, Measurement, Quantity};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::BTreeMap;
@@ -41,7 +42,10 @@ pub(crate) fn set(report: &mut Report, measurement: &Measurement, first: Option<
         FigureData {
             data_sheet: data_sheet(&profile.data_sheet),
             spectrum: {
-                let model = |frequency: f64| model_density(&channel.refitted.terms, frequency, period_s);
+                let terms = channel.refitted.terms.iter().map(|TermReport { term, .. }| *term);
+                let whole = Model::new(period_s, terms);
+                // Root of the one-sided density.
+                let model = |frequency: f64| (2.0 * whole.density(frequency)).sqrt();
                 let own = spectrum(&UniformSeries::from_series(&series), model);
                 let faster = first.and_then(|first| {
                     let series = Series::from_measurement(first, first.named(profile.name)?);
@@ -73,14 +77,6 @@ pub(crate) fn data_sheet(noise: &DataSheetNoise) -> Option<DataSheetReport> {
         rate_random_walk,
         curve: curve.to_vec(),
     })
-}
-
-/// Root of the one-sided density of a model, unit/√Hz.
-fn model_density(terms: &[TermReport], frequency: f64, period_s: f64) -> f64 {
-    let density = |TermReport { term, .. }: &TermReport| {
-        2.0 * term.value * term.value * term.kind.process().density(frequency, period_s)
-    };
-    terms.iter().map(density).sum::<f64>().sqrt()
 }
 
 /// The spectrum of `series` in bands of equal width on a logarithmic axis.

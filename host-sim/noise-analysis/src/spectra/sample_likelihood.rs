@@ -287,12 +287,8 @@ impl Shapes {
     /// The density of the samples.
     fn density(&self, kind: &NoiseTerm, frequency: f64) -> f64 {
         let density = kind.process().density(frequency, self.period);
-        match kind {
-            NoiseTerm::BiasInstability | NoiseTerm::RateRandomWalk | NoiseTerm::Markov(_) => {
-                density * self.gain(frequency)
-            }
-            _ => density,
-        }
+        let passes = kind.passes_filter() || matches!(kind, NoiseTerm::Markov(_));
+        if passes { density * self.gain(frequency) } else { density }
     }
 
     /// Whether the ends of the record leak into the first, the middle or the last coefficient of a band behind the filter: few
@@ -307,12 +303,7 @@ impl Shapes {
 
     /// Power gain of the filter of the model.
     fn gain(&self, frequency: f64) -> f64 {
-        let Some(MovingAverageFilter { stages, taps, decimation }) = self.filtered.as_ref().map(|of| of.filter) else {
-            return 1.0;
-        };
-        let half = PI * frequency * self.period / decimation;
-        let ratio = (f64::from(taps) * half).sin() / (f64::from(taps) * half.sin());
-        ratio.powi(2 * i32::from(stages))
+        self.filtered.as_ref().map_or(1.0, |filtered| filtered.filter.gain(frequency, self.period))
     }
 
     /// `model` with what makes this `evidence` likeliest.

@@ -5,8 +5,8 @@ use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, frames, heights, 
 use crate::formatting::{capital, words};
 use crate::rounding::{quantity, quantity_digits, span, unit};
 use crate::summary::deviance_per_point;
-use allan_core::NoiseTerm;
-use allan_core::model::cube_root_deviation;
+use allan_core::model::{FittedTerm, cube_root_deviation};
+use allan_core::{Model, NoiseTerm};
 use noise_analysis::report::{ChannelReport, Finding, ModelReport, Report};
 use std::f64::consts::{LN_2, PI};
 
@@ -122,8 +122,10 @@ fn terms(channel: &ChannelReport, model: &ModelReport, rate_hz: f64) -> Vec<Line
     let factors: Vec<u64> = (0..=last.max(1).ilog2() * PER_OCTAVE)
         .map(|step| 2f64.powf(f64::from(step) / f64::from(PER_OCTAVE)).round() as u64)
         .collect();
-    let line = |(kind, value): (NoiseTerm, f64)| {
-        let deviation = |n: u64| (n as f64 / rate_hz, value * kind.avar(n, 1.0 / rate_hz).sqrt());
+    let whole = Model::new(1.0 / rate_hz, model.terms.iter().map(|of| of.term));
+    let line = |term: &FittedTerm| {
+        let kind = term.kind;
+        let deviation = |n: u64| (n as f64 / rate_hz, whole.part(term, n).sqrt());
         let points = factors.iter().map(|&n| deviation(n)).filter(|&(_, of)| has_logarithm(of)).collect();
         let mark = match kind {
             NoiseTerm::AngleRandomWalk | NoiseTerm::Filtered(_) => "N",
@@ -135,7 +137,7 @@ fn terms(channel: &ChannelReport, model: &ModelReport, rate_hz: f64) -> Vec<Line
         };
         Line { mark, in_legend: false, ..Line::new(words(kind.name()), Look::Term, points) }
     };
-    let known = model.terms.iter().map(|of| (of.term.kind, of.term.value)).filter(|(_, value)| *value > 0.0);
+    let known = whole.terms().iter().filter(|term| term.value > 0.0);
     known.map(line).filter(|line| !line.points.is_empty()).collect()
 }
 

@@ -50,7 +50,6 @@ pub(super) struct ChannelDeviance<'a> {
     pub(super) name: &'static str,
     comparison: DevianceComparison<'a>,
     curve: &'a Curve<OCTAVES>,
-    model: &'a Model,
     /// The terms of the channel beside its white noise.
     others: Vec<NoiseTerm>,
     /// By how much the deviance exceeds that of a curve which a filter describes, at least 1; what it is divided by.
@@ -69,7 +68,6 @@ impl<'a> ChannelDeviance<'a> {
             name: channel.name,
             comparison: DevianceComparison::new(curve, model),
             curve,
-            model,
             others,
             dispersion: 1.0,
             slowest: Vec::new(),
@@ -116,7 +114,6 @@ impl<'a> ChannelDeviance<'a> {
     /// Variance of the decimation's score over its information, at least 1: by how much the deviance falls and rises more
     /// than for independent points.
     pub(super) fn scatter(&self, filter: MovingAverageFilter) -> f64 {
-        let period = self.model.sample_period();
         let model = allan_core::fit::fit(self.curve, &self.kinds(filter));
         let points: Vec<&AllanPoint> =
             self.curve.points().iter().filter(|point| point.avar > 0.0 && model.avar(point.n) > 0.0).collect();
@@ -127,19 +124,16 @@ impl<'a> ChannelDeviance<'a> {
             let read = MovingAverageFilter { decimation: filter.decimation * factor, ..filter };
             NoiseTerm::Filtered(read)
         };
-        let share = |point: &AllanPoint, term: &FittedTerm, kind: NoiseTerm| {
-            term.value * term.value * kind.avar(point.n, period) / model.avar(point.n)
-        };
+        let share = |point: &AllanPoint, term: &FittedTerm| model.part(term, point.n) / model.avar(point.n);
         let direction = DVector::from_iterator(
             points.len(),
             points.iter().map(|point| {
-                let (from, to) = (shorter(1.0 - DERIVATIVE_STEP), shorter(1.0 + DERIVATIVE_STEP));
-                (share(point, filtered, to) - share(point, filtered, from)) / (2.0 * DERIVATIVE_STEP)
+                let [from, to] = [1.0 - DERIVATIVE_STEP, 1.0 + DERIVATIVE_STEP]
+                    .map(|factor| share(point, &FittedTerm { kind: shorter(factor), ..**filtered }));
+                (to - from) / (2.0 * DERIVATIVE_STEP)
             }),
         );
-        let amounts = DMatrix::from_fn(points.len(), present.len(), |at, term| {
-            share(points[at], present[term], present[term].kind)
-        });
+        let amounts = DMatrix::from_fn(points.len(), present.len(), |at, term| share(points[at], present[term]));
         let weights = DVector::from_iterator(points.len(), points.iter().map(|point| model.edf(point) / 2.0));
         let weighted = DMatrix::from_diagonal(&weights) * &amounts;
         let Some(information) = (amounts.transpose() * &weighted).cholesky() else { return 1.0 };

@@ -52,7 +52,7 @@ pub fn relative_error(model: &Model, term: usize, duration: f64) -> Option<f64> 
     while first < ordinates {
         let count = (first / 16).clamp(1, ordinates - first);
         let frequency = (first as f64 + (count - 1) as f64 / 2.0) / (2.0 * duration);
-        let density = |term: &&FittedTerm| term.value * term.value * term.kind.process().density(frequency, period);
+        let density = |term: &&FittedTerm| model.part_of_density(term, frequency);
         let densities = DVector::from_iterator(present.len(), present.iter().map(density));
         let total = densities.sum();
         if total > 0.0 {
