@@ -100,12 +100,12 @@ fn build(target: &str, image: &str) -> PathBuf {
     let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(workspace)
         .args(["build", "--package", "instruction-counts", "--bin", image, "--features", "on-target"])
-        .args(["--release", "--locked", "--target", target, "--target-dir"])
+        .args(["--profile", "counted", "--locked", "--target", target, "--target-dir"])
         .arg(&directory)
         .status()
         .expect("cargo starts");
     assert!(status.success(), "the image does not build; its target comes with `rustup target add {target}`");
-    directory.join(target).join("release").join(image)
+    directory.join(target).join("counted").join(image)
 }
 
 /// Runs an image and returns its output. With `-icount shift=0` an instruction takes 1 ns of the board's time, whatever
