@@ -166,7 +166,7 @@ impl NoiseTerm {
                 })
             }
             Self::Sinusoid(_) => Self::Sinusoid(Sinusoid { frequency: shape[0] }),
-            Self::Filtered(filter) => Self::Filtered(MovingAverageFilter { decimation: shape[1], ..filter }),
+            Self::Filtered(filter) => Self::Filtered(MovingAverageFilter { decimation: shape[1].max(1.0), ..filter }),
             other => other,
         }
     }

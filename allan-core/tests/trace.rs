@@ -4,6 +4,7 @@
 #[path = "support/simulation.rs"]
 mod simulation;
 
+use allan_core::fit::fit_shapes;
 use allan_core::model::FittedTerm;
 use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm, Resonance, Shape, Sinusoid};
 use allan_core::trace::{LineCandidates, Trace, trace};
@@ -117,6 +118,19 @@ fn the_decimation_of_a_filter_is_estimated() {
     let [term] = added[..] else { panic!("{added:?}") };
     let Shape::Filtered { decimation: (low, high), .. } = term.shape else { panic!("{term:?}") };
     assert!(low < decimation && decimation < high && high - low < 1.0, "{term:?}");
+}
+
+/// A filter that is read more often than it has values is none of a sensor, and no kept model may have one.
+#[test]
+fn the_decimation_of_a_filter_is_at_least_one() {
+    for seed in 1..=6 {
+        let recorded = (NoiseTerm::Filtered(MovingAverageFilter::bartlett(8)), 0.05);
+        let curve = curve(&Noise::new(seed).sum(SAMPLES, &[recorded]));
+        let start = MovingAverageFilter { decimation: 1.1, ..MovingAverageFilter::bartlett(8) };
+        let model = fit_shapes(&curve, &[NoiseTerm::Filtered(start)]);
+        let filter = model.filter().expect("the term that was fitted");
+        assert!((1.0..1.05).contains(&filter.decimation), "{filter:?}");
+    }
 }
 
 #[test]
