@@ -111,7 +111,7 @@ fn a_stale_inertial_word_and_an_error_flag_of_any_word_are_faults() {
         assert_eq!(stale.faults(), if inertial { Faults::NO_NEW_DATA } else { Faults::empty() }, "{channel:?}");
         let mut alarmed = burst(|_| ());
         alarmed.words[channel as usize].0 |= 0x4000;
-        assert!(alarmed.faults().contains(Faults::ERROR_ALARM), "{channel:?}");
+        assert_eq!(alarmed.faults(), Faults::ERROR_ALARM | Faults::MIXED_ALARM, "{channel:?}");
     }
 }
 

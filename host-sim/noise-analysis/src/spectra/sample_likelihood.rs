@@ -116,16 +116,12 @@ struct FilteredNoise {
 }
 
 impl FilteredNoise {
-    fn find(mut kinds: impl Iterator<Item = NoiseTerm>, period: f64) -> Option<Self> {
-        let filter = kinds.find_map(|kind| match kind {
-            NoiseTerm::Filtered(filter) => Some(filter),
-            _ => None,
-        })?;
+    fn new(filter: MovingAverageFilter, period: f64) -> Self {
         let reach = (f64::from(filter.stages) * f64::from(filter.taps) / filter.decimation) as u32;
         // The covariance is half the second difference of the variance of sums.
         let sum = |samples: f64| filter.sum_variance(samples.abs(), period);
         let covariance = |lag: f64| (sum(lag + 1.0) - 2.0 * sum(lag) + sum(lag - 1.0)) / 2.0;
-        Some(Self { filter, covariances: (0..=reach).map(|lag| period * covariance(lag.into())).collect() })
+        Self { filter, covariances: (0..=reach).map(|lag| period * covariance(lag.into())).collect() }
     }
 
     /// Expected square of the coefficient of this order of `count` samples, times the sample period: the density, and what the ends of
@@ -167,7 +163,7 @@ impl Shapes {
             return None;
         }
         let period = model.sample_period();
-        let filtered = FilteredNoise::find(kinds(), period);
+        let filtered = model.filter().map(|filter| FilteredNoise::new(filter, period));
         let has_white = kinds().any(|kind| kind == NoiseTerm::AngleRandomWalk);
         // One-sided there.
         let rounding = (filtered.is_some() && !has_white).then(|| series.rounding_density() / 2.0);
@@ -411,8 +407,7 @@ mod tests {
     #[test]
     fn coefficients_of_filtered_noise_have_the_squares_of_its_covariance() {
         let covariances = [44.0, 40.0, 31.0, 20.0, 10.0, 4.0, 1.0].map(|of| of / 256.0);
-        let kinds = [NoiseTerm::Filtered(MovingAverageFilter::bartlett(4))];
-        let filtered = FilteredNoise::find(kinds.into_iter(), 0.01).expect("a filter");
+        let filtered = FilteredNoise::new(MovingAverageFilter::bartlett(4), 0.01);
         let count = 40;
         for order in 1..count {
             let pair = |a: usize, b: usize| {
