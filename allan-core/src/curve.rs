@@ -19,8 +19,8 @@ pub struct AllanPoint {
     pub tau: f64,
     /// Allan variance, in the square of the unit of the samples, without [`interpolation`](Self::interpolation).
     pub avar: f64,
-    /// Variance that was subtracted from the measured one because replacing missing samples had added it. At most nine
-    /// tenths of the measured variance.
+    /// Variance that was subtracted from the measured one because replacing missing samples had added it, at most nine
+    /// tenths of the measured variance; on a host also that of rounding errors that are correlated.
     pub interpolation: f64,
     /// Share of the samples that was replaced because it was missing, 0 to 1. Where differences with missing samples are
     /// left out it is 0.
@@ -406,6 +406,12 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
             point.interpolation = added.subtracted(measured);
             point.avar = measured - point.interpolation;
         }
+        self.reset_confidence();
+    }
+
+    /// Sets noise types and confidence of changed variances.
+    #[cfg(feature = "host")]
+    pub(crate) fn reset_confidence(&mut self) {
         self.classify();
         self.set_confidence(&mut |point| point.power_law.variance_fractions());
     }

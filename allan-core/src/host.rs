@@ -6,6 +6,9 @@ use crate::fit::{Baseline, FreeShapes, estimate, set_free_bounds};
 use crate::model::Model;
 use crate::term::{AllTerms, NoiseTerm};
 
+/// Part of a measured variance that remains of it when rounding is taken off.
+const LEAST_LEFT: f64 = 0.01;
+
 impl<const OCTAVES: usize> Curve<OCTAVES> {
     /// This curve at averaging factors below `from`, and at longer ones that of the means of each `samples` samples in a row,
     /// which are `means`.
@@ -22,6 +25,17 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self.sample_period = means.sample_period / samples as f64;
         self.samples = means.samples.saturating_mul(samples);
         self
+    }
+
+    /// Takes what rounding to counts adds off the variance of every point: `variance` of its averaging factor, as far as a hundredth of
+    /// what was measured remains. It becomes part of `interpolation`, and the confidence is set anew: the scatter is that of
+    /// the measured variance.
+    pub fn subtract_rounding(&mut self, variance: impl Fn(u64) -> f64) {
+        for point in &mut self.points {
+            let left = (point.avar - variance(point.n)).max(LEAST_LEFT * point.avar);
+            (point.interpolation, point.avar) = (point.interpolation + point.avar - left, left);
+        }
+        self.reset_confidence();
     }
 
     /// Replaces the variance of every point with a positive one. The bounds change in proportion, the degrees of freedom

@@ -216,6 +216,9 @@ pub struct CurvePoint {
     /// Allan deviation by equation (5) from the measured spectrum, in the channel's unit; absent at averaging times of more
     /// than a sixteenth of the record, which the spectrum does not resolve.
     pub adev_by_spectrum: Option<f64>,
+    /// Allan deviation of rounding errors that are correlated, a part of `adev` and of that of the models; 0 where they are white, and
+    /// so a part of N.
+    pub rounding: f64,
 }
 
 impl CurvePoint {
@@ -232,6 +235,7 @@ impl CurvePoint {
             replaced_percent: 100.0 * point.replaced,
             accuracy_percent: slope_method::percentage_accuracy(samples, point.n),
             adev_by_spectrum: None,
+            rounding: 0.0,
         }
     }
 }

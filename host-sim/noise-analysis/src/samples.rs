@@ -1,5 +1,6 @@
 //! Samples on a time base: the series of a channel, with and without gaps, and the estimators that are fed with them.
 
+pub(crate) mod correlated_rounding;
 pub(crate) mod epoch_ranges;
 pub(crate) mod exclusion;
 pub(crate) mod gapped_cascade;

@@ -103,7 +103,8 @@ fn curve_of_terms(channel: &ChannelReport, add: &mut impl FnMut(String)) {
             continue;
         }
         for (point, adev) in channel.curve.iter().zip(&model.adev).filter(|(point, _)| point.n >= 16) {
-            let of_terms = model.terms.iter().map(|term| variance(term, point.tau_s)).sum::<f64>().sqrt();
+            let of_terms: f64 = model.terms.iter().map(|term| variance(term, point.tau_s)).sum();
+            let of_terms = (of_terms + point.rounding.powi(2)).sqrt();
             if (of_terms - adev).abs() > 0.02 * adev {
                 add(format!("{name}: {adev} at {} s, its terms {of_terms}", point.tau_s));
             }

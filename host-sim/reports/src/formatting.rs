@@ -3,7 +3,7 @@
 use crate::line_breaks::broken;
 use crate::rounding::{NONE, quantity_digits, significant};
 use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
-use noise_analysis::report::assessment::{CoefficientsFrom, Innovations, RecordLength};
+use noise_analysis::report::assessment::{Innovations, RecordLength};
 use noise_analysis::report::{ChannelReport, MissingSamples, ModelErrorReport, ModelReport};
 use std::fmt;
 
@@ -111,15 +111,6 @@ pub fn parameter_name(name: &str) -> String {
 
 /// Smallest p-value of the whiteness test at which innovations are called white.
 const WHITE: f64 = 0.01;
-
-/// Why coefficients are not those by all samples, where a reader would expect it, and which ones a filter takes.
-#[must_use]
-pub fn coefficients_source(from: CoefficientsFrom) -> Option<&'static str> {
-    (from == CoefficientsFrom::OctavesAgainstSamples).then_some(
-        "N, B and K are those that the Allan deviation shows: a fit to all samples does not describe it, because the record has more than \
-         the model, such as noise that changes, a line that wanders or another filter; a navigation filter takes these",
-    )
-}
 
 /// Whether a Kalman filter of the model is consistent: its innovations' variance against the expected one, and their
 /// whiteness.

@@ -1,13 +1,14 @@
 //! Every table of a report as text: at most 100 columns, the same in a terminal and in a file.
 
+use crate::coefficient_notes::coefficient_notes;
 use crate::coefficients::{self, CoefficientRow};
 use crate::curve_numbers::curve_numbers;
 use crate::evidence::{EvidenceText, NumberStyle};
 use crate::explanation;
 use crate::finding_text::FindingText;
 use crate::formatting::{
-    TextTable, capital, coefficients_source, count, duration, filter_consistency, interval, missing_samples, number,
-    optional, parameter_name, percent, recording_advice, words, worst_deviations, wrap,
+    TextTable, capital, count, duration, filter_consistency, interval, missing_samples, number, optional,
+    parameter_name, percent, recording_advice, words, worst_deviations, wrap,
 };
 use crate::rounding::{NONE, Scale, bounded_quantity, parameter_magnitude, probability, quantity_digits, unit};
 use crate::summary;
@@ -71,7 +72,8 @@ pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io:
 fn verdict(report: &Report, out: &mut impl Write) -> io::Result<()> {
     let paragraph = |out: &mut dyn Write, text: &str| writeln!(out, "{}", wrap(text, WIDTH.into()));
     writeln!(out)?;
-    for sentence in summary::record_sentences(report).into_iter().chain(summary::part_notes(report)) {
+    let notes = summary::part_notes(report).into_iter().chain(coefficient_notes(report));
+    for sentence in summary::record_sentences(report).into_iter().chain(notes) {
         paragraph(out, &sentence)?;
     }
     let (found, _) = summary::findings(report);
@@ -225,9 +227,6 @@ fn curve_table(channel: &ChannelReport) -> TextTable {
 fn write_assessment(assessment: &Assessment, out: &mut impl Write) -> io::Result<()> {
     if !assessment.coefficients.is_empty() {
         writeln!(out, "{}", unit_table(&assessment.coefficients))?;
-    }
-    if let Some(text) = coefficients_source(assessment.coefficients_from) {
-        writeln!(out, "{}", wrap(&format!("• {text}."), WIDTH.into()))?;
     }
     if !assessment.drift.is_empty() {
         writeln!(out, "{}", drift_table(&assessment.drift))?;

@@ -3,13 +3,14 @@
 
 mod tables;
 
+use crate::coefficient_notes::coefficient_notes;
 use crate::evidence::{EvidenceText, NumberStyle};
 use crate::explanation;
 use crate::figure::{self, Plot};
 use crate::finding_text::{FindingText, describe};
 use crate::formatting::{
-    capital, coefficients_source, count, filter_consistency, interval, missing_samples, number, parameter_name,
-    recording_advice, words, worst_deviations,
+    capital, count, filter_consistency, interval, missing_samples, number, parameter_name, recording_advice, words,
+    worst_deviations,
 };
 use crate::rounding::{bounded_quantity, probability, unit};
 use crate::summary;
@@ -127,6 +128,7 @@ fn verdict(report: &Report) -> Markup {
             @let conditions = summary::conditions(report);
             @if !conditions.is_empty() { p.faint { "Conditions: " (conditions.join("; ")) "." } }
             (tables::coefficients_of_all(report))
+            @for text in coefficient_notes(report) { p.faint { (text) } }
             @let notes = summary::part_notes(report);
             @if !notes.is_empty() {
                 details { summary { "Clock and filter of the part" } p.faint { (notes.join(" ")) } }
@@ -268,7 +270,6 @@ fn assessment(assessment: &Assessment) -> Markup {
         @if !assessment.coefficients.is_empty() { (tables::units(&assessment.coefficients)) }
         @if !assessment.drift.is_empty() { (tables::drift(&assessment.drift)) }
         ul {
-            @if let Some(text) = coefficients_source(assessment.coefficients_from) { li { (text) "." } }
             @if let Some(innovations) = &assessment.innovations {
                 li { b { "Kalman filter of the model" } ", unseen half: " (filter_consistency(innovations)) "."
                     span.parameter { (count(innovations.count as u64)) " innovations, " (number(innovations.normalised))

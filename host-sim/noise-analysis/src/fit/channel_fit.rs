@@ -17,9 +17,6 @@ use allan_core::trace::{LineCandidates, Residual, Trace, trace, trace_while};
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 use measurement::{ChannelId, SensorProfile};
 
-/// A channel is dithered if its Allan deviation exceeds the limit of the profile at any of the first octaves, this many.
-/// Behind a filter neighbouring samples are correlated, so that the limit is exceeded only at longer averaging times.
-pub(crate) const DITHERED_OCTAVES: usize = 7;
 /// p-value of a model's goodness of fit below which a trace with the lines of the curve itself is tried.
 const POOR_FIT: f64 = 1e-3;
 /// By how much the deviance may rise with the other channels' filter: a correct filter rises by more by chance once in 600

@@ -4,6 +4,7 @@ use crate::OCTAVES;
 use crate::detectors::bias::BiasSensitivity;
 use crate::detectors::block_means::BLOCKS;
 use crate::record::estimators::RecordPart;
+use crate::samples::correlated_rounding::CorrelatedRounding;
 use crate::samples::series::Series;
 use allan_core::Curve;
 use allan_core::regression::{CovarianceCurve, Covariate, CovariateRegression, Sensitivity};
@@ -28,8 +29,10 @@ pub(crate) struct CovariateFit {
     data: RegressionData,
     /// `covariate` of each counts as in [`RegressionData`].
     sensitivities: Vec<Sensitivity>,
-    /// The channel's curve less the share of the covariates.
+    /// The channel's curve less the share of the covariates, and less correlated rounding errors.
     pub curve: Curve<OCTAVES>,
+    /// These.
+    pub rounding: CorrelatedRounding,
 }
 
 impl RegressionData {
@@ -42,7 +45,7 @@ impl RegressionData {
         };
         let pairs = channels.iter().enumerate().flat_map(|(i, &a)| channels[..i].iter().map(move |&b| (a, b)));
         Self {
-            channel: part.curve(channel),
+            channel: part.curve_before_rounding(channel),
             covariates: channels.iter().enumerate().map(covariate).collect(),
             with_channel: channels.iter().map(|&of| part.covariance(channel, of)).collect(),
             mutual: pairs.map(|(a, b)| part.covariance(a, b)).collect(),
@@ -95,7 +98,7 @@ impl CovariateFit {
             }
         }
         let curve = data.regress(|regression| regression.compensated(&sensitivities));
-        Self { data, sensitivities, curve }
+        Self { data, sensitivities, curve, rounding: part.correlated_rounding(channel) }
     }
 
     /// Whether the channel depends on no covariate.

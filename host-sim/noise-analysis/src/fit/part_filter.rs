@@ -249,7 +249,8 @@ mod tests {
         });
         let filters = profile.filters_read_at(rate_hz);
         let models = curves.each_ref().map(|curve| trace(curve, LineCandidates::Spectrum(&[]), &filters).after);
-        let channel = |(curve, model)| FilteredChannel { name: "", curve, model, resolution: 1.0, is_dithered: true };
+        let channel =
+            |(curve, model)| FilteredChannel { name: "", curve, model, white_rounding: 1.0 / 12.0, is_dithered: true };
         let channels: Vec<FilteredChannel> = curves.iter().zip(&models).map(channel).collect();
         estimate(&channels, &profile.filters, CLOCK_HZ / rate_hz)
     }

@@ -98,7 +98,8 @@ impl FirstHalf {
             let ChannelFit { covariates, before, .. } = ChannelFit::fit_baseline(covariates);
             let is_screened = record.record.channels[channel].samples.is_screened;
             let spectrum = record.record.spectrum_within(channel, 0..middle).filter(|_| !is_screened);
-            let samples = SamplesOfCurve { rest: &UniformSeries::from_series(&rest), spectrum: spectrum.as_ref() };
+            let rest = UniformSeries::from_series(&rest).with_correlated_rounding(&covariates.rounding);
+            let samples = SamplesOfCurve { rest: &rest, spectrum: spectrum.as_ref() };
             by_samples(&covariates.curve, &before, samples).unwrap_or(before)
         });
         (Self { part, raw, events }, Epochs { series, channels })
@@ -129,15 +130,20 @@ impl FirstHalf {
         // The model with the added terms, fitted to the whole record, with the errors of `after`.
         let refitted = ModelReport {
             terms: term_reports(fit.after(), unit),
-            adev: with_events(&self.events[channel], &curve, fit.deviations(estimators, channel, &curve)),
+            adev: self.as_recorded(fit, estimators, channel, &curve),
             ..after.clone()
+        };
+        let rounding = estimators.both.correlated_rounding(channel);
+        let point = |point: &AllanPoint| CurvePoint {
+            rounding: rounding.avar(point.n).sqrt(),
+            ..CurvePoint::new(point, curve.samples())
         };
         ChannelReport {
             name: estimators.both.channels[channel].name.to_owned(),
             unit: unit.to_owned(),
             samples: curve.samples(),
             missing: MissingSamples::default(),
-            curve: curve.points().iter().map(|point| CurvePoint::new(point, curve.samples())).collect(),
+            curve: curve.points().iter().map(point).collect(),
             read_off: SlopeMethodReport::from_curve(&curve, unit),
             before: self.before(estimators, channel, &curve, has_rules),
             effects: Vec::new(),
@@ -167,10 +173,11 @@ impl FirstHalf {
         has_rules: bool,
     ) -> ModelReport {
         let model = &self.raw[channel];
-        let error = |part: &RecordPart| ModelErrorReport::new(model, &part.curve(channel));
+        let rounding = estimators.both.correlated_rounding(channel);
+        let error = |part: &RecordPart| ModelErrorReport::new(model, &part.curve_before_rounding(channel));
         ModelReport {
             terms: term_reports(model, estimators.both.channels[channel].unit),
-            adev: whole.points().iter().map(|point| model.avar(point.n).sqrt()).collect(),
+            adev: whole.points().iter().map(|point| (model.avar(point.n) + rounding.avar(point.n)).sqrt()).collect(),
             fitted: error(&estimators.raw[0]),
             unseen: error(&estimators.raw[1]),
             unseen_excluding: has_rules.then(|| error(&estimators.ruled[1])),
@@ -192,19 +199,28 @@ impl FirstHalf {
         let unseen = |part: &RecordPart| fit.covariates.compensated(part, channel);
         ModelReport {
             terms: term_reports(model, estimators.both.channels[channel].unit),
-            adev: with_events(events, whole, fit.deviations(estimators, channel, whole)),
+            adev: self.as_recorded(fit, estimators, channel, whole),
             fitted: ModelErrorReport::new(model, fit.fitted_curve()),
             unseen: ModelErrorReport::with_events(model, events, &unseen(&estimators.raw[1])),
             unseen_excluding: has_rules.then(|| ModelErrorReport::new(model, &unseen(&estimators.ruled[1]))),
             events: events.report(whole.points().iter().map(|point| point.n)),
         }
     }
-}
 
-/// The Allan deviations of a model at the points of the curve of the `whole` record, with the share of the events.
-fn with_events(events: &EventShare, whole: &Curve<OCTAVES>, deviations: Vec<f64>) -> Vec<f64> {
-    let with = |(point, deviation): (&AllanPoint, f64)| (deviation * deviation + events.avar(point.n)).sqrt();
-    if events.is_empty() { deviations } else { whole.points().iter().zip(deviations).map(with).collect() }
+    /// The Allan deviations that the model of `fit` foretells at the points of the curve of the `whole` record: with the shares of the
+    /// covariates, of the events and of correlated rounding errors.
+    fn as_recorded(
+        &self,
+        fit: &ChannelFit,
+        estimators: &RecordEstimators,
+        channel: ChannelId,
+        whole: &Curve<OCTAVES>,
+    ) -> Vec<f64> {
+        let rounding = estimators.both.correlated_rounding(channel);
+        let added = |n: u64| self.events[channel].avar(n) + rounding.avar(n);
+        let with = |(point, deviation): (&AllanPoint, f64)| (deviation * deviation + added(point.n)).sqrt();
+        whole.points().iter().zip(fit.deviations(estimators, channel, whole)).map(with).collect()
+    }
 }
 
 impl Epochs {

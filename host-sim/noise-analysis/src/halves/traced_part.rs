@@ -3,8 +3,9 @@
 
 use crate::detectors::bias::BiasSensitivity;
 use crate::detectors::random_telegraph;
+use crate::distributions::ROUNDING;
 use crate::effects::TelegraphNoise;
-use crate::fit::channel_fit::{ChannelFit, DITHERED_OCTAVES};
+use crate::fit::channel_fit::ChannelFit;
 use crate::fit::contradiction::Contradiction;
 use crate::fit::covariates::CovariateFit;
 use crate::fit::part_filter::{self, FilteredChannel, PartFilter, Unidentified};
@@ -19,6 +20,7 @@ use crate::rivals::signals::SpectrumProposals;
 use crate::rivals::slow_drift::ChannelsInCommon;
 use crate::rivals::table::standing_in_spectrum;
 use crate::rivals::unexplained;
+use crate::samples::correlated_rounding::DITHERED_OCTAVES;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::Welch;
@@ -190,7 +192,8 @@ impl ChannelTrace {
         let faster = &samples.record.channels[channel].faster_lines;
         let (fit, mut lines) =
             fit_with_lines(covariates, own, rest.as_ref(), profile, (samples.record.samples_per_mean, faster));
-        let rest = UniformSeries::from_series(rest.as_ref().unwrap_or(own));
+        let rest =
+            UniformSeries::from_series(rest.as_ref().unwrap_or(own)).with_correlated_rounding(&fit.covariates.rounding);
         let (mut telegraph, mut signals) = (None, Vec::new());
         if samples.seeks_signals {
             let correlation_times: Vec<f64> = fit.correlation_times().collect();
@@ -217,7 +220,7 @@ fn agree_on_filter(part: &PartData, channels: &mut PerChannel<ChannelTrace>) -> 
                 name: curves.channels[channel].name,
                 curve: &fit.covariates.curve,
                 model: fit.after(),
-                resolution,
+                white_rounding: if fit.covariates.rounding.is_none() { ROUNDING * resolution.powi(2) } else { 0.0 },
                 is_dithered: fit.is_dithered(profile, resolution, DITHERED_OCTAVES),
             }
         })

@@ -3,6 +3,7 @@
 use crate::OCTAVES;
 use crate::distributions::quantile;
 use crate::record::sample_curves::SampleCurves;
+use crate::samples::correlated_rounding::CorrelatedRounding;
 use crate::samples::epoch_ranges::epochs;
 use crate::samples::exclusion::Exclusion;
 use crate::samples::gapped_cascade::GappedCascade;
@@ -130,11 +131,12 @@ fn quarter_curves(series: &Series, middle: u64) -> [Curve<OCTAVES>; 2] {
     [curve(series, from..quarter), curve(series, quarter..middle)]
 }
 
-/// The curve of the sample periods `slots`.
+/// The curve of the sample periods `slots`, without correlated rounding errors.
 pub(super) fn curve(series: &Series, slots: Range<u64>) -> Curve<OCTAVES> {
     let position = |slot: u64| series.slots.partition_point(|&of| of < slot);
     let range = position(slots.start)..position(slots.end);
-    GappedCascade::of_series(series, range).curve(series.period_s).scaled(series.resolution)
+    let curve = GappedCascade::of_series(series, range).curve(series.period_s).scaled(series.resolution);
+    CorrelatedRounding::of_curve(&curve, series.resolution).subtracted_from(curve)
 }
 
 /// Logarithms of the variances of some epochs at an averaging factor; `None` where an epoch has too few averages.

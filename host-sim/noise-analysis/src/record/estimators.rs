@@ -9,6 +9,7 @@ use crate::parallel::in_parallel;
 use crate::record::condensed_record::CondensedRecord;
 use crate::record::preprocessing::Preprocessing;
 use crate::record::sample_curves::SampleCurves;
+use crate::samples::correlated_rounding::CorrelatedRounding;
 use crate::samples::exclusion::Exclusion;
 use crate::samples::gapped_cascade::GappedCascade;
 use crate::samples::streamed_curves::STEPS_PER_COUNT;
@@ -292,6 +293,19 @@ impl RecordPart {
     pub(crate) fn curve(&self, channel: ChannelId) -> Curve<OCTAVES> {
         let own = self.estimators.cascade(channel.position()).curve(self.period_s).scaled(self.step_size(channel));
         self.shorter[channel].0.clone().continued_by_means(&own, self.samples_per_mean, self.until)
+    }
+
+    /// Rounding errors of a gyro or accelerometer that are correlated: the noise of the other channels is not traced.
+    pub(crate) fn correlated_rounding(&self, channel: ChannelId) -> CorrelatedRounding {
+        if !self.channels[channel].quantity.is_inertial() {
+            return CorrelatedRounding::default();
+        }
+        CorrelatedRounding::of_curve(&self.curve(channel), self.resolution(channel))
+    }
+
+    /// Allan variances of a channel without correlated rounding errors: what models are fitted to and compared with.
+    pub(crate) fn curve_before_rounding(&self, channel: ChannelId) -> Curve<OCTAVES> {
+        self.correlated_rounding(channel).subtracted_from(self.curve(channel))
     }
 
     /// Samples of a channel that were replaced because they are missing.

@@ -23,8 +23,9 @@ pub(crate) fn fit_with_lines(
 ) -> (ChannelFit, Vec<MergedLine>) {
     let rate_error = profile.sample_rate_error;
     let read_every = if samples_per_mean > 1 { 1 } else { profile.read_every(1.0 / series.period_s) };
+    let rounding = covariates.rounding.clone();
     let find = |series: &Series, known: Option<&Model>| {
-        let mut lines = spectral_lines::find(series, known, rate_error, read_every);
+        let mut lines = spectral_lines::find(series, &rounding, known, rate_error, read_every);
         lines.retain(|line| stands_as_line(&LineClaim { faster, ..LineClaim::new(line, series.period_s) }));
         lines.iter_mut().for_each(|line| line.deviation = before_averaging(line, series.period_s, samples_per_mean));
         lines
@@ -55,14 +56,7 @@ pub(crate) fn fit_with_lines(
     (fit, lines)
 }
 
-/// The least power gain of a filter of the model at `frequency` Hz.
+/// The part of the density of white noise that passes the filter of the model, with what is folded, at `frequency` Hz.
 fn filter_gain(model: &Model, frequency: f64) -> f64 {
-    let gain = |kind: &NoiseTerm| match kind {
-        // The density of the filtered unit white noise is 1 at low frequencies.
-        NoiseTerm::Filtered(filter) if filter.decimation == 1.0 => {
-            kind.process().density(frequency, model.sample_period())
-        }
-        _ => 1.0,
-    };
-    model.terms().iter().map(|term| gain(&term.kind)).fold(1.0, f64::min)
+    model.filter().map_or(1.0, |filter| NoiseTerm::Filtered(filter).process().density(frequency, model.sample_period()))
 }

@@ -35,8 +35,6 @@ pub(crate) enum Origin {
         /// Number of the term.
         number: usize,
         kind: NoiseTerm,
-        /// Lower bound of its coefficient.
-        low: f64,
     },
     /// Two levels in the samples.
     Levels {
@@ -96,8 +94,6 @@ pub(crate) struct ChannelFacts {
     pub is_dithered: bool,
     /// Whether it is at the shortest averaging time.
     pub is_dithered_at_once: bool,
-    /// Length of the impulse response of the model's filter, s.
-    pub filter_length_s: f64,
     /// Change from the first tenth of the samples to the last over the time between them, in the channel's unit per s; `None` where the
     /// samples are not kept.
     pub slope_of_ends: Option<f64>,

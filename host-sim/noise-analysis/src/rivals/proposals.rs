@@ -13,11 +13,12 @@ use crate::effects::{
     SpectrumEvidence, SupplySensitivity, TelegraphEvidence, TelegraphNoise, TemperatureSensitivity, Unexplained,
     UnexplainedPlace,
 };
-use crate::fit::channel_fit::{ChannelFit, DITHERED_OCTAVES};
-use crate::fit::noise_terms::{filter_length_s, is_white, line_frequency};
+use crate::fit::channel_fit::ChannelFit;
+use crate::fit::noise_terms::{is_white, line_frequency};
 use crate::fit::traced_model::Addition;
 use crate::rivals::proposal::{ChannelFacts, Origin, Proposal};
 use crate::rivals::slow_drift::ChannelsInCommon;
+use crate::samples::correlated_rounding::DITHERED_OCTAVES;
 use crate::samples::gapped_cascade::GappedCascade;
 use crate::samples::streamed_curves::STEPS_PER_COUNT;
 use crate::samples::uniform_series::UniformSeries;
@@ -72,13 +73,12 @@ pub(crate) fn propose(profile: &SensorProfile, findings: &ChannelFindings) -> (V
         duration_s: fit.covariates.curve.samples() as f64 * period_s,
         is_dithered: fit.is_dithered(profile, resolution, DITHERED_OCTAVES),
         is_dithered_at_once: fit.is_dithered(profile, resolution, 1),
-        filter_length_s: filter_length_s(fit.after()),
         slope_of_ends: None,
     };
     let mut proposals = sensitivity_proposals(profile, channel, &findings.sensitivities);
     for (number, (term, found)) in fit.traced.added().into_iter().enumerate() {
         let effects = term_effects(profile, findings, &facts, (term, found)).into_iter();
-        let origin = Origin::Term { number, kind: term.kind, low: term.low };
+        let origin = Origin::Term { number, kind: term.kind };
         proposals.extend(effects.map(|effect| Proposal { effect, origin: origin.clone() }));
     }
     let of_levels = |found: &TelegraphNoise| {

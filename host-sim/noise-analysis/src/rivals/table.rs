@@ -19,11 +19,8 @@ use std::f64::consts::{PI, TAU};
 #[cfg(test)]
 mod tests;
 
-/// In a channel that is not dithered, two levels closer than this, in steps of its resolution, are two neighbouring counts, and a
-/// correlated process of no more than their deviation is the rounding error.
+/// In a channel that is not dithered, two levels closer than this, in steps of its resolution, are two neighbouring counts.
 const NEIGHBOURING_COUNTS: f64 = 1.5;
-/// In a channel that is not dithered, the rounding error is correlated over about this many lengths of the filter.
-const ROUNDING_FILTER_LENGTHS: f64 = 20.0;
 /// Farthest that an octave of the curve and the time constant that it may belong to are apart, in octaves: either is known to a factor
 /// of 2.
 const SAME_TIME_OCTAVES: f64 = 2.0;
@@ -116,7 +113,7 @@ const fn row(
 
 /// The rows, in their order.
 #[rustfmt::skip]
-pub static RIVALRIES: [Rivalry; 47] = [
+pub static RIVALRIES: [Rivalry; 44] = [
     // Lines and signals of the spectrum.
     row("line above half the rate of the means", "line of the means", "at its alias, and as wide", "means sample it too slowly",
         Rule::Line(|of| of.faster.iter().any(|faster| is_alias(of.line, faster, of.period_s)))),
@@ -172,21 +169,9 @@ pub static RIVALRIES: [Rivalry; 47] = [
     row("rounding to counts", "every term of the curve but a filter", "not dithered at any short averaging time",
         "without dither the rounding error is no white noise, and the curve shows its steps",
         Rule::Channel(|of| !of.facts.is_dithered && of.kind().is_some_and(|kind| !is_filter(&kind)))),
-    row("rounding to counts", "Markov process of the curve",
-        "below 20 lengths of the filter and below the deviation of 1.5 counts, not dithered at the shortest averaging time",
-        "the rounding error is correlated as the filtered noise is",
-        Rule::Channel(|of| matches!(of.kind(), Some(NoiseTerm::Markov(markov))
-            if markov.time_constant < of.rounding_s() && of.is_below_count()))),
-    row("rounding to counts", "quantization of the angle", "behind a filter, not dithered at the shortest averaging time",
-        "the rounding error falls as that does",
-        Rule::Channel(|of| of.kind() == Some(NoiseTerm::Quantization) && of.rounding_s() > 0.0)),
     row("line of the spectrum", "line of the curve", "within a fifth of the frequency or half the bandwidth",
         "the spectrum resolves it better",
         Rule::Channel(|of| of.line_of_curve().is_some_and(|frequency| of.spectrum_has(frequency)))),
-    row("rounding to counts", "line of the curve",
-        "behind a filter and below the deviation of 1.5 counts, not dithered at the shortest averaging time",
-        "a steady bias between two counts",
-        Rule::Channel(|of| of.line_of_curve().is_some() && of.rounding_s() > 0.0 && of.is_below_count())),
 
     // Several effects of one term of the curve.
     row("unexplained octave of few periods", "line of the curve", "fewer than 8 periods in the record",
@@ -445,18 +430,6 @@ impl<'a> Claim<'a> {
             Effect::TelegraphNoise(of) => Some(of.time_constant_s.value),
             _ => None,
         }
-    }
-
-    /// Whether the term has no larger a deviation than two neighbouring counts.
-    fn is_below_count(&self) -> bool {
-        // Two levels have half their distance as their deviation.
-        let limit = NEIGHBOURING_COUNTS * self.facts.resolution;
-        matches!(self.origin(), Origin::Term { low, .. } if 2.0 * low < limit)
-    }
-
-    /// Time over which the rounding error is correlated, s; 0 where it is white.
-    fn rounding_s(&self) -> f64 {
-        if self.facts.is_dithered_at_once { 0.0 } else { ROUNDING_FILTER_LENGTHS * self.facts.filter_length_s }
     }
 
     /// Telegraph noise of the samples.

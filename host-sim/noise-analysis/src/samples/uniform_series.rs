@@ -1,6 +1,7 @@
 //! A channel sampled at a constant period, with missing samples as `NaN`: the input of transforms and filters.
 
 use crate::distributions::ROUNDING;
+use crate::samples::correlated_rounding::{CorrelatedRounding, Rounding};
 use crate::samples::interpolation::{ALL_NEIGHBOURS, Autocovariance, Neighbours, PartialInterpolation, REACH};
 use crate::samples::series::Series;
 use std::borrow::Cow;
@@ -12,8 +13,8 @@ use std::ops::Range;
 pub struct UniformSeries {
     sample_period: f64,
     values: Vec<f64>,
-    /// One-sided density of the error of rounding the samples that the values are made of, unit²/Hz.
-    rounding_density: f64,
+    /// Of the samples that the values are made of.
+    rounding: Rounding,
     /// Values of the sensor for each of these.
     read_every: u32,
 }
@@ -28,7 +29,7 @@ impl UniformSeries {
     /// `values` taken every `sample_period` seconds; a value that is not finite counts as missing.
     #[must_use]
     pub fn new(sample_period: f64, values: Vec<f64>) -> Self {
-        Self { sample_period, values, rounding_density: 0.0, read_every: 1 }
+        Self { sample_period, values, rounding: Rounding::White(0.0), read_every: 1 }
     }
 
     /// The samples of a channel over the whole span of its record, with a `NaN` for each missing one.
@@ -60,13 +61,17 @@ impl UniformSeries {
     /// The same values, which are known to be rounded to steps of this size.
     pub(crate) fn rounded_to(self, step: f64) -> Self {
         // Rounding to steps of q has the variance q²/12, up to half the sample rate.
-        Self { rounding_density: 2.0 * ROUNDING * self.sample_period * step.powi(2), ..self }
+        Self { rounding: Rounding::White(2.0 * ROUNDING * self.sample_period * step.powi(2)), ..self }
     }
 
-    /// One-sided density of the error of rounding the samples to counts, unit²/Hz, where it acts as white noise; 0 where the
-    /// values are not known to be rounded.
-    pub(crate) fn rounding_density(&self) -> f64 {
-        self.rounding_density
+    /// The same values, of samples whose rounding errors are `correlated`, if there are such.
+    pub(crate) fn with_correlated_rounding(self, correlated: &CorrelatedRounding) -> Self {
+        if correlated.is_none() { self } else { Self { rounding: Rounding::Correlated(correlated.clone()), ..self } }
+    }
+
+    /// The errors of rounding the samples to counts.
+    pub(crate) fn rounding(&self) -> &Rounding {
+        &self.rounding
     }
 
     /// The same values, each of them one of so many of the sensor.
@@ -81,7 +86,7 @@ impl UniformSeries {
 
     /// The series with other values at the same times.
     pub(crate) fn with_values(&self, values: Vec<f64>) -> Self {
-        Self { values, ..*self }
+        Self { values, rounding: self.rounding.clone(), ..*self }
     }
 
     /// Seconds between samples.
@@ -220,7 +225,7 @@ impl UniformSeries {
             sample_period: self.sample_period * size as f64,
             values: self.values.chunks_exact(size).map(average).collect(),
             // An average has less of the error, at a lower rate.
-            rounding_density: self.rounding_density,
+            rounding: self.rounding.clone(),
             read_every: if size > 1 { 1 } else { self.read_every },
         }
     }

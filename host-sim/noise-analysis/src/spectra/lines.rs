@@ -171,7 +171,7 @@ fn slow_sines(mut series: UniformSeries) -> Vec<(Sine, SpectralLine)> {
         }
         let Some(part) = part_left(&series, &sine, slow).filter(|part| part * SLOW_GAIN <= 1.0) else { break };
         let left = part * slow / FEWEST_PERIODS as f64;
-        let ratio = sine.density(&level) / left.max(series.rounding_density());
+        let ratio = sine.density(&level) / left.max(series.rounding().density(sine.frequency));
         // What is left has two degrees of freedom an ordinate, less the sinusoid's and the line's.
         let p_value = part.powi(FEWEST_PERIODS as i32 - 2);
         found.push((sine, sine_line(&sine, series.duration(), ratio, p_value)));

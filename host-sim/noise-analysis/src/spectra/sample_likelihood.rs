@@ -20,6 +20,7 @@ use super::transforms;
 use super::welch::Welch;
 use super::whittle::{Sign, SpectralBand, fit_mixture, fit_mixture_with};
 use crate::distributions::NORMAL_975;
+use crate::samples::correlated_rounding::Rounding;
 use crate::samples::uniform_series::UniformSeries;
 use allan_core::model::FittedTerm;
 use allan_core::term::{MovingAverageFilter, Process};
@@ -140,14 +141,23 @@ impl FilteredNoise {
 /// A band of a spectrum with the mean density of each shape in it.
 type Evidence = Vec<(SpectralBand, Vec<f64>)>;
 
-/// The densities of the noise terms of a model, each for the coefficient 1.
+/// A shape that a spectrum is made of.
+#[derive(Clone, Copy)]
+enum Shape {
+    /// That of a noise term for the coefficient 1.
+    Term(NoiseTerm),
+    /// That of rounding, whose size is known.
+    Rounding,
+}
+
+/// The densities of the noise terms of a model, and of what rounding adds.
 struct Shapes {
     kinds: Vec<NoiseTerm>,
     /// Frequencies of its lines, Hz.
     lines: Vec<f64>,
     filtered: Option<FilteredNoise>,
-    /// Density of rounding, where no term has it.
-    rounding: Option<f64>,
+    /// Rounding errors, where no term has them.
+    rounding: Option<Rounding>,
     /// Seconds between samples, and samples of a mean.
     period: f64,
     samples_per_mean: u64,
@@ -165,13 +175,15 @@ impl Shapes {
         let period = model.sample_period();
         let filtered = model.filter().map(|filter| FilteredNoise::new(filter, period));
         let has_white = kinds().any(|kind| kind == NoiseTerm::AngleRandomWalk);
-        // One-sided there.
-        let rounding = (filtered.is_some() && !has_white).then(|| series.rounding_density() / 2.0);
+        let rounding = match series.rounding() {
+            Rounding::White(density) if filtered.is_none() || has_white || *density == 0.0 => None,
+            rounding => Some(rounding.clone()),
+        };
         Some(Self {
             kinds: kinds().filter(|kind| line_frequency(kind).is_none()).collect(),
             lines: kinds().filter_map(|kind| line_frequency(&kind)).collect(),
             filtered,
-            rounding: rounding.filter(|density| *density > 0.0),
+            rounding,
             period,
             samples_per_mean,
             resolution: 0.5 / series.duration(),
@@ -218,10 +230,10 @@ impl Shapes {
         let lowest = (above / spectrum.resolution()).ceil() as usize;
         let band = |points: &Vec<usize>| {
             let average = spectrum.average(points);
-            let bases = self.terms().map(|kind| {
+            let bases = self.all().map(|shape| {
                 let of_point = |point: &usize| {
                     let at = |(beside, weight): (f64, f64)| {
-                        weight * self.density(&kind, (*point as f64 + beside) * spectrum.resolution())
+                        weight * self.density(shape, (*point as f64 + beside) * spectrum.resolution())
                     };
                     HANN.map(at).iter().sum::<f64>()
                 };
@@ -233,9 +245,9 @@ impl Shapes {
         spectrum.band_points(lowest, is_line).iter().map(band).collect()
     }
 
-    /// The terms, with white noise for that of rounding as the last one.
-    fn terms(&self) -> impl Iterator<Item = NoiseTerm> {
-        self.kinds.iter().copied().chain(self.rounding.map(|_| NoiseTerm::AngleRandomWalk))
+    /// The terms, and rounding as the last shape.
+    fn all(&self) -> impl Iterator<Item = Shape> {
+        self.kinds.iter().copied().map(Shape::Term).chain(self.rounding.as_ref().map(|_| Shape::Rounding))
     }
 
     /// The mean of each in a band of the coefficients of `count` samples.
@@ -246,42 +258,52 @@ impl Shapes {
             let part = (point as f64 + 0.5) / points as f64;
             0.5 + indices.start as f64 + part * indices.len() as f64
         };
-        let mean =
-            |kind: NoiseTerm| (0..points).map(|at| self.at(&kind, order(at), count)).sum::<f64>() / points as f64;
-        self.terms().map(mean).collect()
+        let mean = |shape| (0..points).map(|at| self.at(shape, order(at), count)).sum::<f64>() / points as f64;
+        self.all().map(mean).collect()
     }
 
-    /// That of a term at a coefficient of this order.
-    fn at(&self, kind: &NoiseTerm, order: f64, count: usize) -> f64 {
-        let frequency = order * self.resolution;
-        match (kind, &self.filtered) {
-            (NoiseTerm::Filtered(_), Some(filtered)) if self.samples_per_mean == 1 => filtered.expected(order, count),
-            (NoiseTerm::BiasInstability, _) => self.density_of_means(kind, frequency) * flicker_leakage(order),
-            _ => self.density_of_means(kind, frequency),
+    /// That of a shape at a coefficient of this order.
+    fn at(&self, shape: Shape, order: f64, count: usize) -> f64 {
+        let density = || self.density_of_means(shape, order * self.resolution);
+        match (shape, &self.filtered) {
+            (Shape::Term(NoiseTerm::Filtered(_)), Some(filtered)) if self.samples_per_mean == 1 => {
+                filtered.expected(order, count)
+            }
+            (Shape::Term(NoiseTerm::BiasInstability), _) => density() * flicker_leakage(order),
+            _ => density(),
         }
     }
 
     /// The density of the means: what they let through, with its aliases.
-    fn density_of_means(&self, kind: &NoiseTerm, frequency: f64) -> f64 {
+    fn density_of_means(&self, shape: Shape, frequency: f64) -> f64 {
         let count = self.samples_per_mean as f64;
         let rate = 1.0 / (count * self.period);
         let alias = |order: f64| {
             let frequency = frequency + order * rate;
             let half = PI * frequency * self.period;
             let gain = if half == 0.0 { 1.0 } else { (count * half).sin() / (count * half.sin()) };
-            gain * gain * self.density(kind, frequency)
+            gain * gain * self.density(shape, frequency)
         };
-        match kind {
-            _ if self.samples_per_mean == 1 => self.density(kind, frequency),
+        match shape {
+            _ if self.samples_per_mean == 1 => self.density(shape, frequency),
             // Means of means are means over their whole time.
-            NoiseTerm::BiasInstability => kind.process().density(frequency, 1.0 / rate) * self.gain(frequency),
-            NoiseTerm::AngleRandomWalk => 1.0,
+            Shape::Term(kind @ NoiseTerm::BiasInstability) => {
+                kind.process().density(frequency, 1.0 / rate) * self.gain(frequency)
+            }
+            Shape::Term(NoiseTerm::AngleRandomWalk) => 1.0,
             _ => (0..self.samples_per_mean).map(|order| alias(order as f64)).sum(),
         }
     }
 
     /// The density of the samples.
-    fn density(&self, kind: &NoiseTerm, frequency: f64) -> f64 {
+    fn density(&self, shape: Shape, frequency: f64) -> f64 {
+        let kind = match (shape, &self.rounding) {
+            (Shape::Term(kind), _) => kind,
+            (Shape::Rounding, rounding) => {
+                // One-sided there.
+                return rounding.as_ref().map_or(0.0, |of| of.density(frequency) / 2.0);
+            }
+        };
         let density = kind.process().density(frequency, self.period);
         let passes = kind.passes_filter() || matches!(kind, NoiseTerm::Markov(_));
         if passes { density * self.gain(frequency) } else { density }
@@ -305,11 +327,11 @@ impl Shapes {
     /// `model` with what makes this `evidence` likeliest.
     fn fitted(&self, model: &Model, evidence: Evidence) -> Option<Model> {
         let (bands, bases): (Vec<SpectralBand>, Vec<Vec<f64>>) = evidence.into_iter().unzip();
-        let mut densities = vec![0.0; self.terms().count()];
+        let mut densities = vec![0.0; self.all().count()];
         let mut objective = fit_mixture(&bands, &bases, Sign::NonNegative, &mut densities);
-        let rounding = self.rounding.map(|_| self.kinds.len());
-        if let Some((at, density)) = rounding.zip(self.rounding) {
-            densities[at] = density;
+        let rounding = self.rounding.as_ref().map(|_| self.kinds.len());
+        if let Some(at) = rounding {
+            densities[at] = 1.0;
             objective = fit_mixture_with(&bands, &bases, Sign::NonNegative, &[at], &mut densities);
         }
         let profile = Profile { bands: &bands, bases: &bases, densities: &densities, objective, rounding };

@@ -3,6 +3,7 @@
 //! A line whose frequency wanders leaves many peaks in the spectrum, which are merged into one line.
 
 use crate::bounds::MeasuredValue;
+use crate::samples::correlated_rounding::{CorrelatedRounding, Rounding};
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra;
@@ -88,13 +89,17 @@ pub(crate) fn is_alias(line: &MergedLine, of: &MergedLine, period_s: f64) -> boo
 
 /// The lines of a series, the strongest first, over the background of the model `known`, or without a model over any sum
 /// of white, flicker and random-walk noise. Each sample is one of `read_every` values of the sensor.
-pub(crate) fn find(series: &Series, known: Option<&Model>, rate_error: f64, read_every: u32) -> Vec<MergedLine> {
+pub(crate) fn find(
+    series: &Series,
+    rounding: &CorrelatedRounding,
+    known: Option<&Model>,
+    rate_error: f64,
+    read_every: u32,
+) -> Vec<MergedLine> {
     let duration_s = series.duration_s();
-    let grid = UniformSeries::from_series(series).with_one_of(read_every);
+    let grid = UniformSeries::from_series(series).with_one_of(read_every).with_correlated_rounding(rounding);
     let peaks = match known {
-        Some(model) => {
-            spectra::find_lines_over(&grid, |frequency| background(model, frequency, grid.rounding_density()))
-        }
+        Some(model) => spectra::find_lines_over(&grid, |frequency| background(model, frequency, grid.rounding())),
         None => spectra::find_lines(&grid),
     };
     merged(peaks, duration_s, duration_s, rate_error)
@@ -136,14 +141,15 @@ fn width(peak: &spectra::SpectralLine) -> f64 {
 /// Density of a model's noise without its lines over what of it is white, flicker and random-walk noise: Markov processes are not, and
 /// white noise behind a filter that is read slowly is not folded as that at the samples' own rate. What remains in its nulls is the
 /// rounding to counts, of this one-sided density.
-fn background(model: &Model, frequency: f64, rounding: f64) -> f64 {
+fn background(model: &Model, frequency: f64, rounding: &Rounding) -> f64 {
+    let rounding = 0.5 * rounding.density(frequency);
     let (mut all, mut power_laws) = (0.0, 0.0);
     for FittedTerm { kind, value, .. } in model.terms() {
         let density = value * value * kind.process().density(frequency, model.sample_period());
         let (own, of_power_laws) = match kind {
             NoiseTerm::Sinusoid(_) | NoiseTerm::Resonance(_) => (0.0, 0.0),
             NoiseTerm::Markov(_) => (density, 0.0),
-            kind if is_read_slowly(kind) => (density + 0.5 * rounding, value * value + 0.5 * rounding),
+            kind if is_read_slowly(kind) => (density + rounding, value * value + rounding),
             _ => (density, density),
         };
         (all, power_laws) = (all + own, power_laws + of_power_laws);
@@ -279,6 +285,7 @@ impl MergedLine {
 #[cfg(test)]
 mod tests {
     use super::{find, gain_of_mean};
+    use crate::samples::correlated_rounding::CorrelatedRounding;
     use crate::samples::series::Series;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -300,8 +307,11 @@ mod tests {
 
     #[test]
     fn a_line_that_swells_and_fades_has_sidebands() {
-        let of =
-            |depth: f64| find(&series(depth), None, 0.0, 1).first().map(|line| (line.frequency.value, line.modulation));
+        let of = |depth: f64| {
+            find(&series(depth), &CorrelatedRounding::default(), None, 0.0, 1)
+                .first()
+                .map(|line| (line.frequency.value, line.modulation))
+        };
         let (frequency, modulation) = of(0.5).expect("100 times the noise at its frequency");
         // Frequencies are known to a fraction of the resolution of 0.0025 Hz.
         assert!((frequency - 7.3).abs() < 0.0025, "{frequency}");

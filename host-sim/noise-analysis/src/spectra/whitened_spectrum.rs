@@ -6,6 +6,7 @@ use super::periodogram::{PADDING, Periodogram};
 use super::smooth_shape::{Background, LocalLevel, WINDOW};
 use crate::bounds::MeasuredValue;
 use crate::distributions::mean_ratio_tail;
+use crate::samples::correlated_rounding::Rounding;
 use crate::samples::uniform_series::UniformSeries;
 use std::f64::consts::PI;
 
@@ -50,8 +51,8 @@ pub(super) struct Spectrum {
     read_every: u32,
     /// Independent exponential variables of mean 1 whose mean varies as an ordinate over its density does.
     pub independent: f64,
-    /// Least density of the background: that of the rounding to counts, below which a spectrum shows the rounding itself.
-    pub floor: f64,
+    /// What is the least density of the background: below it a spectrum shows the rounding to counts itself.
+    pub(super) floor: Rounding,
 }
 
 impl Spectrum {
@@ -62,7 +63,7 @@ impl Spectrum {
             sample_period: series.sample_period(),
             read_every: series.read_every(),
             independent: independent_part(series),
-            floor: series.rounding_density(),
+            floor: series.rounding().clone(),
         })
     }
 
@@ -125,19 +126,19 @@ pub(super) struct WhitenedSpectrum<'a> {
     deflation: Vec<f64>,
     /// As those of the [`Spectrum`].
     independent: f64,
-    floor: f64,
+    floor: &'a Rounding,
     looks: f64,
 }
 
 impl<'a> WhitenedSpectrum<'a> {
     /// Removes the `resonances`, except the one with the index `kept`, from the spectrum.
     pub(super) fn new(
-        spectrum: &Spectrum,
+        spectrum: &'a Spectrum,
         known: &'a dyn Fn(f64) -> f64,
         resonances: &[Resonance],
         kept: Option<usize>,
     ) -> Option<Self> {
-        let &Spectrum { ref periodogram, sample_period, read_every, independent, floor } = spectrum;
+        let &Spectrum { ref periodogram, sample_period, read_every, independent, ref floor } = spectrum;
         let looks = periodogram.looks();
         let bin = |at: usize| at as f64 / PADDING as f64;
         let others = resonances.iter().enumerate().filter(|(index, _)| Some(*index) != kept);
@@ -160,6 +161,11 @@ impl<'a> WhitenedSpectrum<'a> {
         let whitened = padded.iter().copied().step_by(PADDING).collect();
         let resolution = periodogram.resolution();
         Some(Self { resolution, background, whitened, padded, deflation, independent, floor, looks })
+    }
+
+    /// Least density of the background at a bin.
+    fn floor_at(&self, bin: f64) -> f64 {
+        self.floor.density(bin * self.resolution)
     }
 
     /// The most significant line, if one is significant.
@@ -200,7 +206,7 @@ impl<'a> WhitenedSpectrum<'a> {
             let sine = Sine::fit_near(series, at as f64 * spacing, spacing);
             let bin = sine.frequency / self.resolution;
             let level = self.background.level(&self.whitened, at / PADDING);
-            let background = (level.value * self.background.shape_at(bin)).max(self.floor);
+            let background = (level.value * self.background.shape_at(bin)).max(self.floor_at(bin));
             let ratio = sine.density(series) * self.deflation[at] / background;
             (ratio, level, sine)
         });
@@ -222,7 +228,8 @@ impl<'a> WhitenedSpectrum<'a> {
             }
             let [left, here, right] = [self.padded[at - 1], self.padded[at], self.padded[at + 1]];
             let is_peak = here >= left && here > right && here > 4.0 * level;
-            if is_peak && here * self.background.shape_at(at as f64 / PADDING as f64) > 4.0 * self.floor {
+            let bin = at as f64 / PADDING as f64;
+            if is_peak && here * self.background.shape_at(bin) > 4.0 * self.floor_at(bin) {
                 peaks.push((here / level, at));
             }
         }
@@ -257,7 +264,7 @@ impl<'a> WhitenedSpectrum<'a> {
             for (offset, values) in [(0, &averages), (size / 2, &shifted)].into_iter().take(size) {
                 for (at, (&value, level)) in values.iter().zip(&levels).enumerate() {
                     let centre = (first + offset + at * size) as f64 + size as f64 / 2.0;
-                    let excess = value / level.value.max(self.floor / self.background.shape_at(centre));
+                    let excess = value / level.value.max(self.floor_at(centre) / self.background.shape_at(centre));
                     let [own, others] = [size as f64, level.ordinates].map(|count| self.independent * count);
                     if excess > 1.0 + LEAST_EXCESS.max(EXAMINED * (1.0 / own + 1.0 / others).sqrt()) {
                         let p_value = trials * mean_ratio_tail(excess, own, others);

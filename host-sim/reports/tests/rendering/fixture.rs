@@ -204,6 +204,7 @@ fn point(octave: u32, scale: f64) -> CurvePoint {
         replaced_percent: 0.0,
         // Within a sixteenth of the record.
         adev_by_spectrum: (16 * n <= SAMPLES).then_some(1.003 * adev),
+        rounding: 0.0,
         accuracy_percent: 100.0 / (2.0 * (SAMPLES as f64 / n as f64 - 1.0)).sqrt(),
     }
 }

@@ -1,7 +1,6 @@
 //! The deviance of the curve of one channel as a function of the filter, and the decimation at which several have the least.
 
 use crate::OCTAVES;
-use crate::distributions::ROUNDING;
 use crate::fit::minimum::golden_section;
 use crate::fit::noise_terms::is_white;
 use crate::fit::octave_covariance::relative_covariance;
@@ -31,8 +30,8 @@ pub(crate) struct FilteredChannel<'a> {
     pub curve: &'a Curve<OCTAVES>,
     /// Its own model, whose terms beside the white noise it keeps.
     pub model: &'a Model,
-    /// Smallest distance of two values, in the channel's unit.
-    pub resolution: f64,
+    /// Variance of the rounding errors in the curve that are white, in the channel's unit squared.
+    pub white_rounding: f64,
     /// Whether rounding adds white noise and nothing else. A channel that is not dithered says nothing of the filter.
     pub is_dithered: bool,
 }
@@ -40,8 +39,7 @@ pub(crate) struct FilteredChannel<'a> {
 /// The curve of a channel without the white noise of its rounding.
 pub(super) fn without_rounding(channel: &FilteredChannel) -> Curve<OCTAVES> {
     let mut curve = channel.curve.clone();
-    let rounding = ROUNDING * channel.resolution * channel.resolution;
-    curve.replace_avar(|point| point.avar - (rounding / point.n as f64).min(MOST_ROUNDING * point.avar));
+    curve.replace_avar(|point| point.avar - (channel.white_rounding / point.n as f64).min(MOST_ROUNDING * point.avar));
     curve
 }
 

@@ -54,7 +54,6 @@ const DITHERED: ChannelFacts = ChannelFacts {
     duration_s: 1000.0,
     is_dithered: true,
     is_dithered_at_once: true,
-    filter_length_s: 0.02,
     slope_of_ends: Some(1.0),
 };
 /// The same with noise that exceeds the resolution at longer averaging times alone: its rounding error is correlated over 0.4 s.
@@ -138,23 +137,19 @@ const IRREVERSIBLE: Refutation = Refutation::Irreversible { time_constant_s: 1.0
 const RARE: Refutation = Refutation::RareDisturbances { time_constant_s: 1.0, kurtosis: [3.0, 0.1] };
 const UNDECIDED: Refutation = Refutation::UndecidedLevels { time_constant_s: 1.0, kurtosis: [0.4, 0.3] };
 
-const fn of_markov(number: usize, time_constant: f64, low: f64) -> Origin {
-    Origin::Term { number, kind: NoiseTerm::Markov(Markov { time_constant }), low }
+const fn of_markov(number: usize, time_constant: f64) -> Origin {
+    Origin::Term { number, kind: NoiseTerm::Markov(Markov { time_constant }) }
 }
 
-const fn of_sinusoid(frequency: f64, low: f64) -> Origin {
-    Origin::Term { number: 0, kind: NoiseTerm::Sinusoid(Sinusoid { frequency }), low }
+const fn of_sinusoid(frequency: f64) -> Origin {
+    Origin::Term { number: 0, kind: NoiseTerm::Sinusoid(Sinusoid { frequency }) }
 }
 
 const fn of_resonance(frequency: f64) -> Origin {
-    Origin::Term {
-        number: 0,
-        kind: NoiseTerm::Resonance(Resonance { frequency, bandwidth: 0.1 * frequency }),
-        low: 0.9,
-    }
+    Origin::Term { number: 0, kind: NoiseTerm::Resonance(Resonance { frequency, bandwidth: 0.1 * frequency }) }
 }
 
-const OF_RAMP: Origin = Origin::Term { number: 0, kind: NoiseTerm::RateRamp, low: 0.9 };
+const OF_RAMP: Origin = Origin::Term { number: 0, kind: NoiseTerm::RateRamp };
 const OF_LINE: Origin = Origin::Line { is_slow: false };
 const OF_LEVELS: Origin = Origin::Levels { is_reversible: true };
 
@@ -244,8 +239,6 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
     let level_change = |explained| -> Effect {
         LevelChange { time_s: known(500.0), ratio: known(2.0), explained, p_value: 1e-9 }.into()
     };
-    let quantization = AngleQuantization { coefficient: size(1.0), evidence: CURVE };
-    let of_quantization = Origin::Term { number: 0, kind: NoiseTerm::Quantization, low: 0.9 };
     let low_pass = FirstOrderFilter { bandwidth_hz: known(1.0), time_constant_s: 0.16, evidence: CURVE };
     let step = LevelStep { time_s: known(500.0), size: size(0.2), p_value: 1e-9 };
     let shown = |channel: usize| Shown { channel, effect: line(0.01), parts: Vec::new() };
@@ -253,9 +246,9 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
     let two_levels = TelegraphNoise { time_constant_s: known(1.0), amplitude: size(1.0), evidence: by_kurtosis };
     let [of_periodic, of_track, of_decays] =
         [Signal::Periodic(periodic()), Signal::Chirp(track()), Signal::Decays(decays())].map(|of| signal(&of));
-    let few_periods = [of(line(0.005), of_sinusoid(0.005, 0.9)), of(refuted_line(0.005, Refutation::FewPeriods), of_sinusoid(0.005, 0.9))];
-    let absent = || [of(line(10.0), of_sinusoid(10.0, 0.9)), of(refuted_line(10.0, not_in_spectrum), of_sinusoid(10.0, 0.9))];
-    let of_term = |number: usize, effect: Effect| of(effect, of_markov(number, 1.0, 0.9));
+    let few_periods = [of(line(0.005), of_sinusoid(0.005)), of(refuted_line(0.005, Refutation::FewPeriods), of_sinusoid(0.005))];
+    let absent = || [of(line(10.0), of_sinusoid(10.0)), of(refuted_line(10.0, not_in_spectrum), of_sinusoid(10.0))];
+    let of_term = |number: usize, effect: Effect| of(effect, of_markov(number, 1.0));
     let narrow = spectral_line(0.3, None, 50.0);
     vec![
         (["line above half the rate of the means", "line of the means"],
@@ -290,11 +283,8 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
         (["rounding to counts", "telegraph noise of the samples"], later(levels(1.0, 1e-3), OF_LEVELS), vec![]),
         (["rounding to counts", "every term of the curve but a filter"],
             Claims::Channel(ChannelFacts { is_dithered: false, ..DITHERED }, vec![of(drift(1.0), OF_RAMP)]), vec![]),
-        (["rounding to counts", "Markov process of the curve"], later(markov(0.1), of_markov(0, 0.1, 5e-4)), vec![]),
-        (["rounding to counts", "quantization of the angle"], later(quantization.into(), of_quantization), vec![]),
         (["line of the spectrum", "line of the curve"],
-            channel([of(line(10.0), of_sinusoid(10.0, 0.9)), of(line(10.5), OF_LINE)]), vec!["sinusoid"]),
-        (["rounding to counts", "line of the curve"], later(line(10.0), of_sinusoid(10.0, 5e-4)), vec![]),
+            channel([of(line(10.0), of_sinusoid(10.0)), of(line(10.5), OF_LINE)]), vec!["sinusoid"]),
         (["unexplained octave of few periods", "line of the curve"], channel(few_periods), vec!["unexplained"]),
         (["harmonic of a line of the spectrum", "line of the curve"],
             channel(absent().into_iter().chain([of(line(3.0), OF_LINE)])), vec!["sinusoid"]),
@@ -373,11 +363,11 @@ fn rows_do_not_reach_beyond_their_conditions() {
     let beyond = [
         [of(motion(0.7), alone), of(levels(1.0, 0.3), OF_LEVELS)],
         [of(motion(0.7), shared), of(levels(1.0, 1.0), OF_LEVELS)],
-        [of(markov(0.05), of_markov(0, 0.05, 0.9)), periodic.clone()],
+        [of(markov(0.05), of_markov(0, 0.05)), periodic.clone()],
         [of(resonance(2.0), of_resonance(2.0)), periodic],
-        [of(markov(5.0), of_markov(0, 5.0, 0.9)), track.clone()],
+        [of(markov(5.0), of_markov(0, 5.0)), track.clone()],
         [of(resonance(12.0), of_resonance(12.0)), track],
-        [of(markov(50.0), of_markov(0, 50.0, 0.9)), decays],
+        [of(markov(50.0), of_markov(0, 50.0)), decays],
         [of(drift(1.9), OF_RAMP), of(sinusoid(10.0, known(1.0)), OF_LINE)],
         [of(spikes(), Origin::Samples), of(levels(2.0, 1.0), OF_LEVELS)],
     ];
