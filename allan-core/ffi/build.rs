@@ -5,9 +5,9 @@ use std::path::PathBuf;
 mod smaller;
 
 fn main() {
-    println!("cargo:rerun-if-changed=src/cascade_24_8.rs");
-    println!("cargo:rerun-if-changed=smaller.rs");
-    let larger = std::fs::read_to_string("src/cascade_24_8.rs").expect("src/cascade_24_8.rs");
+    println!("cargo:rerun-if-changed=build.rs");
+    // Found beside this file, whichever package it builds.
+    let larger = include_str!("src/cascade_24_8.rs");
     let folder = PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-    std::fs::write(folder.join("cascade_20_4.rs"), smaller::smaller(&larger)).expect("room");
+    std::fs::write(folder.join("cascade_20_4.rs"), smaller::smaller(larger)).expect("room");
 }

@@ -1,10 +1,9 @@
 //! The measured curve.
 
-use crate::model::allan_power_law;
 use crate::status::allan_status::{self, *};
 use crate::status::{contained, status};
 use crate::storage::{Object, initialise, object, object_mut, store};
-use allan_core::Curve;
+use allan_core::{Curve, PowerLaw};
 
 /// The curve of both types of estimator.
 pub(crate) struct Points;
@@ -32,6 +31,19 @@ impl Object for This {
     const MARK: u64 = u64::from_le_bytes(*b"allancrv");
 }
 
+/// The noise that dominates around an averaging time.
+#[repr(C)]
+pub enum allan_power_law {
+    /** Variance proportional to 1/tau^2. */
+    ALLAN_QUANTIZATION_NOISE = 0,
+    /** Variance proportional to 1/tau. */
+    ALLAN_WHITE_NOISE = 1,
+    /** Constant variance. */
+    ALLAN_FLICKER_NOISE = 2,
+    /** Variance proportional to tau. */
+    ALLAN_RANDOM_WALK_NOISE = 3,
+}
+
 /// One averaging time of a curve.
 #[repr(C)]
 pub struct allan_point {
@@ -55,6 +67,17 @@ pub struct allan_point {
     pub kurtosis: f64,
     /// The noise that dominates.
     pub power_law: allan_power_law,
+}
+
+impl From<PowerLaw> for allan_power_law {
+    fn from(law: PowerLaw) -> Self {
+        match law {
+            PowerLaw::Quantization => Self::ALLAN_QUANTIZATION_NOISE,
+            PowerLaw::White => Self::ALLAN_WHITE_NOISE,
+            PowerLaw::Flicker => Self::ALLAN_FLICKER_NOISE,
+            PowerLaw::RandomWalk => Self::ALLAN_RANDOM_WALK_NOISE,
+        }
+    }
 }
 
 /// The curve in `memory`, which is empty at first.

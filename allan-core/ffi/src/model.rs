@@ -7,24 +7,11 @@ use crate::storage::{elements, object_ref, store};
 use allan_core::fit::{fit, fit_power_laws, fit_shapes, goodness};
 use allan_core::model::{FittedTerm, MAX_TERMS};
 use allan_core::term::{Markov, MovingAverageFilter, Resonance, Sinusoid};
-use allan_core::{Model, NoiseTerm, PowerLaw};
+use allan_core::{Model, NoiseTerm};
 
 /// Largest number of terms of a model.
 pub const ALLAN_MAX_TERMS: usize = 8;
 const _: () = assert!(ALLAN_MAX_TERMS == MAX_TERMS);
-
-/// The noise that dominates around an averaging time.
-#[repr(C)]
-pub enum allan_power_law {
-    /** Variance proportional to 1/tau^2. */
-    ALLAN_QUANTIZATION_NOISE = 0,
-    /** Variance proportional to 1/tau. */
-    ALLAN_WHITE_NOISE = 1,
-    /** Constant variance. */
-    ALLAN_FLICKER_NOISE = 2,
-    /** Variance proportional to tau. */
-    ALLAN_RANDOM_WALK_NOISE = 3,
-}
 
 /// Kinds of terms, with the unit of their coefficient in terms of the unit of the samples.
 #[repr(C)]
@@ -83,17 +70,6 @@ pub struct allan_model {
     pub count: usize,
     /// The terms, of which the first `count` are set.
     pub terms: [allan_term; 8],
-}
-
-impl From<PowerLaw> for allan_power_law {
-    fn from(law: PowerLaw) -> Self {
-        match law {
-            PowerLaw::Quantization => Self::ALLAN_QUANTIZATION_NOISE,
-            PowerLaw::White => Self::ALLAN_WHITE_NOISE,
-            PowerLaw::Flicker => Self::ALLAN_FLICKER_NOISE,
-            PowerLaw::RandomWalk => Self::ALLAN_RANDOM_WALK_NOISE,
-        }
-    }
 }
 
 impl allan_term {

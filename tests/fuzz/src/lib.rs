@@ -1,6 +1,7 @@
 //! What reads bytes that someone else has written, each as a function of these bytes that has to return: it panics where a promise is
 //! broken. `tests/corpus.rs` calls them with the bytes that are kept in `corpus`; the example `fuzz` has libFuzzer look for others.
 
+mod c_interface;
 mod device;
 mod driver;
 mod files;
@@ -11,7 +12,7 @@ mod state;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 7] = [
+pub const TARGETS: [Target; 8] = [
     ("driver", driver::answers_of_the_bus),
     ("recording", files::recording),
     ("report", files::report),
@@ -19,4 +20,5 @@ pub const TARGETS: [Target; 7] = [
     ("state", state::estimators),
     ("settings", state::settings),
     ("commands", device::commands),
+    ("c_interface", c_interface::calls),
 ];

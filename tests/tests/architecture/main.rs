@@ -40,7 +40,8 @@ const MAY_DEPEND_ON: &[(&str, &str)] = &[
     ("host-sim", "adis16405-driver link measurement noise-analysis recordings reports simulation"),
     ("system-tests", ""),
     ("driver-footprint", "adis16405-driver allan-core"),
-    ("fuzz", "adis16405-driver allan-core firmware link measurement recordings reports simulation virtual-sensor"),
+    ("allan-core-c", "allan-core"),
+    ("fuzz", "adis16405-driver allan-core allan-core-c firmware link measurement recordings reports simulation virtual-sensor"),
     ("instruction-counts", "adis16405-driver allan-core"),
     ("peers-accuracy", "allan-core noise-analysis virtual-sensor"),
 ];
