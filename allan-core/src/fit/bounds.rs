@@ -244,3 +244,35 @@ impl<T: TermSet> Candidates<'_, '_, T> {
         scatter.map_or(f32::NAN, |scatter| value + scatter.quantile::<T>(upper))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Curve;
+    use crate::term::{AllTerms, NoiseTerm};
+
+    /// White noise of variance 1 at 1 Hz, measured with 20 and 100 degrees of freedom, whose 2.5 % quantiles of χ² are 9.591 and 74.22
+    /// (Abramowitz and Stegun, table 26.8). A random walk of K = 1 has the Allan variance (2n² + 1)/6n: 1/2 and 3/4.
+    #[test]
+    fn no_amount_is_larger_than_the_upper_bound_of_a_point() {
+        let curve = Curve::<4>::from_points(1.0, 1000, 4, &[(1, 1.0), (2, 0.5)]).expect("a curve");
+        let mut points = Points::empty((&curve).into());
+        points.fill::<AllTerms>();
+        let mut problem = Problem::<AllTerms>::empty();
+        problem.set_terms(&points, &[NoiseTerm::AngleRandomWalk, NoiseTerm::RateRandomWalk]);
+        let of_point = |avar: f64, edf: f64, quantile: f64, share: f64| avar * edf / quantile / share;
+        for (edf, expected) in
+            [([20.0, 100.0], of_point(0.5, 100.0, 74.22, 0.75)), ([100.0, 20.0], of_point(0.5, 20.0, 9.591, 0.75))]
+        {
+            points.measured.iter_mut().zip(edf).for_each(|(point, edf)| point.edf = edf);
+            let square = f64::from(largest(&points, &problem, 1)) * problem.units[1];
+            assert!((square / expected - 1.0).abs() < 0.005, "{square}, {expected}");
+        }
+        // That of the shorter time is the smaller one.
+        points.measured.truncate(1);
+        let square = f64::from(largest(&points, &problem, 1)) * problem.units[1];
+        assert!((square / of_point(1.0, 100.0, 74.22, 0.5) - 1.0).abs() < 0.005, "{square}");
+        points.measured.clear();
+        assert_eq!(largest(&points, &problem, 1), 0.0, "without a point");
+    }
+}

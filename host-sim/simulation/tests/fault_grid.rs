@@ -8,11 +8,14 @@ use rand_chacha::ChaCha8Rng;
 use simulation::LineFault::{self, *};
 use simulation::{Device, RandomFault, SampleAudit};
 use statrs::distribution::{ContinuousCDF, Normal};
-use virtual_sensor::{NoiseModel, VirtualAdis16405};
+use virtual_sensor::{DiagnosisFlag, NoiseModel, VirtualAdis16405};
 
 const RATE_HZ: f64 = 204.8;
 /// Bits of a temperature; the other words have 14.
 const TEMPERATURE: (u8, i32) = (10, 12);
+/// Bursts after a start that hold something of what was before: two of the filter, which has one tap, and those of 6.2 ms, in which the
+/// poles of 330 Hz settle.
+const SETTLING: u64 = 2 + 2;
 
 fn device(seed: u64) -> Device {
     // Flicker noise of longer times is hidden by the random walk.
@@ -29,19 +32,25 @@ struct Run {
     audit: SampleAudit,
     longest_gap_s: f64,
     recoveries: u32,
+    /// Bursts in which the error flag is set.
+    marked: u32,
     restarts: u32,
     channels: Vec<ChannelMessage>,
 }
 
 /// A device with the fault for `seconds`, then without it for three, and its report. In the third all samples are used.
 fn run(fault: Option<RandomFault>, seconds: f64, seed: u64) -> Run {
-    let mut device = device(seed);
+    run_with(device(seed), seconds, |device, is_on| device.faults().random = if is_on { fault.clone() } else { None })
+}
+
+/// The same of anything that is switched on and off.
+fn run_with(mut device: Device, seconds: f64, switch: impl Fn(&mut Device, bool)) -> Run {
     device.press(b"i0\r");
     run_until(&mut device, 10.0); // the sensor settles, and the gate learns the noise
     device.take_audit();
-    device.faults().random = fault;
+    switch(&mut device, true);
     run_until(&mut device, seconds);
-    device.faults().random = None;
+    switch(&mut device, false);
     run_until(&mut device, seconds + 2.0);
     let audit = device.take_audit();
     let longest_gap_s = audit.longest_gap_us(device.bus().part().now() / 1000) as f64 * 1e-6;
@@ -51,17 +60,17 @@ fn run(fault: Option<RandomFault>, seconds: f64, seed: u64) -> Run {
     assert_eq!((after.wrong, after.needless), (0, 0));
     device.press(b"r");
     let mut decoder = Decoder::new();
-    let (mut channels, mut recoveries) = (Vec::new(), 0);
+    let (mut channels, mut recoveries, mut marked) = (Vec::new(), 0, 0);
     let sent = run_until(&mut device, seconds + 4.0);
     for message in sent.into_iter().filter_map(|byte| decoder.push(byte)).filter_map(Received::message) {
         match message {
             Message::Channel(channel) => channels.push(channel),
-            Message::Health(health) => recoveries = health.recoveries,
+            Message::Health(health) => (recoveries, marked) = (health.recoveries, health.marked),
             _ => {}
         }
     }
     assert_eq!(channels.len(), 8);
-    Run { audit, longest_gap_s, recoveries, restarts: device.restarts(), channels }
+    Run { audit, longest_gap_s, recoveries, marked, restarts: device.restarts(), channels }
 }
 
 /// The largest shifts of N, B and K of gyros and accelerometers against the same sensor without the fault, in half-widths of their
@@ -189,6 +198,80 @@ fn sixteen_minutes_with_each_fault() {
 #[ignore = "long: 150 simulated hours take minutes; run with --long"]
 fn an_hour_with_each_fault() {
     grid(&cells(&[1e-7, 1e-6, 1e-5, 1e-4], &[1e-5, 1e-4, 1e-3, 1e-2]), 3, 3_600.0);
+}
+
+/// What lasts and falsifies no word: flags of DIAG_STAT that are set again with every sample, of a weak supply, an overload, a flash memory and
+/// a self-test that failed; a sensor without power or in reset for a second; a USB port whose host does not read. All but those two
+/// last for 110 s.
+#[test]
+fn states_that_last_cost_no_sample_that_there_is() {
+    fn hold(device: &mut Device, flag: DiagnosisFlag, is_on: bool) {
+        device.bus().part_mut().hold_flag(flag, is_on);
+    }
+    type Switch = fn(&mut Device, bool);
+    const UNREAD: &str = "host does not read";
+    const STATES: [(&str, f64, Switch); 8] = [
+        ("nothing", 120.0, |_, _| {}),
+        ("supply low flag", 120.0, |device, is_on| hold(device, DiagnosisFlag::SupplyLow, is_on)),
+        ("over-range flag", 120.0, |device, is_on| hold(device, DiagnosisFlag::OverRange, is_on)),
+        ("flash checksum flag", 120.0, |device, is_on| hold(device, DiagnosisFlag::FlashChecksum, is_on)),
+        ("self-test flag", 120.0, |device, is_on| hold(device, DiagnosisFlag::SelfTest, is_on)),
+        ("sensor without power", 11.1, |device, is_on| {
+            if is_on {
+                run_until(device, 10.1); // the gap has a beginning
+                device.bus().part_mut().power_off();
+            } else {
+                device.bus().part_mut().power_on();
+            }
+        }),
+        ("sensor held in reset", 11.1, |device, is_on| {
+            if is_on {
+                run_until(device, 10.1);
+            }
+            device.bus().part_mut().drive_reset(!is_on);
+        }),
+        (UNREAD, 120.0, |_, _| {}),
+    ];
+    let runs: Vec<Run> = std::thread::scope(|scope| {
+        let start = |&(name, end_s, switch): &(&'static str, f64, Switch)| {
+            scope.spawn(move || {
+                let device = device(1);
+                run_with(if name == UNREAD { device.with_unread_usb() } else { device }, end_s, switch)
+            })
+        };
+        let threads: Vec<_> = STATES.iter().map(start).collect();
+        threads.into_iter().map(|thread| thread.join().expect("no panic")).collect()
+    });
+    println!(
+        "state                     words  marked  wrong  used  refused right  longest gap  losses  shift of N       B       K"
+    );
+    for ((name, end_s, _), run) in STATES.iter().zip(&runs) {
+        let (audit, stops) = (&run.audit, *end_s < 12.0);
+        // A sensor that starts again has another noise, and a run of 15 s another curve.
+        let shift = if stops { [0.0; 3] } else { shifts(run, &runs[0]) };
+        println!(
+            "{name:<22} {:8}  {:6}  {:5}  {:4}  {:13}  {:9.3} s  {:6}  {:10.2}  {:6.2}  {:6.2}",
+            audit.words,
+            run.marked,
+            audit.wrong,
+            audit.undetected,
+            audit.needless,
+            run.longest_gap_s,
+            run.recoveries,
+            shift[0],
+            shift[1],
+            shift[2]
+        );
+        // Each sample has the flag, also those between two reads of DIAG_STAT.
+        assert_eq!(run.marked > 20_000, name.ends_with("flag"), "{name}: {} marked", run.marked);
+        assert_eq!((run.restarts, audit.undetected), (0, 0), "{name}: {audit:?}");
+        // The first bursts after a start are refused: the channels settle.
+        assert!(audit.needless <= if stops { 8 * SETTLING } else { 0 }, "{name}: {audit:?}");
+        assert!(shift.iter().all(|shift| shift.abs() < 0.01), "{name}: {shift:?}");
+        // Start-up and configuration take 0.3 s, and the first steps of recovery 2 s.
+        let longest_s = if stops { 1.0 + 2.5 } else { 0.1 };
+        assert!(run.longest_gap_s < longest_s, "{name}: {} s", run.longest_gap_s);
+    }
 }
 
 /// Bytes of the serial port that are lost, or inverted in a bit. A byte between two frames belongs to both: each costs two messages at
