@@ -28,7 +28,6 @@ STEPS=(
     "python:the Python module and its tests"
     "build:build for the tests"
     "tests:tests, the images in emulators among them"
-    "fuzz:search for bytes that break a promise"
 )
 case "${1-}" in
     "") chosen=() ;;
@@ -68,7 +67,6 @@ tools() {
         rustup component list --installed | grep -q "^$component" || run rustup component add "$component"
     done
     local packages=()
-    command -v c++ >/dev/null || packages+=(g++)
     command -v qemu-system-arm >/dev/null || packages+=(qemu-system-arm)
     command -v chromium >/dev/null || packages+=(chromium fonts-dejavu-core)
     command -v sigrok-cli >/dev/null || packages+=(sigrok-cli)
@@ -154,11 +152,6 @@ tests() {
     bound_tests
     host test --no-fail-fast -- "${chosen[@]}" 2>&1 | tee -a "$log"
     sed -n 's/: .* ADIS_RECORDINGS names$//p' "$SKIPPED_TESTS" | sort -u >"$WITHOUT_RECORDINGS"
-}
-fuzz() { # each target for ten seconds, with --long for ten minutes
-    local seconds=10
-    case " ${chosen[*]-} " in *" --include-ignored "*) seconds=600 ;; esac
-    run ./tests/fuzz.sh "$seconds"
 }
 recordings() {
     bound_tests

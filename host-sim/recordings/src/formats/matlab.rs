@@ -76,7 +76,7 @@ impl Matrix4 {
             is_plausible.then_some(Self {
                 is_big_endian,
                 scalar: Some(scalar).filter(|_| own % 10 == 0),
-                bytes: u64::from(rows) * u64::from(columns) * scalar.bytes() as u64,
+                bytes: (u64::from(rows) * u64::from(columns)).checked_mul(scalar.bytes() as u64)?,
                 sides: [rows as usize, columns as usize],
                 is_complex: imaginary == 1,
                 name_bytes: u64::from(name_bytes),
