@@ -29,15 +29,20 @@ const INTERNAL_RATE_HZ: f64 = 819.2;
 const RESOLUTION: f64 = 0.05;
 /// N in °/√s, B in °/s and K in °/s/√s of the published characterisation (docs/paper.md).
 const COEFFICIENTS: [f64; 3] = [0.0368, 0.0093, 0.0013];
-/// Taps of each of the two averages, and which of the values are read.
-const TAPS: [usize; 5] = [1, 4, 8, 16, 64];
-const READ_EVERY: [usize; 4] = [1, 2, 4, 9];
+/// Taps of each of the two averages.
+pub const TAPS: [usize; 5] = [1, 4, 8, 16, 64];
+/// Which of the values are read.
+pub const READ_EVERY: [usize; 4] = [1, 2, 4, 9];
 /// The channels of a record.
 const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
 
 /// Which records to simulate.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct FilteredNoisePlan {
+    /// Taps of each of the two averages, 1 or more.
+    pub taps: Vec<usize>,
+    /// Which of the values are read: 1 for every one, 2 for every second.
+    pub every: Vec<usize>,
     /// Records of each filter and reading, of three gyros each. The same noises are behind all of the filters.
     pub records: u64,
     /// Length of a record, s.
@@ -53,12 +58,12 @@ impl FilteredNoisePlan {
     #[must_use]
     pub fn run(&self, progress: impl Fn(usize, usize) + Sync) -> FilteredNoiseTable {
         let seeds = self.first_seed..self.first_seed + self.records;
-        let items: Vec<(u64, usize)> = seeds.flat_map(|seed| TAPS.map(|taps| (seed, taps))).collect();
+        let items: Vec<(u64, usize)> = seeds.flat_map(|seed| self.taps.iter().map(move |taps| (seed, *taps))).collect();
         let work = |&(seed, taps): &(u64, usize)| Ok::<_, Infallible>(self.record(seed, taps));
         let Ok(results) = parallel::map(&items, self.jobs, work, progress);
         let mut cells: BTreeMap<(usize, usize), Vec<FilteredChannel>> = BTreeMap::new();
         for ((_, taps), readings) in items.iter().zip(results) {
-            for (every, channels) in READ_EVERY.into_iter().zip(readings) {
+            for (every, channels) in self.every.iter().copied().zip(readings) {
                 cells.entry((*taps, every)).or_default().extend(channels);
             }
         }
@@ -75,7 +80,7 @@ impl FilteredNoisePlan {
             moving_average(&moving_average(&noise, taps), taps)
         };
         let filtered: Vec<Vec<f64>> = (0..GYROS.len()).map(filtered).collect();
-        let read = |every: usize| {
+        let read = |&every: &usize| {
             let report = analyze(&measurement(&filtered, every));
             let truth = truth(taps, every);
             let of = |&name: &&'static str| {
@@ -84,7 +89,7 @@ impl FilteredNoisePlan {
             };
             GYROS.iter().filter_map(of).collect()
         };
-        READ_EVERY.map(read).into()
+        self.every.iter().map(read).collect()
     }
 }
 
@@ -216,7 +221,8 @@ mod tests {
 
     #[test]
     fn a_small_run_has_every_cell_and_its_intervals_hold_for_the_default_filter() {
-        let plan = FilteredNoisePlan { records: 1, seconds: 60.0, first_seed: 3, jobs: 2 };
+        let (taps, every) = (TAPS.to_vec(), READ_EVERY.to_vec());
+        let plan = FilteredNoisePlan { taps, every, records: 1, seconds: 60.0, first_seed: 3, jobs: 2 };
         let table = plan.run(|_, _| ());
         assert_eq!(table.cells.len(), TAPS.len() * READ_EVERY.len());
         assert!(table.cells.iter().all(|cell| cell.channels.len() == GYROS.len()));

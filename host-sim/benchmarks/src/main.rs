@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 use benchmarks::contradictions::ContradictionPlan;
-use benchmarks::filtered_noise::FilteredNoisePlan;
+use benchmarks::filtered_noise::{FilteredNoisePlan, READ_EVERY, TAPS};
 use benchmarks::losses::LossPlan;
 use benchmarks::reproduction::Reproduction;
 use benchmarks::undeclared::{EffectKind, MeasuredNoisePlan, NoiseRecording, SEEDS_PER_GROUP, UndeclaredPlan};
@@ -125,6 +125,12 @@ struct ContradictionArguments {
 
 #[derive(Debug, Args)]
 struct FilterArguments {
+    /// Taps of each of the two averages.
+    #[arg(long, value_delimiter = ',', default_values_t = TAPS, value_parser = in_filter)]
+    taps: Vec<usize>,
+    /// Which of the values are read: 1 for every one, 2 for every second.
+    #[arg(long, value_delimiter = ',', default_values_t = READ_EVERY, value_parser = in_filter)]
+    every: Vec<usize>,
     /// Records of three gyros behind each filter.
     #[arg(long, default_value_t = 300, value_parser = value_parser!(u64).range(1..=MOST_RECORDINGS))]
     records: u64,
@@ -178,6 +184,14 @@ fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
         _ => Err("not a number above 0".to_owned()),
+    }
+}
+
+/// Taps of an average of the filter or a distance of the values that are read, as the table of the models allows.
+fn in_filter(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(value @ 1..=128) => Ok(value),
+        _ => Err("not a whole number from 1 to 128".to_owned()),
     }
 }
 
@@ -247,8 +261,8 @@ fn run(Cli { benchmark, json }: Cli) -> Result<()> {
             bar.finish_and_clear();
             conclude(&table, json, |out| table.write(out))
         }
-        Benchmark::Filters(FilterArguments { records, seconds, seed, jobs }) => {
-            let plan = FilteredNoisePlan { records, seconds, first_seed: seed, jobs: threads(jobs) };
+        Benchmark::Filters(FilterArguments { taps, every, records, seconds, seed, jobs }) => {
+            let plan = FilteredNoisePlan { taps, every, records, seconds, first_seed: seed, jobs: threads(jobs) };
             let table = plan.run(progress);
             bar.finish_and_clear();
             conclude(&table, json, |out| table.write(out))
