@@ -1,11 +1,11 @@
 //! Samples on a time base: the series of a channel, with and without gaps, and the estimators that are fed with them.
 
-pub(crate) mod correlated_rounding;
 pub(crate) mod epoch_ranges;
 pub(crate) mod exclusion;
 pub(crate) mod gapped_cascade;
 pub(crate) mod interpolation;
 pub(crate) mod neighbouring_gaps;
+pub(crate) mod rounding;
 pub mod series;
 pub(crate) mod streamed_curves;
 pub mod uniform_series;

@@ -12,7 +12,7 @@
 //!               ├► frequency_track                       a line whose frequency runs
 //!               ├► decaying_disturbances                 disturbances that begin at once and decay
 //!               ├► cosine_spectrum                       a Markov process that the curve does not tell from a walk
-//!               ├► sample_likelihood                     the coefficients of a model by all samples
+//!               ├► SampleSpectrum ─► sample_likelihood   the coefficients of a model by all samples
 //!               ├► Welch ─► white_noise                  N, independent of the Allan variance
 //!               │        ├► equation_5                   the Allan deviation, by equation (5) of the paper
 //!               │        └► SpectralShape                a smooth curve through the spectrum
@@ -26,6 +26,7 @@ pub(crate) mod cosine_spectrum;
 pub(crate) mod decaying_disturbances;
 pub(crate) mod epoch_spectra;
 mod equation_5;
+mod filtered_noise;
 pub(crate) mod frequency_track;
 mod line_envelope;
 mod line_models;
@@ -34,6 +35,7 @@ mod markov_spectrum;
 pub(crate) mod periodic_signal;
 mod periodogram;
 mod sample_likelihood;
+mod sample_spectrum;
 mod slow_background;
 mod smooth_shape;
 pub(crate) mod spectral_lines;
@@ -50,7 +52,8 @@ pub use line_envelope::Modulation;
 pub use lines::find_lines;
 pub(crate) use lines::{find_lines_over, without_sines, without_slow_sines};
 pub(crate) use markov_spectrum::MarkovEstimate;
-pub use sample_likelihood::{fit_to_means, fit_to_samples};
+pub(crate) use sample_likelihood::SpectrumBehindFilter;
+pub use sample_spectrum::SampleSpectrum;
 pub use smooth_shape::SpectralShape;
 pub use welch::Welch;
 pub use white_noise::{FilterSpectrum, KnownShapes, WhiteNoiseFit, fit_white_noise};

@@ -39,9 +39,15 @@ fn value(model: &ModelReport, kind: &str) -> Option<Parameter> {
     model.terms.iter().find(|term| term.kind() == kind).map(TermReport::coefficient)
 }
 
-/// N of a model, behind its filter or not.
+/// N of a model: the white noise behind its filter and that which entered after it.
 fn angle_random_walk(model: &ModelReport) -> Option<Parameter> {
-    value(model, "filter_bandwidth").or_else(|| value(model, "angle_random_walk"))
+    let both = |a: Parameter, b: Parameter| Parameter {
+        value: a.value.hypot(b.value),
+        low: a.low.hypot(b.low),
+        high: a.high.hypot(b.high),
+        ..a
+    };
+    ["filter_bandwidth", "angle_random_walk"].iter().filter_map(|kind| value(model, kind)).reduce(both)
 }
 
 /// Allan variance of a term at the averaging time `tau_s` by its formula in IEEE Std 952, for the terms of [`POWERS`].
@@ -217,11 +223,11 @@ fn terms_in_findings(channel: &ChannelReport, add: &mut impl FnMut(String)) {
         };
         let is_told = match term.kind() {
             "sinusoid" | "resonance" => effects().any(|effect| {
-                // Octaves tell a frequency to some tenths. A wave that is no sinusoid has lines at multiples of its frequency.
+                // Octaves tell a frequency to some tenths. A vibration has lines at multiples of its frequency, the lowest of which the
+                // spectrum lists alone.
                 frequency(effect).zip(of_term).is_some_and(|(of, frequency)| {
                     let multiple = (frequency / of).round().max(1.0);
-                    let is_wave = effect.name() == "square_wave" || effect.parameters().contains_key("harmonics");
-                    (frequency / of / if is_wave { multiple } else { 1.0 }).ln().abs() < 0.25
+                    (frequency / of / multiple).ln().abs() < 0.25
                 }) || is_octave(effect)
             }),
             // Terms of the curve that a detector in the samples or in several channels names.

@@ -46,8 +46,7 @@ pub(crate) fn sentence(note: &PartNote) -> String {
             other_taps.iter().map(u16::to_string).collect::<Vec<_>>().join(" or ")
         ),
         PartNote::Contradicted { channel, decimation } => format!(
-            "{} alone would have its filter read every {} values, farther from the common figure than chance explains: the bounds of \
-             that are wider for it.",
+            "{} alone would have its filter read every {} values, farther from the common figure than chance explains.",
             capital(&names(&[*channel])),
             significant(*decimation, 4)
         ),

@@ -4,7 +4,7 @@ use crate::OCTAVES;
 use crate::detectors::bias::BiasSensitivity;
 use crate::detectors::block_means::BLOCKS;
 use crate::record::estimators::RecordPart;
-use crate::samples::correlated_rounding::CorrelatedRounding;
+use crate::samples::rounding::Rounding;
 use crate::samples::series::Series;
 use allan_core::Curve;
 use allan_core::regression::{CovarianceCurve, Covariate, CovariateRegression, Sensitivity};
@@ -15,7 +15,9 @@ const BLOCK_DEGREES_OF_FREEDOM: f64 = BLOCKS as f64;
 
 /// The curves of a channel and of its covariates in one part of a recording, and their covariances.
 struct RegressionData {
+    /// Without correlated rounding errors.
     channel: Curve<OCTAVES>,
+    rounding: Rounding,
     /// The covariates.
     channels: Vec<ChannelId>,
     covariates: Vec<Covariate<OCTAVES>>,
@@ -31,8 +33,6 @@ pub(crate) struct CovariateFit {
     sensitivities: Vec<Sensitivity>,
     /// The channel's curve less the share of the covariates, and less correlated rounding errors.
     pub curve: Curve<OCTAVES>,
-    /// These.
-    pub rounding: CorrelatedRounding,
 }
 
 impl RegressionData {
@@ -44,8 +44,10 @@ impl RegressionData {
             None => Covariate::new(&part.curve(of), part.resolution(of), part.coupled_from()),
         };
         let pairs = channels.iter().enumerate().flat_map(|(i, &a)| channels[..i].iter().map(move |&b| (a, b)));
+        let rounding = part.rounding(channel);
         Self {
-            channel: part.curve_before_rounding(channel),
+            channel: rounding.subtracted_from(part.curve(channel)),
+            rounding,
             covariates: channels.iter().enumerate().map(covariate).collect(),
             with_channel: channels.iter().map(|&of| part.covariance(channel, of)).collect(),
             mutual: pairs.map(|(a, b)| part.covariance(a, b)).collect(),
@@ -98,7 +100,12 @@ impl CovariateFit {
             }
         }
         let curve = data.regress(|regression| regression.compensated(&sensitivities));
-        Self { data, sensitivities, curve, rounding: part.correlated_rounding(channel) }
+        Self { data, sensitivities, curve }
+    }
+
+    /// The rounding errors of the channel's samples.
+    pub(crate) fn rounding(&self) -> &Rounding {
+        &self.data.rounding
     }
 
     /// Whether the channel depends on no covariate.

@@ -26,6 +26,15 @@ pub(crate) fn line_frequency(kind: &NoiseTerm) -> Option<f64> {
     }
 }
 
+/// Frequencies of the sinusoids among `kinds`, Hz.
+pub(crate) fn sinusoids<'a>(kinds: impl Iterator<Item = &'a NoiseTerm>) -> Vec<f64> {
+    let frequency = |kind: &NoiseTerm| match kind {
+        NoiseTerm::Sinusoid(line) => Some(line.frequency),
+        _ => None,
+    };
+    kinds.filter_map(frequency).collect()
+}
+
 /// Length of the impulse response of the longest filter in a model, s.
 pub(crate) fn filter_length_s(model: &Model) -> f64 {
     let length = |kind: &NoiseTerm| match kind {

@@ -9,8 +9,13 @@
 //! one of them, and differences between these that say nothing of the filter. Its deviances are divided by its smallest one per
 //! degree of freedom, as those of overdispersed observations are (P. McCullagh and J. Nelder, "Generalized Linear Models",
 //! chapter 9).
+//!
+//! Where the samples are kept, their likelihood chooses among the filters that the curves allow, and finds the decimation.
 
 mod channel_deviance;
+mod decimation;
+mod hypothesis;
+mod joint_samples;
 mod screen;
 
 pub(crate) use channel_deviance::FilteredChannel;
@@ -21,15 +26,11 @@ use crate::effects::findings::SIGNIFICANCE;
 use crate::parallel;
 use allan_core::Curve;
 use allan_core::term::MovingAverageFilter;
-use channel_deviance::{
-    ChannelDeviance, LEAST_DECIMATION, SEARCH_STEPS, decimations, longest_decimation, slowest_deviance,
-    without_rounding,
-};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
-use std::collections::BTreeSet;
+use channel_deviance::{ChannelDeviance, without_rounding};
+use decimation::{decimations, slowest};
+use hypothesis::{BOUNDED, Hypothesis, Identified, birge_ratio, chi_squared_quantile, simplest};
+use joint_samples::AllowedFilter;
 
-/// Rise of a deviance at the 95 % bounds of one parameter: the 95 % quantile of χ² with one degree of freedom.
-const RISE_AT_BOUNDS: f64 = 3.841_458_820_694_124;
 /// From so many channels on, at least half of them must show a filter.
 const CHANNELS_FOR_MAJORITY: usize = 3;
 
@@ -87,9 +88,9 @@ pub(crate) fn estimate(
         dithered.iter().map(|(channel, curve)| ChannelDeviance::new(channel, curve)).collect();
     parallel::for_each(&mut joint, |channel| channel.fit_alone(filters));
     let unfiltered: Vec<f64> = joint.iter_mut().map(|channel| channel.unfiltered()).collect();
-    let tried = filters.iter().flat_map(|&filter| [Some(filter), slowest_deviance(&mut joint, filter)]).flatten();
-    let tried: Vec<Hypothesis> =
-        tried.collect::<Vec<_>>().into_iter().map(|filter| Hypothesis::new(&mut joint, filter)).collect();
+    let filters = filters.iter().flat_map(|&filter| [Some(filter), slowest(filter, |read| total(&mut joint, read))]);
+    let filters: Vec<MovingAverageFilter> = filters.flatten().collect();
+    let tried: Vec<Hypothesis> = filters.into_iter().map(|filter| hypothesis(&mut joint, filter)).collect();
     let Some(best) = tried.iter().min_by(|a, b| a.total().total_cmp(&b.total())) else {
         return Err(Unidentified::NotCorrelated);
     };
@@ -114,40 +115,52 @@ pub(crate) fn estimate(
     // The curve knows the length of the filter in samples, taps over decimation, far better than each of the two.
     let scatter = scatters.iter().sum::<f64>() / scatters.len() as f64;
     // Where the channels differ among themselves by more than chance, a common filter is known so much less.
-    let of_best = contradictions(&mut joint, best, &scatters, &shown);
-    let disagreement = birge_ratio(&of_best.rises);
-    let is_as_good = |of: &&Hypothesis| of.total() - best.total() <= RISE_AT_BOUNDS * scatter * disagreement;
-    let from_nominal = |of: &&Hypothesis| (of.filter.decimation / nominal_decimation).ln().abs();
-    let as_good: Vec<&Hypothesis> = tried.iter().filter(is_as_good).collect();
-    // The simpler of two that fit alike: every value recorded.
-    let own_rate = as_good.iter().copied().filter(|of| of.filter.decimation == 1.0);
-    let own_rate = own_rate.min_by(|a, b| a.total().total_cmp(&b.total()));
-    let slow = as_good.iter().copied().min_by(|a, b| from_nominal(a).total_cmp(&from_nominal(b)));
-    let chosen = own_rate.or(slow).unwrap_or(best);
-    let filter = chosen.filter;
-    let others: BTreeSet<u16> = as_good.iter().map(|of| of.filter.taps).filter(|taps| *taps != filter.taps).collect();
-    let other_taps = others.into_iter().collect();
-    let is_best = filter == best.filter;
-    let contradicting = if is_best { of_best } else { contradictions(&mut joint, chosen, &scatters, &shown) };
-    let decimation = bounds(&mut joint, filter, &contradicting.rises, scatter);
-    let contradicting = contradicting.channels;
+    let scatter = scatter * birge_ratio(&contradictions(&mut joint, best, &scatters, &shown).rises);
+    let showing_channels = dithered.iter().zip(&shown).filter(|(_, shown)| **shown).map(|((channel, _), _)| *channel);
+    let showing_channels: Vec<&FilteredChannel> = showing_channels.collect();
+    let (least, nominal) = (best.total(), nominal_decimation);
+    // The samples know more of each filter that the curves allow, as far as they do.
+    let by_samples =
+        joint_samples::identified(&showing_channels, &allowed(&mut joint, &tried, (least, scatter)), nominal);
+    let identified = by_samples.or_else(|| by_curves(&mut joint, &tried, (least, scatter), nominal));
+    let Some(Identified { filter, decimation, other_taps }) = identified else {
+        return Err(Unidentified::NotCorrelated);
+    };
+    let common = hypothesis(&mut joint, filter);
+    let contradicting = contradictions(&mut joint, &common, &scatters, &shown).channels;
     Ok(PartFilter { filter, decimation, shown: (showing, joint.len()), contradicting, other_taps })
 }
 
-/// A filter and the deviance of each channel with it.
-struct Hypothesis {
-    filter: MovingAverageFilter,
-    deviances: Vec<f64>,
+/// Those of `tried` whose deviance is above `least`, in units of its `scatter`, by no more than chance, with the decimations of which that
+/// holds.
+fn allowed(joint: &mut [ChannelDeviance], tried: &[Hypothesis], (least, scatter): (f64, f64)) -> Vec<AllowedFilter> {
+    let limit = least + scatter * chi_squared_quantile(1.0 - SIGNIFICANCE, 1.0);
+    let filters = tried.iter().filter(|of| of.total() <= limit).map(|of| of.filter);
+    filters.map(|filter| (filter, decimation::allowed(filter, limit, |read| total(joint, read)))).collect()
 }
 
-impl Hypothesis {
-    fn new(joint: &mut [ChannelDeviance], filter: MovingAverageFilter) -> Self {
-        Self { filter, deviances: joint.iter_mut().map(|channel| channel.deviance(filter)).collect() }
-    }
+/// The simplest of `tried` that is as good as the one with the deviance `least`, with the bounds of its decimation.
+fn by_curves(
+    joint: &mut [ChannelDeviance],
+    tried: &[Hypothesis],
+    (least, scatter): (f64, f64),
+    nominal_decimation: f64,
+) -> Option<Identified> {
+    let rise = scatter * chi_squared_quantile(BOUNDED, 1.0);
+    let (chosen, other_taps) = simplest(tried, least + rise, nominal_decimation)?;
+    let Hypothesis { filter, .. } = tried[chosen];
+    let bounds = decimation::allowed(filter, tried[chosen].total() + rise, |read| total(joint, read));
+    Some(Identified::new(filter, bounds, other_taps))
+}
 
-    fn total(&self) -> f64 {
-        self.deviances.iter().sum()
-    }
+/// A filter with the deviances of all channels.
+fn hypothesis(joint: &mut [ChannelDeviance], filter: MovingAverageFilter) -> Hypothesis {
+    Hypothesis { filter, deviances: joint.iter_mut().map(|channel| channel.deviance(filter)).collect() }
+}
+
+/// Sum of the deviances of all channels.
+fn total(joint: &mut [ChannelDeviance], filter: MovingAverageFilter) -> f64 {
+    joint.iter_mut().map(|channel| channel.deviance(filter)).sum()
 }
 
 /// How the channels differ from the common filter.
@@ -184,104 +197,109 @@ fn contradictions(
     found
 }
 
-/// By how much the channels differ among themselves: the sum of the `rises` of their deviances over its expectation, at least 1
-/// (R. Birge, Phys. Rev. 40, 1932).
-fn birge_ratio(rises: &[f64]) -> f64 {
-    (rises.iter().sum::<f64>() / (rises.len() as f64 - 1.0).max(1.0)).max(1.0)
-}
-
-/// 95 % bounds of the common decimation by its profile likelihood: where the sum of the deviances rises by 3.84 times its
-/// scatter. If the channels differ among themselves by more than chance, so much wider.
-fn bounds(joint: &mut [ChannelDeviance], filter: MovingAverageFilter, rises: &[f64], scatter: f64) -> BoundedEstimate {
-    let value = filter.decimation;
-    if value == 1.0 {
-        return BoundedEstimate { value, low: value, high: value };
-    }
-    let birge = birge_ratio(rises);
-    let mut total = |decimation: f64| -> f64 {
-        let read = MovingAverageFilter { decimation, ..filter };
-        joint.iter_mut().map(|channel| channel.deviance(read)).sum()
-    };
-    let limit = total(value) + RISE_AT_BOUNDS * scatter * birge;
-    let mut bound = |outside: f64| {
-        let (mut inside, mut outside) = (value.ln(), outside.ln());
-        if total(outside.exp()) <= limit {
-            return outside.exp();
-        }
-        for _ in 0..SEARCH_STEPS {
-            let middle = 0.5 * (inside + outside);
-            if total(middle.exp()) > limit { outside = middle } else { inside = middle }
-        }
-        (0.5 * (inside + outside)).exp()
-    };
-    let longest = longest_decimation(filter);
-    BoundedEstimate { value, low: bound(LEAST_DECIMATION.min(value)), high: bound(longest.max(value)) }
-}
-
-fn chi_squared_quantile(probability: f64, degrees_of_freedom: f64) -> f64 {
-    // Both arguments are constants of this file in the range of the distribution.
-    ChiSquared::new(degrees_of_freedom).map_or(f64::INFINITY, |of| of.inverse_cdf(probability))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::OVERLAP;
+    use crate::fit::sample_coefficients::SamplesOfCurve;
+    use crate::samples::rounding::Rounding;
+    use crate::samples::uniform_series::UniformSeries;
     use crate::simulated_part::{RecordedChannel, read};
     use allan_core::Cascade;
     use allan_core::trace::{LineCandidates, trace};
 
     const CLOCK_HZ: f64 = 819.2;
 
+    /// What the filter is estimated from.
+    #[derive(Debug, Clone, Copy)]
+    enum Evidence {
+        Curves,
+        Samples,
+    }
+
     /// Three channels of a part with a Bartlett window of `taps` values, read at `rate_hz`: with 2.5, 5 and 20 counts, so that
     /// rounding is 1.3 % of the variance of the first and nothing in the last. 2¹⁷ samples.
-    fn estimated(taps: usize, rate_hz: f64, seed: u64) -> Result<PartFilter, Unidentified> {
+    fn estimated(taps: usize, rate_hz: f64, seed: u64, evidence: Evidence) -> Result<PartFilter, Unidentified> {
         let profile = measurement::adis16405::profile(0.05);
-        let curves = [2.5, 5.0, 20.0].map(|deviation| {
-            let decimation = CLOCK_HZ / rate_hz;
+        let (period, decimation) = (1.0 / rate_hz, CLOCK_HZ / rate_hz);
+        let recorded = [2.5, 5.0, 20.0].map(|deviation| {
             // The filter takes the variance of a sample down by about its length in samples.
             let deviation = deviation * (1.0_f64).max(1.5 * taps as f64 / decimation).sqrt();
             let seed = 1_000 * seed + deviation.to_bits() % 997;
+            read(&RecordedChannel { taps, decimation, deviation, samples: 1 << 17, seed })
+        });
+        let curves = recorded.each_ref().map(|counts| {
             let mut cascade = Cascade::<OCTAVES, OVERLAP>::new();
-            let channel = RecordedChannel { taps, decimation, deviation, samples: 1 << 17, seed };
-            read(&channel).into_iter().for_each(|count| cascade.push(count));
-            cascade.curve(1.0 / rate_hz)
+            counts.iter().for_each(|count| cascade.push(*count));
+            cascade.curve(period)
+        });
+        let series = recorded.each_ref().map(|counts| {
+            let values = counts.iter().map(|count| f64::from(*count)).collect();
+            UniformSeries::new(period, values).with_rounding(Rounding::white(1.0, period))
         });
         let filters = profile.filters_read_at(rate_hz);
         let models = curves.each_ref().map(|curve| trace(curve, LineCandidates::Spectrum(&[]), &filters).after);
-        let channel =
-            |(curve, model)| FilteredChannel { name: "", curve, model, white_rounding: 1.0 / 12.0, is_dithered: true };
-        let channels: Vec<FilteredChannel> = curves.iter().zip(&models).map(channel).collect();
-        estimate(&channels, &profile.filters, CLOCK_HZ / rate_hz)
+        let channel = |((curve, model), rest)| FilteredChannel {
+            name: "",
+            curve,
+            model,
+            white_rounding: 1.0 / 12.0,
+            is_dithered: true,
+            samples: match evidence {
+                Evidence::Curves => None,
+                Evidence::Samples => Some((SamplesOfCurve { rest, spectrum: None }, Vec::new())),
+            },
+        };
+        let channels: Vec<FilteredChannel> = curves.iter().zip(&models).zip(&series).map(channel).collect();
+        estimate(&channels, &profile.filters, decimation)
     }
 
-    /// 819.2 Hz read at odd rates, with filters that reach over one to many samples. Of 20 intervals of 95 %, 19 ± 1 hold; at three
-    /// standard deviations less 16.
-    #[test]
-    fn joint_intervals_hold_the_true_decimation() {
-        let mut held = 0;
-        let parts = [(8, 91.8), (8, 100.0), (16, 137.0), (16, 211.3), (64, 100.0)];
+    /// Estimates the decimation of each of `parts` (taps, rate in Hz) for four seeds. Of 20 intervals of 95 %, 19 ± 1 hold; at three
+    /// standard deviations less 16. Returns their widths as parts of the decimations.
+    fn held_intervals(parts: [(usize, f64); 5], evidence: Evidence) -> Vec<f64> {
+        let (mut held, mut widths) = (0, Vec::new());
         for (taps, rate_hz) in parts {
             for seed in 1..=4 {
-                let found = estimated(taps, rate_hz, seed).expect("a filter");
+                let found = estimated(taps, rate_hz, seed, evidence).expect("a filter");
                 let truth = CLOCK_HZ / rate_hz;
                 assert_eq!(usize::from(found.filter.taps), taps, "read at {rate_hz} Hz: {found:?}");
                 assert!(found.contradicting.is_empty(), "read at {rate_hz} Hz: {found:?}");
                 let BoundedEstimate { value, low, high } = found.decimation;
                 println!("{taps} taps, {truth:.4}: {value:.4} [{low:.4}, {high:.4}]");
-                // Known well enough to be of use.
-                assert!(high - low < 0.05 * value, "{found:?}");
+                widths.push((high - low) / value);
                 held += usize::from((low..=high).contains(&truth));
             }
         }
-        assert!(held >= 16, "{held} of 20");
+        assert!(held >= 16, "{held} of 20 by {evidence:?}");
+        widths
+    }
+
+    /// 819.2 Hz read at odd rates, with filters that reach over one to many samples.
+    #[test]
+    fn joint_intervals_hold_the_true_decimation() {
+        let parts = [(8, 91.8), (8, 100.0), (16, 137.0), (16, 211.3), (64, 100.0)];
+        let by_curves = held_intervals(parts, Evidence::Curves);
+        // Known well enough to be of use.
+        assert!(by_curves.iter().all(|width| *width < 0.05), "{by_curves:?}");
+        let by_samples = held_intervals(parts, Evidence::Samples);
+        let narrower = by_curves.iter().zip(&by_samples).filter(|(curves, samples)| samples < curves).count();
+        assert!(narrower >= 18, "{by_curves:?}, {by_samples:?}");
+    }
+
+    /// A reader that counts the values of the part reads every second or ninth, and the phase between their clocks stays.
+    #[test]
+    fn joint_intervals_hold_whole_decimations() {
+        let parts = [(8, 2.0), (16, 2.0), (16, 4.0), (16, 9.0), (64, 9.0)];
+        held_intervals(parts.map(|(taps, every)| (taps, CLOCK_HZ / every)), Evidence::Samples);
     }
 
     #[test]
     fn a_filter_whose_every_value_is_recorded_is_told_from_one_that_is_read_slowly() {
         for taps in [2, 4, 16] {
-            let found = estimated(taps, CLOCK_HZ, 7).expect("a filter");
-            assert_eq!((usize::from(found.filter.taps), found.filter.decimation), (taps, 1.0), "{found:?}");
+            for evidence in [Evidence::Curves, Evidence::Samples] {
+                let found = estimated(taps, CLOCK_HZ, 7, evidence).expect("a filter");
+                assert_eq!((usize::from(found.filter.taps), found.filter.decimation), (taps, 1.0), "{found:?}");
+            }
         }
     }
 
@@ -289,8 +307,8 @@ mod tests {
     #[test]
     fn white_noise_identifies_no_filter() {
         for seed in 1..=4 {
-            assert_eq!(estimated(1, CLOCK_HZ, seed), Err(Unidentified::NotCorrelated));
-            assert_eq!(estimated(4, 91.8, seed), Err(Unidentified::NotCorrelated));
+            assert_eq!(estimated(1, CLOCK_HZ, seed, Evidence::Samples), Err(Unidentified::NotCorrelated));
+            assert_eq!(estimated(4, 91.8, seed, Evidence::Samples), Err(Unidentified::NotCorrelated));
         }
         assert_eq!(estimate(&[], &[], 1.0), Err(Unidentified::NotDithered));
     }

@@ -1,8 +1,9 @@
 //! Coefficients by all samples in place of those by the curve, where the curve does not contradict them.
 
 use crate::OCTAVES;
+use crate::fit::noise_terms::sinusoids;
 use crate::samples::uniform_series::UniformSeries;
-use crate::spectra::{Welch, fit_to_means, fit_to_samples};
+use crate::spectra::{SampleSpectrum, Welch};
 use allan_core::fit::goodness;
 use allan_core::{Curve, Model};
 use serde::Serialize;
@@ -34,20 +35,29 @@ pub(crate) struct SamplesOfCurve<'a> {
     pub spectrum: Option<&'a Welch>,
 }
 
+impl SamplesOfCurve<'_> {
+    /// Their spectrum without lines at these frequencies in Hz; `None` where too few of the samples of `curve` are kept.
+    pub(crate) fn spectrum(&self, curve: &Curve<OCTAVES>, lines: &[f64]) -> Option<SampleSpectrum> {
+        let Self { rest, spectrum } = self;
+        let samples_per_mean = (rest.sample_period() / curve.sample_period()).round();
+        let samples = rest.present() as f64 * samples_per_mean;
+        match spectrum {
+            _ if samples < (1.0 - SAME_DURATION) * curve.samples() as f64 => None,
+            None if samples_per_mean > 1.0 => None,
+            None => SampleSpectrum::of_samples(rest, lines),
+            Some(spectrum) => SampleSpectrum::of_means(rest, samples_per_mean as u64, spectrum, lines),
+        }
+    }
+}
+
 /// `model`, fitted to `curve`, with the coefficients and the bounds by its samples; otherwise what those of `model` are from.
 pub(crate) fn by_samples(
     curve: &Curve<OCTAVES>,
     model: &Model,
-    SamplesOfCurve { rest, spectrum }: SamplesOfCurve,
+    samples: SamplesOfCurve,
 ) -> Result<Model, CoefficientsFrom> {
-    let samples_per_mean = (rest.sample_period() / curve.sample_period()).round();
-    let samples = rest.present() as f64 * samples_per_mean;
-    let fitted = match spectrum {
-        _ if samples < (1.0 - SAME_DURATION) * curve.samples() as f64 => None,
-        None if samples_per_mean > 1.0 => None,
-        None => fit_to_samples(rest, model),
-        Some(spectrum) => fit_to_means(rest, samples_per_mean as u64, spectrum, model),
-    };
+    let lines = sinusoids(model.terms().iter().map(|term| &term.kind));
+    let fitted = samples.spectrum(curve, &lines).and_then(|spectrum| spectrum.fitted(model));
     let by_samples = fitted.ok_or(CoefficientsFrom::Octaves)?;
     let is_described = goodness(curve, &by_samples).p_value >= DESCRIBES;
     if is_described { Ok(by_samples) } else { Err(CoefficientsFrom::OctavesAgainstSamples) }

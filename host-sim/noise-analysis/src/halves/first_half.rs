@@ -16,6 +16,7 @@ use crate::report::{
     term_reports,
 };
 use crate::samples::exclusion::Exclusion;
+use crate::samples::rounding::Rounding;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use allan_core::{AllanPoint, Curve, Model};
@@ -98,7 +99,7 @@ impl FirstHalf {
             let ChannelFit { covariates, before, .. } = ChannelFit::fit_baseline(covariates);
             let is_screened = record.record.channels[channel].samples.is_screened;
             let spectrum = record.record.spectrum_within(channel, 0..middle).filter(|_| !is_screened);
-            let rest = UniformSeries::from_series(&rest).with_correlated_rounding(&covariates.rounding);
+            let rest = UniformSeries::from_series(&rest).with_rounding(covariates.rounding().clone());
             let samples = SamplesOfCurve { rest: &rest, spectrum: spectrum.as_ref() };
             by_samples(&covariates.curve, &before, samples).unwrap_or(before)
         });
@@ -126,16 +127,16 @@ impl FirstHalf {
         let baseline = &self.part.channels[channel].fit.before;
         let curve = estimators.measured[channel].clone();
         let curve = curve.with_confidence(|point| baseline.variance_fractions(point.n));
-        let after = self.after(estimators, channel, &curve, has_rules);
+        let rounding = estimators.both.rounding(channel);
+        let after = self.after(estimators, channel, (&curve, &rounding), has_rules);
         // The model with the added terms, fitted to the whole record, with the errors of `after`.
         let refitted = ModelReport {
             terms: term_reports(fit.after(), unit),
-            adev: self.as_recorded(fit, estimators, channel, &curve),
+            adev: self.as_recorded(fit, estimators, channel, (&curve, &rounding)),
             ..after.clone()
         };
-        let rounding = estimators.both.correlated_rounding(channel);
         let point = |point: &AllanPoint| CurvePoint {
-            rounding: rounding.avar(point.n).sqrt(),
+            rounding: rounding.correlated_avar(point.n).sqrt(),
             ..CurvePoint::new(point, curve.samples())
         };
         ChannelReport {
@@ -145,7 +146,7 @@ impl FirstHalf {
             missing: MissingSamples::default(),
             curve: curve.points().iter().map(point).collect(),
             read_off: SlopeMethodReport::from_curve(&curve, unit),
-            before: self.before(estimators, channel, &curve, has_rules),
+            before: self.before(estimators, channel, (&curve, &rounding), has_rules),
             effects: Vec::new(),
             first_half_curve: self.curve_error(estimators, channel),
             after,
@@ -169,15 +170,15 @@ impl FirstHalf {
         &self,
         estimators: &RecordEstimators,
         channel: ChannelId,
-        whole: &Curve<OCTAVES>,
+        (whole, rounding): (&Curve<OCTAVES>, &Rounding),
         has_rules: bool,
     ) -> ModelReport {
         let model = &self.raw[channel];
-        let rounding = estimators.both.correlated_rounding(channel);
+        let with_rounding = |point: &AllanPoint| (model.avar(point.n) + rounding.correlated_avar(point.n)).sqrt();
         let error = |part: &RecordPart| ModelErrorReport::new(model, &part.curve_before_rounding(channel));
         ModelReport {
             terms: term_reports(model, estimators.both.channels[channel].unit),
-            adev: whole.points().iter().map(|point| (model.avar(point.n) + rounding.avar(point.n)).sqrt()).collect(),
+            adev: whole.points().iter().map(with_rounding).collect(),
             fitted: error(&estimators.raw[0]),
             unseen: error(&estimators.raw[1]),
             unseen_excluding: has_rules.then(|| error(&estimators.ruled[1])),
@@ -190,7 +191,7 @@ impl FirstHalf {
         &self,
         estimators: &RecordEstimators,
         channel: ChannelId,
-        whole: &Curve<OCTAVES>,
+        (whole, rounding): (&Curve<OCTAVES>, &Rounding),
         has_rules: bool,
     ) -> ModelReport {
         let fit = &self.part.channels[channel].fit;
@@ -199,7 +200,7 @@ impl FirstHalf {
         let unseen = |part: &RecordPart| fit.covariates.compensated(part, channel);
         ModelReport {
             terms: term_reports(model, estimators.both.channels[channel].unit),
-            adev: self.as_recorded(fit, estimators, channel, whole),
+            adev: self.as_recorded(fit, estimators, channel, (whole, rounding)),
             fitted: ModelErrorReport::new(model, fit.fitted_curve()),
             unseen: ModelErrorReport::with_events(model, events, &unseen(&estimators.raw[1])),
             unseen_excluding: has_rules.then(|| ModelErrorReport::new(model, &unseen(&estimators.ruled[1]))),
@@ -214,10 +215,9 @@ impl FirstHalf {
         fit: &ChannelFit,
         estimators: &RecordEstimators,
         channel: ChannelId,
-        whole: &Curve<OCTAVES>,
+        (whole, rounding): (&Curve<OCTAVES>, &Rounding),
     ) -> Vec<f64> {
-        let rounding = estimators.both.correlated_rounding(channel);
-        let added = |n: u64| self.events[channel].avar(n) + rounding.avar(n);
+        let added = |n: u64| self.events[channel].avar(n) + rounding.correlated_avar(n);
         let with = |(point, deviation): (&AllanPoint, f64)| (deviation * deviation + added(point.n)).sqrt();
         whole.points().iter().zip(fit.deviations(estimators, channel, whole)).map(with).collect()
     }

@@ -3,7 +3,6 @@
 
 use crate::detectors::bias::BiasSensitivity;
 use crate::detectors::random_telegraph;
-use crate::distributions::ROUNDING;
 use crate::effects::TelegraphNoise;
 use crate::fit::channel_fit::ChannelFit;
 use crate::fit::contradiction::Contradiction;
@@ -20,7 +19,7 @@ use crate::rivals::signals::SpectrumProposals;
 use crate::rivals::slow_drift::ChannelsInCommon;
 use crate::rivals::table::standing_in_spectrum;
 use crate::rivals::unexplained;
-use crate::samples::correlated_rounding::DITHERED_OCTAVES;
+use crate::samples::rounding::DITHERED_OCTAVES;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::Welch;
@@ -124,8 +123,7 @@ impl TracedPart {
     pub(crate) fn take_coefficients_of_samples(&mut self) {
         let of = |channel: ChannelId| {
             let trace = &self.channels[channel];
-            let samples = |rest| SamplesOfCurve { rest, spectrum: trace.spectrum.as_ref() };
-            trace.rest.as_ref().map(|rest| trace.fit.by_samples(samples(rest)))
+            trace.samples().map(|samples| trace.fit.by_samples(samples))
         };
         let models = per_channel(self.channels.ids(), of);
         for (trace, models) in self.channels.iter_mut().zip(models) {
@@ -176,6 +174,11 @@ impl ChannelTrace {
         }
     }
 
+    /// The samples of the curve; `None` where they were not used.
+    fn samples(&self) -> Option<SamplesOfCurve<'_>> {
+        self.rest.as_ref().map(|rest| SamplesOfCurve { rest, spectrum: self.spectrum.as_ref() })
+    }
+
     fn without_samples(fit: ChannelFit) -> Self {
         Self { fit, lines: Vec::new(), rest: None, telegraph: None, signals: Vec::new(), slowest: None, spectrum: None }
     }
@@ -192,8 +195,8 @@ impl ChannelTrace {
         let faster = &samples.record.channels[channel].faster_lines;
         let (fit, mut lines) =
             fit_with_lines(covariates, own, rest.as_ref(), profile, (samples.record.samples_per_mean, faster));
-        let rest =
-            UniformSeries::from_series(rest.as_ref().unwrap_or(own)).with_correlated_rounding(&fit.covariates.rounding);
+        let rest = UniformSeries::from_series(rest.as_ref().unwrap_or(own));
+        let rest = rest.with_rounding(fit.covariates.rounding().clone());
         let (mut telegraph, mut signals) = (None, Vec::new());
         if samples.seeks_signals {
             let correlation_times: Vec<f64> = fit.correlation_times().collect();
@@ -215,13 +218,17 @@ fn agree_on_filter(part: &PartData, channels: &mut PerChannel<ChannelTrace>) -> 
     let filtered: Vec<FilteredChannel> = inertial
         .iter()
         .map(|&channel| {
-            let (fit, resolution) = (&channels[channel].fit, curves.resolution(channel));
+            let trace = &channels[channel];
+            let (fit, resolution) = (&trace.fit, curves.resolution(channel));
+            let rounding = fit.covariates.rounding();
+            let lines = || trace.lines.iter().map(|line| line.frequency.value).collect();
             FilteredChannel {
                 name: curves.channels[channel].name,
                 curve: &fit.covariates.curve,
                 model: fit.after(),
-                white_rounding: if fit.covariates.rounding.is_none() { ROUNDING * resolution.powi(2) } else { 0.0 },
+                white_rounding: if rounding.is_correlated() { 0.0 } else { rounding.variance() },
                 is_dithered: fit.is_dithered(profile, resolution, DITHERED_OCTAVES),
+                samples: trace.samples().map(|samples| (samples, lines())),
             }
         })
         .collect();

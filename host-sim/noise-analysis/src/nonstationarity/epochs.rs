@@ -3,10 +3,10 @@
 use crate::OCTAVES;
 use crate::distributions::quantile;
 use crate::record::sample_curves::SampleCurves;
-use crate::samples::correlated_rounding::CorrelatedRounding;
 use crate::samples::epoch_ranges::epochs;
 use crate::samples::exclusion::Exclusion;
 use crate::samples::gapped_cascade::GappedCascade;
+use crate::samples::rounding::Rounding;
 use crate::samples::series::Series;
 use allan_core::{AllanPoint, Curve, Model};
 use serde::Serialize;
@@ -136,7 +136,7 @@ pub(super) fn curve(series: &Series, slots: Range<u64>) -> Curve<OCTAVES> {
     let position = |slot: u64| series.slots.partition_point(|&of| of < slot);
     let range = position(slots.start)..position(slots.end);
     let curve = GappedCascade::of_series(series, range).curve(series.period_s).scaled(series.resolution);
-    CorrelatedRounding::of_curve(&curve, series.resolution).subtracted_from(curve)
+    Rounding::of_curve(&curve, series.resolution).subtracted_from(curve)
 }
 
 /// Logarithms of the variances of some epochs at an averaging factor; `None` where an epoch has too few averages.

@@ -9,9 +9,9 @@ use crate::parallel::in_parallel;
 use crate::record::condensed_record::CondensedRecord;
 use crate::record::preprocessing::Preprocessing;
 use crate::record::sample_curves::SampleCurves;
-use crate::samples::correlated_rounding::CorrelatedRounding;
 use crate::samples::exclusion::Exclusion;
 use crate::samples::gapped_cascade::GappedCascade;
+use crate::samples::rounding::Rounding;
 use crate::samples::streamed_curves::STEPS_PER_COUNT;
 use allan_core::regression::CovarianceCurve;
 use allan_core::{Coupling, Curve};
@@ -295,17 +295,18 @@ impl RecordPart {
         self.shorter[channel].0.clone().continued_by_means(&own, self.samples_per_mean, self.until)
     }
 
-    /// Rounding errors of a gyro or accelerometer that are correlated: the noise of the other channels is not traced.
-    pub(crate) fn correlated_rounding(&self, channel: ChannelId) -> CorrelatedRounding {
-        if !self.channels[channel].quantity.is_inertial() {
-            return CorrelatedRounding::default();
+    /// The rounding errors of a channel; white where its noise is not traced, as it is of a gyro or accelerometer alone.
+    pub(crate) fn rounding(&self, channel: ChannelId) -> Rounding {
+        let resolution = self.resolution(channel);
+        match self.channels[channel].quantity {
+            quantity if quantity.is_inertial() => Rounding::of_curve(&self.curve(channel), resolution),
+            _ => Rounding::white(resolution, self.sample_period()),
         }
-        CorrelatedRounding::of_curve(&self.curve(channel), self.resolution(channel))
     }
 
     /// Allan variances of a channel without correlated rounding errors: what models are fitted to and compared with.
     pub(crate) fn curve_before_rounding(&self, channel: ChannelId) -> Curve<OCTAVES> {
-        self.correlated_rounding(channel).subtracted_from(self.curve(channel))
+        self.rounding(channel).subtracted_from(self.curve(channel))
     }
 
     /// Samples of a channel that were replaced because they are missing.

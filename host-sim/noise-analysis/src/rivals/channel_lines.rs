@@ -23,7 +23,7 @@ pub(crate) fn fit_with_lines(
 ) -> (ChannelFit, Vec<MergedLine>) {
     let rate_error = profile.sample_rate_error;
     let read_every = if samples_per_mean > 1 { 1 } else { profile.read_every(1.0 / series.period_s) };
-    let rounding = covariates.rounding.clone();
+    let rounding = covariates.rounding().clone();
     let find = |series: &Series, known: Option<&Model>| {
         let mut lines = spectral_lines::find(series, &rounding, known, rate_error, read_every);
         lines.retain(|line| stands_as_line(&LineClaim { faster, ..LineClaim::new(line, series.period_s) }));

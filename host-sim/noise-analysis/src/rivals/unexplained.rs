@@ -6,7 +6,7 @@ use crate::distributions::{NORMAL_975, ROUNDING, quantile, upper_tail};
 use crate::effects::findings::SIGNIFICANCE;
 use crate::effects::{Observation, Unexplained, UnexplainedPlace};
 use crate::fit::channel_fit::ChannelFit;
-use crate::samples::correlated_rounding::DITHERED_OCTAVES;
+use crate::samples::rounding::DITHERED_OCTAVES;
 use crate::samples::series::Series;
 use allan_core::{AllanPoint, Model};
 use measurement::SensorProfile;

@@ -1,8 +1,7 @@
 //! A channel sampled at a constant period, with missing samples as `NaN`: the input of transforms and filters.
 
-use crate::distributions::ROUNDING;
-use crate::samples::correlated_rounding::{CorrelatedRounding, Rounding};
 use crate::samples::interpolation::{ALL_NEIGHBOURS, Autocovariance, Neighbours, PartialInterpolation, REACH};
+use crate::samples::rounding::Rounding;
 use crate::samples::series::Series;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -29,7 +28,7 @@ impl UniformSeries {
     /// `values` taken every `sample_period` seconds; a value that is not finite counts as missing.
     #[must_use]
     pub fn new(sample_period: f64, values: Vec<f64>) -> Self {
-        Self { sample_period, values, rounding: Rounding::White(0.0), read_every: 1 }
+        Self { sample_period, values, rounding: Rounding::default(), read_every: 1 }
     }
 
     /// The samples of a channel over the whole span of its record, with a `NaN` for each missing one.
@@ -55,18 +54,12 @@ impl UniformSeries {
         if part.end == slots.len() && !values.is_empty() {
             values.resize(values.len() + missing(next, series.span.end), f64::NAN);
         }
-        Self::new(series.period_s, values).rounded_to(series.resolution)
+        Self::new(series.period_s, values).with_rounding(Rounding::white(series.resolution, series.period_s))
     }
 
-    /// The same values, which are known to be rounded to steps of this size.
-    pub(crate) fn rounded_to(self, step: f64) -> Self {
-        // Rounding to steps of q has the variance q²/12, up to half the sample rate.
-        Self { rounding: Rounding::White(2.0 * ROUNDING * self.sample_period * step.powi(2)), ..self }
-    }
-
-    /// The same values, of samples whose rounding errors are `correlated`, if there are such.
-    pub(crate) fn with_correlated_rounding(self, correlated: &CorrelatedRounding) -> Self {
-        if correlated.is_none() { self } else { Self { rounding: Rounding::Correlated(correlated.clone()), ..self } }
+    /// The same values, of samples with these rounding errors.
+    pub(crate) fn with_rounding(self, rounding: Rounding) -> Self {
+        Self { rounding, ..self }
     }
 
     /// The errors of rounding the samples to counts.

@@ -3,7 +3,7 @@
 //! A line whose frequency wanders leaves many peaks in the spectrum, which are merged into one line.
 
 use crate::bounds::MeasuredValue;
-use crate::samples::correlated_rounding::{CorrelatedRounding, Rounding};
+use crate::samples::rounding::Rounding;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra;
@@ -91,13 +91,13 @@ pub(crate) fn is_alias(line: &MergedLine, of: &MergedLine, period_s: f64) -> boo
 /// of white, flicker and random-walk noise. Each sample is one of `read_every` values of the sensor.
 pub(crate) fn find(
     series: &Series,
-    rounding: &CorrelatedRounding,
+    rounding: &Rounding,
     known: Option<&Model>,
     rate_error: f64,
     read_every: u32,
 ) -> Vec<MergedLine> {
     let duration_s = series.duration_s();
-    let grid = UniformSeries::from_series(series).with_one_of(read_every).with_correlated_rounding(rounding);
+    let grid = UniformSeries::from_series(series).with_one_of(read_every).with_rounding(rounding.clone());
     let peaks = match known {
         Some(model) => spectra::find_lines_over(&grid, |frequency| background(model, frequency, grid.rounding())),
         None => spectra::find_lines(&grid),
@@ -285,7 +285,7 @@ impl MergedLine {
 #[cfg(test)]
 mod tests {
     use super::{find, gain_of_mean};
-    use crate::samples::correlated_rounding::CorrelatedRounding;
+    use crate::samples::rounding::Rounding;
     use crate::samples::series::Series;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -308,7 +308,7 @@ mod tests {
     #[test]
     fn a_line_that_swells_and_fades_has_sidebands() {
         let of = |depth: f64| {
-            find(&series(depth), &CorrelatedRounding::default(), None, 0.0, 1)
+            find(&series(depth), &Rounding::default(), None, 0.0, 1)
                 .first()
                 .map(|line| (line.frequency.value, line.modulation))
         };

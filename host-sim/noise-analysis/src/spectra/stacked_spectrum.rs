@@ -8,6 +8,7 @@
 use super::lines::MOST;
 use super::smooth_shape::median;
 use super::whitened_spectrum::{NARROWEST, Resonance, SpectralLine, Spectrum, WhitenedSpectrum, refit};
+use crate::samples::rounding::Rounding;
 use crate::samples::uniform_series::UniformSeries;
 
 /// The mean of the spectra of stretches of equal length.
@@ -52,8 +53,9 @@ impl StackedSpectrum {
     fn end_stretch(&mut self) {
         let missing = vec![f64::NAN; self.stretch.len()];
         let values = std::mem::replace(&mut self.stretch, missing);
+        let rounding = Rounding::white(self.resolution, self.sample_period);
         let stretch =
-            UniformSeries::new(self.sample_period, values).rounded_to(self.resolution).with_one_of(self.read_every);
+            UniformSeries::new(self.sample_period, values).with_rounding(rounding).with_one_of(self.read_every);
         if 2 * stretch.present() <= stretch.values().len() {
             return;
         }

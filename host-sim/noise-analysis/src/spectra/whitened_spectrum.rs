@@ -6,7 +6,7 @@ use super::periodogram::{PADDING, Periodogram};
 use super::smooth_shape::{Background, LocalLevel, WINDOW};
 use crate::bounds::MeasuredValue;
 use crate::distributions::mean_ratio_tail;
-use crate::samples::correlated_rounding::Rounding;
+use crate::samples::rounding::Rounding;
 use crate::samples::uniform_series::UniformSeries;
 use std::f64::consts::PI;
 

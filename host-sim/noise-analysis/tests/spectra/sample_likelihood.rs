@@ -7,7 +7,7 @@ use allan_core::term::MovingAverageFilter;
 use allan_core::{Model, NoiseTerm};
 use noise_analysis::report::assessment::record_length::relative_error;
 use noise_analysis::samples::uniform_series::UniformSeries;
-use noise_analysis::spectra::{Welch, fit_to_means, fit_to_samples};
+use noise_analysis::spectra::{SampleSpectrum, Welch};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::io::Write;
@@ -21,6 +21,11 @@ const RECORDS: u64 = 600;
 /// N, B and K: the densities of white and flicker noise are equal at 0.6 Hz, those of flicker noise and the walk at 0.16 Hz, 26 periods
 /// of a record.
 const NOISE: [f64; 3] = [1.0, 2.0, 2.0];
+
+/// `model` with the coefficients by all samples; the lines at these frequencies are left out.
+fn fit_to_samples(series: &UniformSeries, lines: &[f64], model: &Model) -> Option<Model> {
+    SampleSpectrum::of_samples(series, lines)?.fitted(model)
+}
 
 /// Errors of the coefficients over their truth, and intervals that hold it.
 struct Outcome {
@@ -41,7 +46,7 @@ fn outcome(kinds: &[NoiseTerm], truth: [f64; 3], record: impl Fn(&mut ChaCha8Rng
     let mut outcome = Outcome { errors: [const { Vec::new() }; 3], held: [0; 3] };
     for seed in 0..RECORDS {
         let values = record(&mut ChaCha8Rng::seed_from_u64(seed));
-        let fitted = fit_to_samples(&UniformSeries::new(PERIOD_S, values), &model).expect("a whole record");
+        let fitted = fit_to_samples(&UniformSeries::new(PERIOD_S, values), &[], &model).expect("a whole record");
         for (at, (term, truth)) in fitted.terms().iter().zip(truth).enumerate() {
             outcome.errors[at].push(term.value / truth - 1.0);
             outcome.held[at] += u64::from((term.low..=term.high).contains(&truth));
@@ -116,7 +121,8 @@ fn means_with_the_spectrum_of_the_samples_have_the_error_that_the_samples_allow(
             let means = values.chunks_exact(OF_MEAN).map(|of| of.iter().sum::<f64>() / OF_MEAN as f64).collect();
             let spectrum = Welch::estimate(&UniformSeries::new(PERIOD_S, values), 2048).expect("segments");
             let means = UniformSeries::new(PERIOD_S * OF_MEAN as f64, means);
-            let fitted = fit_to_means(&means, OF_MEAN as u64, &spectrum, &truth).expect("a whole record");
+            let spectrum = SampleSpectrum::of_means(&means, OF_MEAN as u64, &spectrum, &[]);
+            let fitted = spectrum.and_then(|spectrum| spectrum.fitted(&truth)).expect("a whole record");
             for (at, (term, truth)) in fitted.terms().iter().zip(NOISE).enumerate() {
                 errors[at] += (term.value / truth - 1.0).powi(2) / CASE_RECORDS as f64;
                 held[at] += u64::from((term.low..=term.high).contains(&truth));
@@ -145,14 +151,14 @@ fn lines_are_left_out_and_what_cannot_be_fitted_has_no_coefficients() {
     let terms =
         [FittedTerm::exact(NoiseTerm::AngleRandomWalk, 0.0), FittedTerm::exact(NoiseTerm::Sinusoid(line), 30.0)];
     let series = UniformSeries::new(PERIOD_S, values.clone());
-    let fitted = fit_to_samples(&series, &Model::new(PERIOD_S, terms)).expect("noise");
+    let fitted = fit_to_samples(&series, &[line.frequency], &Model::new(PERIOD_S, terms)).expect("noise");
     // N of 16,384 samples is known to 0.55 %; the line has 4.5 times the power of the noise.
     assert!((fitted.terms()[0].value - 1.0).abs() < 3.0 * 0.0056, "{fitted:?}");
     assert_eq!(fitted.terms()[1], terms[1]);
     let ramp = Model::new(PERIOD_S, [FittedTerm::exact(NoiseTerm::RateRamp, 1.0)]);
-    assert_eq!(fit_to_samples(&series, &ramp), None);
+    assert_eq!(fit_to_samples(&series, &[line.frequency], &ramp), None);
     values[4_000..4_020].fill(f64::NAN);
-    assert_eq!(fit_to_samples(&UniformSeries::new(PERIOD_S, values), &Model::new(PERIOD_S, terms)), None);
+    assert_eq!(fit_to_samples(&UniformSeries::new(PERIOD_S, values), &[], &Model::new(PERIOD_S, terms)), None);
 }
 
 /// N, B and K of each of these series by the likelihood with exact covariances of `tests/peers/accuracy/likelihood.py`.
@@ -191,7 +197,7 @@ fn the_fit_is_that_of_the_likelihood_with_exact_covariances() {
         let model = Model::new(PERIOD_S, kinds.map(|(kind, _)| FittedTerm::exact(kind, 0.0)));
         let exact = by_exact_covariances(&python, &series, names);
         for (values, exact) in series.into_iter().zip(exact) {
-            let fitted = fit_to_samples(&UniformSeries::new(PERIOD_S, values), &model).expect("a whole record");
+            let fitted = fit_to_samples(&UniformSeries::new(PERIOD_S, values), &[], &model).expect("a whole record");
             for (term, exact) in fitted.terms().iter().zip(exact.into_iter().flatten()) {
                 let half_width = (term.high - term.low) / 2.0;
                 assert!((term.value - exact).abs() < apart * half_width, "{names}: {term:?}, {exact}");

@@ -269,8 +269,7 @@ fn what_the_record_does_not_tell_of_the_part_is_told_in_sentences() {
          was stated.",
         "The curves give the length of the filter, 1.77 samples, and not its taps. 8 taps are nearest to the nominal clock of 819.2 Hz; \
          4 or 16 taps at another clock have the same length.",
-        "Gyro z alone would have its filter read every 8.873 values, farther from the common figure than chance explains: the bounds of \
-         that are wider for it.",
+        "Gyro z alone would have its filter read every 8.873 values, farther from the common figure than chance explains.",
         "The filter shows in 5 of the 6 channels whose noise is larger than a count.",
     ];
     assert_eq!(told[told.len() - 4..], last);

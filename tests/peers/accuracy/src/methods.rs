@@ -8,7 +8,7 @@ use anyhow::{Context, Result, ensure};
 use imu_calib::allan::{AllanConfig, AllanEstimator, Sensor};
 use noise_analysis::report::assessment::record_length::relative_error;
 use noise_analysis::samples::uniform_series::UniformSeries;
-use noise_analysis::spectra::fit_to_samples;
+use noise_analysis::spectra::SampleSpectrum;
 use serde::Deserialize;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -29,7 +29,7 @@ pub(crate) fn fitted(case: &Case, series: &[f64], kinds: &[NoiseTerm]) -> Model 
 
 /// The same model by all samples.
 pub(crate) fn fitted_to_samples(series: &[f64], model: &Model) -> Option<Model> {
-    fit_to_samples(&UniformSeries::new(SAMPLE_PERIOD, series.to_vec()), model)
+    SampleSpectrum::of_samples(&UniformSeries::new(SAMPLE_PERIOD, series.to_vec()), &[])?.fitted(model)
 }
 
 /// The terms of which the case consists.

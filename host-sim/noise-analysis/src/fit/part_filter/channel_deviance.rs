@@ -1,9 +1,10 @@
-//! The deviance of the curve of one channel as a function of the filter, and the decimation at which several have the least.
+//! The deviance of the curve of one channel as a function of the filter.
 
+use super::decimation::slowest;
 use crate::OCTAVES;
-use crate::fit::minimum::golden_section;
 use crate::fit::noise_terms::is_white;
 use crate::fit::octave_covariance::relative_covariance;
+use crate::fit::sample_coefficients::SamplesOfCurve;
 use allan_core::host::DevianceComparison;
 use allan_core::model::{FittedTerm, MAX_TERMS};
 use allan_core::term::MovingAverageFilter;
@@ -12,13 +13,6 @@ use nalgebra::{DMatrix, DVector};
 
 /// Rounding takes at most this part of a measured variance: it is white only where the noise is larger.
 const MOST_ROUNDING: f64 = 0.5;
-/// Decimations are tried in steps of this factor, a quarter of an octave: with the shape of the filter known, the curve of the
-/// deviance has one minimum within an octave.
-pub(super) const STEP: f64 = 1.189_207_115_002_721;
-/// Least decimation that is told from 1 (every value read).
-pub(super) const LEAST_DECIMATION: f64 = 1.02;
-/// Steps of a golden-section search: the bracket of two steps shrinks to `1e-6` of the decimation.
-pub(super) const SEARCH_STEPS: usize = 26;
 /// Relative step of numerical derivatives.
 const DERIVATIVE_STEP: f64 = 1e-3;
 
@@ -34,6 +28,8 @@ pub(crate) struct FilteredChannel<'a> {
     pub white_rounding: f64,
     /// Whether rounding adds white noise and nothing else. A channel that is not dithered says nothing of the filter.
     pub is_dithered: bool,
+    /// Its samples, and the frequencies of lines in their spectrum, Hz, where they are kept.
+    pub samples: Option<(SamplesOfCurve<'a>, Vec<f64>)>,
 }
 
 /// The curve of a channel without the white noise of its rounding.
@@ -78,7 +74,7 @@ impl<'a> ChannelDeviance<'a> {
         let mut least = self.unfiltered();
         for &filter in filters {
             least = least.min(self.deviance(filter));
-            if let Some(slow) = slowest_deviance(std::slice::from_mut(self), filter) {
+            if let Some(slow) = slowest(filter, |read| self.deviance(read)) {
                 least = least.min(self.deviance(slow));
                 self.slowest.push(slow);
             }
@@ -98,21 +94,14 @@ impl<'a> ChannelDeviance<'a> {
     }
 
     pub(super) fn deviance(&mut self, filter: MovingAverageFilter) -> f64 {
-        let kinds = self.kinds(filter);
+        let kinds = kinds(filter, &self.others);
         self.comparison.deviance(&kinds) / self.dispersion
-    }
-
-    /// At the filter's own rate the curve tells white noise after the filter from what passed it; read slowly it does not.
-    fn kinds(&self, filter: MovingAverageFilter) -> Vec<NoiseTerm> {
-        let after = (filter.decimation == 1.0).then_some(NoiseTerm::AngleRandomWalk);
-        let first = NoiseTerm::Filtered(filter);
-        std::iter::once(first).chain(self.others.iter().copied()).chain(after).collect()
     }
 
     /// Variance of the decimation's score over its information, at least 1: by how much the deviance falls and rises more
     /// than for independent points.
     pub(super) fn scatter(&self, filter: MovingAverageFilter) -> f64 {
-        let model = allan_core::fit::fit(self.curve, &self.kinds(filter));
+        let model = allan_core::fit::fit(self.curve, &kinds(filter, &self.others));
         let points: Vec<&AllanPoint> =
             self.curve.points().iter().filter(|point| point.avar > 0.0 && model.avar(point.n) > 0.0).collect();
         let present: Vec<&FittedTerm> = model.terms().iter().filter(|term| term.value > 0.0).collect();
@@ -143,31 +132,10 @@ impl<'a> ChannelDeviance<'a> {
     }
 }
 
-/// The largest decimation at which a filter is tried: its length, beyond which no two samples are correlated.
-pub(super) fn longest_decimation(filter: MovingAverageFilter) -> f64 {
-    f64::from(filter.stages) * f64::from(filter.taps)
-}
-
-/// The decimations at which a filter that is read slowly is tried, from just above 1 to its length.
-pub(super) fn decimations(filter: MovingAverageFilter) -> impl Iterator<Item = f64> {
-    let longest = longest_decimation(filter);
-    std::iter::successors(Some(LEAST_DECIMATION), |decimation| Some(decimation * STEP))
-        .take_while(move |decimation| *decimation < longest)
-}
-
-/// The filter read at the decimation with the least deviance of all channels: from just above 1 to the filter's length. `None` for
-/// a filter that is shorter than that.
-pub(super) fn slowest_deviance(
-    joint: &mut [ChannelDeviance],
-    filter: MovingAverageFilter,
-) -> Option<MovingAverageFilter> {
-    let mut total = |decimation: f64| -> f64 {
-        let read = MovingAverageFilter { decimation, ..filter };
-        joint.iter_mut().map(|channel| channel.deviance(read)).sum()
-    };
-    let tried = decimations(filter).map(|decimation| (decimation, total(decimation)));
-    let (start, _) = tried.reduce(|best, next| if next.1 < best.1 { next } else { best })?;
-    let (from, to) = ((start / STEP).max(LEAST_DECIMATION), (start * STEP).min(longest_decimation(filter)));
-    let least = golden_section((from.ln(), to.ln()), SEARCH_STEPS, |log| total(log.exp()));
-    Some(MovingAverageFilter { decimation: least.exp(), ..filter })
+/// Noise behind `filter` with the terms `others`. At the filter's own rate white noise after the filter is told from what passed it; read
+/// slowly it is not.
+pub(super) fn kinds(filter: MovingAverageFilter, others: &[NoiseTerm]) -> Vec<NoiseTerm> {
+    let after = (filter.decimation == 1.0).then_some(NoiseTerm::AngleRandomWalk);
+    let first = NoiseTerm::Filtered(filter);
+    std::iter::once(first).chain(others.iter().copied()).chain(after).collect()
 }

@@ -3,7 +3,8 @@
 //! Most records of white noise show none. There, the deviances at few decimations of each filter spare the search for the best one and
 //! the dispersion of each channel, which needs that search too.
 
-use super::channel_deviance::{ChannelDeviance, FilteredChannel, decimations};
+use super::channel_deviance::{ChannelDeviance, FilteredChannel};
+use super::decimation::decimations;
 use crate::OCTAVES;
 use crate::parallel::in_parallel;
 use allan_core::Curve;

@@ -1,4 +1,4 @@
-//! Rounding to counts that is no white noise.
+//! The errors of rounding to counts: white noise, or correlated.
 //!
 //! Behind a long filter of which every value is read, neighbouring samples differ by a small part of a count, and their rounding errors
 //! by as little. For normal differences with a mean square of D(k) counts² at lag k, and a mean that is anywhere between two
@@ -19,8 +19,6 @@ use std::f64::consts::PI;
 /// A channel is dithered if its Allan deviation exceeds the limit of the profile at any of the first octaves, this many.
 /// Behind a filter neighbouring samples are correlated, so that the limit is exceeded only at longer averaging times.
 pub(crate) const DITHERED_OCTAVES: usize = 7;
-/// Least correlation of neighbouring rounding errors that is taken for one.
-const CORRELATED: f64 = 0.1;
 /// Mean square of a difference, counts², beyond which its rounding errors are uncorrelated to 0.2 %.
 const UNCORRELATED: f64 = 0.3;
 /// Mean square of a difference, counts², below which it reaches over more than one count once in 10¹² times.
@@ -34,105 +32,114 @@ const SOUGHT: [f64; 2] = [1e-9, 1e3];
 /// Halvings of that interval: to 10⁻⁹ of the value.
 const HALVINGS: usize = 40;
 
-/// Rounding errors that are correlated, or none.
+/// The rounding errors of the samples of a channel.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct CorrelatedRounding {
-    /// Covariances at lags of 1, 2, … samples, counts²; 0 beyond. Empty without correlated errors.
-    covariances: Vec<f64>,
-    /// Size of a count.
+pub(crate) struct Rounding {
+    /// Size of a count; 0 where the values are not known to be rounded.
     resolution: f64,
-    /// Two-sided densities at [`DENSITIES`] frequencies from 0 to half the sample rate, and seconds between samples.
-    densities: Vec<f64>,
+    /// Seconds between samples.
     period: f64,
+    /// `None` of white errors.
+    correlated: Option<Correlation>,
 }
 
-/// The rounding errors of a series.
+/// Errors that are correlated.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Rounding {
-    /// Of this one-sided density, unit²/Hz; 0 where the values are not known to be rounded.
-    White(f64),
-    Correlated(CorrelatedRounding),
+struct Correlation {
+    /// Covariances at lags of 1, 2, … samples, counts²; 0 beyond.
+    covariances: Vec<f64>,
+    /// Two-sided densities at [`DENSITIES`] frequencies from 0 to half the sample rate.
+    densities: Vec<f64>,
 }
 
 impl Rounding {
+    /// Of samples every `period` seconds with counts of `resolution`, uncorrelated.
+    pub(crate) const fn white(resolution: f64, period: f64) -> Self {
+        Self { resolution, period, correlated: None }
+    }
+
+    /// By a curve with counts of `resolution`. White where the errors of neighbouring samples are not correlated, and where those of
+    /// samples far apart are: there the noise does not reach from one count to the next.
+    pub(crate) fn of_curve(curve: &Curve<OCTAVES>, resolution: f64) -> Self {
+        let white = Self::white(resolution, curve.sample_period());
+        let correlated = squares(curve, resolution).map(|squares| {
+            let covariances: Vec<f64> = squares.into_iter().map(covariance).collect();
+            let densities = (0..DENSITIES).map(|at| white.two_sided(at, &covariances)).collect();
+            Correlation { covariances, densities }
+        });
+        Self { correlated, ..white }
+    }
+
+    /// Two-sided density of errors with these covariances at one of [`DENSITIES`] frequencies.
+    fn two_sided(&self, at: usize, covariances: &[f64]) -> f64 {
+        let phase = PI * at as f64 / (DENSITIES - 1) as f64;
+        let of_lag = |(lag, of): (i32, &f64)| 2.0 * of * (f64::from(lag) * phase).cos();
+        self.period * self.resolution.powi(2) * (ROUNDING + (1..).zip(covariances).map(of_lag).sum::<f64>())
+    }
+
     /// One-sided density at a frequency in Hz, unit²/Hz.
     pub(crate) fn density(&self, frequency: f64) -> f64 {
-        match self {
-            Self::White(density) => *density,
-            Self::Correlated(errors) => 2.0 * errors.density(frequency),
-        }
-    }
-}
-
-impl CorrelatedRounding {
-    /// By a curve with counts of `resolution`. None where the errors of neighbouring samples are not correlated, and where those of samples
-    /// far apart are: there the noise does not reach from one count to the next.
-    pub(crate) fn of_curve(curve: &Curve<OCTAVES>, resolution: f64) -> Self {
-        let mut squares: Vec<f64> = Vec::new();
-        let octaves = curve.points().iter().zip(0..DITHERED_OCTAVES);
-        for (point, _) in octaves.take_while(|(point, octave)| point.n == 1 << octave && point.avar > 0.0) {
-            let (n, known, measured) = (point.n, squares.len(), point.avar / resolution.powi(2));
-            let last = squares.last().copied();
-            let with = |square: f64| (known + 1..2 * n as usize).map(move |lag| power_law(known, last, n, square, lag));
-            let avar = |square: f64| -> f64 {
-                let all = squares.iter().copied().chain(with(square));
-                (1_u64..).zip(all).map(|(lag, square)| share(n, lag) * (square + added(square))).sum()
-            };
-            let (mut low, mut high) = (SOUGHT[0].ln(), SOUGHT[1].ln());
-            for _ in 0..HALVINGS {
-                let middle = 0.5 * (low + high);
-                if avar(middle.exp()) < measured { low = middle } else { high = middle }
-            }
-            let solution = (0.5 * (low + high)).exp();
-            let solved: Vec<f64> = with(solution).collect();
-            squares.extend(solved);
-            if n == 1 && covariance(solution) < CORRELATED * ROUNDING {
-                break;
-            }
-            if solution > UNCORRELATED {
-                return Self::new(squares.into_iter().map(covariance).collect(), resolution, curve.sample_period());
-            }
-        }
-        Self::default()
-    }
-
-    /// With these covariances, of samples every `period` seconds.
-    fn new(covariances: Vec<f64>, resolution: f64, period: f64) -> Self {
-        let density = |at: usize| {
-            let phase = PI * at as f64 / (DENSITIES - 1) as f64;
-            let of_lag = |(lag, of): (i32, &f64)| 2.0 * of * (f64::from(lag) * phase).cos();
-            period * resolution.powi(2) * (ROUNDING + (1..).zip(&covariances).map(of_lag).sum::<f64>())
+        let Some(Correlation { densities, .. }) = &self.correlated else {
+            return 2.0 * self.period * self.variance();
         };
-        let densities = (0..DENSITIES).map(density).collect();
-        Self { covariances, resolution, densities, period }
-    }
-
-    /// Two-sided density at a frequency in Hz.
-    fn density(&self, frequency: f64) -> f64 {
         let turns = frequency * self.period;
         let at = 2.0 * (turns - turns.round()).abs() * (DENSITIES - 1) as f64;
         let (below, part) = ((at as usize).min(DENSITIES - 2), at.fract());
-        self.densities[below] + part * (self.densities[below + 1] - self.densities[below])
+        2.0 * (densities[below] + part * (densities[below + 1] - densities[below]))
     }
 
-    /// Whether there are none.
-    pub(crate) fn is_none(&self) -> bool {
-        self.covariances.is_empty()
+    /// Their variance, unit²; 0 where the values are not known to be rounded.
+    pub(crate) fn variance(&self) -> f64 {
+        ROUNDING * self.resolution.powi(2)
     }
 
-    /// A curve without these errors.
+    /// Whether they are correlated.
+    pub(crate) fn is_correlated(&self) -> bool {
+        self.correlated.is_some()
+    }
+
+    /// A curve without errors that are correlated.
     pub(crate) fn subtracted_from(&self, mut curve: Curve<OCTAVES>) -> Curve<OCTAVES> {
-        if !self.is_none() {
-            curve.subtract_rounding(|n| self.avar(n));
+        if self.is_correlated() {
+            curve.subtract_rounding(|n| self.correlated_avar(n));
         }
         curve
     }
 
-    /// What correlated rounding adds to the Allan variance at the averaging factor `n`.
-    pub(crate) fn avar(&self, n: u64) -> f64 {
-        let correlated = (1..2 * n).zip(&self.covariances).map(|(lag, covariance)| 2.0 * share(n, lag) * covariance);
+    /// What correlated errors add to the Allan variance at the averaging factor `n`; 0 of white ones, which are a part of white noise.
+    pub(crate) fn correlated_avar(&self, n: u64) -> f64 {
+        let Some(Correlation { covariances, .. }) = &self.correlated else { return 0.0 };
+        let correlated = (1..2 * n).zip(covariances).map(|(lag, covariance)| 2.0 * share(n, lag) * covariance);
         self.resolution.powi(2) * (ROUNDING / n as f64 - correlated.sum::<f64>()).max(0.0)
     }
+}
+
+/// Mean squares of the differences of samples at lags of 1, 2, …, counts², as far as the errors are correlated. `None` where those of
+/// neighbouring samples are not, or those of samples far apart are.
+fn squares(curve: &Curve<OCTAVES>, resolution: f64) -> Option<Vec<f64>> {
+    let mut squares: Vec<f64> = Vec::new();
+    let octaves = curve.points().iter().zip(0..DITHERED_OCTAVES);
+    for (point, _) in octaves.take_while(|(point, octave)| point.n == 1 << octave && point.avar > 0.0) {
+        let (n, known, measured) = (point.n, squares.len(), point.avar / resolution.powi(2));
+        let last = squares.last().copied();
+        let with = |square: f64| (known + 1..2 * n as usize).map(move |lag| power_law(known, last, n, square, lag));
+        let avar = |square: f64| -> f64 {
+            let all = squares.iter().copied().chain(with(square));
+            (1_u64..).zip(all).map(|(lag, square)| share(n, lag) * (square + added(square))).sum()
+        };
+        let (mut low, mut high) = (SOUGHT[0].ln(), SOUGHT[1].ln());
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if avar(middle.exp()) < measured { low = middle } else { high = middle }
+        }
+        let solution = (0.5 * (low + high)).exp();
+        let solved: Vec<f64> = with(solution).collect();
+        squares.extend(solved);
+        if solution > UNCORRELATED {
+            return (n > 1).then_some(squares);
+        }
+    }
+    None
 }
 
 /// The mean square at `lag`, by a power law from `last`, that at lag `known`, to `square` at lag 2n − 1.
@@ -209,10 +216,10 @@ mod tests {
             let fine = filtered(taps, deviation, 1);
             let exact = curve(fine.iter().copied(), 1.0 / 256.0);
             let rounded = curve(fine.iter().map(|value| (value + 128) >> 8), 1.0);
-            let rounding = CorrelatedRounding::of_curve(&rounded, 1.0);
-            assert!(!rounding.is_none(), "{taps} taps");
+            let rounding = Rounding::of_curve(&rounded, 1.0);
+            assert!(rounding.is_correlated(), "{taps} taps");
             for (exact, rounded) in exact.points().iter().zip(rounded.points()).take(9) {
-                let (added, found) = (rounded.avar - exact.avar, rounding.avar(exact.n));
+                let (added, found) = (rounded.avar - exact.avar, rounding.correlated_avar(exact.n));
                 let independent = SAMPLES as f64 / (2.0 * exact.n.max(8) as f64);
                 let tolerance = 4.0 * 2.0 * (found * exact.avar / independent).sqrt() + 0.02 * found;
                 assert!((added - found).abs() < tolerance, "{taps} taps, {}: {added}, {found}", exact.n);
@@ -224,10 +231,10 @@ mod tests {
 
     /// White noise of a count, which no filter makes slow, has no such errors; and none are told of noise below a count.
     #[test]
-    fn white_noise_and_noise_below_a_count_have_none() {
+    fn the_rounding_of_white_noise_and_of_noise_below_a_count_is_white() {
         for deviation in [1.0, 0.1] {
             let rounded = curve(filtered(1, deviation, 1).into_iter().map(|value| (value + 128) >> 8), 1.0);
-            assert!(CorrelatedRounding::of_curve(&rounded, 1.0).is_none(), "{deviation} counts");
+            assert!(!Rounding::of_curve(&rounded, 1.0).is_correlated(), "{deviation} counts");
         }
     }
 
@@ -235,14 +242,12 @@ mod tests {
     /// time, and the density of all frequencies together is the variance of the errors.
     #[test]
     fn the_density_is_that_of_the_allan_variance_and_of_the_variance() {
-        let period = 0.01;
         let fine = filtered(32, 6.0, 1);
-        let rounded = curve(fine.iter().map(|value| (value + 128) >> 8), 1.0);
-        let covariances = CorrelatedRounding::of_curve(&rounded, 1.0).covariances;
-        let errors = CorrelatedRounding::new(covariances, 0.5, period);
-        let (long, low) = (errors.avar(1 << 16) * f64::from(1 << 16), errors.density(0.0) / period);
+        let rounded = curve(fine.iter().map(|value| (value + 128) >> 8), 0.5);
+        let errors = Rounding::of_curve(&rounded, 0.5);
+        let (long, low) = (errors.correlated_avar(1 << 16) * f64::from(1 << 16), errors.density(0.0) / 2.0);
         assert!((long / low - 1.0).abs() < 2e-3, "{long} {low}");
-        let mean = (0..1000).map(|at| errors.density((f64::from(at) + 0.5) * 0.05)).sum::<f64>() / 1000.0 / period;
+        let mean = (0..1000).map(|at| errors.density((f64::from(at) + 0.5) * 5e-4)).sum::<f64>() / 1000.0 / 2.0;
         assert!((mean / (0.25 / 12.0) - 1.0).abs() < 1e-3, "{mean}");
     }
 

@@ -1,0 +1,192 @@
+//! The spectrum of a record by all its samples, in bands.
+//!
+//! ```text
+//! samples ─► cosine transform ─► squares, averaged over bands ─┐
+//! means   ─► cosine transform ─► the lower half of the bands ──┼─► spectrum
+//! samples ─► Welch's spectrum ─► the bands above them ─────────┘
+//! ```
+//!
+//! The even continuation of a record has no jump at its ends. The cosines are the principal components of white noise and of a random
+//! walk whose first value is unknown: their coefficients are independent, with the variance `S(k/2T)/dt` of the two-sided density `S`.
+
+use super::line_models::Sine;
+use super::transforms;
+use super::welch::Welch;
+use super::whittle::SpectralBand;
+use crate::samples::rounding::Rounding;
+use crate::samples::uniform_series::UniformSeries;
+use std::f64::consts::PI;
+use std::ops::Range;
+
+/// Fewest samples.
+const LEAST_SAMPLES: usize = 1024;
+/// Largest share of samples that may be interpolated: they have less noise than the others.
+const MOST_INTERPOLATED: f64 = 1e-3;
+/// Relative width of a band, and the number of equal bands at which its growth ends: narrow enough for the nulls of a filter.
+const BANDS_PER_E_FOLD: usize = 16;
+const BANDS: usize = 512;
+/// Coefficients, and points of Welch's spectrum, on either side of a line that are left out.
+const LINE_COEFFICIENTS: f64 = 8.0;
+const LINE_POINTS: f64 = 4.0;
+/// Part of the rate of means up to which their coefficients are used, and the lowest point of Welch's spectrum: below, the window
+/// spreads drift over several points.
+const OF_MEANS: f64 = 0.25;
+const LOWEST_POINT: f64 = 8.0;
+
+/// The spectrum of all samples of a record without its lines, two-sided.
+pub struct SampleSpectrum {
+    pub(super) bands: Vec<SampleBand>,
+    /// Samples or means whose cosine transform it has.
+    pub(super) count: usize,
+    /// Samples of a mean, and seconds between samples.
+    pub(super) samples_per_mean: u64,
+    pub(super) period: f64,
+    /// Frequency of the coefficient of order 1, and distance of the points of Welch's spectrum, Hz.
+    pub(super) resolution: f64,
+    pub(super) point_resolution: f64,
+    /// Of the samples.
+    pub(super) rounding: Rounding,
+}
+
+/// An average over neighbouring frequencies.
+#[derive(Clone)]
+pub(super) struct SampleBand {
+    pub(super) measured: SpectralBand,
+    pub(super) place: Place,
+}
+
+/// What a band is an average of.
+#[derive(Clone)]
+pub(super) enum Place {
+    /// Squares of the coefficients of the cosine transform, of the orders 1, 2, 3 … from index 0 on.
+    Coefficients(Range<usize>),
+    /// Points of Welch's spectrum.
+    Points(Vec<usize>),
+}
+
+impl SampleSpectrum {
+    /// Of a series with `lines` at these frequencies in Hz. `None` if more than a thousandth of the samples is missing, or a long gap,
+    /// or if there are fewer than 1,024.
+    #[must_use]
+    pub fn of_samples(series: &UniformSeries, lines: &[f64]) -> Option<Self> {
+        Self::of_values(series, 1, lines, f64::INFINITY)
+    }
+
+    /// The same of a series of means of so many samples each, and of Welch's spectrum of the samples.
+    #[must_use]
+    pub fn of_means(means: &UniformSeries, samples_per_mean: u64, welch: &Welch, lines: &[f64]) -> Option<Self> {
+        let below = OF_MEANS / means.sample_period();
+        let mut spectrum = Self::of_values(means, samples_per_mean, lines, below)?;
+        spectrum.point_resolution = welch.resolution();
+        spectrum.bands.extend(bands_of_points(welch, lines, below.max(LOWEST_POINT * welch.resolution())));
+        Some(spectrum)
+    }
+
+    /// Number of its bands.
+    pub(crate) fn bands(&self) -> usize {
+        self.bands.len()
+    }
+
+    /// The bands of the coefficients of `series` below a frequency.
+    fn of_values(series: &UniformSeries, samples_per_mean: u64, lines: &[f64], below: f64) -> Option<Self> {
+        let (filled, replaced) = series.interpolated();
+        let mut filled = filled.into_owned();
+        let (period, resolution) = (series.sample_period(), 0.5 / series.duration());
+        // Means show a line at its alias.
+        let shown: Vec<f64> = lines.iter().map(|line| (line - (line * period).round() / period).abs()).collect();
+        for &line in shown.iter().filter(|line| **line > resolution) {
+            filled = Sine::fit_near(&filled, line, resolution).subtracted_from(&filled);
+        }
+        let values = filled.values();
+        let is_whole = values.len() >= LEAST_SAMPLES && values.iter().all(|value| value.is_finite());
+        if !is_whole || replaced > MOST_INTERPOLATED {
+            return None;
+        }
+        let squares = squared_coefficients(values, series.mean());
+        let is_line =
+            |order: usize| shown.iter().any(|line| (order as f64 - line / resolution).abs() < LINE_COEFFICIENTS);
+        let is_kept = |orders: &Range<usize>| (orders.end as f64) * resolution < below && !orders.clone().any(is_line);
+        let band = |orders: Range<usize>| {
+            let density = period * squares[orders.clone()].iter().sum::<f64>() / orders.len() as f64;
+            let frequency = resolution * (orders.start + orders.end - 1) as f64 / 2.0;
+            // One real number has half the degrees of freedom of an ordinate of a Fourier transform.
+            let measured = SpectralBand { frequency, density, ordinates: 0.5 * orders.len() as f64 };
+            SampleBand { measured, place: Place::Coefficients(orders) }
+        };
+        Some(Self {
+            bands: bands(squares.len()).filter(is_kept).map(band).collect(),
+            count: values.len(),
+            samples_per_mean,
+            period: period / samples_per_mean as f64,
+            resolution,
+            point_resolution: resolution,
+            rounding: series.rounding().clone(),
+        })
+    }
+}
+
+/// The bands of Welch's spectrum above a frequency.
+fn bands_of_points(welch: &Welch, lines: &[f64], above: f64) -> impl Iterator<Item = SampleBand> {
+    let reach = LINE_POINTS * welch.resolution();
+    let is_line = |frequency: f64| lines.iter().any(|line| (frequency - line).abs() < reach);
+    let band = |points: Vec<usize>| {
+        let average = welch.average(&points);
+        // Two-sided.
+        let measured = SpectralBand { density: average.density / 2.0, ..average };
+        SampleBand { measured, place: Place::Points(points) }
+    };
+    welch.band_points((above / welch.resolution()).ceil() as usize, is_line).into_iter().map(band)
+}
+
+/// Squares of the coefficients of the cosine transform of `values` around `mean`, of the orders 1, 2, 3 …, normalised so that those of
+/// white noise have its variance.
+fn squared_coefficients(values: &[f64], mean: f64) -> Vec<f64> {
+    let count = values.len();
+    // The transform of the even samples, followed by the odd ones in reverse, turned by a quarter of its phase (J. Makhoul, "A fast
+    // cosine transform in one and two dimensions", IEEE Trans. ASSP 28, 1980).
+    let transform = transforms::forward(count);
+    let mut input: Vec<f64> = values.iter().step_by(2).map(|value| value - mean).collect();
+    input.extend(values.iter().skip(1).step_by(2).rev().map(|value| value - mean));
+    let mut output = transform.make_output_vec();
+    if transform.process(&mut input, &mut output).is_err() {
+        return Vec::new();
+    }
+    let mut squares = vec![0.0; count - 1];
+    for (order, value) in output.iter().enumerate().skip(1) {
+        let (sine, cosine) = (PI * order as f64 / (2 * count) as f64).sin_cos();
+        let turned = [value.re * cosine + value.im * sine, value.im * cosine - value.re * sine];
+        squares[order - 1] = 2.0 / count as f64 * turned[0].powi(2);
+        squares[count - order - 1] = 2.0 / count as f64 * turned[1].powi(2);
+    }
+    squares
+}
+
+/// Bands of `count` coefficients, as indices of their squares: narrow ones at low orders.
+fn bands(count: usize) -> impl Iterator<Item = Range<usize>> {
+    let widest = (count / BANDS).max(1);
+    let next = move |from: usize| {
+        let width = ((from + 1) / BANDS_PER_E_FOLD).clamp(1, widest);
+        (from < count).then(|| from..(from + width).min(count))
+    };
+    std::iter::successors(next(0), move |band| next(band.end))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_squares_are_those_of_the_sums_with_each_cosine() {
+        for count in [12, 15] {
+            let values: Vec<f64> = (0..count).map(|at| f64::from((at * at * 7 + at) as u32 % 11)).collect();
+            let squares = squared_coefficients(&values, values.iter().sum::<f64>() / count as f64);
+            for order in 1..count {
+                let cosine = |at: usize| {
+                    (2.0 / count as f64).sqrt() * (PI * (order * (2 * at + 1)) as f64 / (2 * count) as f64).cos()
+                };
+                let sum: f64 = values.iter().enumerate().map(|(at, value)| value * cosine(at)).sum();
+                assert!((squares[order - 1] - sum * sum).abs() < 1e-9, "{count}, {order}");
+            }
+        }
+    }
+}
