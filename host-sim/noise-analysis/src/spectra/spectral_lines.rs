@@ -139,8 +139,8 @@ fn width(peak: &spectra::SpectralLine) -> f64 {
 }
 
 /// Density of a model's noise without its lines over what of it is white, flicker and random-walk noise: Markov processes are not, and
-/// white noise behind a filter that is read slowly is not folded as that at the samples' own rate. What remains in its nulls is the
-/// rounding to counts, of this one-sided density.
+/// white noise behind a filter that is read slowly is not folded as that at the samples' own rate. What remains in its nulls is
+/// `rounding`.
 fn background(model: &Model, frequency: f64, rounding: &Rounding) -> f64 {
     let rounding = 0.5 * rounding.density(frequency);
     let (mut all, mut power_laws) = (0.0, 0.0);
