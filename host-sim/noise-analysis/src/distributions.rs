@@ -9,6 +9,9 @@ pub use allan_core::confidence::NORMAL_975;
 /// Variance of the error of rounding to steps of 1, which is uniform over a step where noise reaches over several.
 pub(crate) const ROUNDING: f64 = 1.0 / 12.0;
 
+/// Least p-value of what a model describes: what comes of the model itself has less in one of 1,000 records.
+pub(crate) const DESCRIBED: f64 = 1e-3;
+
 /// Probability that a standard normal number exceeds `z`.
 pub fn upper_tail(z: f64) -> f64 {
     Normal::standard().sf(z)

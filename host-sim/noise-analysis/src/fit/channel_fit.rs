@@ -2,6 +2,7 @@
 
 use crate::OCTAVES;
 use crate::bounds::BoundedEstimate;
+use crate::distributions::DESCRIBED;
 use crate::fit::covariates::CovariateFit;
 use crate::fit::noise_terms::{filter_length_s, is_filter, is_line, is_white, line_frequency};
 use crate::fit::part_filter::PartFilter;
@@ -17,8 +18,6 @@ use allan_core::trace::{LineCandidates, Residual, Trace, trace, trace_while};
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 use measurement::{ChannelId, SensorProfile};
 
-/// p-value of a model's goodness of fit below which a trace with the lines of the curve itself is tried.
-const POOR_FIT: f64 = 1e-3;
 /// By how much the deviance may rise with the other channels' filter: a correct filter rises by more by chance once in 600
 /// times (χ² of one degree of freedom).
 const MAX_DEVIANCE_RISE: f64 = 10.0;
@@ -83,7 +82,7 @@ impl ChannelFit {
     /// whose frequency wanders is many lines in the spectrum of a long record and one in the curve.
     pub(crate) fn fit_traced(covariates: CovariateFit, lines: &[NoiseTerm], filters: &[MovingAverageFilter]) -> Self {
         let by_spectrum = trace(&covariates.curve, LineCandidates::Spectrum(lines), filters);
-        if lines.is_empty() || by_spectrum.after_goodness.p_value > POOR_FIT {
+        if lines.is_empty() || by_spectrum.after_goodness.p_value >= DESCRIBED {
             return Self::new(covariates, by_spectrum);
         }
         let by_curve = trace(&covariates.curve, LineCandidates::Curve, filters);
@@ -251,7 +250,7 @@ impl ChannelFit {
             let bounded = model.clone().bounded(curve, None);
             bounded.model().terms().first().is_none_or(|filter| filter.low <= KNOWN_WHITE * filter.value)
         };
-        let other = if plain.goodness.p_value > POOR_FIT {
+        let other = if plain.goodness.p_value >= DESCRIBED {
             Some(plain)
         } else {
             is_unknown(&best).then(|| with_filter(curve, &traced_behind(curve, common.filter), common))

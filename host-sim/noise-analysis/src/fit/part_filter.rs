@@ -239,18 +239,19 @@ mod tests {
         });
         let filters = profile.filters_read_at(rate_hz);
         let models = curves.each_ref().map(|curve| trace(curve, LineCandidates::Spectrum(&[]), &filters).after);
-        let channel = |((curve, model), rest)| FilteredChannel {
+        let recorded = curves.iter().zip(&models).zip(&series);
+        let channels = recorded.map(|((curve, model), rest)| FilteredChannel {
             name: "",
             curve,
             model,
-            white_rounding: 1.0 / 12.0,
+            rounding: rest.rounding(),
             is_dithered: true,
             samples: match evidence {
                 Evidence::Curves => None,
                 Evidence::Samples => Some((SamplesOfCurve { rest, spectrum: None }, Vec::new())),
             },
-        };
-        let channels: Vec<FilteredChannel> = curves.iter().zip(&models).zip(&series).map(channel).collect();
+        });
+        let channels: Vec<FilteredChannel> = channels.collect();
         estimate(&channels, &profile.filters, decimation)
     }
 

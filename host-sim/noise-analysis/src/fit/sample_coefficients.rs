@@ -1,6 +1,7 @@
 //! Coefficients by all samples in place of those by the curve, where the curve does not contradict them.
 
 use crate::OCTAVES;
+use crate::distributions::DESCRIBED;
 use crate::fit::noise_terms::sinusoids;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::{SampleSpectrum, Welch};
@@ -8,8 +9,6 @@ use allan_core::fit::goodness;
 use allan_core::{Curve, Model};
 use serde::Serialize;
 
-/// Least p-value of the fit of the curve by the model with the coefficients of the samples: a true model has less in one of 1,000 records.
-const DESCRIBES: f64 = 1e-3;
 /// Largest difference of the durations of the samples and of the curve, as a part of that of the curve.
 const SAME_DURATION: f64 = 0.01;
 
@@ -59,6 +58,6 @@ pub(crate) fn by_samples(
     let lines = sinusoids(model.terms().iter().map(|term| &term.kind));
     let fitted = samples.spectrum(curve, &lines).and_then(|spectrum| spectrum.fitted(model));
     let by_samples = fitted.ok_or(CoefficientsFrom::Octaves)?;
-    let is_described = goodness(curve, &by_samples).p_value >= DESCRIBES;
+    let is_described = goodness(curve, &by_samples).p_value >= DESCRIBED;
     if is_described { Ok(by_samples) } else { Err(CoefficientsFrom::OctavesAgainstSamples) }
 }

@@ -220,13 +220,12 @@ fn agree_on_filter(part: &PartData, channels: &mut PerChannel<ChannelTrace>) -> 
         .map(|&channel| {
             let trace = &channels[channel];
             let (fit, resolution) = (&trace.fit, curves.resolution(channel));
-            let rounding = fit.covariates.rounding();
             let lines = || trace.lines.iter().map(|line| line.frequency.value).collect();
             FilteredChannel {
                 name: curves.channels[channel].name,
                 curve: &fit.covariates.curve,
                 model: fit.after(),
-                white_rounding: if rounding.is_correlated() { 0.0 } else { rounding.variance() },
+                rounding: fit.covariates.rounding(),
                 is_dithered: fit.is_dithered(profile, resolution, DITHERED_OCTAVES),
                 samples: trace.samples().map(|samples| (samples, lines())),
             }

@@ -4,7 +4,6 @@
 use crate::OCTAVES;
 use crate::bounds::{BoundedEstimate, ChannelEstimate, MeasuredValue};
 use crate::detectors::random_telegraph::is_reversible;
-use crate::distributions::ROUNDING;
 use crate::effects::findings::SIGNIFICANCE;
 use crate::effects::{
     AccelerationSensitivity, AngleQuantization, BandMismatch, CommonMode, CurveEvidence, Effect, FirstOrderFilter,
@@ -19,7 +18,7 @@ use crate::fit::traced_model::Addition;
 use crate::rivals::proposal::{ChannelFacts, Origin, Proposal};
 use crate::rivals::slow_drift::ChannelsInCommon;
 use crate::samples::gapped_cascade::GappedCascade;
-use crate::samples::rounding::DITHERED_OCTAVES;
+use crate::samples::rounding::{DITHERED_OCTAVES, Rounding};
 use crate::samples::streamed_curves::STEPS_PER_COUNT;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::Modulation;
@@ -212,7 +211,7 @@ fn is_band(term: &FittedTerm, duration_s: f64) -> bool {
 /// noise, filtered or not, is no larger than the rounding error.
 fn is_low_pass(model: &Model, markov: Markov, resolution: f64) -> bool {
     let period_s = model.sample_period();
-    let rounding = ROUNDING * resolution * resolution * period_s;
+    let rounding = Rounding::white(resolution, period_s).variance() * period_s;
     let white = model.terms().iter().filter(|term| is_white(&term.kind));
     let left: f64 = white.map(|term| term.low * term.low).sum();
     markov.time_constant < MAX_LOW_PASS_SAMPLES * period_s && left <= rounding

@@ -52,7 +52,7 @@ impl SampleSpectrum {
         if kinds.contains(&NoiseTerm::RateRamp) {
             return None;
         }
-        let spectrum = model.filter().iter().fold(self, |spectrum, filter| spectrum.without_leakage(*filter));
+        let spectrum = if let Some(filter) = model.filter() { self.without_leakage(filter) } else { self };
         let likelihood = Likelihood::new(&spectrum, &kinds);
         let at_decimation = |decimation: f64| {
             let read = |kind: &NoiseTerm| match kind {
@@ -78,11 +78,11 @@ impl SampleSpectrum {
         Some(Model::new(model.sample_period(), terms.collect::<Option<Vec<FittedTerm>>>()?))
     }
 
-    /// Its likelihood behind `filter`, the first of `kinds`.
-    pub(crate) fn behind(&self, filter: MovingAverageFilter, kinds: &[NoiseTerm]) -> SpectrumBehindFilter<'_> {
+    /// Its likelihood with the terms `kinds`, of which the first is noise behind a filter.
+    pub(crate) fn behind(&self, kinds: &[NoiseTerm]) -> SpectrumBehindFilter<'_> {
         let as_measured = |band: &SpectralBand| band.ordinates * (band.density.max(f64::MIN_POSITIVE).ln() + 1.0);
         let saturated = self.bands.iter().map(|band| as_measured(&band.measured)).sum();
-        SpectrumBehindFilter { spectrum: self, filter, likelihood: Likelihood::new(self, kinds), saturated }
+        SpectrumBehindFilter { spectrum: self, likelihood: Likelihood::new(self, kinds), saturated }
     }
 
     /// Without the bands into whose first, middle or last coefficient behind `filter` the ends of the record leak: few
@@ -111,17 +111,15 @@ impl SampleSpectrum {
 /// that it was made for: it is slow against any filter.
 pub(crate) struct SpectrumBehindFilter<'a> {
     spectrum: &'a SampleSpectrum,
-    filter: MovingAverageFilter,
     likelihood: Likelihood,
     /// The objective of a spectrum that is as measured.
     saturated: f64,
 }
 
 impl SpectrumBehindFilter<'_> {
-    /// Twice what the logarithm of the likelihood, with the likeliest coefficients, is below that of a spectrum that is as measured. A
-    /// true model has about the number of [bands](SampleSpectrum::bands).
-    pub(crate) fn deviance(&self, decimation: f64) -> f64 {
-        let filter = MovingAverageFilter { decimation, ..self.filter };
+    /// With this filter in place of the first term: twice what the logarithm of the likelihood, with the likeliest coefficients, is below
+    /// that of a spectrum that is as measured. A true model has about the number of [bands](SampleSpectrum::bands).
+    pub(crate) fn deviance(&self, filter: MovingAverageFilter) -> f64 {
         2.0 * (self.likelihood.with_first(&Shapes::new(self.spectrum, &[NoiseTerm::Filtered(filter)])) - self.saturated)
     }
 }

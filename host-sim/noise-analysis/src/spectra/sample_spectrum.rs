@@ -49,14 +49,12 @@ pub struct SampleSpectrum {
 }
 
 /// An average over neighbouring frequencies.
-#[derive(Clone)]
 pub(super) struct SampleBand {
     pub(super) measured: SpectralBand,
     pub(super) place: Place,
 }
 
 /// What a band is an average of.
-#[derive(Clone)]
 pub(super) enum Place {
     /// Squares of the coefficients of the cosine transform, of the orders 1, 2, 3 … from index 0 on.
     Coefficients(Range<usize>),

@@ -5,6 +5,7 @@ use crate::OCTAVES;
 use crate::fit::noise_terms::is_white;
 use crate::fit::octave_covariance::relative_covariance;
 use crate::fit::sample_coefficients::SamplesOfCurve;
+use crate::samples::rounding::Rounding;
 use allan_core::host::DevianceComparison;
 use allan_core::model::{FittedTerm, MAX_TERMS};
 use allan_core::term::MovingAverageFilter;
@@ -24,8 +25,8 @@ pub(crate) struct FilteredChannel<'a> {
     pub curve: &'a Curve<OCTAVES>,
     /// Its own model, whose terms beside the white noise it keeps.
     pub model: &'a Model,
-    /// Variance of the rounding errors in the curve that are white, in the channel's unit squared.
-    pub white_rounding: f64,
+    /// Of its samples. Errors that are correlated are not in the curve any more.
+    pub rounding: &'a Rounding,
     /// Whether rounding adds white noise and nothing else. A channel that is not dithered says nothing of the filter.
     pub is_dithered: bool,
     /// Its samples, and the frequencies of lines in their spectrum, Hz, where they are kept.
@@ -35,7 +36,10 @@ pub(crate) struct FilteredChannel<'a> {
 /// The curve of a channel without the white noise of its rounding.
 pub(super) fn without_rounding(channel: &FilteredChannel) -> Curve<OCTAVES> {
     let mut curve = channel.curve.clone();
-    curve.replace_avar(|point| point.avar - (channel.white_rounding / point.n as f64).min(MOST_ROUNDING * point.avar));
+    if !channel.rounding.is_correlated() {
+        let variance = channel.rounding.variance();
+        curve.replace_avar(|point| point.avar - (variance / point.n as f64).min(MOST_ROUNDING * point.avar));
+    }
     curve
 }
 

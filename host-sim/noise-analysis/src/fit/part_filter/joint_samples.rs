@@ -5,6 +5,7 @@ use super::decimation::{allowed_within, least_within};
 use super::hypothesis::{
     BOUNDED, Hypothesis, Identified, birge_ratio, chi_squared_quantile, chi_squared_tail, simplest,
 };
+use crate::distributions::DESCRIBED;
 use crate::fit::noise_terms::{is_white, sinusoids};
 use crate::parallel::in_parallel;
 use crate::spectra::{SampleSpectrum, SpectrumBehindFilter};
@@ -14,9 +15,6 @@ use allan_core::term::MovingAverageFilter;
 /// Steps of the search for the decimation within what the curves allow, and of that for its bounds: to one in a thousand of that range.
 const SEARCH_STEPS: usize = 14;
 const BOUND_STEPS: usize = 10;
-
-/// Least p-value of a spectrum that a filter describes: a true one has less in one of 1,000 records.
-const DESCRIBES: f64 = 1e-3;
 
 /// A filter that the curves allow, with a decimation between these.
 pub(super) type AllowedFilter = (MovingAverageFilter, (f64, f64));
@@ -53,9 +51,9 @@ struct ChannelBehindFilter<'a> {
 
 impl<'a> ChannelBehindFilter<'a> {
     fn new(ChannelSpectrum { spectrum, others }: &'a ChannelSpectrum, (filter, range): AllowedFilter) -> Self {
-        let spectrum = spectrum.behind(filter, &kinds(filter, others));
-        let own = likeliest((filter, range), |read| spectrum.deviance(read.decimation));
-        Self { least: spectrum.deviance(own.decimation), spectrum }
+        let spectrum = spectrum.behind(&kinds(filter, others));
+        let (least, _) = likeliest((filter, range), |read| spectrum.deviance(read));
+        Self { least, spectrum }
     }
 }
 
@@ -74,30 +72,29 @@ impl<'a> TriedChannel<'a> {
             allowed.iter().map(|filter| ChannelBehindFilter::new(of, *filter)).collect();
         let least = behind.iter().map(|of| of.least).fold(f64::INFINITY, f64::min);
         let bands = of.spectrum.bands() as f64;
-        let is_described = chi_squared_tail(least, bands) >= DESCRIBES;
+        let is_described = chi_squared_tail(least, bands) >= DESCRIBED;
         Self { behind, dispersion: (least / bands).max(1.0), is_described }
     }
 }
 
-/// The filter with the least deviance at a decimation within a range.
+/// The least deviance of a filter at a decimation within a range, and the filter with that decimation.
 ///
 /// A reader that counts the values of the sensor has a whole number, at which the least deviance is a cusp: between two values of
 /// its clock a sensor gives the one before, and which one that is changes with time.
 fn likeliest(
     (filter, (from, to)): AllowedFilter,
     deviance: impl Fn(MovingAverageFilter) -> f64,
-) -> MovingAverageFilter {
+) -> (f64, MovingAverageFilter) {
     if filter.decimation == 1.0 {
-        return filter;
+        return (deviance(filter), filter);
     }
     let whole = (from.ceil() as u32..=to.floor() as u32).map(f64::from);
     let whole = whole.map(|decimation| MovingAverageFilter { decimation, ..filter });
     let between = least_within(filter, (from, to), SEARCH_STEPS, &deviance);
-    let (_, likeliest) = whole.fold((deviance(between), between), |least, read| {
+    whole.fold((deviance(between), between), |least, read| {
         let deviance = deviance(read);
         if deviance < least.0 { (deviance, read) } else { least }
-    });
-    likeliest
+    })
 }
 
 /// The spectra of several channels behind one filter.
@@ -109,11 +106,11 @@ struct JointSpectra<'a> {
 
 impl JointSpectra<'_> {
     fn deviances(&self, filter: MovingAverageFilter) -> Vec<f64> {
-        in_parallel(&self.channels, |(of, dispersion)| of.spectrum.deviance(filter.decimation) / dispersion)
+        in_parallel(&self.channels, |(of, dispersion)| of.spectrum.deviance(filter) / dispersion)
     }
 
     fn likeliest(&self) -> Hypothesis {
-        let filter = likeliest(self.allowed, |read| self.deviances(read).iter().sum());
+        let (_, filter) = likeliest(self.allowed, |read| self.deviances(read).iter().sum());
         Hypothesis { filter, deviances: self.deviances(filter) }
     }
 
