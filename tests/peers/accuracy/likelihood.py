@@ -48,6 +48,18 @@ def of_differences(name, count, duration):
     return toeplitz(2 * around[1:-1] - around[:-2] - around[2:])
 
 
+def halves(count):
+    """Orthonormal bases of the vectors that stay the same when reversed, and of those that change sign.
+
+    A symmetric Toeplitz matrix reversed is itself, so the parts of a stationary vector in the two bases are independent. Two covariance
+    matrices of half the size take a quarter of the time of one.
+    """
+    identity = np.eye(count)
+    middle = count // 2
+    pairs = [(identity[:middle] + sign * identity[: count - middle - 1 : -1]) / np.sqrt(2) for sign in (1, -1)]
+    return [np.vstack([pairs[0], identity[middle : count - middle]]), pairs[1]]
+
+
 def within(name, samples):
     """Expected variance of the samples of a block around their mean, with the divisor `samples − 1`."""
     lags = np.arange(1.0, samples)
@@ -81,8 +93,10 @@ class Likelihood:
         lags = np.arange(float(PARTS))
         parts = [toeplitz(covariances(name, lags, self.parts_s)) for name in names]
         self.contrasts = dct(np.eye(PARTS), axis=0, norm="ortho")[1:]
+        self.differences = [of_differences(name, BLOCKS - 1, block_s) for name in names]
+        self.halves = halves(BLOCKS - 1)
         self.groups = [
-            Normal([of_differences(name, BLOCKS - 1, block_s) for name in names], 1),
+            *[Normal([half @ matrix @ half.T for matrix in self.differences], 1) for half in self.halves],
             Normal([self.contrasts @ part @ self.contrasts.T for part in parts], BLOCKS),
             Normal([np.array([[within(name, self.size)]]) for name in names], BLOCKS * PARTS * (self.size - 1)),
         ]
@@ -91,14 +105,14 @@ class Likelihood:
         """The squares of the likeliest coefficients, by Fisher's scoring; none is negative."""
         samples = series.reshape(BLOCKS, PARTS, self.size)
         parts = samples.mean(axis=2)
-        variance = np.sum((samples - parts[:, :, None]) ** 2) / self.groups[2].repeats
+        variance = np.sum((samples - parts[:, :, None]) ** 2) / self.groups[-1].repeats
         differences = np.diff(parts.mean(axis=1))
         contrasts = parts @ self.contrasts.T
-        statistics = [np.outer(differences, differences), contrasts.T @ contrasts / BLOCKS, np.array([[variance]])]
+        statistics = [np.outer(half @ differences, half @ differences) for half in self.halves]
+        statistics += [contrasts.T @ contrasts / BLOCKS, np.array([[variance]])]
         # White noise explains the squares within the parts, and each other noise an equal part of the differences.
-        first = self.groups[0].matrices
-        squares = np.array([np.var(differences) / matrix[0, 0] for matrix in first]) / len(first)
-        squares[0] = variance / self.groups[2].matrices[0][0, 0]
+        squares = np.array([np.var(differences) / matrix[0, 0] for matrix in self.differences]) / len(self.differences)
+        squares[0] = variance / self.groups[-1].matrices[0][0, 0]
         least = 1e-9 * squares
         for _ in range(ROUNDS):
             sums = [group.score_and_information(squares, of) for group, of in zip(self.groups, statistics)]
