@@ -36,6 +36,30 @@ pub enum LineFault {
     DoubledEdge,
 }
 
+impl LineFault {
+    /// Every fault.
+    pub const ALL: [Self; 13] = [
+        Self::AnswerBits,
+        Self::RequestBits,
+        Self::AnswerRun,
+        Self::StuckFrom { high: false },
+        Self::StuckFrom { high: true },
+        Self::MissingClock,
+        Self::ExtraClock,
+        Self::Repeated,
+        Self::ShortSelect,
+        Self::Reset,
+        Self::Failed,
+        Self::LostEdge,
+        Self::DoubledEdge,
+    ];
+
+    /// Whether it meets bits; the others meet bursts.
+    pub fn is_of_bits(self) -> bool {
+        matches!(self, Self::AnswerBits | Self::RequestBits)
+    }
+}
+
 /// A [`LineFault`] and how often it comes.
 #[derive(Debug, Clone)]
 pub struct RandomFault {

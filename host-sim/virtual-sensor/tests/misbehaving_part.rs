@@ -8,8 +8,8 @@ use std::rc::Rc;
 use std::task::{Context, Poll, Waker};
 
 use adis16405_driver::{
-    Adis16405, Config, Diagnosis, Error, Faults, PerClockMode, Product, Register, SamplePeriod, SelectDuringStall,
-    Sleep, Timing,
+    Adis16405, Burst, BurstValidator, ChannelMask, Config, Diagnosis, Error, Faults, PerClockMode, Product, Register,
+    SamplePeriod, SelectDuringStall, Sleep, Timing,
 };
 use embedded_hal::digital::{ErrorType, OutputPin};
 use embedded_hal_async::delay::DelayNs;
@@ -160,6 +160,23 @@ fn each_latched_flag_is_a_warning_until_its_diagnosis_is_read() {
         assert_eq!(imu.diagnosis(), Ok(Diagnosis::from_bits_retain(flag.bit())));
         bus.wait_for_data();
         assert_eq!(imu.read().unwrap().warnings() - Faults::REPEATED, Faults::empty(), "{flag:?}");
+    }
+}
+
+/// A sensor sets the error flag in all words of a burst or in none: in one word alone it is a bit that the bus has inverted.
+#[test]
+fn an_error_flag_in_one_word_alone_refuses_the_burst() {
+    let bus = strict(1_000);
+    let mut imu = driver(&bus);
+    imu.start_up().unwrap();
+    bus.wait_for_data();
+    let sound = imu.burst().unwrap();
+    for word in 0..12 {
+        let mut bytes = sound.to_bytes();
+        // The answer to the burst's own frame comes first; the flag is bit 14 of a word, and the upper byte comes first.
+        bytes[2 + 2 * word] ^= 0x40;
+        let validity = BurstValidator::default().validate(&Burst::from_bytes(&bytes));
+        assert_eq!((validity.faults, validity.refused), (Faults::ERROR_ALARM | Faults::MIXED_ALARM, ChannelMask::ALL));
     }
 }
 
