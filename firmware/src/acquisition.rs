@@ -151,7 +151,7 @@ pub enum DrdyEdge {
 /// Monitors the data-ready edges of a sensor with one programmed sample period.
 #[derive(Debug, Clone, Copy)]
 pub struct DataReadyMonitor {
-    /// Programmed period in 1/256 µs.
+    /// Programmed period in 1/256 µs; above 0.
     period_q8: u64,
     last_us: Option<u64>,
     /// When the sensor was probed last.
@@ -192,7 +192,8 @@ impl DataReadyMonitor {
         };
         let interval_us = at_us.saturating_sub(last_us);
         let (interval, period) = (interval_us << 8, self.mean_period_q8());
-        let periods = (interval + period / 2) / period;
+        // Without a period memory is damaged: the main loop, not an interrupt, restarts the device.
+        let Some(periods) = (interval + period / 2).checked_div(period) else { return DrdyEdge::Spurious };
         let deviation = interval.abs_diff(periods * period);
         if core::mem::take(&mut self.new_phase) {
             self.last_us = Some(at_us);
@@ -230,6 +231,11 @@ impl DataReadyMonitor {
     pub fn is_silent_at(&self, now_us: u64) -> bool {
         let last_sign_us = self.last_us.unwrap_or(0).max(self.probed_us);
         now_us.saturating_sub(last_sign_us) > self.silence_us()
+    }
+
+    /// Whether there is a programmed period, as with every configuration: without it memory is damaged.
+    pub(crate) const fn has_period(&self) -> bool {
+        self.period_q8 > 0
     }
 
     /// Clears the suspicion: the sensor was probed and configured at `now_us`.

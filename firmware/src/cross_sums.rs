@@ -108,9 +108,12 @@ impl CrossSums {
     }
 
     fn add_products(&mut self, row: usize, differences: &[Option<i64>; CHANNELS.len()]) {
-        let sums = self.low[row].iter_mut().zip(&mut self.high[row]).zip(&mut self.counts[row]);
-        for (((low, high), count), (a, b)) in sums.zip(PAIRS) {
-            if let (Some(a), Some(b)) = (differences[a], differences[b]) {
+        // Without a check that would panic: this is a part of the sampling path.
+        let (Some(low), Some(high)) = (self.low.get_mut(row), self.high.get_mut(row)) else { return };
+        let Some(counts) = self.counts.get_mut(row) else { return };
+        let difference = |of: usize| differences.get(of).copied().flatten();
+        for (((low, high), count), (a, b)) in low.iter_mut().zip(high).zip(counts).zip(PAIRS) {
+            if let (Some(a), Some(b)) = (difference(a), difference(b)) {
                 let sum = wide(*low, *high) + i128::from(a) * i128::from(b);
                 (*low, *high) = (sum as u64, (sum >> 64) as i32);
                 *count = count.saturating_add(1);

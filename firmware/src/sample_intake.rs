@@ -134,6 +134,11 @@ impl<'m> Estimators<'m> {
         self.monitor.is_suspect() || self.unusable >= 2 * UNUSABLE_BURSTS
     }
 
+    /// Whether what samples are divided by is as no damage to the memory leaves it.
+    pub(crate) fn is_intact(&self) -> bool {
+        self.monitor.has_period()
+    }
+
     /// Why the sensor must be probed at `now_us`; `None` if it need not be.
     pub(crate) fn trouble(&self, now_us: u64) -> Option<SensorTrouble> {
         if self.monitor.is_silent_at(now_us) {

@@ -12,6 +12,7 @@ mod images;
 mod microcontroller;
 mod peripherals;
 mod probe;
+mod sampling_path;
 
 use adis16405_driver::GyroRange;
 use bench::{Outcome, Scenario, image, run};

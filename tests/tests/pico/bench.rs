@@ -125,8 +125,8 @@ pub(crate) struct Pico {
 pub(crate) enum Fault {
     /// The DMA channel that receives a burst stops with an error.
     Dma,
-    /// The programmed sample period, by which the firmware divides, becomes 0.
-    Divisor,
+    /// The programmed sample period becomes 0.
+    Period,
     /// The exception HardFault.
     Exception,
     /// The core executes nothing any more, as after a fault within the handler of faults.

@@ -3,7 +3,7 @@
 // rp2040js, the image as UF2 and as ELF, which must agree, the time to run in s, `ok` or `dead` for the crystal, a fault and its
 // time in s, `none` or the time in s from which a USB host reads the serial port, `none` or a file with the flash memory that keeps
 // the settings, which is written at the end, and keys as TIME=TEXT for the UART and usb:TIME=TEXT. The faults: `none`, `dma` (an error
-// of the channel that receives a burst), `divisor` (the firmware divides by 0), `exception`, `lockup`. A restart by the watchdog or
+// of the channel that receives a burst), `period` (the programmed sample period becomes 0), `exception`, `lockup`. A restart by the watchdog or
 // by the firmware keeps the memory.
 //
 // A question is one byte and a time in ns (f64, little-endian): `n` advances the sensor to the time, `c` has a frequency of SCK in
@@ -198,7 +198,7 @@ const run = (retained, reason) => {
   // Faults of the processor, which happen between two instructions.
   const fail = {
     // Every aligned word pair that is the programmed period in 1/256 us becomes 0, by which the firmware then divides.
-    divisor() {
+    period() {
       const memory = new BigUint64Array(mcu.sram.buffer);
       memory.forEach((value, index) => (memory[index] = value === 1_250_000n ? 0n : value));
     },

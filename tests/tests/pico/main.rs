@@ -265,10 +265,10 @@ fn a_failed_transfer_is_recovered_from() {
 /// panic, the address of a fault, nothing after a lock-up, which the watchdog ends within 8.3 s.
 #[test]
 fn a_restart_keeps_the_statistics_and_tells_its_cause() {
-    // The panic comes before 64 samples have measured the period, when not every channel has been kept.
+    // The panic comes when not every channel has been kept.
     let cases = [
         (None, "start 2: Software, 8 channels restored", ""),
-        (Some((0.25, Fault::Divisor)), "start 2: Software, ", "panic at acquisition.rs:"),
+        (Some((0.25, Fault::Period)), "start 2: Software, ", "panic at device.rs:"),
         (Some((2.5, Fault::Exception)), "start 2: Software, 8 channels restored", "hard fault at 0x100"),
         (Some((2.5, Fault::LockUp)), "start 2: Watchdog, 8 channels restored", ""),
     ];

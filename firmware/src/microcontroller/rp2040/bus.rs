@@ -53,14 +53,15 @@ impl<W: ValidSpiPinout<SPI0>, S: OutputPin<Error = Infallible>> Spi0Bus<W, S> {
 
     /// Transfers the next bytes of the burst: all of them, or one word if there is to be a gap between words.
     fn start_bytes(&mut self) {
-        let from = self.started;
         let count = if self.select.timing.word_gap_ns == 0 { BURST_BYTES } else { 2 };
+        let from = self.started.min(BURST_BYTES - count);
         self.started += count;
         let data = registers().sspdr().as_ptr() as u32;
-        let (received, request) = (self.received[from..].as_mut_ptr() as u32, REQUEST[from..].as_ptr() as u32);
+        let received = self.received.as_mut_ptr().wrapping_add(from) as u32;
+        let request = REQUEST.as_ptr().wrapping_add(from) as u32;
         compiler_fence(Ordering::SeqCst);
-        for (channel, read, write) in [(RX, data, received), (TX, request, data)] {
-            let registers = self.dma.ch(channel);
+        let channels = [(RX, self.dma.ch(RX), data, received), (TX, self.dma.ch(TX), request, data)];
+        for (channel, registers, read, write) in channels {
             // SAFETY: the channels transfer `count` bytes, which both arrays have from `from` on, from and to SPI0 only, and
             // `received` is not read before they have stopped.
             unsafe {
@@ -83,8 +84,8 @@ impl<W: ValidSpiPinout<SPI0>, S: OutputPin<Error = Infallible>> Spi0Bus<W, S> {
     fn stop_bytes(&mut self) -> bool {
         // SAFETY: clears the request of a channel that only this bus uses.
         self.dma.ints0().write(|w| unsafe { w.bits(1 << RX) });
-        let complete = [RX, TX].iter().all(|&channel| {
-            let registers = self.dma.ch(channel);
+        let channels = [self.dma.ch(RX), self.dma.ch(TX)];
+        let complete = channels.iter().all(|registers| {
             let control = registers.ch_ctrl_trig().read();
             control.read_error().bit_is_clear()
                 && control.write_error().bit_is_clear()
@@ -95,10 +96,9 @@ impl<W: ValidSpiPinout<SPI0>, S: OutputPin<Error = Infallible>> Spi0Bus<W, S> {
             // SAFETY: aborts the two channels that only this bus uses.
             self.dma.chan_abort().write(|w| unsafe { w.bits(1 << RX | 1 << TX) });
             let _aborted = wait_for(|| self.dma.chan_abort().read().bits() == 0);
-            for channel in [RX, TX] {
-                let control = self.dma.ch(channel).ch_al1_ctrl();
+            for registers in channels {
                 // SAFETY: disables the channel and clears its errors; nothing is triggered through this alias.
-                control.write(|w| unsafe { w.bits(ERRORS) });
+                registers.ch_al1_ctrl().write(|w| unsafe { w.bits(ERRORS) });
             }
             // An abort may complete the transfer, too (erratum RP2040-E13).
             // SAFETY: as above.

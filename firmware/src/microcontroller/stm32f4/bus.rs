@@ -67,9 +67,9 @@ impl<S: OutputPin<Error = Infallible>> Spi1Bus<S> {
         // only, and `received` is not read before they have stopped.
         unsafe {
             rx.par().write(|w| w.pa().bits(data));
-            rx.m0ar().write(|w| w.m0a().bits(self.received[from..].as_mut_ptr() as u32));
+            rx.m0ar().write(|w| w.m0a().bits(self.received.as_mut_ptr().wrapping_add(from) as u32));
             tx.par().write(|w| w.pa().bits(data));
-            tx.m0ar().write(|w| w.m0a().bits(REQUEST[from..].as_ptr() as u32));
+            tx.m0ar().write(|w| w.m0a().bits(REQUEST.as_ptr().wrapping_add(from) as u32));
         }
         rx.ndtr().write(|w| w.ndt().set(count as u16));
         tx.ndtr().write(|w| w.ndt().set(count as u16));
@@ -89,9 +89,9 @@ impl<S: OutputPin<Error = Infallible>> Spi1Bus<S> {
         let complete = flags.tcif0().bit_is_set() && flags.teif0().bit_is_clear() && flags.teif3().bit_is_clear();
         let complete = complete && self.dma.st(RX).ndtr().read().ndt().bits() == 0;
         registers().cr2().modify(|_, w| w.rxdmaen().clear_bit().txdmaen().clear_bit());
-        let stopped = [RX, TX].map(|stream| {
-            self.dma.st(stream).cr().modify(|_, w| w.en().clear_bit());
-            wait_for(|| self.dma.st(stream).cr().read().en().bit_is_clear())
+        let stopped = [self.dma.st(RX), self.dma.st(TX)].map(|stream| {
+            stream.cr().modify(|_, w| w.en().clear_bit());
+            wait_for(|| stream.cr().read().en().bit_is_clear())
         });
         self.clear_flags();
         compiler_fence(Ordering::SeqCst);

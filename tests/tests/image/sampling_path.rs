@@ -1,0 +1,136 @@
+//! What the sampling path of each image can run into: the machine code that the two sampling interrupts and that of the estimators reach.
+
+use crate::bench::{TARGET, feather_image, image};
+use crate::images;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::process::Command;
+
+/// The target of the Pico.
+const PICO: &str = "thumbv6m-none-eabi";
+/// What calls a function by its address alone, and the closure that it calls: the encoder of messages, which hands over bytes.
+const CALLS_BY_ADDRESS: [&str; 2] = ["firmware::transmit::TransmitQueue::send", "link::frame::CobsFlavor"];
+const CALLED_BY_ADDRESS: &str = "firmware::transmit::TransmitQueue::send::{{closure}}";
+/// The checks that are left, in crates of others: what is called, and a part of the place. A queue of `heapless` divides by the number of its
+/// slots, of which each end has a copy in memory. `postcard` cuts an integer, `[..=last]`, out of the bytes that it has just written. The HAL of
+/// the RP2040 takes no number but 0 or 1 from the register that tells its cores apart.
+const LEFT: [(&str, &str); 3] = [
+    ("core::panicking::panic_const::panic_const_rem_by_zero", "/src/spsc.rs:"),
+    ("RangeToInclusive<usize> as core::slice::index::SliceIndex", "/slice/index.rs:"),
+    ("core::panicking::panic_fmt", "/src/sio.rs:"),
+];
+
+/// A call within the code of an image.
+struct Call {
+    to: u32,
+    /// File and line of the source.
+    place: String,
+}
+
+/// A function of an image, by the disassembler.
+#[derive(Default)]
+struct Function {
+    name: String,
+    calls: Vec<Call>,
+    calls_by_address: bool,
+}
+
+/// The functions of an image, by their addresses.
+fn functions(image: &Path) -> BTreeMap<u32, Function> {
+    let output = Command::new("arm-none-eabi-objdump")
+        .args(["--disassemble", "--demangle", "--line-numbers", "--no-show-raw-insn"])
+        .arg(image)
+        .output()
+        .expect("arm-none-eabi-objdump, of the package binutils-arm-none-eabi");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let listing = String::from_utf8(output.stdout).expect("names in UTF-8");
+    let address = |text: &str| u32::from_str_radix(text.trim(), 16).ok();
+    let (mut functions, mut place) = (BTreeMap::<u32, Function>::new(), "");
+    for line in listing.lines() {
+        if line.starts_with('/') {
+            place = line;
+        } else if let Some((start, name)) = line.strip_suffix(">:").and_then(|line| line.split_once(" <"))
+            && let Some(start) = address(start)
+        {
+            functions.insert(start, Function { name: name.to_owned(), ..Function::default() });
+        } else if let [_, mnemonic, arguments, ..] = line.split('\t').collect::<Vec<_>>()[..]
+            && let Some(mut function) = functions.last_entry()
+        {
+            let target = arguments.split_once(" <").and_then(|(target, _)| address(target));
+            match (mnemonic.trim_end_matches(".n").trim_end_matches(".w"), target) {
+                ("b" | "bl", Some(to)) => function.get_mut().calls.push(Call { to, place: place.to_owned() }),
+                ("blx", None) => function.get_mut().calls_by_address = true,
+                ("bx", None) if arguments != "lr" => function.get_mut().calls_by_address = true,
+                _ => {}
+            }
+        }
+    }
+    functions
+}
+
+/// Whether a function panics, or is one that finds out whether to.
+fn is_panic(name: &str) -> bool {
+    [
+        "core::slice::index::SliceIndex",
+        "core::panicking::",
+        "unwrap_failed",
+        "expect_failed",
+        "_fail",
+        "rust_begin_unwind",
+    ]
+    .iter()
+    .any(|part| name.contains(part))
+}
+
+/// Asserts that nothing that these interrupts reach panics, and returns those of [`LEFT`] that are reached.
+fn assert_no_panic(image: &Path, interrupts: [&str; 3]) -> BTreeSet<&'static str> {
+    let functions = functions(image);
+    let is_root = |name: &str| interrupts.contains(&name) || name == CALLED_BY_ADDRESS;
+    let mut open: Vec<u32> = functions.iter().filter(|(_, of)| is_root(&of.name)).map(|(&start, _)| start).collect();
+    assert_eq!(open.len(), interrupts.len() + 1, "{interrupts:?} in {}", image.display());
+    let mut reached: BTreeSet<u32> = open.iter().copied().collect();
+    let (mut panics, mut left) = (Vec::new(), BTreeSet::new());
+    while let Some(start) = open.pop() {
+        let function = &functions[&start];
+        let is_known = CALLS_BY_ADDRESS.iter().any(|name| function.name.contains(name));
+        assert!(is_known || !function.calls_by_address, "{} calls a function by its address", function.name);
+        for Call { to, place } in &function.calls {
+            let (&called, of) = functions.range(..=*to).next_back().expect("a function");
+            let kept = LEFT.iter().find(|(name, part)| of.name.contains(name) && place.contains(part));
+            match is_panic(&of.name) {
+                true if let Some((name, _)) = kept => drop(left.insert(*name)),
+                true => panics.push(format!("{} calls {} at {place}", function.name, of.name)),
+                false if reached.insert(called) => open.push(called),
+                false => {}
+            }
+        }
+    }
+    assert!(panics.is_empty(), "{}: {panics:#?}", image.display());
+    println!("{}: {} functions, checks left in {left:?}", image.display(), reached.len());
+    left
+}
+
+/// The sampling interrupts validate a burst and queue it; that of the estimators adds it to all sums and sends the raw stream.
+#[test]
+fn the_sampling_path_of_each_image_has_no_panic() {
+    let h405 = ["EXTI0", "DMA2_STREAM0", "CAN1_TX"];
+    let feather = ["EXTI4", "DMA2_STREAM0", "CAN1_TX"];
+    let pico = ["IO_IRQ_BANK0", "DMA_IRQ_0", "SW0_IRQ"];
+    let images = [
+        (image(), h405),
+        (feather_image(), feather),
+        (&images::build("feather", TARGET, &["feather-usb"]), feather),
+        (&images::build("pico", PICO, &[]), pico),
+    ];
+    let left: BTreeSet<&str> =
+        images.into_iter().flat_map(|(image, interrupts)| assert_no_panic(image, interrupts)).collect();
+    assert_eq!(left, BTreeSet::from(LEFT.map(|(name, _)| name)), "checks that are left");
+}
+
+/// The main loop panics where a check fails, so that the path to it would be seen.
+#[test]
+fn the_main_loop_has_panics() {
+    let functions = functions(image());
+    let calls = functions.values().filter(|of| of.name.starts_with("firmware::app::run"));
+    assert!(calls.flat_map(|of| &of.calls).any(|call| functions.get(&call.to).is_some_and(|of| is_panic(&of.name))));
+}
