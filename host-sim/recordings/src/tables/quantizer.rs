@@ -13,6 +13,8 @@ const EXAMINED: usize = 4096;
 const MIN_DISTINCT: usize = 3;
 /// Largest distance of a number from its multiple, in steps.
 const ON_STEP: f64 = 0.02;
+/// Largest whole numbers whose distances, and the multiples next to these, double precision has exactly.
+const EXACT: f64 = (1u64 << 51) as f64;
 /// Largest part of the numbers that may lie beyond the largest count; where more do, the LSB is raised.
 const MAX_BEYOND: f64 = 1e-3;
 /// Largest noise in counts: of a finer step, as of the many digits of a text, counts would leave no room in the estimator's sums of
@@ -82,9 +84,10 @@ pub(crate) fn step(values: &[f64]) -> Option<(f64, f64)> {
     let stride = values.len().div_ceil(EXAMINED).max(1);
     let mut examined: Vec<f64> = values.iter().copied().step_by(stride).filter(|value| value.is_finite()).collect();
     examined.sort_by(f64::total_cmp);
-    // Half a unit in the last place of a number in single or double precision; decimal texts are read as doubles. Whole numbers are exact.
+    // Half a unit in the last place of a number in single or double precision; decimal texts are read as doubles. Whole numbers are exact
+    // as far as double precision is.
     let is_single = examined.iter().all(|&value| f64::from(value as f32) == value);
-    let is_whole = examined.iter().all(|value| value.fract() == 0.0);
+    let is_whole = largest <= EXACT && examined.iter().all(|value| value.fract() == 0.0);
     let precision = if is_single { f64::from(f32::EPSILON) } else { 2.0 * f64::EPSILON };
     let rounding = if is_whole { 0.0 } else { 0.5 * largest * precision };
     examined.dedup_by(|one, other| (*one - *other).abs() <= 4.0 * rounding);
@@ -288,6 +291,13 @@ mod tests {
         assert!((step / 1e-9 - 1.0).abs() < 1e-6, "{step}");
         let quantizer = Quantizer::new(&values);
         assert!(quantizer.lsb > 1e-3 && quantizer.cost.is_some(), "{quantizer:?}");
+    }
+
+    /// Euclid's algorithm found remainders without end, which were the errors of its products.
+    #[test]
+    fn whole_numbers_beyond_double_precision_have_no_common_divisor() {
+        let times = [1_700_000_000_000_072_828_i64, -1, -7_908_400_996_633_745_333, -415_939_286_374_804_831];
+        assert_eq!(step(&times.map(|time| time as f64)), None);
     }
 
     #[test]
