@@ -31,7 +31,7 @@ struct Cli {
     /// Interpreter in whose environment requirements.txt is installed; without, the peers in Python are left out.
     #[arg(long)]
     python: Option<String>,
-    /// Interpreter with numpy and scipy, for the likelihood by exact covariances, 2 s or more a series; without, it is left out.
+    /// Interpreter with numpy and scipy, for the likelihood by exact covariances, half a second a series; without, it is left out.
     #[arg(long, value_name = "PYTHON")]
     likelihood: Option<String>,
     /// Only this project's own estimator, beside that likelihood if it is asked for.
