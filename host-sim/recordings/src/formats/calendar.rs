@@ -78,11 +78,13 @@ pub(crate) fn time_of_day(text: &str) -> Option<i64> {
                 (None, Some(milliseconds)) if milliseconds.len() == 3 => (text, milliseconds),
                 _ => return None,
             };
-            let is_fraction = (1..=18).contains(&fraction.len()) && fraction.bytes().all(|b| b.is_ascii_digit());
-            let digits = fraction.get(..9).unwrap_or(fraction);
+            if !(1..=18).contains(&fraction.len()) || !fraction.bytes().all(|b| b.is_ascii_digit()) {
+                return None;
+            }
+            let digits = &fraction[..fraction.len().min(9)];
             let scale = 10i64.pow(9 - digits.len() as u32);
             // The 61st second of a minute is a leap second.
-            (two_digits(second, 61)?, is_fraction.then(|| digits.parse::<i64>().ok()).flatten()? * scale)
+            (two_digits(second, 61)?, digits.parse::<i64>().ok()? * scale)
         }
         None => (0, 0),
     };
@@ -195,7 +197,9 @@ mod tests {
         for text in ["2018-02-29", "2018-13-01", "1.2.3", "0.5", "-0.012", "2018-04", "1e-3", "18-04-25"] {
             assert_eq!(date(text), None, "{text}");
         }
-        for text in ["25:00:00", "10:61:00", "10", "10:00:13.", "10:00:00:00", "a:b", "1:2:3.4.5", "+1:00"] {
+        for text in
+            ["25:00:00", "10:61:00", "10", "10:00:13.", "10:00:00:00", "a:b", "1:2:3.4.5", "+1:00", "1:2:3.12345678é"]
+        {
             assert_eq!(time_of_day(text), None, "{text}");
         }
     }
