@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
-# Has libFuzzer look for bytes that break a promise: tests/fuzz.sh [SECONDS] [TARGET...], of all targets if none is named, each for 5 s.
+# Has libFuzzer look for bytes that break a promise: tests/fuzz.sh [SECONDS] [TARGET...], of all targets if none is named, each for 10 s.
 #
+# It tries the same bytes each time; SEED=2 has it try others. SEED=0 is one by the clock.
 # Needs a C++ compiler. The crates of this workspace are compiled with counters of the edges of their code, by flags that stable Rust has;
 # those of others as the tests compile them. Each target begins with the bytes that are kept, in `tests/fuzz/corpus`; what is found is left in
 # `target/fuzz`, in `TARGET/` what reached new code, as `TARGET-crash-…` what broke a promise. Ends with an error if there is such a thing.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-seconds=${1-5}
+seconds=${1-10}
 shift $(($# ? 1 : 0))
 targets=("$@")
 [ $# -gt 0 ] || mapfile -t targets < <(ls tests/fuzz/corpus)
@@ -29,12 +30,13 @@ cp "$TARGET/debug/examples/fuzz" "$TARGET/fuzz/fuzz"
 # The kept bytes are copied: libFuzzer adds what it finds to the first folder.
 fuzz() {
     local found=$TARGET/fuzz/$1
+    rm -rf "$found" "$found"-*
     mkdir -p "$found"
-    FUZZ_TARGET=$1 "$TARGET/fuzz/fuzz" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=1000 -max_len=8192 -print_final_stats=1 \
+    FUZZ_TARGET=$1 "$TARGET/fuzz/fuzz" -seed="$SEED" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=1000 -max_len=8192 -print_final_stats=1 \
         -artifact_prefix="$found-" "$found" "tests/fuzz/corpus/$1" >"$found.log" 2>&1 || { tail -n 40 "$found.log"; echo "$1: a finding"; return 1; }
     printf '%-10s %9s runs, %5s edges\n' "$1" "$(sed -n 's/^stat::number_of_executed_units: *//p' "$found.log")" \
         "$(sed -n 's/.* cov: \([0-9]*\) .*/\1/p' "$found.log" | tail -n 1)"
 }
 export -f fuzz
-export TARGET seconds
+export TARGET seconds SEED=${SEED-1}
 printf '%s\n' "${targets[@]}" | xargs -P 2 -I{} bash -c 'fuzz {}'

@@ -28,6 +28,7 @@ STEPS=(
     "python:the Python module and its tests"
     "build:build for the tests"
     "tests:tests, the images in emulators among them"
+    "search:search for bytes that break a reader"
 )
 case "${1-}" in
     "") chosen=() ;;
@@ -71,6 +72,7 @@ tools() {
     command -v chromium >/dev/null || packages+=(chromium fonts-dejavu-core)
     command -v sigrok-cli >/dev/null || packages+=(sigrok-cli)
     command -v arm-none-eabi-gcc >/dev/null || packages+=(gcc-arm-none-eabi libnewlib-arm-none-eabi)
+    command -v c++ >/dev/null || packages+=(g++)
     command -v cmake >/dev/null || packages+=(cmake)
     command -v pkg-config >/dev/null || packages+=(pkg-config)
     python3 -c 'import ensurepip, venv' 2>/dev/null || packages+=(python3-venv)
@@ -153,6 +155,7 @@ tests() {
     host test --no-fail-fast -- "${chosen[@]}" 2>&1 | tee -a "$log"
     sed -n 's/: .* ADIS_RECORDINGS names$//p' "$SKIPPED_TESTS" | sort -u >"$WITHOUT_RECORDINGS"
 }
+search() { run tests/fuzz.sh 10; }
 recordings() {
     bound_tests
     host test --no-fail-fast -- "${chosen[@]}" 2>&1 | tee -a "$log"

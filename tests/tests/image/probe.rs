@@ -110,8 +110,5 @@ fn a_probe_reads_a_panic() {
     let lines = lines(image(), &log);
     println!("{lines:#?}");
     let (level, line) = lines.iter().find(|(_, line)| line.starts_with("panic at ")).expect("the panic");
-    assert!(
-        level == "error" && line.contains("device.rs:") && line.ends_with("the sample period is 0"),
-        "{line}"
-    );
+    assert!(level == "error" && line.contains("device.rs:") && line.ends_with("the sample period is 0"), "{line}");
 }
