@@ -146,14 +146,15 @@ impl DeviceState {
             SensorState::Probing { at_us, step } if now_us >= at_us => self.probe(step, board),
             SensorState::Probing { .. } => {}
             SensorState::Sampled { since_us } => {
-                if !board.estimators(|estimators| estimators.is_intact()) {
+                let (is_intact, trouble, used, settled) = board.estimators(|estimators| {
+                    let (used, settled) = (estimators.used_since_probe() > 0, estimators.is_settled());
+                    (estimators.is_intact(), estimators.trouble(now_us), used, settled)
+                });
+                if !is_intact {
                     // The burst under way ends first: a sensor that is cut off within one does not answer at once.
                     board.set_sampling(false);
                     panic!("memory is damaged: the sample period is 0");
                 }
-                let (trouble, used, settled) = board.estimators(|estimators| {
-                    (estimators.trouble(now_us), estimators.used_since_probe() > 0, estimators.is_settled())
-                });
                 if let Some(trouble) = trouble {
                     self.recovery.recoveries = self.recovery.recoveries.saturating_add(u32::from(used));
                     self.recover(trouble, since_us + RETRY_US, board);
