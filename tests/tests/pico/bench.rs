@@ -53,21 +53,27 @@ fn bench_without_usb() -> Bench {
     Bench::new(images::build_package(("firmware", "observatory-pico"), TARGET, &arguments, "observatory-pico-uart"))
 }
 
+/// The folder with rp2040js, which is installed once, by the first test of several at the same time.
 fn emulator() -> PathBuf {
-    let folder = images::folder().join("rp2040js");
-    if !folder.join("node_modules/rp2040js").is_dir() {
-        std::fs::create_dir_all(&folder).expect("a folder");
-        let install = Command::new("npm")
-            .args(["install", "--no-save", "--no-audit", "--no-fund", "--prefix"])
-            .arg(&folder)
-            .arg("rp2040js@1.4.1")
-            .status();
-        assert!(
-            install.is_ok_and(|status| status.success()),
-            "rp2040js cannot be installed: it needs Node.js 18 or later with npm"
-        );
-    }
-    folder
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    let install = || {
+        let folder = images::folder().join("rp2040js");
+        // The last file that an installation writes.
+        if !folder.join("node_modules/.package-lock.json").is_file() {
+            std::fs::create_dir_all(&folder).expect("a folder");
+            let install = Command::new("npm")
+                .args(["install", "--no-save", "--no-audit", "--no-fund", "--prefix"])
+                .arg(&folder)
+                .arg("rp2040js@1.4.1")
+                .status();
+            assert!(
+                install.is_ok_and(|status| status.success()),
+                "rp2040js cannot be installed: it needs Node.js 18 or later with npm"
+            );
+        }
+        folder
+    };
+    FOLDER.get_or_init(install).clone()
 }
 
 /// An event that happens to the sensor during a run.
