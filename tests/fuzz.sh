@@ -27,13 +27,15 @@ RUSTC_WRAPPER='' RUSTC_WORKSPACE_WRAPPER=$TARGET/fuzz/rustc cargo build --locked
     fuzz/libfuzzer,adis16405-driver/async,adis16405-driver/defmt,adis16405-driver/serde,allan-core/serde,allan-core/defmt
 cp "$TARGET/debug/examples/fuzz" "$TARGET/fuzz/fuzz"
 
-# The kept bytes are copied: libFuzzer adds what it finds to the first folder.
+# The kept bytes are copied: libFuzzer adds what it finds to the first folder. Each simulated device leaks its statics, 0.1 MB.
 fuzz() {
-    local found=$TARGET/fuzz/$1
+    local found=$TARGET/fuzz/$1 limit_mb=1000
+    [ "$1" != commands ] || limit_mb=$((limit_mb + 20 * seconds))
     rm -rf "$found" "$found"-*
     mkdir -p "$found"
-    FUZZ_TARGET=$1 "$TARGET/fuzz/fuzz" -seed="$SEED" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=1000 -max_len=8192 -print_final_stats=1 \
-        -artifact_prefix="$found-" "$found" "tests/fuzz/corpus/$1" >"$found.log" 2>&1 || { tail -n 40 "$found.log"; echo "$1: a finding"; return 1; }
+    FUZZ_TARGET=$1 "$TARGET/fuzz/fuzz" -seed="$SEED" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=$limit_mb -malloc_limit_mb=1000 \
+        -max_len=8192 -print_final_stats=1 -artifact_prefix="$found-" "$found" "tests/fuzz/corpus/$1" >"$found.log" 2>&1 ||
+        { tail -n 40 "$found.log"; echo "$1: a finding"; return 1; }
     printf '%-10s %9s runs, %5s edges\n' "$1" "$(sed -n 's/^stat::number_of_executed_units: *//p' "$found.log")" \
         "$(sed -n 's/.* cov: \([0-9]*\) .*/\1/p' "$found.log" | tail -n 1)"
 }

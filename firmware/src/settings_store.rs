@@ -10,15 +10,32 @@ use core::pin::pin;
 use core::task::{Context, Poll, Waker};
 use embedded_storage_async::nor_flash::NorFlash;
 use sequential_storage::cache::{Cache, Uncached};
-use sequential_storage::map::{MapConfig, MapStorage};
+use sequential_storage::map::{MapConfig, MapStorage, SerializationError, Value};
 
-/// Key of the record.
+/// The first byte of an item that is a record.
 const KEY: u8 = 1;
 /// Most bytes of a record.
 pub const MAX_RECORD: usize = 3072;
 /// The record with its key, aligned to the words of any flash.
 #[repr(align(8))]
 struct RecordBuffer([u8; MAX_RECORD + 8]);
+
+/// An item of the ring. It has its key itself: of an item of no bytes, which damage can leave, `sequential-storage` takes a key of one
+/// byte from the item before, and panics.
+struct Item<'a>(&'a [u8]);
+
+impl<'a> Value<'a> for Item<'a> {
+    fn serialize_into(&self, buffer: &mut [u8]) -> Result<usize, SerializationError> {
+        let (key, record) = buffer.split_first_mut().ok_or(SerializationError::BufferTooSmall)?;
+        *key = KEY;
+        Ok(1 + self.0.serialize_into(record)?)
+    }
+
+    fn deserialize_from(buffer: &'a [u8]) -> Result<(Self, usize), SerializationError> {
+        let record = buffer.strip_prefix(&[KEY]).ok_or(SerializationError::InvalidFormat)?;
+        Ok((Self(record), buffer.len()))
+    }
+}
 
 /// Why a record was not written. The one before is still there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,7 +60,7 @@ impl core::fmt::Display for StoreError {
 
 /// A record in a range of a flash memory.
 pub struct SettingsStore<F: NorFlash> {
-    map: MapStorage<u8, F, Cache<Uncached, Uncached, Uncached, u8>>,
+    map: MapStorage<(), F, Cache<Uncached, Uncached, Uncached, ()>>,
 }
 
 impl<F: NorFlash> SettingsStore<F> {
@@ -56,7 +73,7 @@ impl<F: NorFlash> SettingsStore<F> {
     /// Copies the record to `record` and returns its length; `None` if there is none.
     pub fn read(&mut self, record: &mut [u8]) -> Option<usize> {
         let mut buffer = RecordBuffer([0; _]);
-        let found = complete(self.map.fetch_item::<&[u8]>(&mut buffer.0, &KEY))?.ok()??;
+        let found = self.find(&mut buffer)?;
         record.get_mut(..found.len())?.copy_from_slice(found);
         Some(found.len())
     }
@@ -75,8 +92,8 @@ impl<F: NorFlash> SettingsStore<F> {
         }
         let mut buffer = RecordBuffer([0; _]);
         for was_erased in [false, true] {
-            let written = complete(self.map.store_item(&mut buffer.0, &KEY, &record));
-            let found = complete(self.map.fetch_item::<&[u8]>(&mut buffer.0, &KEY)).and_then(Result::ok).flatten();
+            let written = complete(self.map.store_item(&mut buffer.0, &(), &Item(record)));
+            let found = self.find(&mut buffer);
             // Flash that takes nothing leaves the record before, or stays blank.
             let erasing_helps = match written {
                 Some(Ok(())) if found == Some(record) => return Ok(()),
@@ -90,6 +107,10 @@ impl<F: NorFlash> SettingsStore<F> {
             self.erase()?;
         }
         Err(StoreError::Flash)
+    }
+
+    fn find<'b>(&mut self, buffer: &'b mut RecordBuffer) -> Option<&'b [u8]> {
+        complete(self.map.fetch_item::<Item<'b>>(&mut buffer.0, &()))?.ok()?.map(|item| item.0)
     }
 
     /// Whether all pages are as an erasure leaves them, which need not be erased again: that takes seconds, in which no sample is read.

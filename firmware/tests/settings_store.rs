@@ -192,6 +192,20 @@ fn contents_that_hide_what_is_written_are_erased() {
 }
 
 /// Flash that does not take what is written, as that of a part whose store the debugger has locked, or that of an emulator.
+/// Damage that has its checksums: an item of no bytes behind the record (crate `sequential-storage`: checksum of the data, their length,
+/// checksum of the length).
+#[test]
+fn an_item_of_no_bytes_is_no_record() {
+    let (mut flash, _) = SmallFlash::new().write_record(&record(1));
+    let used = flash.bytes[..4096 - WORD].iter().rposition(|byte| *byte != 0xFF).expect("a record") + 1;
+    let behind = used.next_multiple_of(WORD);
+    flash.bytes[behind..behind + 8].copy_from_slice(&[0x11, 0x11, 0x11, 0x11, 0, 0, 0x03, 0xE2]);
+    assert_eq!(flash.read_record(), None);
+    let (flash, done) = flash.write_record(&record(2));
+    assert!(done);
+    assert_eq!(flash.read_record(), Some(record(2)));
+}
+
 #[test]
 fn what_is_not_there_afterwards_is_not_called_written() {
     let mut flash = SmallFlash::new();
