@@ -2,7 +2,8 @@
 //!
 //! Each sample is compared with the best linear interpolation from its neighbours, which follows from the autocovariance of
 //! the data. In white noise that is their mean; in filtered noise, on a sinusoid or in drift it is far more precise. The
-//! interpolation error is normal, so the threshold for N samples comes from N times the normal tail.
+//! interpolation error is normal, so the threshold for N samples comes from N times the normal tail. Where the noise is louder, as in a
+//! vibration whose level wanders, it is as many deviations of the errors around a sample.
 
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, density, poisson_bounds, poisson_tail, quantile, upper_tail};
@@ -25,6 +26,10 @@ const CLIP: f64 = 4.5;
 /// The means of the neighbours before and after a spike differ by less than this fraction of it; otherwise it is a jump of
 /// the bias.
 const SETTLED: f64 = 0.5;
+
+/// Samples on either side by which the noise around a sample is judged: its level may change within some of them, and a level that is
+/// hardly higher is told by many.
+const AROUND: [usize; 4] = [16, 32, 64, 128];
 
 /// A disturbance ends where it would have decayed, exponentially, to this part of the deviation of the interpolation error: the rest of
 /// its energy is below that of half a sample of noise for each of its time constants.
@@ -49,12 +54,21 @@ pub(crate) struct SpikeRule {
 /// What a rule finds in samples of its channel.
 #[derive(Clone, Default)]
 pub(crate) struct FoundSpikes {
-    /// Sample periods, in ascending order within what was looked at.
-    pub slots: Vec<u64>,
-    /// Interpolation errors, in the channel's unit, without their sign.
-    sizes: Vec<f64>,
+    /// In ascending order within what was looked at.
+    spikes: Vec<FoundSpike>,
     /// Candidates that are jumps of the bias.
     jumps: usize,
+}
+
+/// A sample that its neighbours do not tell.
+#[derive(Clone, Copy)]
+struct FoundSpike {
+    /// Sample period.
+    slot: u64,
+    /// Interpolation error, in the channel's unit, without its sign.
+    size: f64,
+    /// Whether it stands out of the noise around it too.
+    stands_out: bool,
 }
 
 /// Samples in a row that do not belong to the noise: longer than the interpolation reaches over, and so no spikes that a filter has
@@ -74,37 +88,50 @@ pub(crate) struct Disturbance {
 }
 
 impl FoundSpikes {
+    fn kept(&self, kept: impl Fn(&FoundSpike) -> bool) -> Self {
+        Self { spikes: self.spikes.iter().filter(|spike| kept(spike)).copied().collect(), jumps: self.jumps }
+    }
+
     /// Those in the sample periods `slots`.
-    pub(crate) fn within(self, slots: Range<u64>) -> Self {
-        let kept = self.slots.into_iter().zip(self.sizes).filter(|(slot, _)| slots.contains(slot));
-        let (slots, sizes) = kept.unzip();
-        Self { slots, sizes, jumps: self.jumps }
+    pub(crate) fn within(&self, slots: &Range<u64>) -> Self {
+        self.kept(|spike| slots.contains(&spike.slot))
     }
 
     /// Those before a sample period. Where jumps of the bias are, is not known.
     pub(crate) fn before(&self, slot: u64) -> Self {
-        let count = self.slots.partition_point(|of| *of < slot);
-        Self { slots: self.slots[..count].to_vec(), sizes: self.sizes[..count].to_vec(), jumps: 0 }
+        Self { jumps: 0, ..self.kept(|spike| spike.slot < slot) }
+    }
+
+    /// Those that are no part of louder noise. Where most stand out of the noise around them, so do the others: a burst of a few samples,
+    /// or noise that is louder by chance. Where most do not, the level wanders.
+    pub(crate) fn out_of_noise(&self) -> Self {
+        let stands_out = self.spikes.iter().filter(|spike| spike.stands_out).count();
+        let wanders = 2 * stands_out < self.spikes.len();
+        self.kept(|spike| spike.stands_out || !wanders)
     }
 
     /// Adds those of later samples.
     pub(crate) fn extend(&mut self, later: Self) {
-        self.slots.extend(later.slots);
-        self.sizes.extend(later.sizes);
+        self.spikes.extend(later.spikes);
         self.jumps += later.jumps;
+    }
+
+    /// Their sample periods.
+    pub(crate) fn slots(&self) -> impl Iterator<Item = u64> {
+        self.spikes.iter().map(|spike| spike.slot)
     }
 
     /// The sample period and the interpolation error of each.
     pub(crate) fn samples(&self) -> impl Iterator<Item = (u64, f64)> {
-        self.slots.iter().copied().zip(self.sizes.iter().copied())
+        self.spikes.iter().map(|spike| (spike.slot, spike.size))
     }
 
     /// Positions of the samples that stand out with no more than [`REACH`] sample periods between them.
     fn events(&self) -> Vec<Range<usize>> {
         let mut events: Vec<Range<usize>> = Vec::new();
-        for at in 0..self.slots.len() {
+        for at in 0..self.spikes.len() {
             match events.last_mut() {
-                Some(event) if self.slots[at] - self.slots[at - 1] <= REACH as u64 => event.end = at + 1,
+                Some(event) if self.spikes[at].slot - self.spikes[at - 1].slot <= REACH as u64 => event.end = at + 1,
                 _ => events.push(at..at + 1),
             }
         }
@@ -115,17 +142,17 @@ impl FoundSpikes {
     /// largest size. Where independent spikes stand as close together as often, each is one.
     fn sizes_of_events(&self, samples: u64) -> Vec<f64> {
         let events = self.events();
-        let joined = (self.slots.len() - events.len()) as u64;
+        let joined = (self.spikes.len() - events.len()) as u64;
         let expected = events.len() as f64 * near_by_chance(events.len(), samples);
         if poisson_tail(joined, expected) >= SIGNIFICANCE {
-            return self.sizes.clone();
+            return self.spikes.iter().map(|spike| spike.size).collect();
         }
-        events.into_iter().map(|event| self.sizes[event].iter().copied().fold(0.0, f64::max)).collect()
+        events.into_iter().map(|event| self.spikes[event].iter().map(|spike| spike.size).fold(0.0, f64::max)).collect()
     }
 
     /// Whether there are spikes, and more of them than jumps of the bias.
     fn are_spikes(&self) -> bool {
-        self.slots.len() > self.jumps
+        self.spikes.len() > self.jumps
     }
 }
 
@@ -148,8 +175,8 @@ impl SpikeRule {
     /// Sample periods of the spikes in a part of the same channel, in ascending order; none if jumps of the bias are at least
     /// as frequent.
     pub(crate) fn slots(&self, series: &Series) -> Vec<u64> {
-        let found = self.find_around(series, self.interpolation.mean);
-        if found.are_spikes() { found.slots } else { Vec::new() }
+        let found = self.find_around(series, self.interpolation.mean).out_of_noise();
+        if found.are_spikes() { found.slots().collect() } else { Vec::new() }
     }
 
     /// What there is in a part of the same channel, whose bias may be another one. Where its noise is larger, so is a spike.
@@ -163,13 +190,7 @@ impl SpikeRule {
         }
         let interpolation = Interpolation { mean, ..self.interpolation };
         let louder = typical_difference(series) / self.difference;
-        let (mut spikes, jumps) = interpolation.spikes(series, self.threshold * louder.max(1.0));
-        spikes.sort_by_key(|spike| spike.position);
-        FoundSpikes {
-            slots: spikes.iter().map(|spike| series.slots[spike.position]).collect(),
-            sizes: spikes.iter().map(|spike| spike.error.abs()).collect(),
-            jumps,
-        }
+        interpolation.spikes(series, self.threshold, louder.max(1.0))
     }
 
     /// What was found in `samples` samples as single spikes and as disturbances, in ascending order.
@@ -181,13 +202,13 @@ impl SpikeRule {
         let events = found.events();
         let near = near_by_chance(events.len(), samples);
         let disturbance = |event: &Range<usize>| {
-            let certain = found.slots[event.start]..found.slots[event.end - 1] + 1;
+            let certain = found.spikes[event.start].slot..found.spikes[event.end - 1].slot + 1;
             let length = certain.end - certain.start;
             let p_value = (events.len() as f64 * near.powi(event.len() as i32 - 1)).min(1.0);
             if length <= 2 * REACH as u64 || p_value >= SIGNIFICANCE {
                 return None;
             }
-            let sizes = || found.sizes[event.clone()].iter().map(|size| size / self.interpolation.deviation);
+            let sizes = || found.spikes[event.clone()].iter().map(|spike| spike.size / self.interpolation.deviation);
             let threshold = self.threshold / self.interpolation.deviation;
             let times = (threshold / DECAYED).ln() / (sizes().fold(threshold, f64::max) / threshold).ln();
             let decay = (times.min(LONGEST_DECAY) * length as f64).ceil() as u64;
@@ -207,13 +228,7 @@ impl SpikeRule {
             }
         }
         let is_single = |slot: &u64| !disturbances.iter().any(|of| of.slots.contains(slot));
-        let kept: Vec<usize> = (0..found.slots.len()).filter(|&at| is_single(&found.slots[at])).collect();
-        let singles = FoundSpikes {
-            slots: kept.iter().map(|&at| found.slots[at]).collect(),
-            sizes: kept.iter().map(|&at| found.sizes[at]).collect(),
-            jumps: found.jumps,
-        };
-        (singles, disturbances)
+        (found.kept(|spike| is_single(&spike.slot)), disturbances)
     }
 
     /// What `singles`, which stand out of `samples` samples, show of the `known` disturbances, those of other channels or of this one: each
@@ -225,15 +240,16 @@ impl SpikeRule {
             known.start.saturating_sub(length)..known.end + length
         };
         let events = singles.events();
-        let is_within = |event: &Range<usize>, known: &Range<u64>| around(known).contains(&singles.slots[event.start]);
+        let is_within =
+            |event: &Range<usize>, known: &Range<u64>| around(known).contains(&singles.spikes[event.start].slot);
         let others = events.iter().filter(|event| !known.iter().any(|known| is_within(event, known))).count();
         let part = |known: &Range<u64>| {
             let inside: Vec<usize> = events.iter().filter(|event| is_within(event, known)).cloned().flatten().collect();
-            let (first, last) = (singles.slots[*inside.first()?], singles.slots[*inside.last()?]);
+            let (first, last) = (singles.spikes[*inside.first()?].slot, singles.spikes[*inside.last()?].slot);
             let window = around(known);
             // One more than those that are there, whose rate is not known better.
             let expected = (others + 1) as f64 * (window.end - window.start) as f64 / samples.max(1) as f64;
-            let squares = inside.iter().map(|&at| (singles.sizes[at] / self.interpolation.deviation).powi(2));
+            let squares = inside.iter().map(|&at| (singles.spikes[at].size / self.interpolation.deviation).powi(2));
             let count = inside.len();
             (expected < COINCIDENCE).then(|| Disturbance {
                 certain: first..last + 1,
@@ -275,7 +291,7 @@ impl SpikeRule {
             threshold_sigmas: threshold / interpolation.deviation,
             largest_sigmas: largest / interpolation.deviation,
         };
-        Some(Detection { effect: spikes.into(), correction: Some(Correction::Exclude(found.slots.clone())) })
+        Some(Detection { effect: spikes.into(), correction: Some(Correction::Exclude(found.slots().collect())) })
     }
 }
 
@@ -296,7 +312,8 @@ impl Disturbance {
 #[must_use]
 pub(crate) fn find(series: &Series) -> Option<Detection> {
     let rule = SpikeRule::fit(series)?;
-    rule.detection(&rule.find(series), (series.duration_s() / 3600.0, series.values.len() as u64), series.unit)
+    let looked_at = (series.duration_s() / 3600.0, series.values.len() as u64);
+    rule.detection(&rule.find(series).out_of_noise(), looked_at, series.unit)
 }
 
 /// Probability that the next of so many independent events in `samples` samples follows within [`REACH`] sample periods.
@@ -313,11 +330,6 @@ struct Interpolation {
     mean: f64,
     /// Standard deviation of its error, at least half a count because rounding errors are not normal.
     deviation: f64,
-}
-
-struct Spike {
-    position: usize,
-    error: f64,
 }
 
 impl Interpolation {
@@ -395,31 +407,67 @@ impl Interpolation {
         })
     }
 
-    /// The spikes above `threshold`, the largest first, and the number of candidates that are jumps of the bias.
-    fn spikes(&self, series: &Series, threshold: f64) -> (Vec<Spike>, usize) {
+    /// How many times as large as in the whole channel the interpolation errors around a position are, those nearer than `hole` aside; 1
+    /// where chance explains it.
+    ///
+    /// Of n normal errors the sum of the squares has the mean n and the variance 2n, in squared standard deviations.
+    fn louder_around(&self, errors: &[f64], position: usize, hole: usize) -> f64 {
+        let louder = |reach: usize| {
+            let before = &errors[position.saturating_sub(reach)..(position + 1).saturating_sub(hole)];
+            let after = &errors[(position + hole).min(errors.len())..(position + reach + 1).min(errors.len())];
+            let around = before.iter().chain(after).filter(|error| **error != 0.0);
+            let squares = around.map(|error| (error / self.deviation).powi(2));
+            let (count, sum) = squares.fold((0.0, 0.0), |(count, sum), square| (count + 1.0, sum + square));
+            let is_louder = count > 0.0 && upper_tail((sum - count) / f64::sqrt(2.0 * count)) < SIGNIFICANCE;
+            if is_louder { f64::sqrt(sum / count) } else { 1.0 }
+        };
+        AROUND.map(louder).into_iter().fold(1.0, f64::max)
+    }
+
+    /// The spikes above `threshold`, where the series is so many times `louder` than the channel.
+    fn spikes(&self, series: &Series, threshold: f64, louder: f64) -> FoundSpikes {
         let mut values = series.values.clone();
         let errors = self.errors(series, &values);
-        let mut candidates: Vec<usize> = (0..errors.len()).filter(|&at| errors[at].abs() > threshold).collect();
+        let mut candidates: Vec<usize> =
+            (0..errors.len()).filter(|&at| errors[at].abs() > threshold * louder).collect();
         candidates.sort_by(|a, b| errors[*b].abs().total_cmp(&errors[*a].abs()));
-        let (mut spikes, mut jumps) = (Vec::<Spike>::new(), 0);
+        let (mut spikes, mut jumps) = (Vec::<(usize, f64)>::new(), Vec::<(usize, f64)>::new());
         let mut partial = BTreeMap::new();
         for position in candidates {
             // Again, because a larger spike nearby may have been removed.
             let error = self.normalised_error(series, &values, position, &mut partial);
-            if error.abs() <= threshold {
+            if error.abs() <= threshold * louder {
                 continue;
             }
             let mean = |from: usize| values[from..from + REACH].iter().sum::<f64>() / REACH as f64;
-            if (mean(position + 1) - mean(position - REACH)).abs() > SETTLED * error.abs() {
+            let height = (mean(position + 1) - mean(position - REACH)).abs();
+            if height > SETTLED * error.abs() {
                 // What a filter spreads over the neighbours of a spike is no jump.
-                let is_part = |spike: &Spike| spike.position.abs_diff(position) <= REACH;
-                jumps += usize::from(!spikes.iter().any(is_part));
+                let is_part = |&(spike, _): &(usize, f64)| spike.abs_diff(position) <= REACH;
+                if !spikes.iter().any(is_part) {
+                    jumps.push((position, height));
+                }
                 continue;
             }
             Arc::make_mut(&mut values)[position] -= error;
-            spikes.push(Spike { position, error });
+            spikes.push((position, error.abs()));
         }
-        (spikes, jumps)
+        if spikes.is_empty() {
+            return FoundSpikes { spikes: Vec::new(), jumps: jumps.len() };
+        }
+        let noise = self.errors(series, &values);
+        // A jump is in the errors of the samples that are interpolated over it.
+        let is_jump = |&(position, height): &(usize, f64)| {
+            height > SETTLED * threshold * self.louder_around(&noise, position, REACH + 1)
+        };
+        spikes.sort_unstable_by_key(|(position, _)| *position);
+        let found = |(position, size): (usize, f64)| FoundSpike {
+            slot: series.slots[position],
+            size,
+            stands_out: size > threshold * self.louder_around(&noise, position, 1),
+        };
+        let jumps = jumps.into_iter().filter(is_jump).count();
+        FoundSpikes { spikes: spikes.into_iter().map(found).collect(), jumps }
     }
 }
 

@@ -10,6 +10,9 @@ use crate::record::sampling_faults;
 use crate::samples::series::Series;
 use adis16405_driver::Channel;
 use measurement::Measurement;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
 use simulation::{HostClock, Simulation};
 use virtual_sensor::{Environment, InjectedEffect, OutputRegister, SensorScenario, TemperatureProfile};
 
@@ -123,6 +126,24 @@ fn a_spike_of_1_7_sigma_is_found_in_filtered_noise() {
     series.values_mut()[20_000] += 0.5 * white();
     let detection = spikes::find(&series).unwrap();
     assert_eq!(detection.correction, Some(Correction::Exclude(vec![20_000])));
+}
+
+/// White noise, and noise whose level wanders by a factor of two in half a second.
+#[test]
+fn loud_noise_has_no_spikes_and_spikes_stand_out_of_it() {
+    let mut series = Case::hiding(Vec::new(), 400.0, 9).series(GYRO);
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let kept = (-1.0f64 / 100.0).exp();
+    let mut level = 0.0;
+    for value in series.values_mut() {
+        let [normal, step]: [f64; 2] = [(); 2].map(|()| random.sample(StandardNormal));
+        level = kept * level + (1.0 - kept * kept).sqrt() * step;
+        *value += white() * 2f64.powf(level) * normal;
+    }
+    assert_eq!(spikes::find(&series), None);
+    let spikes = [10_000, 30_000, 50_000];
+    spikes.iter().for_each(|&at| series.values_mut()[at] += 60.0 * white());
+    assert_eq!(spikes::find(&series).unwrap().correction, Some(Correction::Exclude(spikes.map(|at| at as u64).into())));
 }
 
 #[test]

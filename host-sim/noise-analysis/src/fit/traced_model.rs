@@ -175,18 +175,15 @@ impl TracedModel {
     /// point is hidden by the scatter of the point.
     pub(crate) fn with_lines(&self, curve: &Curve<OCTAVES>, lines: &[FittedTerm]) -> Option<Self> {
         let (model, period_s) = (&self.model, curve.sample_period());
-        let share = |line: &FittedTerm, point: &AllanPoint| line.value * line.value * line.kind.avar(point.n, period_s);
         let last = lines.last()?;
-        let is_visible =
-            |point: &AllanPoint| share(last, point) * (0.5 * model.edf(point)).sqrt() > VISIBLE_SIGMAS * point.avar;
+        let is_visible = |point: &AllanPoint| {
+            share(last, point, period_s) * (0.5 * model.edf(point)).sqrt() > VISIBLE_SIGMAS * point.avar
+        };
         if model.terms().len() + lines.len() > MAX_TERMS || !curve.points().iter().any(is_visible) {
             return None;
         }
-        let mut others = curve.clone();
-        let shares = |point: &AllanPoint| lines.iter().map(|line| share(line, point)).sum::<f64>();
-        others.replace_avar(|point| (point.avar - shares(point)).max(LEAST_LEFT * point.avar));
         let kinds: Vec<NoiseTerm> = model.terms().iter().map(|term| term.kind).collect();
-        let fitted = fit(&others, &kinds);
+        let fitted = fit(&left_by(lines, curve), &kinds);
         // The spectrum knows the lines much better than the curve knows the others: their relative errors stay.
         let kept = |(new, old): (&FittedTerm, &FittedTerm)| {
             let scaled = |bound: f64, limit: f64| if old.value > 0.0 { bound * new.value / old.value } else { limit };
@@ -196,6 +193,12 @@ impl TracedModel {
         let model = within_measured(&Model::new(period_s, kept.chain(lines.iter().copied())), curve);
         let additions = self.additions.iter().copied().chain(lines.iter().map(|_| None)).collect();
         Some(Self { goodness: goodness(curve, &model), model, additions, decimation: self.decimation })
+    }
+
+    /// Fitted, with the shapes of its processes, to what `lines` leave of `curve`.
+    pub(crate) fn shaped_beside(&self, curve: &Curve<OCTAVES>, lines: &[FittedTerm]) -> Self {
+        let terms: Vec<PlannedTerm> = self.terms().collect();
+        Self { decimation: self.decimation, ..Self::fit(&left_by(lines, curve), &terms, Shapes::OfProcesses) }
     }
 
     /// With the coefficients and the bounds of `model`, which has the same terms.
@@ -245,6 +248,19 @@ impl TracedModel {
         };
         self.added_at().into_iter().find(is_unresolved)
     }
+}
+
+/// The variance of a line in a point of a curve of this sample period.
+fn share(line: &FittedTerm, point: &AllanPoint, period_s: f64) -> f64 {
+    line.value * line.value * line.kind.avar(point.n, period_s)
+}
+
+/// What `lines` leave of `curve`.
+fn left_by(lines: &[FittedTerm], curve: &Curve<OCTAVES>) -> Curve<OCTAVES> {
+    let mut others = curve.clone();
+    let shares = |point: &AllanPoint| lines.iter().map(|line| share(line, point, curve.sample_period())).sum::<f64>();
+    others.replace_avar(|point| (point.avar - shares(point)).max(LEAST_LEFT * point.avar));
+    others
 }
 
 /// `model` with no upper bound of N, B or K beyond what `curve` allows: all terms are positive, so that none of them alone exceeds the

@@ -92,7 +92,7 @@ impl SampleScreen {
         let spikes = in_parallel(&numbered, |&at| {
             let rule = self.rules[at].as_ref()?;
             let own = series(&self.held, at);
-            let found = rule.find(&own).within(*settled.slots.first()?..settled.slots.last()? + 1);
+            let found = rule.find(&own).within(&(*settled.slots.first()?..settled.slots.last()? + 1));
             Some((rule.separate(found.clone(), own.values.len() as u64), found))
         });
         let is_repeated = |&at: &usize| {
@@ -103,13 +103,13 @@ impl SampleScreen {
         let repeated: Vec<usize> = (0..all).filter(is_repeated).collect();
         for ((channel, found), spikes) in settled.channels.iter_mut().zip(&mut self.found).zip(spikes) {
             let ((singles, disturbances), spikes) = spikes.unwrap_or_default();
-            let position = |slot: &u64| settled.slots.binary_search(slot).ok();
+            let position = |slot: u64| settled.slots.binary_search(&slot).ok();
             let within = |slots: &Range<u64>| {
                 let [from, to] = [slots.start, slots.end].map(|end| settled.slots.partition_point(|slot| *slot < end));
                 from..to
             };
             let knocks: Vec<usize> = disturbances.iter().flat_map(|of| within(&of.slots)).collect();
-            let spikes_alone: Vec<usize> = singles.slots.iter().filter_map(position).collect();
+            let spikes_alone: Vec<usize> = singles.slots().filter_map(position).collect();
             for (cause, positions) in [("spikes", spikes_alone), ("knock", knocks), ("repeated", repeated.clone())] {
                 if !positions.is_empty() {
                     channel.refused.insert(cause, positions);
