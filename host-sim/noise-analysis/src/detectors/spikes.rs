@@ -29,7 +29,8 @@ const SETTLED: f64 = 0.5;
 
 /// Samples on either side by which the noise around a sample is judged: its level may change within some of them, and a level that is
 /// hardly higher is told by many.
-const AROUND: [usize; 4] = [16, 32, 64, 128];
+const AROUND: [usize; 4] = [16, 32, 64, FARTHEST];
+const FARTHEST: usize = 128;
 
 /// A disturbance ends where it would have decayed, exponentially, to this part of the deviation of the interpolation error: the rest of
 /// its energy is below that of half a sample of noise for each of its time constants.
@@ -103,7 +104,8 @@ impl FoundSpikes {
     }
 
     /// Those that are no part of louder noise. Where most stand out of the noise around them, so do the others: a burst of a few samples,
-    /// or noise that is louder by chance. Where most do not, the level wanders.
+    /// or noise that is louder by chance. Where most do not, the level wanders. A record that is read in blocks is not asked: what of a
+    /// block is left out has to be known before the next one is read.
     pub(crate) fn out_of_noise(&self) -> Self {
         let stands_out = self.spikes.iter().filter(|spike| spike.stands_out).count();
         let wanders = 2 * stands_out < self.spikes.len();
@@ -407,16 +409,14 @@ impl Interpolation {
         })
     }
 
-    /// How many times as large as in the whole channel the interpolation errors around a position are, those nearer than `hole` aside; 1
-    /// where chance explains it.
+    /// How many times as large as in the whole channel the interpolation `errors` around a sample are, each with its distance in samples;
+    /// 1 where chance explains it.
     ///
     /// Of n normal errors the sum of the squares has the mean n and the variance 2n, in squared standard deviations.
-    fn louder_around(&self, errors: &[f64], position: usize, hole: usize) -> f64 {
+    fn louder_around(&self, errors: &[(usize, f64)]) -> f64 {
         let louder = |reach: usize| {
-            let before = &errors[position.saturating_sub(reach)..(position + 1).saturating_sub(hole)];
-            let after = &errors[(position + hole).min(errors.len())..(position + reach + 1).min(errors.len())];
-            let around = before.iter().chain(after).filter(|error| **error != 0.0);
-            let squares = around.map(|error| (error / self.deviation).powi(2));
+            let near = errors.iter().filter(|(distance, error)| *distance <= reach && *error != 0.0);
+            let squares = near.map(|(_, error)| (error / self.deviation).powi(2));
             let (count, sum) = squares.fold((0.0, 0.0), |(count, sum), square| (count + 1.0, sum + square));
             let is_louder = count > 0.0 && upper_tail((sum - count) / f64::sqrt(2.0 * count)) < SIGNIFICANCE;
             if is_louder { f64::sqrt(sum / count) } else { 1.0 }
@@ -452,22 +452,18 @@ impl Interpolation {
             Arc::make_mut(&mut values)[position] -= error;
             spikes.push((position, error.abs()));
         }
-        if spikes.is_empty() {
-            return FoundSpikes { spikes: Vec::new(), jumps: jumps.len() };
-        }
-        let noise = self.errors(series, &values);
-        // A jump is in the errors of the samples that are interpolated over it.
-        let is_jump = |&(position, height): &(usize, f64)| {
-            height > SETTLED * threshold * self.louder_around(&noise, position, REACH + 1)
-        };
         spikes.sort_unstable_by_key(|(position, _)| *position);
-        let found = |(position, size): (usize, f64)| FoundSpike {
-            slot: series.slots[position],
-            size,
-            stands_out: size > threshold * self.louder_around(&noise, position, 1),
+        let mut least = |position: usize, hole: usize| {
+            let around = position.saturating_sub(FARTHEST)..(position + FARTHEST + 1).min(values.len());
+            let around = around.map(|at| (at.abs_diff(position), at)).filter(|(distance, _)| *distance >= hole);
+            let error = |(distance, at)| (distance, self.normalised_error(series, &values, at, &mut partial));
+            threshold * self.louder_around(&around.map(error).collect::<Vec<(usize, f64)>>())
         };
-        let jumps = jumps.into_iter().filter(is_jump).count();
-        FoundSpikes { spikes: spikes.into_iter().map(found).collect(), jumps }
+        // A jump is in the errors of the samples that are interpolated over it.
+        jumps.retain(|&(position, height)| height > SETTLED * least(position, REACH + 1));
+        let found =
+            |(position, size)| FoundSpike { slot: series.slots[position], size, stands_out: size > least(position, 1) };
+        FoundSpikes { spikes: spikes.into_iter().map(found).collect(), jumps: jumps.len() }
     }
 }
 
