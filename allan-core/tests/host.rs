@@ -26,3 +26,16 @@ fn the_curve_of_means_continues_that_of_the_samples() {
     let full = Curve::<14>::empty().continued_by_means(&means, 1 << 40, 0);
     assert_eq!(full.points().len(), means.points().len().min(14));
 }
+
+/// What is taken off for replaced samples is kept beside the variance, and adds up over two times.
+#[test]
+fn what_is_taken_off_twice_adds_up() {
+    let mut curve = Curve::<8>::from_points(0.01, 10_000, 8, &[(1, 4.0), (2, 2.0)]).unwrap();
+    for taken in [0.5, 1.0] {
+        curve.subtract_interpolation(|n| 0.5 / n as f64);
+        for (point, measured) in curve.points().iter().zip([4.0, 2.0]) {
+            let expected = taken / point.n as f64;
+            assert_eq!((point.interpolation, point.avar), (expected, measured - expected));
+        }
+    }
+}

@@ -161,8 +161,13 @@ mod tests {
                 (0..1 << N).filter_map(|set| positive(&full, &b, set)).map(|x| objective(&x)).fold(0.0, f64::min);
             let mut a = [0.0; triangle(N)];
             (0..N).for_each(|i| (0..=i).for_each(|j| a[entry(i, j)] = full[i][j]));
-            let mut x: [f64; N] = core::array::from_fn(|_| uniform().max(0.0) * 10.0);
+            let start: [f64; N] = core::array::from_fn(|_| uniform().max(0.0) * 10.0);
+            let mut x = start;
             non_negative(&a, &b, N, &mut x);
+            // In another unit, by a power of two whose root is one, no digit is another.
+            let (mut same, unit) = (start, 2.0_f64.powi(-60));
+            non_negative(&a.map(|entry| entry * unit), &b.map(|entry| entry * unit), N, &mut same);
+            assert_eq!(same, x, "case {case}");
             assert!(x.iter().all(|&x| x >= 0.0), "case {case}: {x:?}");
             assert!(objective(&x) - least <= 1e-9, "case {case}: {x:?}, {} above the minimum", objective(&x) - least);
         }
