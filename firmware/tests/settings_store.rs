@@ -191,7 +191,6 @@ fn contents_that_hide_what_is_written_are_erased() {
     assert_eq!(flash.read_record(), Some(record(1)));
 }
 
-/// Flash that does not take what is written, as that of a part whose store the debugger has locked, or that of an emulator.
 /// Damage that has its checksums: an item of no bytes behind the record (crate `sequential-storage`: checksum of the data, their length,
 /// checksum of the length).
 #[test]
@@ -206,6 +205,7 @@ fn an_item_of_no_bytes_is_no_record() {
     assert_eq!(flash.read_record(), Some(record(2)));
 }
 
+/// Flash that does not take what is written, as that of a part whose store the debugger has locked, or that of an emulator.
 #[test]
 fn what_is_not_there_afterwards_is_not_called_written() {
     let mut flash = SmallFlash::new();
