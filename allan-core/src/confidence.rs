@@ -126,26 +126,27 @@ impl ChiSquareApproximation {
         Self { edf: m / square, excess_skewness: (cube / (square * square) - 1.0).max(0.0) }
     }
 
-    /// 95 % confidence bounds of the true variance for a measured variance `estimate`, in its unit, of whose degrees of freedom the part
-    /// `left` is left where the variance of replaced samples was subtracted, else 1.
+    /// 95 % confidence bounds of the true variance where `estimate` is left of a measured variance after `subtracted` was
+    /// taken off it, both in one unit.
     ///
-    /// The quantiles are those of χ² with `left·edf` degrees of freedom, multiplied by the Cornish–Fisher term of the excess
+    /// The scatter is that of the measured variance, `estimate + subtracted`, so its bounds are found first and what was
+    /// subtracted is taken off them: the lower one ends at 0.
+    ///
+    /// The quantiles are those of χ² with `edf` degrees of freedom, multiplied by the Cornish–Fisher term of the excess
     /// skewness, `exp(⅔(z² − 1)·excess_skewness/edf · e^(±c/√edf))`. The damping `c` of each tail is fitted to the exact
     /// distribution (Imhof's integral over the eigenvalues of `R`) of white, flicker, random-walk and quantization noise
     /// at overlaps of 1 to 16 and all edf of at least 3. In this range the interval covers the true variance with a
     /// probability of 94.7 to 95.6 %; without the term it would be 95.1 to 97.0 %.
-    ///
-    /// What is subtracted makes the estimate scatter more, and its distribution no more skewed: the term is that of all `edf`. With a few
-    /// hundredths of a degree of freedom it would else take the upper bound below the estimate.
-    pub(crate) fn bounds(&self, estimate: f64, left: f64) -> (f64, f64) {
+    pub(crate) fn bounds(&self, estimate: f64, subtracted: f64) -> (f64, f64) {
         const LOWER_TAIL: f64 = 2.7;
         const UPPER_TAIL: f64 = -3.3;
+        let measured = estimate + subtracted;
         let term = 2.0 / 3.0 * (NORMAL_975 * NORMAL_975 - 1.0) * self.excess_skewness / self.edf;
         let bound = |p: f64, damping: f64| {
-            let edf = left * self.edf;
-            estimate * edf / (chi_square_quantile(p, edf) * exp(term * exp(damping / sqrt(self.edf))))
+            let quantile = chi_square_quantile(p, self.edf) * exp(term * exp(damping / sqrt(self.edf)));
+            measured * self.edf / quantile - subtracted
         };
-        (bound(0.975, UPPER_TAIL), bound(0.025, LOWER_TAIL))
+        (bound(0.975, UPPER_TAIL).max(0.0), bound(0.025, LOWER_TAIL))
     }
 }
 
@@ -286,7 +287,7 @@ mod tests {
             let law = ChiSquareApproximation::new(Difference::Second, 64, count, overlap, fractions);
             // The tolerance allows for flicker correlations beyond four averaging times, which are left out.
             assert!((law.edf / edf - 1.0).abs() < 5e-3, "{fractions:?}, {overlap}, {count}: edf {}", law.edf);
-            let (lower, upper) = law.bounds(1.0, 1.0);
+            let (lower, upper) = law.bounds(1.0, 0.0);
             // Within 0.3 percentage points of 2.5 % at each end.
             assert!((upper * low - 1.0).abs() < 0.06, "{fractions:?}, {overlap}, {count}: {}", 1.0 / upper);
             assert!((lower * high - 1.0).abs() < 0.01, "{fractions:?}, {overlap}, {count}: {}", 1.0 / lower);
@@ -298,12 +299,13 @@ mod tests {
         for fractions in [VarianceFractions::WHITE, VarianceFractions::QUANTIZATION] {
             for count in [5, 20, 100] {
                 let law = ChiSquareApproximation::new(Difference::Second, 64, count, 8, fractions);
-                let mut highest = law.bounds(1.0, 1.0).1;
-                for left in [0.5, 0.1, 0.03, 0.01] {
-                    let (lower, upper) = law.bounds(1.0, left);
-                    assert!(lower < 1.0, "{count}, {left}: {lower}");
-                    assert!(upper >= highest && highest > 1.0, "{count}, {left}: {upper}");
-                    highest = upper;
+                let (measured_low, measured_high) = law.bounds(10.0, 0.0);
+                for estimate in [9.0, 5.0, 1.0, 0.1] {
+                    let (low, high) = law.bounds(estimate, 10.0 - estimate);
+                    assert!((0.0..estimate).contains(&low) && high > estimate, "{count}, {estimate}: {low} to {high}");
+                    // The width is that of the measured variance, less what would be negative.
+                    assert!((high - (measured_high - 10.0 + estimate)).abs() < 1e-12, "{count}, {estimate}: {high}");
+                    assert!(low == 0.0 || (low - (measured_low - 10.0 + estimate)).abs() < 1e-12, "{count}: {low}");
                 }
             }
         }

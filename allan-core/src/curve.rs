@@ -337,9 +337,8 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         for point in &mut self.points {
             let approximation =
                 ChiSquareApproximation::new(Difference::Second, point.n, point.count, point.overlap, fractions(point));
-            let left = point.subtraction_factor();
-            point.edf = left * approximation.edf;
-            (point.low, point.high) = approximation.bounds(point.avar, left);
+            point.edf = point.subtraction_factor() * approximation.edf;
+            (point.low, point.high) = approximation.bounds(point.avar, point.interpolation);
         }
     }
 

@@ -45,9 +45,8 @@ impl HadamardPoint {
 
     fn set_confidence(&mut self, fractions: VarianceFractions) {
         let approximation = ChiSquareApproximation::new(Difference::Third, self.n, self.count, self.overlap, fractions);
-        let left = subtraction_factor(self.hvar, self.interpolation);
-        self.edf = left * approximation.edf;
-        (self.low, self.high) = approximation.bounds(self.hvar, left);
+        self.edf = subtraction_factor(self.hvar, self.interpolation) * approximation.edf;
+        (self.low, self.high) = approximation.bounds(self.hvar, self.interpolation);
     }
 }
 
