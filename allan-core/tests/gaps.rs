@@ -165,6 +165,28 @@ fn losses_of_a_few_percent_cost_few_degrees_of_freedom_and_no_octave() {
     }
 }
 
+/// The 95 % bounds of what is left after a subtraction hold the variance of white noise, 10⁶/n, in 95 % of 600 records within four
+/// binomial standard deviations, from 8 samples on: shorter averaging times leave out what touches a lost sample.
+#[test]
+fn bounds_hold_the_variance_where_much_was_subtracted() {
+    const RECORDS: u64 = 600;
+    let mut covered = [0_u32; OCTAVES];
+    let mut most_subtracted = 0.0_f64;
+    for seed in 0..RECORDS {
+        let record = record(0.0, 5_000 + seed);
+        let curve = Estimators::new(&record, &losses(0.4, 1..2, 2, seed)).cascade.curve(1.0);
+        for (octave, point) in curve.points().iter().enumerate() {
+            covered[octave] += u32::from((point.low..=point.high).contains(&(1e6 / point.n as f64)));
+            most_subtracted = most_subtracted.max(point.interpolation / (point.avar + point.interpolation));
+        }
+    }
+    let (mean, deviation) = (0.95 * RECORDS as f64, (0.95 * 0.05 * RECORDS as f64).sqrt());
+    for (octave, covered) in covered.into_iter().enumerate().skip(3) {
+        assert!((f64::from(covered) - mean).abs() < 4.0 * deviation, "n = {}: {covered} of {RECORDS}", 1 << octave);
+    }
+    assert!(most_subtracted > 0.2, "{most_subtracted}");
+}
+
 #[test]
 fn a_burst_every_second_leaves_the_kurtosis_of_gaussian_noise() {
     let record = record(0.0, 3);
