@@ -6,6 +6,7 @@ use std::cell::Cell;
 use std::num::NonZero;
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 thread_local! {
     static IS_ALONE: Cell<bool> = const { Cell::new(false) };
@@ -32,26 +33,33 @@ pub fn threads() -> usize {
 
 /// Runs `task` for each of `items`, on as many threads as there are cores, and returns the results in the order of `items`.
 pub fn in_parallel<T: Sync, R: Send>(items: &[T], task: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    let cores = threads();
-    if cores == 1 {
-        return items.iter().map(task).collect();
-    }
     let next = AtomicUsize::new(0);
-    let work = || {
-        let taken = std::iter::from_fn(|| {
-            let at = next.fetch_add(1, Ordering::Relaxed);
-            Some((at, task(items.get(at)?)))
-        });
-        taken.collect::<Vec<_>>()
-    };
-    let mut results: Vec<(usize, R)> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..cores.min(items.len())).map(|_| scope.spawn(work)).collect();
-        // A panic in a task is passed on to the caller.
-        let finished = workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic)));
-        finished.flatten().collect()
+    let results = Mutex::new(Vec::from_iter(items.iter().map(|_| None)));
+    on_threads(threads().min(items.len()), &|| {
+        while let Some((at, item)) = taken(&next, items) {
+            let result = task(item);
+            results.lock().unwrap_or_else(PoisonError::into_inner)[at] = Some(result);
+        }
     });
-    results.sort_unstable_by_key(|(at, _)| *at);
-    results.into_iter().map(|(_, result)| result).collect()
+    results.into_inner().unwrap_or_else(PoisonError::into_inner).into_iter().flatten().collect()
+}
+
+/// The next item, and its position.
+fn taken<'a, T>(next: &AtomicUsize, items: &'a [T]) -> Option<(usize, &'a T)> {
+    let at = next.fetch_add(1, Ordering::Relaxed);
+    Some((at, items.get(at)?))
+}
+
+/// Runs `work` on `count` threads at the same time, one of them that of the caller where it is the only one. A panic is passed on. Not
+/// generic: what starts and joins threads is compiled once.
+fn on_threads(count: usize, work: &(dyn Fn() + Sync)) {
+    if count <= 1 {
+        return work();
+    }
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..count).map(|_| scope.spawn(work)).collect();
+        workers.into_iter().for_each(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic)));
+    });
 }
 
 /// What `task` makes of each channel, on as many threads as there are cores.
@@ -69,15 +77,10 @@ pub(crate) fn for_each<T: Send>(changed: &mut [T], task: impl Fn(&mut T) + Sync)
 
 /// Runs `task` for each of `changed` with the one of `others` at the same position, on as many threads as there are cores.
 pub(crate) fn for_each_pair<T: Send, U: Sync>(changed: &mut [T], others: &[U], task: impl Fn(&mut T, &U) + Sync) {
-    let threads = threads().min(changed.len()).max(1);
-    let each = changed.len().div_ceil(threads).max(1);
-    let work = |(changed, others): (&mut [T], &[U])| {
-        changed.iter_mut().zip(others).for_each(|(changed, other)| task(changed, other));
-    };
-    let parts = changed.chunks_mut(each).zip(others.chunks(each));
-    if threads == 1 {
-        parts.for_each(work);
-    } else {
-        std::thread::scope(|scope| parts.for_each(|part| drop(scope.spawn(move || work(part)))));
-    }
+    let each = changed.len().div_ceil(threads()).max(1);
+    let parts: Vec<_> = changed.chunks_mut(each).zip(others.chunks(each)).map(Mutex::new).collect();
+    in_parallel(&parts, |part| {
+        let (changed, others) = &mut *part.lock().unwrap_or_else(PoisonError::into_inner);
+        changed.iter_mut().zip(*others).for_each(|(changed, other)| task(changed, other));
+    });
 }
