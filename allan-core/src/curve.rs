@@ -90,11 +90,6 @@ impl AllanPoint {
         self
     }
 
-    /// Factor on the degrees of freedom of the measured variance.
-    pub(crate) fn subtraction_factor(&self) -> f64 {
-        subtraction_factor(self.avar, self.interpolation)
-    }
-
     fn octave_variance(&self) -> OctaveVariance {
         let weight = self.count as f64 / f64::from(self.overlap);
         OctaveVariance { octave: log2(self.n as f64), variance: self.avar, weight }
@@ -337,7 +332,7 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         for point in &mut self.points {
             let approximation =
                 ChiSquareApproximation::new(Difference::Second, point.n, point.count, point.overlap, fractions(point));
-            point.edf = point.subtraction_factor() * approximation.edf;
+            point.edf = subtraction_factor(point.avar, point.interpolation) * approximation.edf;
             (point.low, point.high) = approximation.bounds(point.avar, point.interpolation);
         }
     }

@@ -50,8 +50,8 @@ fn taken<'a, T>(next: &AtomicUsize, items: &'a [T]) -> Option<(usize, &'a T)> {
     Some((at, items.get(at)?))
 }
 
-/// Runs `work` on `count` threads at the same time; a single one is that of the caller. A panic is passed on. It is not generic, so that what starts
-/// and joins threads is compiled once.
+/// Runs `work` on `count` threads at the same time; a single one is that of the caller. A panic is passed on. It is not generic, so that
+/// what starts and joins threads is compiled once.
 fn on_threads(count: usize, work: &(dyn Fn() + Sync)) {
     if count <= 1 {
         return work();
