@@ -8,8 +8,8 @@
 //!         ├► output_range                                  values that are cut off, and noise below a count
 //!         ├► stuck_output                                  an output that stays at one value
 //!         └► block_means, noise_grid ─► gls_regression ─► bias
-//!                                                          steps, ramps, covariates of the bias: thermal_response,
-//!                                                          vibration_rectification (bias_response)
+//!                                                          steps, ramps, transients (turn_on), covariates of the bias:
+//!                                                          thermal_response, vibration_rectification (bias_response)
 //! UniformSeries ─► random_telegraph                        jumps to and fro between two levels
 //! ```
 //!
@@ -31,6 +31,7 @@ pub(crate) mod spikes;
 pub(crate) mod stuck_output;
 mod telegraph_models;
 mod thermal_response;
+mod turn_on;
 pub(crate) mod vibration_rectification;
 
 #[cfg(test)]

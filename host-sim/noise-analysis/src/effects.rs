@@ -19,6 +19,7 @@ mod kind;
 mod knock;
 mod level_change;
 mod markov_process;
+mod missing_codes;
 mod modulated_line;
 mod motion;
 mod noise_below_count;
@@ -38,6 +39,7 @@ mod stuck_output;
 mod telegraph;
 mod temperature_curvature;
 mod thermal_lag;
+mod turn_on_transient;
 mod unexplained;
 mod vibration_rectification;
 
@@ -55,6 +57,7 @@ pub(crate) use kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence
 pub use knock::NoisyInterval;
 pub use level_change::LevelChange;
 pub use markov_process::{MarkovEvidence, MarkovProcess};
+pub use missing_codes::MissingCodes;
 pub use modulated_line::{ModulatedLine, ModulationEvidence};
 pub use motion::{MotionInterval, MotionScale};
 pub use noise_below_count::NoiseBelowCount;
@@ -64,7 +67,7 @@ pub use rate_ramp::{LinearDrift, LinearDriftEvidence};
 pub use repeated_samples::RepeatedSamples;
 pub use resonance::ResonantLine;
 pub use response::ResponseVariance;
-pub use sample_clock::ClockDeviation;
+pub use sample_clock::{ClockDeviation, RateChange};
 pub use saturation::Saturation;
 pub use shared_drift::SharedDrift;
 pub use sinusoid::SinusoidalLine;
@@ -74,6 +77,7 @@ pub use stuck_output::StuckOutput;
 pub use telegraph::{TelegraphEvidence, TelegraphNoise};
 pub use temperature_curvature::TemperatureCurvature;
 pub use thermal_lag::ThermalLag;
+pub use turn_on_transient::TurnOnTransient;
 pub use unexplained::{BandMismatch, Observation, Refutation, Unexplained, UnexplainedPlace};
 pub use vibration_rectification::VibrationRectification;
 
@@ -111,6 +115,8 @@ pub enum Effect {
     LinearDrift(LinearDrift),
     /// A bias that becomes another one.
     LevelStep(LevelStep),
+    /// A bias that settles after the start.
+    TurnOnTransient(TurnOnTransient),
     /// A bias in proportion to the temperature.
     TemperatureSensitivity(TemperatureSensitivity),
     /// A bias that follows a parabola of the temperature.
@@ -129,6 +135,8 @@ pub enum Effect {
     EffectiveLsb(EffectiveLsb),
     /// Noise that does not reach from one count to the next.
     NoiseBelowCount(NoiseBelowCount),
+    /// Values that a converter never gives.
+    MissingCodes(MissingCodes),
     /// Single samples that stand out.
     Spikes(Spikes),
     /// A time in which the noise is larger.
@@ -221,6 +229,7 @@ kinds!(
     SharedDrift,
     LinearDrift,
     LevelStep,
+    TurnOnTransient,
     TemperatureSensitivity,
     TemperatureCurvature,
     ThermalLag,
@@ -230,6 +239,7 @@ kinds!(
     AngleQuantization,
     EffectiveLsb,
     NoiseBelowCount,
+    MissingCodes,
     Spikes,
     NoisyInterval,
     LevelChange,

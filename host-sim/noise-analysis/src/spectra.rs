@@ -6,6 +6,7 @@
 //! ```text
 //! UniformSeries ─► Periodogram ─► Background ─► lines    sinusoids and resonances, from the whole record at once
 //!               ├► stacked_spectrum ─► lines          the same, of a record that is read stretch by stretch
+//!               ├► alternation                           an offset of every second sample
 //!               ├► epoch_spectra                         the same of each epoch, to follow lines over time
 //!               ├► sine tapers ─► common_mode            drift that several channels share
 //!               ├► periodic_signal                       a slow signal that repeats and is no sinusoid
@@ -19,6 +20,7 @@
 //!               └► autocorrelation                       correlation time of a Markov process
 //! ```
 
+mod alternation;
 mod autocorrelation;
 mod coherent_track;
 pub(crate) mod common_mode;

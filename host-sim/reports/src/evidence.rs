@@ -3,8 +3,9 @@
 use crate::formatting::enumerated;
 use crate::rounding::{quantity_digits, significant};
 use noise_analysis::effects::{
-    BandMismatch, CurveEvidence, Effect, LineEvidence, LineSource, LinearDriftEvidence, MarkovEvidence, ModulatedLine,
-    ModulationEvidence, MotionScale, Multiples, Observation, OutputFilter, Refutation, TelegraphEvidence, Unexplained,
+    BandMismatch, ClockDeviation, CurveEvidence, Effect, LineEvidence, LineSource, LinearDriftEvidence, MarkovEvidence,
+    ModulatedLine, ModulationEvidence, MotionScale, Multiples, Observation, OutputFilter, Refutation,
+    TelegraphEvidence, Unexplained,
 };
 use noise_analysis::report::Finding;
 
@@ -225,6 +226,15 @@ impl Wording {
                 ),
                 "; a sensitivity that itself changes with temperature",
             ),
+            Effect::TurnOnTransient(of) => text(
+                format!(
+                    "the means decay exponentially from the first sample on, with a time constant of {:.0} s, by chance {} in white, flicker and walking \
+                     noise of any mixture",
+                    of.time_constant_s.value,
+                    self.chance(of.p_value)
+                ),
+                "; a part that warms itself after it was turned on",
+            ),
             Effect::ThermalLag(of) => text(
                 format!(
                     "follows the measured temperature behind a lag of {:.0} s, by chance {}, and better than without a lag",
@@ -329,6 +339,14 @@ impl Wording {
                 ),
                 "",
             ),
+            Effect::MissingCodes(of) => text(
+                format!(
+                    "{} codes, all multiples of {} counts apart, have no sample, where the rarer neighbour of each lets expect {:.0} \
+                     in all",
+                    of.codes, of.spacing_counts, of.expected
+                ),
+                "",
+            ),
             Effect::StuckOutput(of) => text(
                 format!(
                     "{} of {} samples are in {} runs of equal values that noise does not make, the longest from {:.2} s to {:.2} s",
@@ -346,6 +364,13 @@ impl Wording {
                     of.equal, of.samples, of.channels, of.by_chance
                 ),
                 "; a register that is read before it is renewed",
+            ),
+            Effect::ClockDeviation(ClockDeviation { change: Some(of), .. }) => text(
+                format!(
+                    "{:.4} Hz by the time stamps up to {:.0} s and {:.4} Hz from then on, {:.1} σ apart; neither wanders",
+                    of.before_hz.value, of.time_s.value, of.after_hz.value, of.sigmas
+                ),
+                "",
             ),
             Effect::ClockDeviation(of) => text(
                 format!(
@@ -456,15 +481,6 @@ impl Wording {
                     "",
                 )
             }
-            Observation::Sawtooth { multiples, line } => text(
-                format!(
-                    "{} of one signal, even and odd ones with amplitudes that fall with their number: it rises evenly and jumps back \
-                     every {:.1} s, which no sinusoid and no square wave does",
-                    harmonics(multiples),
-                    1.0 / frequency_hz
-                ),
-                format!("; {}", self.line(line).sentence()),
-            ),
             Observation::DecayingDisturbances { time_constant_s, sum, reversed, p_value } => text(
                 format!(
                     "disturbances {} that begin at once and decay within {time_constant_s:.2} s: the third moment behind a filter for \

@@ -308,6 +308,17 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
                 format!(".{}", off()),
             ),
         ),
+        Effect::TurnOnTransient(of) => (
+            format!(
+                "The bias begins {} off and settles with a time constant of {}.",
+                size(of.size),
+                seconds(of.time_constant_s)
+            ),
+            Advice::new(
+                "Let the part warm up before it is recorded or used",
+                format!(": after {} a hundredth of this is left.", span(4.6 * of.time_constant_s.value)),
+            ),
+        ),
         Effect::ThermalLag(of) => (
             format!(
                 "The bias follows the temperature with {} through a lag of {}.",
@@ -352,6 +363,13 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
             "The noise is smaller than a count: the samples repeat one value and hide what is below it.".to_owned(),
             Advice::new("Take no coefficient from the short averaging times", "; use a smaller range, or add dither."),
         ),
+        Effect::MissingCodes(of) => (
+            format!("The converter never gives {} of its codes, which are {} apart.", of.codes, size(of.spacing)),
+            Advice::new(
+                "Compare with another part",
+                "; the codes beside the missing ones hold their samples, an error of half a count.",
+            ),
+        ),
         Effect::Spikes(of) => (
             format!("Single samples stand out by {}, {}.", size(of.size), amount(&of.rate_per_hour.parameter("1/h"))),
             Advice::new("Check the wiring and the bus for interference", "; a filter should reject such samples."),
@@ -391,10 +409,24 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
             format!("{} of the samples are copies of the one before.", part_in_percent(of.fraction)),
             Advice::new("Read the part at its data-ready signal", "; copies make white noise look correlated."),
         ),
-        Effect::ClockDeviation(of) => (
-            format!("The clock of the samples runs at {}.", hertz(of.rate_hz)),
-            Advice::new("State this rate: every averaging time and N scale with it", "."),
-        ),
+        Effect::ClockDeviation(of) => match of.change {
+            None => (
+                format!("The clock of the samples runs at {}.", hertz(of.rate_hz)),
+                Advice::new("State this rate: every averaging time and N scale with it", "."),
+            ),
+            Some(change) => (
+                format!(
+                    "The clock of the samples changes its rate from {} to {} after {}.",
+                    hertz(change.before_hz),
+                    hertz(change.after_hz),
+                    span(change.time_s.value)
+                ),
+                Advice::new(
+                    "Look for what reset or set the part or the reader at this time",
+                    "; the averaging times are those of the mean rate.",
+                ),
+            ),
+        },
         Effect::Unexplained(of) => {
             let (place, percent) = (unexplained_place(of), of.excess_percent.map(|of| of.value));
             let told = percent.map_or_else(

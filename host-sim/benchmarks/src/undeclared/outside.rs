@@ -109,7 +109,8 @@ impl OutsideKind {
             // An offset of every second sample is a line at half the sample rate, and nothing else.
             Self::AlternatingConverters => &["sinusoid", "periodic"],
             Self::ClockStep => &["sample_clock"],
-            Self::SelfHeating | Self::MissingCodes => &[],
+            Self::MissingCodes => &["missing_codes"],
+            Self::SelfHeating => &["turn_on_transient"],
             Self::WanderingBand => &["resonance"],
             Self::Knock => &["knock", "motion"],
         }

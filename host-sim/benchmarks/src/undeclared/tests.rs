@@ -398,7 +398,7 @@ fn an_effect_outside_the_vocabulary_is_told_by_its_own_name_or_as_unexplained() 
     assert_eq!(told(&band, own, markov()), (false, false, false));
     assert_eq!(told(&band, other, resonance()), (false, false, false));
     // The clock is that of all channels; a knock is in all of them.
-    let clock = ClockDeviation { rate_hz: within_a_tenth(200.0), nominal_hz: 204.8, sigmas: 9.0 };
+    let clock = ClockDeviation { rate_hz: within_a_tenth(200.0), nominal_hz: 204.8, sigmas: 9.0, change: None };
     assert_eq!(told(&quiet(OutsideKind::ClockStep), Channel::AcclZ, clock.into()), (false, true, true));
     let dropped = DroppedSamples { fraction: within_a_tenth(1e-3), missing: 10.0, samples: 1e4, gaps: 10 };
     assert_eq!(told(&quiet(OutsideKind::ClockStep), Channel::AcclZ, dropped.into()), (false, false, false));

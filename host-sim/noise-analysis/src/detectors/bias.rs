@@ -1,4 +1,4 @@
-//! What changes the bias of a channel over the record: a ramp, a step, regressors such as the temperature, vibration, or several.
+//! What changes the bias of a channel over the record: a ramp, a step, a transient after the start, regressors such as the temperature, vibration, or several.
 //!
 //! In the differences of the Allan variance a change over the whole record has a few degrees of freedom and is lost in slow
 //! noise. Here each candidate is tested on block means against every mixture of white, flicker and random-walk noise, and
@@ -10,6 +10,7 @@ use super::block_means::BlockMeans;
 use super::gls_regression::{GlsRegression, RegressionEstimate};
 use super::noise_grid::{NoiseGrid, NoiseGrids};
 use super::thermal_response::{self, Lag, TemperatureCourse};
+use super::turn_on::Transient;
 use super::vibration_rectification::{Acceleration, Vibration};
 use crate::bounds::BoundedEstimate;
 use crate::distributions::NORMAL_975;
@@ -41,7 +42,7 @@ pub(crate) struct BiasChanges {
     pub ramp: Option<Detection>,
     /// Indices of the regressors that the bias depends on, with the sensitivity to each.
     pub sensitivities: Vec<(usize, BiasSensitivity)>,
-    /// Responses to temperature behind a lag or with a curvature, and to vibration.
+    /// A transient after the start, and responses to temperature behind a lag or with a curvature, and to vibration.
     pub responses: Vec<BiasResponse>,
 }
 
@@ -59,6 +60,7 @@ enum Candidate {
     Ramp,
     Regressor(usize),
     Step(StepPosition),
+    Transient(Transient),
     /// The temperature behind a lag.
     Lagged(Lag),
     /// The square of the temperature.
@@ -155,6 +157,9 @@ fn find_on_common_samples(
                     linear = Some(estimate);
                 }
             }
+            Candidate::Transient(transient) => {
+                changes.responses.push(transient.response(&blocks, series.period_s, &estimate, series.unit));
+            }
             Candidate::Lagged(lag) => lagged = Some((lag, estimate)),
             Candidate::Squared => squared = Some(estimate),
             Candidate::Vibration(at) => {
@@ -195,7 +200,7 @@ fn varies(means: &DVector<f64>, regressor: &Series) -> bool {
     means.max() - means.min() >= regressor.resolution
 }
 
-/// Of the candidates with a p-value below [`SIGNIFICANCE`], a step and a curvature with one below [`bias_step::SIGNIFICANCE`], the one
+/// Of the candidates with a p-value below [`SIGNIFICANCE`], a step, a transient and a curvature with one below [`bias_step::SIGNIFICANCE`], the one
 /// that explains the data best beside those accepted before.
 fn best_candidate(
     series: &Series,
@@ -246,6 +251,15 @@ fn best_candidate(
             };
             rivals.push((deviance + thermal_response::ADVANTAGE, Accepted { candidate, regressor, p_value }));
         }
+    }
+    let has_transient = accepted.iter().any(|accepted| matches!(accepted.candidate, Candidate::Transient(_)));
+    let transient = if has_transient { None } else { Transient::likeliest(blocks, &regression) };
+    if let Some(transient) = transient {
+        let RegressionEstimate { p_value, deviance, .. } = transient.estimate;
+        let regressor = transient.regressor(blocks);
+        // It has one more parameter, as a lag has.
+        let accepted = Accepted { candidate: Candidate::Transient(transient), regressor, p_value };
+        rivals.push((deviance + thermal_response::ADVANTAGE, accepted));
     }
     let is_shaken = accepted.iter().any(|accepted| matches!(accepted.candidate, Candidate::Vibration(_)));
     for (at, vibration) in vibrations.iter().enumerate().filter(|_| !is_shaken) {

@@ -39,6 +39,6 @@ pub(crate) fn find(series: &Series) -> Option<Detection> {
     Some(Detection { effect: found.into(), correction: None })
 }
 
-fn greatest_common_divisor(a: u64, b: u64) -> u64 {
+pub(crate) fn greatest_common_divisor(a: u64, b: u64) -> u64 {
     if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }

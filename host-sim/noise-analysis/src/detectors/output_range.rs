@@ -1,10 +1,11 @@
-//! What the output of a channel can express: whether its samples are cut off at the end of a range, and whether its noise
-//! reaches from one count to the next.
+//! What the output of a channel can express: whether its samples are cut off at the end of a range, whether its noise
+//! reaches from one count to the next, and whether there are codes that its converter never gives.
 
 use crate::bounds::BoundedEstimate;
+use crate::detectors::effective_lsb::greatest_common_divisor;
 use crate::distributions::poisson_bounds;
-use crate::effects::findings::Detection;
-use crate::effects::{NoiseBelowCount, Saturation};
+use crate::effects::findings::{Detection, SIGNIFICANCE};
+use crate::effects::{MissingCodes, NoiseBelowCount, Saturation};
 use crate::samples::gapped_cascade::GappedCascade;
 use crate::samples::series::Series;
 use measurement::ChannelProfile;
@@ -19,6 +20,8 @@ const PILED: u64 = 3;
 const FEWEST_VALUES: usize = 10;
 /// Most bins in which values are counted: all those of a converter of 14 bits by themselves.
 const MOST_BINS: i64 = 1 << 14;
+/// Fewest missing codes: one between two others may be that between two levels of the signal, such as those of a random telegraph.
+const FEWEST_MISSING: usize = 2;
 /// Fewest samples whose noise is compared with a count.
 const FEWEST_SAMPLES: usize = 100;
 /// Octaves in which noise behind a filter can reach from one count to the next: the longest filters average 64 samples.
@@ -105,6 +108,33 @@ impl ValueCounts {
         };
         Some(Detection { effect: saturation.into(), correction: None })
     }
+
+    /// Codes that never occur, each between two that occur often. `resolution` is the distance of two codes, in the unit of the channel,
+    /// whose noise reaches over several of them.
+    ///
+    /// A density with one peak is at least as high at a code as at the lower of its neighbours, so that a code that is not missing has no
+    /// sample by chance with a probability below `e^−n`, where n is the number of samples of the rarer neighbour.
+    pub(crate) fn missing_codes(&self, resolution: f64, unit: &'static str) -> Option<Detection> {
+        if self.width_log2 > 0 {
+            return None;
+        }
+        let enough = (self.bins.len() as f64 / SIGNIFICANCE).ln();
+        let missing: Vec<(u64, f64)> = (0..)
+            .zip(self.bins.windows(3))
+            .filter(|(_, codes)| codes[1] == 0)
+            .map(|(at, codes)| (at, codes[0].min(codes[2]) as f64))
+            .filter(|&(_, rarer)| rarer > enough)
+            .collect();
+        let (&[(first, _), .., _], true) = (missing.as_slice(), missing.len() >= FEWEST_MISSING) else { return None };
+        let spacing_counts = missing.iter().map(|(at, _)| at - first).fold(0, greatest_common_divisor) as u32;
+        let found = MissingCodes {
+            codes: missing.len() as u32,
+            spacing: BoundedEstimate::exact(f64::from(spacing_counts) * resolution).in_unit(unit),
+            spacing_counts,
+            expected: missing.iter().map(|(_, rarer)| rarer).sum(),
+        };
+        Some(Detection { effect: found.into(), correction: None })
+    }
 }
 
 /// Noise that does not reach from one count to the next: its Allan variance at the shortest octaves is below
@@ -166,5 +196,40 @@ mod tests {
             assert_eq!(found.level.value, f64::from(limit) * channel.lsb);
             assert_eq!(counted(deviation, i32::MAX).saturation(&channel, channel.lsb), None);
         }
+    }
+
+    /// Every eighth code, or none, becomes the next one, in normal noise of 10 counts and in a walk over as many.
+    #[test]
+    fn codes_that_never_occur_between_others_are_missing() {
+        let mut random = ChaCha8Rng::seed_from_u64(4);
+        let mut walk = 0.0;
+        let mut of = |step: f64, modulus: i32| {
+            let mut counts = ValueCounts::default();
+            for _ in 0..200_000 {
+                walk += step * random.sample::<f64, _>(StandardNormal);
+                let value = (walk + 10.0 * random.sample::<f64, _>(StandardNormal)).round() as i32;
+                counts.push(if value.rem_euclid(modulus) == modulus - 1 { value + 1 } else { value });
+            }
+            counts.missing_codes(0.05, "deg/s").map(|found| found.effect)
+        };
+        let Some(Effect::MissingCodes(found)) = of(0.0, 8) else { panic!("none is found") };
+        // 21 samples or more are expected of each code within 3.5 standard deviations: −35 … 35 has 9 of −33, −25 … 31.
+        assert!((8..=10).contains(&found.codes) && found.spacing_counts == 8, "{found:?}");
+        assert!((found.spacing.value - 0.4).abs() < 1e-12);
+        for step in [0.0, 0.1] {
+            assert_eq!(of(step, i32::MAX), None, "{step}");
+        }
+    }
+
+    /// A telegraph between two levels, each of which the noise spreads over three codes: the one between them is empty.
+    #[test]
+    fn a_gap_between_two_levels_is_no_missing_code() {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut counts = ValueCounts::default();
+        for at in 0..200_000 {
+            let level = if (at / 100) % 2 == 0 { 0.0 } else { 4.0 };
+            counts.push((level + 0.3 * random.sample::<f64, _>(StandardNormal)).round() as i32);
+        }
+        assert_eq!(counts.missing_codes(0.05, "deg/s"), None);
     }
 }

@@ -1,6 +1,6 @@
 //! What departs from every model that the analysis knows: where, by how much, and what was seen.
 
-use super::evidence::{CurveEvidence, LineEvidence, Multiples};
+use super::evidence::CurveEvidence;
 use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, Parameter};
 
@@ -54,13 +54,6 @@ pub enum Observation {
         sigmas: f64,
         /// What contradicts a resonance.
         mismatch: BandMismatch,
-    },
-    /// A signal that rises evenly and jumps back.
-    Sawtooth {
-        /// Its lines.
-        multiples: Multiples,
-        /// What shows the fundamental.
-        line: LineEvidence,
     },
     /// Disturbances that begin at once and decay.
     DecayingDisturbances {

@@ -7,7 +7,7 @@
 //! blocks of samples ─► SampleScreen (spikes, repeated samples) ─► means ─► what is slow: drift, steps, temperature, lines
 //!        │                           ├─► StackedSpectrum ─► faster lines
 //!        │                           ├─► EpochSpectra ─► lines of two channels that move with each other
-//!        ├─► ValueCounts ─► saturation
+//!        ├─► ValueCounts ─► saturation, missing codes
 //!        └───────────────────────────┴─► StreamedCurves ─► curves at averaging times below 8 means
 //! ```
 //!
@@ -87,11 +87,18 @@ struct FastFindings {
 }
 
 impl FastFindings {
-    /// Of the channel with this profile, which is `first` among the first samples, of which `shown` is known.
-    fn new(profile: &ChannelProfile, first: Option<ChannelId>, shown: &SampleEffects) -> Self {
-        let effects = first.into_iter().flat_map(|of| shown.of(of));
+    /// Of the channel with this profile, which is `first` among the first samples, of which `shown` is known; `changed_clock` is
+    /// known of more of them.
+    fn new(
+        profile: &ChannelProfile,
+        first: Option<ChannelId>,
+        shown: &SampleEffects,
+        changed_clock: Option<&Effect>,
+    ) -> Self {
+        let is_better_known = |effect: &&Effect| changed_clock.is_some_and(|of| of.is_of_kind(effect));
+        let effects = first.into_iter().flat_map(|of| shown.of(of)).filter(|of| is_fast(of) && !is_better_known(of));
         Self {
-            effects: effects.filter(|effect| is_fast(effect)).cloned().collect(),
+            effects: effects.chain(changed_clock).cloned().collect(),
             resolution: profile.lsb * f64::from(first.map_or(1, |of| shown.counts_per_step(of))),
         }
     }
@@ -169,11 +176,13 @@ impl LongRecordReader {
         // The same channels, of which the size of a count may be another one.
         let of_first: Vec<Option<ChannelId>> = description.channels.iter().map(|of| first.named(of.name)).collect();
         let shown = SampleEffects::detect(&first);
+        let changes = |effect: &Effect| matches!(effect, Effect::ClockDeviation(of) if of.change.is_some());
+        let changed_clock = sampling_faults::sample_clock(beginning).map(|found| found.effect).filter(changes);
         let fast: Vec<FastFindings> = description
             .channels
             .iter()
             .zip(&of_first)
-            .map(|(of, first)| FastFindings::new(of, *first, &shown))
+            .map(|(of, first)| FastFindings::new(of, *first, &shown, changed_clock.as_ref()))
             .collect();
         let repeated = shown.repeated();
         let rules = in_parallel(&of_first, |of_first| {
@@ -262,9 +271,14 @@ impl LongRecordReader {
             channels.into_iter().zip(fast).zip(&description.channels).zip(faster_lines).zip(events)
         {
             let is_inertial = profile.quantity.is_inertial();
-            let saturation = channel.values.saturation(profile, fast.resolution);
+            let shows_codes = |effect: &Effect| !matches!(effect, Effect::NoiseBelowCount(_) | Effect::EffectiveLsb(_));
+            let missing_codes = || channel.values.missing_codes(profile.lsb, profile.unit);
+            let range = channel
+                .values
+                .saturation(profile, fast.resolution)
+                .or_else(|| missing_codes().filter(|_| fast.effects.iter().all(shows_codes)));
             let found = lost.iter().cloned().map(|found| found.effect).chain(fast.effects);
-            let found = found.chain(saturation.map(|found| found.effect)).chain(events);
+            let found = found.chain(range.map(|found| found.effect)).chain(events);
             let parts = |curves: &StreamedCurves| curves.parts().map(|(start, part)| (start, part.clone())).collect();
             condensed.push(CondensedChannel {
                 samples: SampleCurves {

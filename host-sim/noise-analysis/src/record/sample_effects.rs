@@ -21,7 +21,7 @@ pub(crate) struct SampleEffects {
 struct SamplesOfChannel {
     is_inertial: bool,
     counts_per_step: u32,
-    /// Of an inertial channel: a resolution of several counts, values that are cut off, noise below a count.
+    /// Of an inertial channel: a resolution of several counts, values that are cut off, noise below a count, missing codes.
     found: Vec<Detection>,
 }
 
@@ -70,7 +70,10 @@ impl SamplesOfChannel {
         recorded.used_samples(&measurement.slots).for_each(|(_, count)| values.push(count));
         let range = values
             .saturation(&recorded.profile, series.resolution)
-            .or_else(|| find_noise_below_count(&series, measurement.profile.dithered_avar_counts2));
+            .or_else(|| find_noise_below_count(&series, measurement.profile.dithered_avar_counts2))
+            .or_else(|| {
+                values.missing_codes(recorded.profile.lsb, recorded.profile.unit).filter(|_| counts_per_step == 1)
+            });
         Self { is_inertial, counts_per_step, found: resolution.into_iter().chain(range).collect() }
     }
 }

@@ -3,7 +3,7 @@
 use crate::bounds::{BoundedEstimate, MeasuredValue};
 use crate::distributions::{NORMAL_975, poisson_bounds, poisson_tail, upper_tail};
 use crate::effects::findings::{Correction, Detection, SIGNIFICANCE};
-use crate::effects::{ClockDeviation, DroppedSamples, RepeatedSamples};
+use crate::effects::{ClockDeviation, DroppedSamples, RateChange, RepeatedSamples};
 use measurement::{Measurement, SensorProfile};
 use std::collections::BTreeMap;
 
@@ -15,6 +15,13 @@ const MAX_RATE_DEVIATION: f64 = 0.04;
 const DOUBLINGS: std::ops::RangeInclusive<i32> = -3..=3;
 /// The standard deviation of the rate is estimated from the rates of so many segments.
 const SEGMENTS: usize = 8;
+/// Parts of a record whose rates are compared with each other, at most, and the fewest samples of one.
+const RATE_SEGMENTS: usize = 64;
+const MIN_SEGMENT: usize = 100;
+/// Fewest parts before and after a change of the rate.
+const SHORTEST_PART: usize = 4;
+/// By how many standard deviations the scatter of steady rates may exceed that of neighbours.
+const WANDERING: f64 = 4.0;
 /// Shortest recording, in samples, whose sample rate is compared.
 const MIN_SAMPLES: usize = 100 * SEGMENTS;
 
@@ -105,7 +112,7 @@ fn repeated_fraction(all: f64, shares: &[f64]) -> f64 {
 }
 
 /// Compares the sample rate by the time stamps with the stated rate, or without one with the nearest rate that the sensor
-/// can be set to or that hosts usually read at.
+/// can be set to or that hosts usually read at; and its parts with each other.
 #[must_use]
 pub(crate) fn sample_clock(measurement: &Measurement) -> Option<Detection> {
     let MeasuredValue { value: measured, error } = rate_by_time_stamps(measurement)?;
@@ -114,40 +121,84 @@ pub(crate) fn sample_clock(measurement: &Measurement) -> Option<Detection> {
     let z = off.abs() * measured / error;
     let p_value = 2.0 * upper_tail(z);
     let unusual = measurement.stated_rate_hz.is_none() && off.abs() > MAX_RATE_DEVIATION;
-    if unusual || p_value > SIGNIFICANCE {
+    let change = rate_change(measurement);
+    if (unusual || p_value > SIGNIFICANCE) && change.is_none() {
         return None;
     }
-    let half = NORMAL_975 * error;
-    let clock = ClockDeviation {
-        rate_hz: BoundedEstimate::new(measured, measured - half, measured + half),
-        nominal_hz: nominal,
-        sigmas: z,
-    };
+    let rate_hz = bounded(MeasuredValue { value: measured, error });
+    let clock = ClockDeviation { rate_hz, nominal_hz: nominal, sigmas: z, change };
     Some(Detection { effect: clock.into(), correction: None })
+}
+
+fn bounded(MeasuredValue { value, error }: MeasuredValue) -> BoundedEstimate {
+    let half = NORMAL_975 * error;
+    BoundedEstimate::new(value, value - half, value + half)
 }
 
 /// The sample rate by the time stamps, Hz: its standard deviation is that of the segments' rates and
 /// [`SensorProfile::host_clock_error`]. `None` without time stamps or with fewer than [`MIN_SAMPLES`].
 #[must_use]
 pub(crate) fn rate_by_time_stamps(measurement: &Measurement) -> Option<MeasuredValue> {
-    let times = measurement.times_s.as_ref()?;
-    let slots: Vec<f64> = measurement.slots.iter().map(|&slot| slot as f64).collect();
-    if slots.len() < MIN_SAMPLES {
+    let rates = segment_rates(measurement, SEGMENTS)?;
+    let [measured] = segment_rates(measurement, 1)?[..] else { return None };
+    let scatter = variance(&rates) / rates.len() as f64;
+    let host = measurement.profile.host_clock_error * measured;
+    Some(MeasuredValue { value: measured, error: scatter.sqrt().hypot(host) })
+}
+
+/// The rates of so many parts of the record, Hz, each by its time stamps. `None` without time stamps, with fewer than
+/// [`MIN_SAMPLES`], or where stamps do not grow.
+fn segment_rates(measurement: &Measurement, segments: usize) -> Option<Vec<f64>> {
+    let (times, slots) = (measurement.times_s.as_ref()?, &measurement.slots);
+    let of_segment = |segment: usize| {
+        let range = slots.len() * segment / segments..slots.len() * (segment + 1) / segments;
+        rate(&slots[range.clone()], &times[range])
+    };
+    (slots.len() >= MIN_SAMPLES).then(|| (0..segments).map(of_segment).collect())?
+}
+
+/// A rate that becomes another one: at the time for which the rates before and after it scatter least about their means.
+///
+/// They have to differ by more than chance and the host's clock explain. What is left has to scatter as neighbours differ: a clock that
+/// wanders or drifts has no such time. The ratio of both variances is 1 ± 1/√n for n independent rates (J. von Neumann, "Distribution
+/// of the ratio of the mean square successive difference to the variance", Ann. Math. Stat. 12, 1941).
+fn rate_change(measurement: &Measurement) -> Option<RateChange> {
+    let segments = RATE_SEGMENTS.min(measurement.len() / MIN_SEGMENT);
+    if segments < 4 * SHORTEST_PART {
         return None;
     }
-    let rates: Option<Vec<f64>> = (0..SEGMENTS)
-        .map(|segment| {
-            let range = slots.len() * segment / SEGMENTS..slots.len() * (segment + 1) / SEGMENTS;
-            rate(&slots[range.clone()], &times[range])
-        })
-        .collect();
-    let rates = rates?;
-    let measured = rate(&slots, times)?;
-    let mean = rates.iter().sum::<f64>() / SEGMENTS as f64;
-    let scatter = rates.iter().map(|rate| (rate - mean).powi(2)).sum::<f64>() / (SEGMENTS * (SEGMENTS - 1)) as f64;
+    let rates = segment_rates(measurement, segments)?;
+    let squares = |rates: &[f64]| variance(rates) * (rates.len() - 1) as f64;
+    // The part in which the rate changes belongs to neither.
+    let left = |at: usize| squares(&rates[..at]) + squares(&rates[at + 1..]);
+    let at = (SHORTEST_PART..segments - SHORTEST_PART).min_by(|a, b| left(*a).total_cmp(&left(*b)))?;
+    let (before, after) = (&rates[..at], &rates[at + 1..]);
+    let pairs = |rates: &[f64]| rates.windows(2).map(|pair| 0.5 * (pair[1] - pair[0]).powi(2)).sum::<f64>();
+    let count = (segments - 3) as f64;
+    let (of_all, of_neighbours) = (left(at) / count, (pairs(before) + pairs(after)) / count);
     let host = measurement.profile.host_clock_error;
-    let error = (scatter / (measured * measured) + host * host).sqrt();
-    Some(MeasuredValue { value: measured, error: error * measured })
+    let part = |rates: &[f64]| {
+        let value = mean(rates);
+        MeasuredValue { value, error: (of_all / rates.len() as f64).sqrt().hypot(host * value) }
+    };
+    let [earlier, later] = [before, after].map(part);
+    let sigmas = (later.value - earlier.value).abs() / earlier.error.hypot(later.error);
+    let places = (segments - 2 * SHORTEST_PART) as f64;
+    let is_steady = of_all < (1.0 + WANDERING / count.sqrt()) * of_neighbours;
+    let is_change = places * 2.0 * upper_tail(sigmas) < SIGNIFICANCE;
+    let time_s = |at: usize| {
+        let position = (measurement.len() * at / segments).min(measurement.len() - 1);
+        measurement.slots[position] as f64 / measurement.sample_rate_hz
+    };
+    let [from_s, to_s] = [at, at + 1].map(time_s);
+    // The rate of the part between them is the mean of both, each for its time.
+    let of_part = ((rates[at] - later.value) / (earlier.value - later.value)).clamp(0.0, 1.0);
+    (is_steady && is_change).then(|| RateChange {
+        time_s: BoundedEstimate::new(from_s + of_part * (to_s - from_s), from_s, to_s),
+        before_hz: bounded(earlier),
+        after_hz: bounded(later),
+        sigmas,
+    })
 }
 
 /// The nearest rate, in Hz, that the sensor can be set to or that is round.
@@ -160,15 +211,26 @@ fn nearest_usual_rate(profile: &SensorProfile, measured: f64) -> f64 {
 }
 
 /// Sample rate in Hz: one over the slope of the least-squares line of the time stamps over the sample periods.
-fn rate(slots: &[f64], times: &[f64]) -> Option<f64> {
+fn rate(slots: &[u64], times: &[f64]) -> Option<f64> {
+    let (&first, &start_s) = (slots.first()?, times.first()?);
+    let points = || slots.iter().zip(times).map(|(slot, time)| ((slot - first) as f64, time - start_s));
     let count = slots.len() as f64;
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / count;
-    let (mean_slot, mean_time) = (mean(slots), mean(times));
-    let (squares, products) = slots.iter().zip(times).fold((0.0, 0.0), |(squares, products), (slot, time)| {
+    let (slot_sum, time_sum) = points().fold((0.0, 0.0), |(slots, times), (slot, time)| (slots + slot, times + time));
+    let (mean_slot, mean_time) = (slot_sum / count, time_sum / count);
+    let (squares, products) = points().fold((0.0, 0.0), |(squares, products), (slot, time)| {
         (squares + (slot - mean_slot).powi(2), products + (slot - mean_slot) * (time - mean_time))
     });
     let rate = squares / products;
     (rate.is_finite() && rate > 0.0).then_some(rate)
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+fn variance(values: &[f64]) -> f64 {
+    let mean = mean(values);
+    values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (values.len() - 1) as f64
 }
 
 #[cfg(test)]

@@ -27,6 +27,8 @@ const SAME_TIME_OCTAVES: f64 = 2.0;
 /// Shortest time constant of a process, in periods of a periodic signal, that may be the signal's: its jumps and slopes have the
 /// spectrum of one with its time scale.
 const LEAST_OF_PERIOD: f64 = 0.02;
+/// Longest time constant of two levels of a periodic signal, in periods: that of levels for half a period each.
+const LARGEST_OF_PERIOD: f64 = 0.25;
 /// Time constants of a process, in periods of a line, that may be the line's: the Allan deviation of the process is largest at 1.89 time
 /// constants, that of the line at 0.37 periods, and octaves tell either to a factor of 4.
 const OF_TRACK_PERIOD: [f64; 2] = [0.05, 0.8];
@@ -113,7 +115,7 @@ const fn row(
 
 /// The rows, in their order.
 #[rustfmt::skip]
-pub static RIVALRIES: [Rivalry; 44] = [
+pub static RIVALRIES: [Rivalry; 45] = [
     // Lines and signals of the spectrum.
     row("line above half the rate of the means", "line of the means", "at its alias, and as wide", "means sample it too slowly",
         Rule::Line(|of| of.faster.iter().any(|faster| is_alias(of.line, faster, of.period_s)))),
@@ -293,6 +295,9 @@ pub static RIVALRIES: [Rivalry; 44] = [
     row("line in common", "rest of a drift in common", "in one channel alone",
         "it is in common with a channel that shows the line",
         Rule::Cause(|of| matches!(of.effect, Effect::CommonMode(_)) && of.shown_by == Some(1))),
+    row("periodic signal", "telegraph noise", "a time constant of a fiftieth to a quarter of its period",
+        "two levels for the parts p and 1 − p of a period have the time constant p(1 − p) of it",
+        Rule::Cause(|of| matches!(of.effect, Effect::TelegraphNoise(telegraph) if of.is_of_period(telegraph)))),
 ];
 
 /// Whether a line of the spectrum stands.
@@ -497,6 +502,19 @@ impl CauseClaim<'_> {
                 && frequency_hz.is_some_and(|of| TAU * of.value * drift.time_constant_s.value < WITHIN_COMMON_MODE)
         };
         self.periodic.iter().any(|cause| cause.shown.len() > 1 && cause.shown.iter().any(is_within))
+    }
+
+    /// Whether the channel has a periodic signal that may have the two levels.
+    fn is_of_period(&self, levels: &TelegraphNoise) -> bool {
+        let BoundedEstimate { low, high, .. } = levels.time_constant_s;
+        let has_levels = |shown: &Shown| match &shown.effect {
+            Effect::Periodic(of) if shown.channel == self.channel => {
+                let turns = |time_constant_s: f64| time_constant_s * of.frequency_hz.value;
+                turns(high) > LEAST_OF_PERIOD && turns(low) < LARGEST_OF_PERIOD
+            }
+            _ => false,
+        };
+        self.periodic.iter().any(|cause| cause.shown.iter().any(has_levels))
     }
 }
 

@@ -3,8 +3,10 @@
 //! A sinusoid is tested by the likelihood ratio of its least-squares fit against a locally white background. The p-value
 //! accounts for all the frequencies that were searched (R. Baluev, "Assessing the statistical significance of periodogram
 //! peaks", MNRAS 385, 2008) and for the uncertainty of the background. A resonance is sought in averages over 4, 16, 64 …
-//! ordinates. A peak is taken for the model with the larger likelihood.
+//! ordinates. A peak is taken for the model with the larger likelihood. What is at half of the sample rate itself is tested by
+//! [itself](super::alternation).
 
+use super::alternation::Alternation;
 use super::line_envelope::{MOST_PERIODS, Modulation};
 use super::line_models::Sine;
 use super::periodogram::{PADDING, Periodogram};
@@ -44,10 +46,10 @@ const SLOW_ROUNDS: usize = 6;
 /// Ordinates on either side whose median is the noise of one.
 const NEARBY: usize = 32;
 
-/// The lines of a series with a p-value below 2·10⁻⁴, the strongest first; at most 6.
+/// The lines of a series with a p-value below 2·10⁻⁴, the strongest first; at most 6 and one at half the sample rate.
 ///
 /// Searches from 8 periods per record up to half the sample rate, or to half the rate at which rounding acts as noise
-/// where that is lower. A record of fewer than some hundred samples has too few ordinates and yields none.
+/// where that is lower, and at half the sample rate. A record of fewer than some hundred samples has too few ordinates and yields none.
 #[must_use]
 pub fn find_lines(series: &UniformSeries) -> Vec<SpectralLine> {
     find_lines_over(series, |_| 1.0)
@@ -85,8 +87,9 @@ pub(crate) fn find_lines_over(series: &UniformSeries, known: impl Fn(f64) -> f64
         find_modulations(&mut sines, &rest.series, &resonances);
     }
     let sines = sines.into_iter().map(|found| found.line);
-    let mut found: Vec<SpectralLine> =
-        slow.into_iter().chain(sines).chain(resonances.iter().map(|resonance| resonance.line)).collect();
+    let at_half_the_rate = Alternation::of(series).line(series.duration(), series.sample_period());
+    let others = resonances.iter().map(|resonance| resonance.line).chain(at_half_the_rate);
+    let mut found: Vec<SpectralLine> = slow.into_iter().chain(sines).chain(others).collect();
     found.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
     let all = found.clone();
     found.retain(|line| !all.iter().any(|strong| is_residue(line, strong)));

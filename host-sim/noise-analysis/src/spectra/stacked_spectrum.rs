@@ -5,6 +5,7 @@
 //! 150, as for the spectrum of all of the record at once, which resolves more. A resonance that is wider than a stretch resolves has to
 //! be no larger.
 
+use super::alternation::Alternation;
 use super::lines::MOST;
 use super::smooth_shape::median;
 use super::whitened_spectrum::{NARROWEST, Resonance, SpectralLine, Spectrum, WhitenedSpectrum, refit};
@@ -23,6 +24,10 @@ pub(crate) struct StackedSpectrum {
     number: u64,
     /// Of means of as many samples as the first stretch needs for its rounding to act as noise.
     mean: Option<Spectrum>,
+    /// Of all samples: the mean of spectra has no phases.
+    alternation: Alternation,
+    /// Sample periods up to the latest sample.
+    periods: u64,
     /// Sum of the levels of the stretches, and of the squares of these.
     levels: [f64; 2],
 }
@@ -31,12 +36,23 @@ impl StackedSpectrum {
     /// For stretches of `length` samples that are `sample_period` s apart; two values of the channel differ by `resolution` or more,
     /// and each sample is one of `read_every` values of the sensor.
     pub(crate) fn new(sample_period: f64, length: usize, resolution: f64, read_every: u32) -> Self {
-        let stretch = vec![f64::NAN; length];
-        Self { sample_period, resolution, read_every, stretch, number: 0, mean: None, levels: [0.0; 2] }
+        Self {
+            sample_period,
+            resolution,
+            read_every,
+            stretch: vec![f64::NAN; length],
+            number: 0,
+            mean: None,
+            alternation: Alternation::default(),
+            periods: 0,
+            levels: [0.0; 2],
+        }
     }
 
     /// Takes the next sample, which was taken in the sample period `slot`. What is left over at the end is in no stretch.
     pub(crate) fn push(&mut self, slot: u64, value: f64) {
+        self.alternation.push(slot, value);
+        self.periods = slot + 1;
         let length = self.stretch.len() as u64;
         if slot / length != self.number {
             self.end_stretch();
@@ -72,7 +88,7 @@ impl StackedSpectrum {
         }
     }
 
-    /// The lines with a p-value below 2·10⁻⁴, the strongest first; at most 6.
+    /// The lines with a p-value below 2·10⁻⁴, the strongest first; at most 6 and one at half the sample rate.
     pub(crate) fn lines(&self) -> Vec<SpectralLine> {
         let Some(mut spectrum) = self.mean.clone() else { return Vec::new() };
         // Where the level of the noise changes from stretch to stretch, the loud ones have most of the weight.
@@ -99,8 +115,9 @@ impl StackedSpectrum {
                 }
             }
         }
-        let mut lines: Vec<SpectralLine> =
-            sinusoids.into_iter().chain(resonances.iter().map(|resonance| resonance.line)).collect();
+        let at_half_the_rate = self.alternation.line(self.periods as f64 * self.sample_period, self.sample_period);
+        let others = resonances.iter().map(|resonance| resonance.line).chain(at_half_the_rate);
+        let mut lines: Vec<SpectralLine> = sinusoids.into_iter().chain(others).collect();
         lines.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
         lines
     }

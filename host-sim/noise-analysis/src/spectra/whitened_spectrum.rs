@@ -11,7 +11,7 @@ use crate::samples::uniform_series::UniformSeries;
 use std::f64::consts::PI;
 
 /// Probability that a record without lines yields one sinusoid or more, and the same again for a resonance.
-const FALSE_ALARM: f64 = 2e-4;
+pub(super) const FALSE_ALARM: f64 = 2e-4;
 /// Lowest frequency that is searched, in periods per record: below, lines cannot be distinguished from drift.
 pub(super) const FEWEST_PERIODS: usize = 8;
 /// Peaks of the periodogram that a sinusoid is fitted to, the highest over the local level.

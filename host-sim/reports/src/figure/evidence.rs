@@ -43,9 +43,11 @@ pub(crate) fn evidence(report: &Report, index: usize) -> Option<Plot> {
             let label = format!("{} … {}", span(from_s), span(to_s));
             in_time(report, channel, finding, Some(TimePlace { label, from_s, to_s }))
         }
-        Effect::LinearDrift(_) | Effect::CommonMode(_) | Effect::SharedDrift(_) | Effect::VibrationRectification(_) => {
-            in_time(report, channel, finding, None)
-        }
+        Effect::LinearDrift(_)
+        | Effect::TurnOnTransient(_)
+        | Effect::CommonMode(_)
+        | Effect::SharedDrift(_)
+        | Effect::VibrationRectification(_) => in_time(report, channel, finding, None),
         Effect::TemperatureSensitivity(_) | Effect::TemperatureCurvature(_) | Effect::ThermalLag(_) => {
             beside(report, channel, "temp")
         }
@@ -65,6 +67,7 @@ pub(crate) fn evidence(report: &Report, index: usize) -> Option<Plot> {
         | Effect::AngleQuantization(_)
         | Effect::EffectiveLsb(_)
         | Effect::NoiseBelowCount(_)
+        | Effect::MissingCodes(_)
         | Effect::Spikes(_)
         | Effect::Saturation(_)
         | Effect::DroppedSamples(_)

@@ -115,6 +115,13 @@ pub(super) fn examples() -> Vec<Effect> {
             response: ResponseVariance::default(),
         }
         .into(),
+        TurnOnTransient {
+            size: size(),
+            time_constant_s: estimate(),
+            p_value: 1e-9,
+            response: ResponseVariance::default(),
+        }
+        .into(),
         ThermalLag {
             sensitivity: size(),
             time_constant_s: estimate(),
@@ -165,6 +172,7 @@ pub(super) fn examples() -> Vec<Effect> {
             moved_s: 12,
         }
         .into(),
+        MissingCodes { codes: 9, spacing: size(), spacing_counts: 8, expected: 25_000.0 }.into(),
         Saturation {
             fraction: BoundedEstimate::exact(0.003),
             level: size(),
@@ -186,7 +194,14 @@ pub(super) fn examples() -> Vec<Effect> {
         .into(),
         DroppedSamples { fraction: estimate(), missing: 12.0, samples: 1e5, gaps: 3 }.into(),
         RepeatedSamples { fraction: estimate(), equal: 12, samples: 1e5, by_chance: 0.1, channels: 6 }.into(),
-        ClockDeviation { rate_hz: estimate(), nominal_hz: 819.2, sigmas: 9.0 }.into(),
+        ClockDeviation { rate_hz: estimate(), nominal_hz: 819.2, sigmas: 9.0, change: None }.into(),
+        ClockDeviation {
+            rate_hz: estimate(),
+            nominal_hz: 819.2,
+            sigmas: 9.0,
+            change: Some(RateChange { time_s: estimate(), before_hz: estimate(), after_hz: estimate(), sigmas: 9.0 }),
+        }
+        .into(),
         unexplained(tau, Some(estimate())).into(),
         unexplained(tau, None).into(),
         unexplained(line_of_curve, Some(estimate())).into(),

@@ -8,8 +8,8 @@
 use super::harmonic_series::{BY_CHANCE, most_certain};
 use super::line::{Frequency, Line, NORMAL_995};
 use super::waveform::{
-    Multiple, SQUARE_BY_CHANCE, SQUARE_SIGMAS, SQUARE_TOLERANCE, by_channel, is_sawtooth, is_square, periodic,
-    sawtooth, square_wave,
+    Multiple, SQUARE_BY_CHANCE, SQUARE_SIGMAS, SQUARE_TOLERANCE, by_channel, is_no_sinusoid, is_square, no_sinusoid,
+    periodic, square_wave,
 };
 use crate::bounds::{BoundedEstimate, ChannelEstimate};
 use crate::distributions::NORMAL_975;
@@ -37,10 +37,11 @@ pub(super) fn causes(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cau
         frequencies = others;
     }
     while let Some(places) = modulated_line(&frequencies, duration_s) {
-        let (modulated, others): (Vec<_>, Vec<_>) =
-            frequencies.into_iter().enumerate().partition(|(number, _)| places.contains(number));
-        causes.push(modulated_cause(modulated.into_iter().map(|(_, frequency)| frequency).collect()));
-        frequencies = others.into_iter().map(|(_, frequency)| frequency).collect();
+        let further = further_sidebands(&frequencies, places, duration_s);
+        causes
+            .push(modulated_cause(places.map(|place| &frequencies[place]), further.iter().map(|&at| &frequencies[at])));
+        let mut place = 0..;
+        frequencies.retain(|_| place.next().is_some_and(|place| !places.contains(&place) && !further.contains(&place)));
     }
     causes.extend(frequencies.into_iter().map(|frequency| harmonic_cause(&[(Multiple::Harmonic(1), frequency)])));
     causes
@@ -72,6 +73,33 @@ fn modulated_line(frequencies: &[Frequency], duration_s: f64) -> Option<[usize; 
     (p_value < BY_CHANCE).then_some(triple)
 }
 
+/// The lines of the same channel at further multiples of the distance between a line and its sidebands, which a change of the amplitude has
+/// that is no sinusoid, such as a line that is switched on and off.
+///
+/// Unrelated lines are spread evenly over the logarithm of the frequency, as for [harmonics](super::harmonic_series): one lies within d of
+/// one of 2k places near f₀ with the probability 4kd/(f₀·L).
+fn further_sidebands(frequencies: &[Frequency], places: [usize; 3], duration_s: f64) -> Vec<usize> {
+    let [below, line, above] = places.map(|place| frequencies[place].best());
+    let change = 0.5 * (above.frequency - below.frequency);
+    let highest = frequencies.iter().map(|of| of.best().frequency).fold(0.0, f64::max);
+    let log_range = (highest * duration_s).ln().max(1.0);
+    let error = |of: &Line| of.error_by_amplitude(duration_s);
+    let error_of_change = 0.5 * error(below).hypot(error(above));
+    let is_sideband = |&at: &usize| {
+        let other = frequencies[at].best();
+        let distance = other.frequency - line.frequency;
+        let multiple = (distance / change).round().abs();
+        let errors = error(other).hypot(error(line)).hypot(multiple * error_of_change);
+        let within = NORMAL_995 * errors + SHIFT_OF_NEIGHBOURS / duration_s;
+        let by_chance = 4.0 * multiple * within / (line.frequency * log_range) * frequencies.len() as f64;
+        !places.contains(&at)
+            && is_in_one_channel([&frequencies[at], &frequencies[places[0]], &frequencies[places[1]]])
+            && (distance.abs() - multiple * change).abs() < within
+            && by_chance < BY_CHANCE
+    };
+    (0..frequencies.len()).filter(is_sideband).collect()
+}
+
 /// Whether a channel shows all of these lines.
 fn is_in_one_channel([first, others @ ..]: [&Frequency; 3]) -> bool {
     let shows = |of: &Frequency, channel: usize| of.lines.iter().any(|line| line.channel == channel);
@@ -92,9 +120,9 @@ fn has_equal_sidebands([below, line, above]: [&Frequency; 3]) -> bool {
     })
 }
 
-/// A line whose amplitude changes, by the three lines of [`modulated_line`].
-fn modulated_cause(lines: Vec<Frequency>) -> Cause {
-    let [below, line, above] = [0, 1, 2].map(|place| lines[place].best());
+/// A line whose amplitude changes, by the three lines of [`modulated_line`] and its further sidebands.
+fn modulated_cause<'f>(lines: [&'f Frequency; 3], further: impl Iterator<Item = &'f Frequency>) -> Cause {
+    let [below, line, above] = lines.map(Frequency::best);
     // The amplitude of either sideband is half the depth of that of the line.
     let depth = |of: fn(&ChannelEstimate) -> f64| {
         (of(&below.amplitude) + of(&above.amplitude)) / line.amplitude.value.max(f64::MIN_POSITIVE)
@@ -115,7 +143,7 @@ fn modulated_cause(lines: Vec<Frequency>) -> Cause {
         evidence: ModulationEvidence::Sidebands(line.evidence),
     });
     let mut by_channel: BTreeMap<usize, Vec<Effect>> = BTreeMap::new();
-    for line in lines.iter().flat_map(|frequency| &frequency.lines) {
+    for line in lines.into_iter().chain(further).flat_map(|frequency| &frequency.lines) {
         by_channel.entry(line.channel).or_default().push(line.effect.clone());
     }
     let shown = by_channel.into_iter().map(|(channel, parts)| Shown { channel, effect: effect.clone(), parts });
@@ -127,13 +155,13 @@ fn modulated_cause(lines: Vec<Frequency>) -> Cause {
 fn harmonic_cause(members: &[(Multiple, Frequency)]) -> Cause {
     let by_channel = by_channel(members.iter().map(|(multiple, frequency)| (*multiple, frequency)));
     let is_square = by_channel.values().any(|lines| is_square(lines));
-    let is_sawtooth = by_channel.values().any(|lines| is_sawtooth(lines));
+    let is_no_sinusoid = by_channel.values().any(|lines| is_no_sinusoid(lines));
     let shown = by_channel.into_iter().map(|(channel, mut lines)| {
         lines.sort_by(|a, b| a.1.frequency.total_cmp(&b.1.frequency));
         let parts = lines.iter().map(|(_, line)| line.effect.clone()).collect();
-        let named = match (is_square, is_sawtooth) {
+        let named = match (is_square, is_no_sinusoid) {
             (true, _) => square_wave(&lines),
-            (_, true) => sawtooth(&lines),
+            (_, true) => no_sinusoid(&lines),
             _ => None,
         };
         let effect = named.unwrap_or_else(|| periodic(&lines));

@@ -176,9 +176,10 @@ fn a_sawtooth_is_no_sinusoid() {
     let effects: Vec<Effect> = (1..=3).map(|k| line(2.0 * f64::from(k), 0.1 / f64::from(k))).collect();
     let found = merged(&[("g", &effects)], DURATION_S);
     assert_eq!(found.len(), 1);
-    let Effect::Unexplained(sawtooth) = &found[0].shown[0].effect else { panic!("{:?}", found[0].shown[0].effect) };
-    assert_eq!(sawtooth.frequency_hz().expect("one").value, 2.0);
-    assert!((sawtooth.excess_percent.expect("a size").value - 100.0 * (13.0_f64 / 36.0).sqrt()).abs() < 1e-9);
+    let Effect::Periodic(sawtooth) = &found[0].shown[0].effect else { panic!("{:?}", found[0].shown[0].effect) };
+    assert_eq!((sawtooth.frequency_hz.value, sawtooth.amplitude.value), (2.0, 0.1));
+    assert!((sawtooth.harmonics_percent.value - 100.0 * (13.0_f64 / 36.0).sqrt()).abs() < 1e-9);
+    assert_eq!(sawtooth.harmonics, [0.05, 0.1 / 3.0]);
 }
 
 #[test]
@@ -198,6 +199,13 @@ fn a_line_whose_amplitude_changes_is_modulated() {
     let Effect::ModulatedLine(of) = &cause.shown[0].effect else { panic!("{:?}", cause.shown[0].effect) };
     let parameters = [of.frequency_hz.value, of.amplitude.value, of.depth.value, of.period_s.value];
     assert!(parameters.iter().zip([12.0, 1.0, 0.5, 20.0]).all(|(found, of)| (found - of).abs() < 1e-9), "{of:?}");
+    // Of a line that is on for half of the time the third multiples have a third of the first.
+    let further = [11.85, 12.15].map(|frequency| steady(frequency, 0.25 / 3.0));
+    let switched: Vec<Effect> = modulated.iter().cloned().chain(further).collect();
+    assert_eq!(causes(std::slice::from_ref(&switched)), [("modulated_line", vec![0])]);
+    // A line beside them is one of its own.
+    let beside: Vec<Effect> = modulated.iter().cloned().chain([steady(12.13, 0.1)]).collect();
+    assert_eq!(causes(&[beside]), [("modulated_line", vec![0]), ("sinusoid", vec![0])]);
     // Sidebands of unequal strength, or at unequal distances, are lines of their own.
     let unequal = vec![steady(12.0, 1.0), steady(11.95, 0.25), steady(12.05, 0.05)];
     assert_eq!(causes(&[unequal]).len(), 3);

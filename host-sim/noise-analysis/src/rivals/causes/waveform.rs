@@ -1,11 +1,9 @@
-//! What the amplitudes of the harmonics of a periodic signal say of its form: a square wave, a sawtooth, or another one.
+//! What the amplitudes of the harmonics of a periodic signal say of its form: a square wave, a sinusoid, or neither.
 
 use super::line::{Frequency, Line};
 use crate::bounds::{BoundedEstimate, ChannelEstimate};
-use crate::distributions::NORMAL_975;
-use crate::effects::{
-    Effect, Multiples, Observation, ResonantLine, SinusoidalLine, SquareWave, Unexplained, UnexplainedPlace,
-};
+use crate::distributions::{NORMAL_975, upper_tail};
+use crate::effects::{Effect, LineSource, Multiples, Periodic, ResonantLine, SinusoidalLine, SquareWave};
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_4;
 
@@ -18,6 +16,10 @@ pub(super) const SQUARE_TOLERANCE: f64 = 0.36;
 /// amplitudes are spread evenly over the logarithm of two decades: ln(1.36/0.64)/ln 100.
 pub(super) const SQUARE_BY_CHANCE: f64 = 0.164;
 
+/// Least deviation of the higher harmonics of a signal that is no sinusoid, over that of its fundamental: that of a square wave,
+/// `√(π²/8 − 1)`.
+const NO_SINUSOID: f64 = 0.483;
+
 /// What a line is to the fundamental.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Multiple {
@@ -25,6 +27,16 @@ pub(super) enum Multiple {
     Harmonic(u32),
     /// A line beside such a multiple, at the distance of the modulation.
     Sideband,
+}
+
+impl Multiple {
+    /// The number of the harmonic.
+    fn harmonic(self) -> Option<u32> {
+        match self {
+            Self::Harmonic(number) => Some(number),
+            Self::Sideband => None,
+        }
+    }
 }
 
 /// The lines of each channel among these frequencies.
@@ -47,25 +59,13 @@ fn amplitude_of(lines: &[(Multiple, Line)], harmonic: u32) -> Option<ChannelEsti
 /// Whether the lines of a channel have the amplitudes of a square wave: 1/k at the odd multiples k, the first and the third
 /// among them, and none at even ones that a wave with two unequal halves would have to show.
 pub(super) fn is_square(lines: &[(Multiple, Line)]) -> bool {
-    amplitude_of(lines, 3).is_some() && fall_with_their_number(lines, |multiple| multiple % 2 == 1)
-}
-
-/// Whether the lines of a channel have the amplitudes of a signal that rises and jumps: 1/k at every multiple k, the first three
-/// among them.
-pub(super) fn is_sawtooth(lines: &[(Multiple, Line)]) -> bool {
-    [2, 3].iter().all(|harmonic| amplitude_of(lines, *harmonic).is_some()) && fall_with_their_number(lines, |_| true)
-}
-
-/// Whether the lines of a channel have amplitudes of 1/k of the first at the multiples k that the signal has, and hardly any at
-/// the others.
-fn fall_with_their_number(lines: &[(Multiple, Line)], has: impl Fn(u32) -> bool) -> bool {
-    let Some(first) = amplitude_of(lines, 1) else { return false };
+    let (Some(first), Some(_)) = (amplitude_of(lines, 1), amplitude_of(lines, 3)) else { return false };
     let error = |of: &ChannelEstimate| (of.high - of.low) / (2.0 * NORMAL_975);
     let has_size = |(multiple, line): &(Multiple, Line)| {
         let Multiple::Harmonic(multiple) = *multiple else { return true };
         let amplitude = line.amplitude;
         let expected = first.value / f64::from(multiple);
-        if !has(multiple) {
+        if multiple.is_multiple_of(2) {
             return amplitude.value < SQUARE_TOLERANCE * expected;
         }
         let joint = error(&amplitude).hypot(error(&first) / f64::from(multiple));
@@ -74,19 +74,55 @@ fn fall_with_their_number(lines: &[(Multiple, Line)], has: impl Fn(u32) -> bool)
     lines.iter().all(has_size)
 }
 
-/// A signal that rises evenly and jumps back: no effect that has a name.
-pub(super) fn sawtooth(lines: &[(Multiple, Line)]) -> Option<Effect> {
-    let (_, line) = lines.iter().find(|(multiple, _)| *multiple == Multiple::Harmonic(1))?;
-    let higher = || lines.iter().filter(|(multiple, _)| *multiple != Multiple::Harmonic(1)).map(|(_, line)| line);
-    let lacking = |of: fn(&ChannelEstimate) -> f64| {
-        100.0 * higher().map(|line| of(&line.amplitude).powi(2)).sum::<f64>().sqrt() / line.amplitude.value
+/// Whether the lines of a channel are those of a signal that is the same every period and no sinusoid: a steady fundamental, its second
+/// and its third harmonic, and higher harmonics with at least the part [`NO_SINUSOID`] of its deviation.
+pub(super) fn is_no_sinusoid(lines: &[(Multiple, Line)]) -> bool {
+    let Some(fundamental) = fundamental(lines).filter(|of| matches!(of.effect, Effect::SinusoidalLine(_))) else {
+        return false;
     };
-    let unexplained = Unexplained {
-        place: UnexplainedPlace::Frequency(line.frequency_hz),
-        excess_percent: Some(BoundedEstimate::new(lacking(|of| of.value), lacking(|of| of.low), lacking(|of| of.high))),
-        observation: Observation::Sawtooth { multiples: multiples(lines), line: line.evidence },
+    let shows = |harmonic: u32| amplitude_of(lines, harmonic).is_some();
+    shows(2) && shows(3) && over_fundamental(lines, fundamental, |of| of.value) > NO_SINUSOID
+}
+
+/// The signal of these lines of a channel, if they have a fundamental and higher harmonics.
+pub(super) fn no_sinusoid(lines: &[(Multiple, Line)]) -> Option<Effect> {
+    let line = fundamental(lines)?;
+    let percent = |of: fn(&ChannelEstimate) -> f64| 100.0 * over_fundamental(lines, line, of);
+    let highest = higher(lines).filter_map(|(multiple, _)| multiple.harmonic()).max()?;
+    let amplitude = |harmonic: u32| amplitude_of(lines, harmonic).map_or(0.0, |of| of.value);
+    // An ordinate over the noise is half of the likelihood ratio of its line.
+    let over_noise = |(_, line): &(Multiple, Line)| match line.evidence.source {
+        LineSource::Spectrum(of) => 0.5 * of.sigmas * of.sigmas,
+        LineSource::Curve(_) => 0.0,
     };
-    Some(unexplained.into())
+    let p_value = match line.evidence.source {
+        LineSource::Spectrum(of) => of.p_value,
+        LineSource::Curve(of) => 2.0 * upper_tail(of.gain_sigmas),
+    };
+    let periodic = Periodic {
+        frequency_hz: line.frequency_hz,
+        amplitude: line.amplitude,
+        harmonics_percent: BoundedEstimate::new(percent(|of| of.value), percent(|of| of.low), percent(|of| of.high)),
+        harmonics: (2..=highest).map(amplitude).collect(),
+        sum: higher(lines).map(over_noise).sum(),
+        p_value,
+    };
+    Some(periodic.into())
+}
+
+/// The line at the fundamental.
+fn fundamental(lines: &[(Multiple, Line)]) -> Option<&Line> {
+    lines.iter().find(|(multiple, _)| *multiple == Multiple::Harmonic(1)).map(|(_, line)| line)
+}
+
+/// The lines at higher multiples.
+fn higher(lines: &[(Multiple, Line)]) -> impl Iterator<Item = &(Multiple, Line)> {
+    lines.iter().filter(|(multiple, _)| matches!(multiple, Multiple::Harmonic(2..)))
+}
+
+/// Deviation of the higher harmonics over that of the fundamental.
+fn over_fundamental(lines: &[(Multiple, Line)], fundamental: &Line, of: impl Fn(&ChannelEstimate) -> f64) -> f64 {
+    higher(lines).map(|(_, line)| of(&line.amplitude).powi(2)).sum::<f64>().sqrt() / fundamental.amplitude.value
 }
 
 /// The square wave whose lowest odd harmonic in a channel is among `lines`. A square wave of amplitude A, half the distance of
@@ -117,10 +153,6 @@ pub(super) fn periodic(lines: &[(Multiple, Line)]) -> Effect {
 
 /// What these lines are to the fundamental.
 fn multiples(lines: &[(Multiple, Line)]) -> Multiples {
-    let harmonic = |(multiple, _): &(Multiple, Line)| match multiple {
-        Multiple::Harmonic(number) => Some(*number),
-        Multiple::Sideband => None,
-    };
-    let harmonics: Vec<u32> = lines.iter().filter_map(harmonic).collect();
+    let harmonics: Vec<u32> = lines.iter().filter_map(|(multiple, _)| multiple.harmonic()).collect();
     Multiples { sidebands: lines.len() - harmonics.len(), harmonics }
 }

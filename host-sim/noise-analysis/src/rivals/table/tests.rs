@@ -225,6 +225,19 @@ fn later(effect: Effect, origin: Origin) -> Claims {
     Claims::Channel(DITHERED_LATER, vec![of(effect, origin)])
 }
 
+/// A periodic signal of the first channel.
+fn of_period(frequency_hz: f64) -> Cause {
+    let effect = Effect::from(Periodic {
+        frequency_hz: known(frequency_hz),
+        amplitude: size(0.1),
+        harmonics_percent: known(80.0),
+        harmonics: vec![0.08],
+        sum: 100.0,
+        p_value: 1e-9,
+    });
+    Cause { shown: vec![Shown { channel: 0, parts: vec![effect.clone()], effect }] }
+}
+
 /// For each row, by what stands and in the place of what: a case, and what stands in it by the whole table.
 #[rustfmt::skip]
 fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
@@ -336,6 +349,8 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
             vec![]),
         (["line in common", "rest of a drift in common"],
             Claims::Cause { effect: common_mode(10.0), shown_by: Some(1), periodic: Vec::new() }, vec![]),
+        (["periodic signal", "telegraph noise"],
+            Claims::Cause { effect: levels(5.0, 1.0), shown_by: None, periodic: vec![of_period(0.025)] }, vec![]),
     ]
 }
 
@@ -374,6 +389,12 @@ fn rows_do_not_reach_beyond_their_conditions() {
     for proposals in beyond {
         let names: Vec<&str> = proposals.iter().map(|proposal| proposal.effect.name()).collect();
         assert_eq!(channel(proposals).standing(&all), names);
+    }
+    // Levels that change far faster or slower than a signal of 40 s.
+    for time_constant_s in [0.5, 20.0] {
+        let claim =
+            Claims::Cause { effect: levels(time_constant_s, 1.0), shown_by: None, periodic: vec![of_period(0.025)] };
+        assert_eq!(claim.standing(&all), ["telegraph"]);
     }
 }
 

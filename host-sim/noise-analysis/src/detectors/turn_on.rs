@@ -1,0 +1,157 @@
+//! A bias that settles after the start of the record: `e^(−t/τ)` from the first sample on.
+
+use super::bias_response::{BiasResponse, Course, FRACTIONS, interval};
+use super::bias_step::SIGNIFICANCE;
+use super::block_means::BlockMeans;
+use super::gls_regression::{GlsRegression, RegressionEstimate};
+use crate::bounds::BoundedEstimate;
+use crate::distributions::NORMAL_975;
+use crate::effects::TurnOnTransient;
+use nalgebra::DVector;
+
+/// Shortest time constant, blocks: a shorter transient is one of a single mean.
+const SHORTEST_BLOCKS: f64 = 1.0;
+/// Longest time constant, as a part of the record: within four of them it is down to a fiftieth, and what is slower is a drift.
+const LONGEST_PART: f64 = 0.25;
+/// Time constants that are tried first, evenly on a logarithmic scale: each is 1.5 times the one before, which lowers the statistic of one
+/// between two of them by a hundredth.
+const TIME_CONSTANTS: usize = 9;
+
+/// A transient that may be there.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Transient {
+    /// Blocks.
+    time_constant: f64,
+    /// Standard deviation of its logarithm.
+    relative_error: f64,
+    /// Of the size.
+    pub estimate: RegressionEstimate,
+}
+
+impl Transient {
+    /// The likeliest transient beside the regressors of `regression`, if its p-value is below [`SIGNIFICANCE`].
+    pub(super) fn likeliest(blocks: &BlockMeans, regression: &GlsRegression) -> Option<Self> {
+        let longest = LONGEST_PART * (blocks.numbers.last()? + 1) as f64;
+        let step = (longest / SHORTEST_BLOCKS).ln() / (TIME_CONSTANTS - 1) as f64;
+        let place = |number: usize| SHORTEST_BLOCKS.ln() + step * number as f64;
+        let tried = (0..TIME_CONSTANTS).filter_map(|number| {
+            let logarithm = place(number);
+            Some((logarithm, regression.estimate_below(SIGNIFICANCE, &regressor(logarithm.exp(), blocks))?))
+        });
+        let likelier =
+            |a: &(f64, RegressionEstimate), b: &(f64, RegressionEstimate)| a.1.deviance.total_cmp(&b.1.deviance);
+        let coarse = tried.min_by(likelier)?;
+        let at = |logarithm: f64| Some((logarithm, regression.estimate(&regressor(logarithm.exp(), blocks))?));
+        let (time_constant, estimate) =
+            (-4..=4).filter_map(|number| at(coarse.0 + step * f64::from(number) / 4.0)).min_by(likelier)?;
+        // The curvature of the likelihood at its maximum gives the error.
+        let (below, above) = (at(time_constant - 0.5 * step)?, at(time_constant + 0.5 * step)?);
+        let curvature = (below.1.deviance + above.1.deviance - 2.0 * estimate.deviance) / (0.25 * step * step);
+        let relative_error = if curvature > 0.0 { (2.0 / curvature).sqrt() } else { f64::INFINITY };
+        // One that is likeliest with the longest time constant is slower still: a drift.
+        (time_constant < place(TIME_CONSTANTS - 1)).then(|| Self {
+            time_constant: time_constant.exp(),
+            relative_error,
+            estimate,
+        })
+    }
+
+    /// Its block means, of size 1.
+    pub(super) fn regressor(&self, blocks: &BlockMeans) -> DVector<f64> {
+        regressor(self.time_constant, blocks)
+    }
+
+    /// The bias of the transient with the size of `estimate`, of a channel in `unit` with samples every `period_s`.
+    pub(super) fn response(
+        &self,
+        blocks: &BlockMeans,
+        period_s: f64,
+        estimate: &RegressionEstimate,
+        unit: &'static str,
+    ) -> BiasResponse {
+        let course = course(self.time_constant, blocks);
+        let times = (NORMAL_975 * self.relative_error).exp();
+        let time_constant = self.time_constant * blocks.width as f64 * period_s;
+        let effect = TurnOnTransient {
+            size: interval(estimate, unit),
+            time_constant_s: BoundedEstimate::new(time_constant, time_constant / times, time_constant * times),
+            p_value: estimate.p_value,
+            response: course.variance(estimate.size),
+        };
+        course.response(estimate.size, effect.into())
+    }
+}
+
+/// Block means of a transient of size 1 with this time constant in blocks.
+fn regressor(time_constant: f64, blocks: &BlockMeans) -> DVector<f64> {
+    let mean = |&number: &usize| {
+        let start = -(number as f64) / time_constant;
+        start.exp() * -(-1.0 / time_constant).exp_m1() * time_constant
+    };
+    DVector::from_iterator(blocks.numbers.len(), blocks.numbers.iter().map(mean))
+}
+
+/// The same in fractions of blocks, over the whole record.
+fn course(time_constant: f64, blocks: &BlockMeans) -> Course {
+    let width = (blocks.width / FRACTIONS).max(1);
+    let per_block = blocks.width as f64 / width as f64;
+    let count = ((blocks.numbers.last().map_or(0, |last| last + 1)) as f64 * per_block).ceil() as usize;
+    let value = |at: usize| (-(at as f64 + 0.5) / per_block / time_constant).exp();
+    Course { width, values: (0..count.max(1)).map(value).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::detectors::bias;
+    use crate::detectors::noise_grid::NoiseGrids;
+    use crate::effects::{Effect, TurnOnTransient};
+    use crate::samples::series::Series;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    /// What is found in 1,280 s at 10 Hz of white noise of deviation 1 and a walk with steps of deviation `step`, whose bias begins `size`
+    /// off and settles with a time constant of 60 s.
+    fn found(seed: u64, step: f64, size: f64) -> Vec<Effect> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut walk = 0.0;
+        let value = |slot: u64| {
+            walk += step * random.sample::<f64, _>(StandardNormal);
+            walk + random.sample::<f64, _>(StandardNormal) + size * (-(slot as f64) / 600.0).exp()
+        };
+        let slots = 0..12_800;
+        let values = slots.clone().map(value).collect();
+        let series =
+            Series { slots: slots.clone().collect(), values, span: slots, period_s: 0.1, resolution: 1e-3, unit: "g" };
+        let changes = bias::find(&series, &[], &[], &NoiseGrids::default());
+        let detections = changes.step.into_iter().chain(changes.ramp).map(|found| found.effect);
+        changes.responses.into_iter().map(|of| of.effect).chain(detections).collect()
+    }
+
+    #[test]
+    fn a_bias_that_settles_is_measured() {
+        let (mut sizes, mut times) = (0, 0);
+        for seed in 0..20 {
+            // Without the walk the mean of a time constant is known to 0.04.
+            let found = found(seed, 0.003, -1.5);
+            let [Effect::TurnOnTransient(TurnOnTransient { size, time_constant_s, .. })] = &found[..] else {
+                panic!("{seed}: {found:?}")
+            };
+            sizes += u32::from((size.low..=size.high).contains(&-1.5));
+            times += u32::from((time_constant_s.low..=time_constant_s.high).contains(&60.0));
+        }
+        // 95 % of 20 are expected; 15 or fewer have a probability of 3·10⁻³.
+        assert!(sizes > 15 && times > 15, "{sizes} {times}");
+    }
+
+    /// A walk begins with a transient by chance in one of 100,000 records, or in a few of them with the time constants that are tried.
+    #[test]
+    fn a_walk_is_no_transient() {
+        for seed in 0..100 {
+            for step in [0.0, 0.01, 0.1] {
+                let found = found(seed, step, 0.0);
+                assert!(!found.iter().any(|of| matches!(of, Effect::TurnOnTransient(_))), "{seed} {step}: {found:?}");
+            }
+        }
+    }
+}
