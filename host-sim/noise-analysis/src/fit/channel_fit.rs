@@ -43,6 +43,8 @@ pub(crate) struct ChannelFit {
     pub markov_by_spectrum: Option<MarkovEstimate>,
     /// The curve that the model with added terms is fitted to, where that is not the curve of the whole part.
     recent: Option<Curve<OCTAVES>>,
+    /// Lines of the spectrum; `None` where it was not searched for any.
+    lines: Option<Vec<NoiseTerm>>,
     /// Lines of the spectrum with which the model fits the curve worse.
     refuted: Vec<NoiseTerm>,
     /// What the coefficients of the model with added terms are fitted to.
@@ -65,6 +67,7 @@ impl ChannelFit {
             traced,
             markov_by_spectrum: None,
             recent: None,
+            lines: None,
             refuted: Vec::new(),
             coefficients_from: CoefficientsFrom::Octaves,
         }
@@ -81,13 +84,14 @@ impl ChannelFit {
     /// If the model with `lines` fits badly and the lines that the curve itself shows fit better, those are used: a line
     /// whose frequency wanders is many lines in the spectrum of a long record and one in the curve.
     pub(crate) fn fit_traced(covariates: CovariateFit, lines: &[NoiseTerm], filters: &[MovingAverageFilter]) -> Self {
-        let by_spectrum = trace(&covariates.curve, LineCandidates::Spectrum(lines), filters);
-        if lines.is_empty() || by_spectrum.after_goodness.p_value >= DESCRIBED {
-            return Self::new(covariates, by_spectrum);
+        let mut traced = trace(&covariates.curve, LineCandidates::Spectrum(lines), filters);
+        if !lines.is_empty() && traced.after_goodness.p_value < DESCRIBED {
+            let by_curve = trace(&covariates.curve, LineCandidates::Curve, filters);
+            if by_curve.after_goodness.deviance < traced.after_goodness.deviance {
+                traced = by_curve;
+            }
         }
-        let by_curve = trace(&covariates.curve, LineCandidates::Curve, filters);
-        let is_better = by_curve.after_goodness.deviance < by_spectrum.after_goodness.deviance;
-        Self::new(covariates, if is_better { by_curve } else { by_spectrum })
+        Self { lines: Some(lines.to_vec()), ..Self::new(covariates, traced) }
     }
 
     /// The baseline model and what it lacks by the curve alone; `filters` are those that the sensor may have.
@@ -112,7 +116,7 @@ impl ChannelFit {
     }
 
     /// Takes other terms where these, fitted to the `earlier` of two stretches of the part, foretell the `later` one better: those that
-    /// the curve shows by itself, or none beyond the baseline and the filter.
+    /// the curve shows by itself, if the spectrum has a line beside each of its lines, or none beyond the baseline and the filter.
     ///
     /// The gain in the deviance is compared with [`MAX_DEVIANCE_RISE`] in units of what the better one leaves for each octave: where the
     /// stretches differ, all models fail by that.
@@ -137,10 +141,12 @@ impl ChannelFit {
         let is_basic = |kind: &NoiseTerm| is_filter(kind) || NoiseTerm::BASELINE.contains(kind);
         let basic: Vec<PlannedTerm> = own.iter().filter(|(kind, _)| is_basic(kind)).copied().collect();
         let filters: Vec<MovingAverageFilter> = own.iter().filter_map(|(kind, _)| filter_of(kind)).collect();
-        let by_curve = TracedModel::new(&trace(curve, LineCandidates::Curve, &filters), curve);
+        let by_curve = trace(curve, LineCandidates::Curve, &filters);
+        let is_possible = self.lines.as_ref().is_none_or(|lines| are_in_spectrum(&by_curve, lines));
+        let by_curve = is_possible.then(|| TracedModel::new(&by_curve, curve).terms().collect::<Vec<PlannedTerm>>());
         let of_own = left(&own);
-        let others = [by_curve.terms().collect::<Vec<PlannedTerm>>(), basic];
-        let best = others.into_iter().map(|terms| (left(&terms), terms)).min_by(|a, b| a.0.total_cmp(&b.0));
+        let others = by_curve.into_iter().chain([basic]);
+        let best = others.map(|terms| (left(&terms), terms)).min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((of_best, terms)) = best else { return };
         let unit = (of_best / compared.len().max(1) as f64).max(1.0);
         if of_own - of_best > MAX_DEVIANCE_RISE * unit {
@@ -443,6 +449,14 @@ fn traced_behind(curve: &Curve<OCTAVES>, filter: MovingAverageFilter) -> TracedM
     traced.after_goodness = allan_core::fit::goodness(curve, &traced.after);
     let _ = trace_while(&mut traced, curve, LineCandidates::Curve, &[], &mut || true);
     TracedModel::new(&traced, curve)
+}
+
+/// Whether the spectrum has one of its `lines` beside each line of the model of a curve.
+fn are_in_spectrum(by_curve: &Trace, lines: &[NoiseTerm]) -> bool {
+    let is_near = |frequency: f64| {
+        lines.iter().filter_map(line_frequency).any(|of| (of / frequency).ln().abs() < FREQUENCY_BY_OCTAVES)
+    };
+    by_curve.after.terms().iter().filter_map(|term| line_frequency(&term.kind)).all(is_near)
 }
 
 /// Whether a line of `model` is `line`, one of the `lines` of the spectrum: a line that was traced with the frequency of one of

@@ -8,6 +8,7 @@
 use super::line_models::{Sine, for_each_phase};
 use super::periodogram::taper;
 use crate::bounds::MeasuredValue;
+use crate::distributions::NORMAL_975;
 use crate::samples::uniform_series::UniformSeries;
 use realfft::num_complex::Complex;
 use std::f64::consts::{PI, TAU};
@@ -33,6 +34,8 @@ const AROUND: [f64; 3] = [0.5, 0.15, 0.05];
 
 /// Distance in resolutions within which a line is a sideband of a change.
 const SAME: f64 = 1.5;
+/// Highest multiple of a change that has sidebands: that of a line that is switched on and off has a ninth of the first.
+const HIGHEST: f64 = 9.0;
 
 /// A change of the amplitude or of the phase of a line, to and fro.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,9 +51,12 @@ pub struct Modulation {
 }
 
 impl Modulation {
-    /// Whether a line at a distance from the modulated one is one of the sidebands, in a record of `duration` s; both in Hz.
+    /// Whether a line at a distance from the modulated one, in Hz, is one of the sidebands in a record of `duration` s: at a multiple of
+    /// the change, which a change has that is no sinusoid.
     pub(super) fn is_sideband(&self, distance: f64, duration: f64) -> bool {
-        (distance.abs() - self.frequency.value).abs() < SAME / duration
+        let multiple = (distance.abs() / self.frequency.value).round().clamp(1.0, HIGHEST);
+        let error = (multiple - 1.0) * self.frequency.error;
+        (distance.abs() - multiple * self.frequency.value).abs() < (SAME / duration).hypot(NORMAL_975 * error)
     }
 
     /// The change of `sine` that `rest`, the record without the sine, shows most clearly; `None` if it may be noise of the one-sided
@@ -169,6 +175,16 @@ mod tests {
                 .is_some_and(|found| found.is_sideband(distance, series.duration()))
         );
         assert_eq!(Modulation::find(&sine, &rest, 0.04, &[distance]), None);
+    }
+
+    /// A line that is on for half of the time has sidebands at the odd multiples of the frequency at which it is switched.
+    #[test]
+    fn lines_at_multiples_of_a_change_are_its_sidebands() {
+        let change = |turns: f64| MeasuredValue { value: turns / 400.0, error: 0.01 / 400.0 };
+        let found = Modulation { frequency: change(8.0), of_line: 1.0, depth: change(1.0), of_phase: false };
+        let is_sideband = |turns: f64| found.is_sideband(turns / 400.0, 400.0);
+        assert!([8.0, -24.0, 40.5].into_iter().all(is_sideband));
+        assert!(![4.0, 20.0, 88.0].into_iter().any(is_sideband));
     }
 
     #[test]
