@@ -12,6 +12,9 @@ const FEWEST_SLOTS: u64 = 16;
 /// Fewest blocks for a regression.
 const FEWEST_BLOCKS: usize = BLOCKS / 4;
 
+/// Least change of a mean, in steps of the resolution: a smaller one is an error of floating-point numbers.
+const LEAST_CHANGE: f64 = 1e-6;
+
 /// Means of the blocks of a record.
 pub struct BlockMeans {
     /// Sample periods in a block.
@@ -44,7 +47,8 @@ impl BlockMeans {
         let numbers: Vec<usize> = (0..BLOCKS).filter(|&number| fill(number) >= LEAST_FILL).collect();
         let means =
             DVector::from_iterator(numbers.len(), numbers.iter().map(|&number| sums[number] / counts[number] as f64));
-        let changes = means.iter().any(|mean| *mean != means[0]);
+        let least = LEAST_CHANGE * series.resolution;
+        let changes = means.iter().any(|mean| (mean - means[0]).abs() > least);
         (numbers.len() >= FEWEST_BLOCKS && changes).then(|| Self {
             width,
             means,

@@ -113,7 +113,9 @@ impl ValueCounts {
     /// whose noise reaches over several of them.
     ///
     /// A density with one peak is at least as high at a code as at the lower of its neighbours, so that a code that is not missing has no
-    /// sample by chance with a probability below `e^−n`, where n is the number of samples of the rarer neighbour.
+    /// sample by chance with a probability below `e^−n`, where n is the number of samples of the rarer neighbour. A converter lacks
+    /// codes at carries: all at the same distance from each other, two counts or more. Where the noise was scaled for a part of the record,
+    /// codes are missing in its tails alone.
     pub(crate) fn missing_codes(&self, resolution: f64, unit: &'static str) -> Option<Detection> {
         if self.width_log2 > 0 {
             return None;
@@ -126,7 +128,14 @@ impl ValueCounts {
             .filter(|&(_, rarer)| rarer > enough)
             .collect();
         let (&[(first, _), .., _], true) = (missing.as_slice(), missing.len() >= FEWEST_MISSING) else { return None };
-        let spacing_counts = missing.iter().map(|(at, _)| at - first).fold(0, greatest_common_divisor) as u32;
+        let spacing = missing.iter().map(|(at, _)| at - first).fold(0, greatest_common_divisor);
+        let last = missing.last().map_or(first, |(at, _)| *at);
+        // Bin 0 is the first neighbour of number 0.
+        let is_given = |at: u64| self.bins[at as usize + 1] > 0;
+        if spacing < 2 || (first..=last).step_by(spacing as usize).any(is_given) {
+            return None;
+        }
+        let spacing_counts = spacing as u32;
         let found = MissingCodes {
             codes: missing.len() as u32,
             spacing: BoundedEstimate::exact(f64::from(spacing_counts) * resolution).in_unit(unit),
@@ -219,6 +228,18 @@ mod tests {
         for step in [0.0, 0.1] {
             assert_eq!(of(step, i32::MAX), None, "{step}");
         }
+    }
+
+    /// Twice as loud for a half of the record, by twice the counts.
+    #[test]
+    fn codes_that_scaled_noise_lacks_in_its_tails_are_not_missing() {
+        let mut random = ChaCha8Rng::seed_from_u64(6);
+        let mut counts = ValueCounts::default();
+        for at in 0..100_000 {
+            let value = (10.0 * random.sample::<f64, _>(StandardNormal)).round() as i32;
+            counts.push(if at < 50_000 { value } else { 2 * value });
+        }
+        assert_eq!(counts.missing_codes(0.05, "deg/s"), None);
     }
 
     /// A telegraph between two levels, each of which the noise spreads over three codes: the one between them is empty.

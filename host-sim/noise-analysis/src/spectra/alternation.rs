@@ -7,6 +7,7 @@
 use super::whitened_spectrum::{FALSE_ALARM, SpectralLine};
 use crate::bounds::MeasuredValue;
 use crate::distributions::upper_tail;
+use crate::samples::rounding::Rounding;
 use crate::samples::uniform_series::UniformSeries;
 
 /// Differences of a block.
@@ -57,10 +58,12 @@ impl Alternation {
     }
 
     /// The line, if the mean is larger than chance makes it in all but [`FALSE_ALARM`] of the records. `duration` and `sample_period`
-    /// are in s.
-    pub(super) fn line(&self, duration: f64, sample_period: f64) -> Option<SpectralLine> {
+    /// are in s; samples that scatter less than their `rounding` show nothing.
+    pub(super) fn line(&self, duration: f64, sample_period: f64, rounding: &Rounding) -> Option<SpectralLine> {
         let blocks = self.blocks as f64;
-        let error = (self.squares / (blocks * (blocks - 1.0))).sqrt();
+        // Of white noise the one-sided density is 2σ²τ₀, and the variance of the mean of n differences of two samples σ²/(2n).
+        let of_rounding = rounding.density(0.5 / sample_period) / (2.0 * duration);
+        let error = (self.squares / (blocks * (blocks - 1.0))).max(of_rounding).sqrt();
         let sigmas = self.mean.abs() / error;
         let p_value = 2.0 * upper_tail(sigmas);
         (self.blocks >= FEWEST_BLOCKS && error > 0.0 && p_value < FALSE_ALARM).then(|| SpectralLine {
@@ -79,6 +82,7 @@ impl Alternation {
 #[cfg(test)]
 mod tests {
     use super::Alternation;
+    use crate::samples::rounding::Rounding;
     use crate::samples::uniform_series::UniformSeries;
     use crate::spectra::SpectralLine;
     use rand::{Rng, SeedableRng};
@@ -98,7 +102,7 @@ mod tests {
             if at % 50 == 7 { f64::NAN } else { value }
         };
         let series = UniformSeries::new(0.01, (0..20_000).map(value).collect());
-        Alternation::of(&series).line(series.duration(), series.sample_period())
+        Alternation::of(&series).line(series.duration(), series.sample_period(), &Rounding::default())
     }
 
     #[test]

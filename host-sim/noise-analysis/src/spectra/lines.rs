@@ -87,7 +87,7 @@ pub(crate) fn find_lines_over(series: &UniformSeries, known: impl Fn(f64) -> f64
         find_modulations(&mut sines, &rest.series, &resonances);
     }
     let sines = sines.into_iter().map(|found| found.line);
-    let at_half_the_rate = Alternation::of(series).line(series.duration(), series.sample_period());
+    let at_half_the_rate = Alternation::of(series).line(series.duration(), series.sample_period(), series.rounding());
     let others = resonances.iter().map(|resonance| resonance.line).chain(at_half_the_rate);
     let mut found: Vec<SpectralLine> = slow.into_iter().chain(sines).chain(others).collect();
     found.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));

@@ -115,7 +115,9 @@ impl StackedSpectrum {
                 }
             }
         }
-        let at_half_the_rate = self.alternation.line(self.periods as f64 * self.sample_period, self.sample_period);
+        let (duration, rounding) =
+            (self.periods as f64 * self.sample_period, Rounding::white(self.resolution, self.sample_period));
+        let at_half_the_rate = self.alternation.line(duration, self.sample_period, &rounding);
         let others = resonances.iter().map(|resonance| resonance.line).chain(at_half_the_rate);
         let mut lines: Vec<SpectralLine> = sinusoids.into_iter().chain(others).collect();
         lines.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));

@@ -48,7 +48,8 @@ pub(super) fn causes(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cau
 }
 
 /// A line between two others of one channel that are equally strong and equally far from it: what a sinusoid has whose amplitude
-/// swells and fades. The least likely by chance, if chance is unlikely.
+/// swells and fades. Of those that are unlikely by chance the ones with the largest sidebands: a change that is no sinusoid has others
+/// at multiples of its frequency.
 ///
 /// Unrelated lines between which another one lies have it anywhere, and amplitudes as different as those of any lines.
 fn modulated_line(frequencies: &[Frequency], duration_s: f64) -> Option<[usize; 3]> {
@@ -68,9 +69,13 @@ fn modulated_line(frequencies: &[Frequency], duration_s: f64) -> Option<[usize; 
         (is_in_the_middle && is_slow && has_equal_sidebands(lines(*triple)))
             .then(|| 2.0 * within / distance * SQUARE_BY_CHANCE * of_one_channel.len() as f64)
     };
-    let likely = of_one_channel.iter().filter_map(|triple| Some((by_chance(triple)?, *triple)));
-    let (p_value, triple) = likely.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (p_value < BY_CHANCE).then_some(triple)
+    let is_likely = |triple: &&[usize; 3]| by_chance(triple).is_some_and(|p_value| p_value < BY_CHANCE);
+    let of_sidebands = |triple: &[usize; 3]| {
+        let [below, _, above] = lines(*triple).map(Frequency::best);
+        below.amplitude.value + above.amplitude.value
+    };
+    let likely = of_one_channel.iter().filter(is_likely);
+    likely.max_by(|a, b| of_sidebands(a).total_cmp(&of_sidebands(b))).copied()
 }
 
 /// The lines of the same channel at further multiples of the distance between a line and its sidebands, which a change of the amplitude has
