@@ -425,6 +425,11 @@ impl Wording {
         match &line.source {
             LineSource::Curve(curve) => added(curve, meaning),
             LineSource::Spectrum(of) => {
+                let meaning = if of.is_at_half_rate {
+                    "half of the sample rate: every second sample has an offset"
+                } else {
+                    meaning
+                };
                 let width = of.width_hz.map_or_else(
                     || "no wider than the record resolves".to_owned(),
                     |width_hz| format!("{width_hz:.4} Hz wide"),

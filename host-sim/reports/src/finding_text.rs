@@ -10,6 +10,7 @@ use crate::rounding::{bounded_quantity, plain, quantity, rounded_quantity, signi
 use noise_analysis::bounds::{BoundedEstimate, ChannelEstimate};
 use noise_analysis::effects::{Effect, Unexplained, UnexplainedPlace};
 use noise_analysis::report::{Finding, Parameter, Validation};
+use std::f64::consts::SQRT_2;
 
 /// Frequency of a line below which nothing that turns or hums makes it, Hz.
 const SLOW_HZ: f64 = 0.2;
@@ -160,6 +161,18 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
                 size(of.amplitude)
             ),
             Advice::new(CYCLING, format!(".{}", off())),
+        ),
+        Effect::SinusoidalLine(of) if of.is_at_half_rate() => (
+            format!(
+                "Every second sample is off by {}: a line at half of the sample rate, {}.",
+                // The deviation of the line is half of the offset.
+                size(of.amplitude.scaled(SQRT_2)),
+                hertz(of.frequency_hz)
+            ),
+            Advice::new(
+                "Look for two converters or two readers that take turns",
+                format!("; the mean of two samples has none of it.{}", off()),
+            ),
         ),
         Effect::SinusoidalLine(of) => (
             format!(

@@ -248,7 +248,7 @@ mod tests {
         let mut random = ChaCha8Rng::seed_from_u64(5);
         let mut counts = ValueCounts::default();
         for at in 0..200_000 {
-            let level = if (at / 100) % 2 == 0 { 0.0 } else { 4.0 };
+            let level = f64::from((at / 100 % 2) * 4);
             counts.push((level + 0.3 * random.sample::<f64, _>(StandardNormal)).round() as i32);
         }
         assert_eq!(counts.missing_codes(0.05, "deg/s"), None);

@@ -38,6 +38,8 @@ pub enum LineSource {
 pub struct SpectrumEvidence {
     /// Hz
     pub frequency_hz: f64,
+    /// Whether that is half of the sample rate: an offset of every second sample.
+    pub is_at_half_rate: bool,
     /// Full width at half maximum, Hz; `None` of a line no wider than the record resolves.
     pub width_hz: Option<f64>,
     /// Significance of the strongest peak, standard deviations.

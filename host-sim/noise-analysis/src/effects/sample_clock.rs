@@ -47,7 +47,8 @@ impl Kind for ClockDeviation {
     }
 
     fn lasting(&self) -> Vec<Option<BoundedEstimate>> {
-        vec![Some(self.rate_hz)]
+        // A change of the rate happens once.
+        if self.change.is_some() { Vec::new() } else { vec![Some(self.rate_hz)] }
     }
 
     fn occurrence(&self) -> Occurrence {

@@ -1,6 +1,6 @@
 //! A line no wider than the record resolves.
 
-use super::evidence::{LineEvidence, Multiples};
+use super::evidence::{LineEvidence, LineSource, Multiples, SpectrumEvidence};
 use super::kind::{AddedVariance, AveragingTime, Kind, amplitude_at_frequency, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use allan_core::NoiseTerm;
@@ -17,6 +17,14 @@ pub struct SinusoidalLine {
     pub multiples: Option<Multiples>,
     /// What shows it.
     pub evidence: LineEvidence,
+}
+
+impl SinusoidalLine {
+    /// Whether it is at half of the sample rate: an offset of every second sample.
+    #[must_use]
+    pub const fn is_at_half_rate(&self) -> bool {
+        matches!(self.evidence.source, LineSource::Spectrum(SpectrumEvidence { is_at_half_rate: true, .. }))
+    }
 }
 
 impl Kind for SinusoidalLine {

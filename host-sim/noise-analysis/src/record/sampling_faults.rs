@@ -184,7 +184,9 @@ fn rate_change(measurement: &Measurement) -> Option<RateChange> {
     let [earlier, later] = [before, after].map(part);
     let sigmas = (later.value - earlier.value).abs() / earlier.error.hypot(later.error);
     let places = (segments - 2 * SHORTEST_PART) as f64;
-    let is_steady = of_all < (1.0 + WANDERING / count.sqrt()) * of_neighbours;
+    // As much as the host's clock may be off, both may wander.
+    let tolerated = of_neighbours.max((host * earlier.value).powi(2));
+    let is_steady = of_all < (1.0 + WANDERING / count.sqrt()) * tolerated;
     let is_change = places * 2.0 * upper_tail(sigmas) < SIGNIFICANCE;
     let time_s = |at: usize| {
         let position = (measurement.len() * at / segments).min(measurement.len() - 1);

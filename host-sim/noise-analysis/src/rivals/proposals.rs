@@ -32,6 +32,9 @@ use allan_core::{AllanPoint, Curve, Model};
 use measurement::{ChannelProfile, Quantity, SensorProfile};
 use std::f64::consts::{PI, SQRT_2};
 
+/// Frequency of a line, in halves of the sample rate, above which it is one at half of the rate: the search ends one resolution below it.
+const NO_HIGHER: f64 = 1.0 - 1e-9;
+
 /// Longest time constant, in samples, of a Markov process that is named a low-pass filter.
 const MAX_LOW_PASS_SAMPLES: f64 = 64.0;
 /// Upper bound of the bandwidth of a resonance that the curve alone shows, in units of its frequency: a wider one is no band.
@@ -405,6 +408,7 @@ fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &'static str) -> Effec
         has_width,
         source: LineSource::Spectrum(SpectrumEvidence {
             frequency_hz: line.frequency.value,
+            is_at_half_rate: 2.0 * line.frequency.value * fit.covariates.curve.sample_period() > NO_HIGHER,
             width_hz: line.is_wider_than_resolution().then_some(line.width.value),
             sigmas: line.statistic.sqrt(),
             p_value: line.p_value,

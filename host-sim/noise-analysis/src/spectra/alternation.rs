@@ -97,7 +97,7 @@ mod tests {
         let value = |at: u32| {
             walk += 0.1 * random.sample::<f64, _>(StandardNormal);
             let noise: f64 = random.sample(StandardNormal);
-            let value = walk + 0.7 * noise + 0.3 * last + if at % 2 == 0 { offset } else { -offset };
+            let value = walk + 0.7 * noise + 0.3 * last + if at.is_multiple_of(2) { offset } else { -offset };
             last = noise;
             if at % 50 == 7 { f64::NAN } else { value }
         };

@@ -15,13 +15,22 @@ const CURVE: CurveEvidence = CurveEvidence { excess: 0.1, tau_s: 1.0, sigmas: 9.
 
 /// A steady line at this frequency, by the spectrum.
 pub(super) fn line(frequency_hz: f64) -> SinusoidalLine {
-    let spectrum = SpectrumEvidence { frequency_hz, width_hz: None, sigmas: 220.0, p_value: 1e-30 };
+    let spectrum =
+        SpectrumEvidence { frequency_hz, is_at_half_rate: false, width_hz: None, sigmas: 220.0, p_value: 1e-30 };
     SinusoidalLine {
         frequency_hz: BoundedEstimate::new(frequency_hz, frequency_hz - 0.1, frequency_hz + 0.1),
         amplitude: size(),
         multiples: None,
         evidence: LineEvidence { has_width: false, source: LineSource::Spectrum(spectrum) },
     }
+}
+
+/// An offset of every second sample.
+fn alternating() -> SinusoidalLine {
+    let line = line(102.4);
+    let LineSource::Spectrum(spectrum) = line.evidence.source else { return line };
+    let source = LineSource::Spectrum(SpectrumEvidence { is_at_half_rate: true, ..spectrum });
+    SinusoidalLine { evidence: LineEvidence { source, ..line.evidence }, ..line }
 }
 
 fn resonance(frequency_hz: f64) -> ResonantLine {
@@ -66,6 +75,7 @@ pub(super) fn examples() -> Vec<Effect> {
         FirstOrderFilter { bandwidth_hz: estimate(), time_constant_s: 0.1, evidence: CURVE }.into(),
         line(20.5).into(),
         line(0.12).into(),
+        alternating().into(),
         resonance(20.5).into(),
         resonance(0.12).into(),
         modulated(false).into(),

@@ -155,6 +155,7 @@ fn every_report_tells_how_the_noise_changes() {
             evidence: LineEvidence {
                 has_width: true,
                 source: LineSource::Spectrum(SpectrumEvidence {
+                    is_at_half_rate: false,
                     frequency_hz,
                     width_hz: Some(0.5),
                     sigmas: 9.0,

@@ -20,7 +20,8 @@ fn estimate(value: f64, error: f64) -> BoundedEstimate {
 }
 
 fn evidence(has_width: bool) -> LineEvidence {
-    let spectrum = SpectrumEvidence { frequency_hz: 1.0, width_hz: None, sigmas: 9.0, p_value: 1e-9 };
+    let spectrum =
+        SpectrumEvidence { frequency_hz: 1.0, is_at_half_rate: false, width_hz: None, sigmas: 9.0, p_value: 1e-9 };
     LineEvidence { has_width, source: LineSource::Spectrum(spectrum) }
 }
 
