@@ -341,8 +341,7 @@ impl Wording {
             ),
             Effect::MissingCodes(of) => text(
                 format!(
-                    "{} codes, all multiples of {} counts apart, have no sample, where the rarer neighbour of each lets expect {:.0} \
-                     in all",
+                    "no sample at {} codes, {} counts or a multiple apart; their rarer neighbours have {:.0}",
                     of.codes, of.spacing_counts, of.expected
                 ),
                 "",
