@@ -340,10 +340,7 @@ impl Wording {
                 "",
             ),
             Effect::MissingCodes(of) => text(
-                format!(
-                    "no sample at {} codes, {} counts or a multiple apart; their rarer neighbours have {:.0}",
-                    of.codes, of.spacing_counts, of.expected
-                ),
+                format!("{} codes without a sample, beside {:.0} in their rarer neighbours", of.codes, of.expected),
                 "",
             ),
             Effect::StuckOutput(of) => text(
