@@ -1,5 +1,6 @@
 //! Estimates with their errors or bounds.
 
+use crate::distributions::NORMAL_975;
 use serde::Serialize;
 
 /// An estimate with its standard deviation.
@@ -9,6 +10,14 @@ pub struct MeasuredValue {
     pub value: f64,
     /// Standard deviation, in the unit of the value.
     pub error: f64,
+}
+
+impl MeasuredValue {
+    /// With the 95 % bounds of a normal distribution, of a quantity that is not negative.
+    pub(crate) fn bounds(self) -> BoundedEstimate {
+        let half = NORMAL_975 * self.error;
+        BoundedEstimate::new(self.value, (self.value - half).max(0.0), self.value + half)
+    }
 }
 
 /// An estimate with its 95 % bounds.

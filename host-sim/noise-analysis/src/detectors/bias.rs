@@ -1,4 +1,5 @@
-//! What changes the bias of a channel over the record: a ramp, a step, a transient after the start, regressors such as the temperature, vibration, or several.
+//! What changes the bias of a channel over the record: a ramp, a step, a transient after the start, regressors such as the
+//! temperature, vibration, or several.
 //!
 //! In the differences of the Allan variance a change over the whole record has a few degrees of freedom and is lost in slow
 //! noise. Here each candidate is tested on block means against every mixture of white, flicker and random-walk noise, and
@@ -9,7 +10,8 @@ use super::bias_step::{self, StepPosition};
 use super::block_means::BlockMeans;
 use super::gls_regression::{GlsRegression, RegressionEstimate};
 use super::noise_grid::{NoiseGrid, NoiseGrids};
-use super::thermal_response::{self, Lag, TemperatureCourse};
+use super::thermal_response::{self, TemperatureCourse};
+use super::time_constant::TimeConstant;
 use super::turn_on::Transient;
 use super::vibration_rectification::{Acceleration, Vibration};
 use crate::bounds::BoundedEstimate;
@@ -62,7 +64,7 @@ enum Candidate {
     Step(StepPosition),
     Transient(Transient),
     /// The temperature behind a lag.
-    Lagged(Lag),
+    Lagged(TimeConstant),
     /// The square of the temperature.
     Squared,
     /// One of the vibrations.
@@ -238,13 +240,13 @@ fn best_candidate(
             |(_, rival): &(f64, Accepted)| matches!(rival.candidate, Candidate::Regressor(of) if of == *index);
         if rivals.iter().any(is_followed)
             && let Some(lag) = course.likeliest_lag(blocks, &regression)
-            && let smoothed = course.smoothed_regressor(lag.time_constant, blocks)
+            && let smoothed = course.smoothed_regressor(lag.value, blocks)
             && let Some(without_lag) = regression.estimate(&smoothed)
         {
             // Smoothed as it is behind the lag, the temperature has a smaller rounding error: that is no lag.
             let is_late = lag.estimate.deviance + thermal_response::ADVANTAGE < without_lag.deviance;
             let (RegressionEstimate { p_value, deviance, .. }, candidate, regressor) = if is_late {
-                let regressor = course.lagged_regressor(lag.time_constant, blocks);
+                let regressor = course.lagged_regressor(lag.value, blocks);
                 (lag.estimate, Candidate::Lagged(lag), regressor)
             } else {
                 (without_lag, Candidate::Regressor(*index), smoothed)
@@ -255,7 +257,7 @@ fn best_candidate(
     let has_transient = accepted.iter().any(|accepted| matches!(accepted.candidate, Candidate::Transient(_)));
     let transient = if has_transient { None } else { Transient::likeliest(blocks, &regression) };
     if let Some(transient) = transient {
-        let RegressionEstimate { p_value, deviance, .. } = transient.estimate;
+        let RegressionEstimate { p_value, deviance, .. } = transient.estimate();
         let regressor = transient.regressor(blocks);
         // It has one more parameter, as a lag has.
         let accepted = Accepted { candidate: Candidate::Transient(transient), regressor, p_value };

@@ -4,8 +4,7 @@
 use super::bias_response::{BiasResponse, Course, FRACTIONS, interval};
 use super::block_means::BlockMeans;
 use super::gls_regression::{GlsRegression, RegressionEstimate};
-use crate::bounds::BoundedEstimate;
-use crate::distributions::NORMAL_975;
+use super::time_constant::TimeConstant;
 use crate::effects::{TemperatureCurvature, ThermalLag};
 use crate::samples::series::Series;
 use nalgebra::DVector;
@@ -92,39 +91,30 @@ impl TemperatureCourse {
         self.lagged(time_constant).in_blocks(blocks)
     }
 
-    /// The likeliest lag, and the regression on the course behind it.
-    pub(super) fn likeliest_lag(&self, blocks: &BlockMeans, regression: &GlsRegression) -> Option<Lag> {
+    /// The likeliest lag, s, and the regression on the course behind it.
+    pub(super) fn likeliest_lag(&self, blocks: &BlockMeans, regression: &GlsRegression) -> Option<TimeConstant> {
         let longest = TIME_CONSTANTS_S
             .1
             .min(LONGEST_PART * (self.measured.values.len() as u64 * self.measured.width) as f64 * self.period_s);
         if longest <= TIME_CONSTANTS_S.0 {
             return None;
         }
-        let step = (longest / TIME_CONSTANTS_S.0).ln() / (TIME_CONSTANTS - 1) as f64;
-        let at = |logarithm: f64| {
-            let estimate = regression.estimate(&self.lagged_regressor(logarithm.exp(), blocks))?;
-            Some((logarithm, estimate))
-        };
-        let tried = (0..TIME_CONSTANTS).filter_map(|number| at(TIME_CONSTANTS_S.0.ln() + step * number as f64));
-        let likelier =
-            |a: &(f64, RegressionEstimate), b: &(f64, RegressionEstimate)| a.1.deviance.total_cmp(&b.1.deviance);
-        let coarse = tried.min_by(likelier)?;
-        let fine = (-4..=4).filter_map(|number| at(coarse.0 + step * f64::from(number) / 4.0)).min_by(likelier)?;
-        // The curvature of the likelihood at its maximum gives the error.
-        let (below, above) = (at(fine.0 - step)?, at(fine.0 + step)?);
-        let curvature = (below.1.deviance + above.1.deviance - 2.0 * fine.1.deviance) / (step * step);
-        let error = if curvature > 0.0 { (2.0 / curvature).sqrt() } else { f64::INFINITY };
-        Some(Lag { time_constant: fine.0.exp(), relative_error: error, estimate: fine.1 })
+        let ratio = (longest / TIME_CONSTANTS_S.0).powf(1.0 / (TIME_CONSTANTS - 1) as f64);
+        let estimate = |time_constant: f64| regression.estimate(&self.lagged_regressor(time_constant, blocks));
+        TimeConstant::likeliest((TIME_CONSTANTS_S.0, ratio, TIME_CONSTANTS), 1.0, estimate, estimate)
     }
 
     /// The response of a bias behind a lag.
-    pub(super) fn lag_response(&self, lag: &Lag, estimate: &RegressionEstimate, unit: &'static str) -> BiasResponse {
-        let times = (NORMAL_975 * lag.relative_error).exp();
-        let time_constant = lag.time_constant;
-        let lagged = self.lagged(time_constant);
+    pub(super) fn lag_response(
+        &self,
+        lag: &TimeConstant,
+        estimate: &RegressionEstimate,
+        unit: &'static str,
+    ) -> BiasResponse {
+        let lagged = self.lagged(lag.value);
         let effect = ThermalLag {
             sensitivity: interval(estimate, unit),
-            time_constant_s: BoundedEstimate::new(time_constant, time_constant / times, time_constant * times),
+            time_constant_s: lag.bounds(1.0),
             p_value: estimate.p_value,
             response: lagged.variance(estimate.size),
         };
@@ -149,15 +139,4 @@ impl TemperatureCourse {
         };
         squared.response(estimate.size, effect.into())
     }
-}
-
-/// A lag of the response to the temperature.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Lag {
-    /// s.
-    pub time_constant: f64,
-    /// Standard deviation of its logarithm.
-    relative_error: f64,
-    /// Of the sensitivity.
-    pub estimate: RegressionEstimate,
 }

@@ -4,8 +4,7 @@ use super::bias_response::{BiasResponse, Course, FRACTIONS, interval};
 use super::bias_step::SIGNIFICANCE;
 use super::block_means::BlockMeans;
 use super::gls_regression::{GlsRegression, RegressionEstimate};
-use crate::bounds::BoundedEstimate;
-use crate::distributions::NORMAL_975;
+use super::time_constant::TimeConstant;
 use crate::effects::TurnOnTransient;
 use nalgebra::DVector;
 
@@ -17,48 +16,33 @@ const LONGEST_PART: f64 = 0.25;
 /// between two of them by a hundredth.
 const TIME_CONSTANTS: usize = 9;
 
-/// A transient that may be there.
+/// A transient that may be there, with its time constant in blocks.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Transient {
-    /// Blocks.
-    time_constant: f64,
-    /// Standard deviation of its logarithm.
-    relative_error: f64,
-    /// Of the size.
-    pub estimate: RegressionEstimate,
-}
+pub(super) struct Transient(TimeConstant);
 
 impl Transient {
     /// The likeliest transient beside the regressors of `regression`, if its p-value is below [`SIGNIFICANCE`].
     pub(super) fn likeliest(blocks: &BlockMeans, regression: &GlsRegression) -> Option<Self> {
         let longest = LONGEST_PART * (blocks.numbers.last()? + 1) as f64;
-        let step = (longest / SHORTEST_BLOCKS).ln() / (TIME_CONSTANTS - 1) as f64;
-        let place = |number: usize| SHORTEST_BLOCKS.ln() + step * number as f64;
-        let tried = (0..TIME_CONSTANTS).filter_map(|number| {
-            let logarithm = place(number);
-            Some((logarithm, regression.estimate_below(SIGNIFICANCE, &regressor(logarithm.exp(), blocks))?))
-        });
-        let likelier =
-            |a: &(f64, RegressionEstimate), b: &(f64, RegressionEstimate)| a.1.deviance.total_cmp(&b.1.deviance);
-        let coarse = tried.min_by(likelier)?;
-        let at = |logarithm: f64| Some((logarithm, regression.estimate(&regressor(logarithm.exp(), blocks))?));
-        let (time_constant, estimate) =
-            (-4..=4).filter_map(|number| at(coarse.0 + step * f64::from(number) / 4.0)).min_by(likelier)?;
-        // The curvature of the likelihood at its maximum gives the error.
-        let (below, above) = (at(time_constant - 0.5 * step)?, at(time_constant + 0.5 * step)?);
-        let curvature = (below.1.deviance + above.1.deviance - 2.0 * estimate.deviance) / (0.25 * step * step);
-        let relative_error = if curvature > 0.0 { (2.0 / curvature).sqrt() } else { f64::INFINITY };
+        let ratio = (longest / SHORTEST_BLOCKS).powf(1.0 / (TIME_CONSTANTS - 1) as f64);
+        let found = TimeConstant::likeliest(
+            (SHORTEST_BLOCKS, ratio, TIME_CONSTANTS),
+            0.5,
+            |time_constant| regression.estimate_below(SIGNIFICANCE, &regressor(time_constant, blocks)),
+            |time_constant| regression.estimate(&regressor(time_constant, blocks)),
+        )?;
         // One that is likeliest with the longest time constant is slower still: a drift.
-        (time_constant < place(TIME_CONSTANTS - 1)).then(|| Self {
-            time_constant: time_constant.exp(),
-            relative_error,
-            estimate,
-        })
+        (found.value < longest * (1.0 - 1e-9)).then_some(Self(found))
+    }
+
+    /// The size with the likeliest time constant.
+    pub(super) fn estimate(&self) -> RegressionEstimate {
+        self.0.estimate
     }
 
     /// Its block means, of size 1.
     pub(super) fn regressor(&self, blocks: &BlockMeans) -> DVector<f64> {
-        regressor(self.time_constant, blocks)
+        regressor(self.0.value, blocks)
     }
 
     /// The bias of the transient with the size of `estimate`, of a channel in `unit` with samples every `period_s`.
@@ -69,12 +53,10 @@ impl Transient {
         estimate: &RegressionEstimate,
         unit: &'static str,
     ) -> BiasResponse {
-        let course = course(self.time_constant, blocks);
-        let times = (NORMAL_975 * self.relative_error).exp();
-        let time_constant = self.time_constant * blocks.width as f64 * period_s;
+        let course = course(self.0.value, blocks);
         let effect = TurnOnTransient {
             size: interval(estimate, unit),
-            time_constant_s: BoundedEstimate::new(time_constant, time_constant / times, time_constant * times),
+            time_constant_s: self.0.bounds(blocks.width as f64 * period_s),
             p_value: estimate.p_value,
             response: course.variance(estimate.size),
         };

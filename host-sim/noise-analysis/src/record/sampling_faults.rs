@@ -1,7 +1,7 @@
 //! Detectors of faults of the sampling: lost samples, repeated samples, and a sample rate other than the nominal one.
 
 use crate::bounds::{BoundedEstimate, MeasuredValue};
-use crate::distributions::{NORMAL_975, poisson_bounds, poisson_tail, upper_tail};
+use crate::distributions::{poisson_bounds, poisson_tail, upper_tail};
 use crate::effects::findings::{Correction, Detection, SIGNIFICANCE};
 use crate::effects::{ClockDeviation, DroppedSamples, RateChange, RepeatedSamples};
 use measurement::{Measurement, SensorProfile};
@@ -125,14 +125,9 @@ pub(crate) fn sample_clock(measurement: &Measurement) -> Option<Detection> {
     if (unusual || p_value > SIGNIFICANCE) && change.is_none() {
         return None;
     }
-    let rate_hz = bounded(MeasuredValue { value: measured, error });
+    let rate_hz = MeasuredValue { value: measured, error }.bounds();
     let clock = ClockDeviation { rate_hz, nominal_hz: nominal, sigmas: z, change };
     Some(Detection { effect: clock.into(), correction: None })
-}
-
-fn bounded(MeasuredValue { value, error }: MeasuredValue) -> BoundedEstimate {
-    let half = NORMAL_975 * error;
-    BoundedEstimate::new(value, value - half, value + half)
 }
 
 /// The sample rate by the time stamps, Hz: its standard deviation is that of the segments' rates and
@@ -197,8 +192,8 @@ fn rate_change(measurement: &Measurement) -> Option<RateChange> {
     let of_part = ((rates[at] - later.value) / (earlier.value - later.value)).clamp(0.0, 1.0);
     (is_steady && is_change).then(|| RateChange {
         time_s: BoundedEstimate::new(from_s + of_part * (to_s - from_s), from_s, to_s),
-        before_hz: bounded(earlier),
-        after_hz: bounded(later),
+        before_hz: earlier.bounds(),
+        after_hz: later.bounds(),
         sigmas,
     })
 }

@@ -2,7 +2,7 @@
 //! it stands is told by the [table](crate::rivals::table).
 
 use crate::OCTAVES;
-use crate::bounds::{BoundedEstimate, ChannelEstimate, MeasuredValue};
+use crate::bounds::{BoundedEstimate, ChannelEstimate};
 use crate::detectors::random_telegraph::is_reversible;
 use crate::effects::findings::SIGNIFICANCE;
 use crate::effects::{
@@ -262,12 +262,6 @@ fn filter_effect(
     .into()
 }
 
-/// An estimate with the 95 % bounds of a normal distribution, of a quantity that is not negative.
-fn normal_bounds(estimate: MeasuredValue) -> BoundedEstimate {
-    let half_width = NORMAL_975 * estimate.error;
-    BoundedEstimate::new(estimate.value, (estimate.value - half_width).max(0.0), estimate.value + half_width)
-}
-
 /// A Markov term whose kurtosis is that of random telegraph noise.
 fn telegraph_effect(term: &FittedTerm, kurtosis: &KurtosisRatio, curve: CurveEvidence, unit: &'static str) -> Effect {
     TelegraphNoise {
@@ -403,7 +397,7 @@ fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &'static str) -> Effec
     if let Some(modulation) = &line.modulation {
         return modulated_line(line, modulation, unit);
     }
-    let frequency_hz = normal_bounds(line.frequency);
+    let frequency_hz = line.frequency.bounds();
     let evidence = |has_width: bool| LineEvidence {
         has_width,
         source: LineSource::Spectrum(SpectrumEvidence {
@@ -416,22 +410,22 @@ fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &'static str) -> Effec
     };
     // To the curve a line of a few phase changes in the record is a sinusoid; the spectrum tells it from one.
     if matches!(line.kind(), NoiseTerm::Resonance(_)) || line.is_band() {
-        let deviation = normal_bounds(line.deviation).in_unit(unit);
-        let bandwidth_hz = normal_bounds(line.width);
+        let deviation = line.deviation.bounds().in_unit(unit);
+        let bandwidth_hz = line.width.bounds();
         return ResonantLine { frequency_hz, bandwidth_hz, deviation, multiples: None, evidence: evidence(true) }
             .into();
     }
-    let amplitude = normal_bounds(line.deviation).scaled(SQRT_2).in_unit(unit);
+    let amplitude = line.deviation.bounds().scaled(SQRT_2).in_unit(unit);
     SinusoidalLine { frequency_hz, amplitude, multiples: None, evidence: evidence(false) }.into()
 }
 
 /// A line whose amplitude or phase changes.
 fn modulated_line(line: &MergedLine, modulation: &Modulation, unit: &'static str) -> Effect {
     ModulatedLine {
-        frequency_hz: normal_bounds(line.frequency),
-        amplitude: normal_bounds(line.deviation).scaled(SQRT_2 * modulation.of_line).in_unit(unit),
-        depth: normal_bounds(modulation.depth),
-        period_s: normal_bounds(modulation.frequency).inverse(),
+        frequency_hz: line.frequency.bounds(),
+        amplitude: line.deviation.bounds().scaled(SQRT_2 * modulation.of_line).in_unit(unit),
+        depth: modulation.depth.bounds(),
+        period_s: modulation.frequency.bounds().inverse(),
         of_phase: modulation.of_phase,
         evidence: ModulationEvidence::Envelope { sigmas: line.statistic.sqrt() },
     }
