@@ -1,7 +1,7 @@
 //! A slow periodic signal that is no sinusoid, by the sum of the harmonics of one frequency.
 //!
-//! A thermostat or a pump that comes on every minute has a few periods in a record, and harmonics each of which is too weak for
-//! a line of its own, or is one of a few that look like unrelated sinusoids. Together they stand out of the ordinates between them
+//! A thermostat, a pump that comes on every minute, or a radio that draws on the supply every few seconds has harmonics each of which is
+//! too weak for a line of its own, or is one of a few that look like unrelated sinusoids. Together they stand out of the ordinates between them
 //! (the harmonic sum of pulsar searches: J. Taylor and G. Huguenin, "Two new pulsating radio sources", Nature 221, 1969). The noise is a
 //! sum of white and random-walk noise and of Markov processes, fitted to the ordinates between the harmonics.
 
@@ -14,15 +14,13 @@ use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, exponential_sum_tail, mean_ratio_tail};
 use crate::effects::findings::SIGNIFICANCE;
 use crate::samples::uniform_series::UniformSeries;
+use std::ops::Range;
 
-/// Blocks of the record, at least: twice the highest harmonic is half their rate.
-const BLOCKS: usize = 1024;
 /// Harmonics in the sum, the fundamental among them.
 const HARMONICS: usize = 8;
-/// Lowest and highest fundamental, in periods per record. Between the harmonics of a lower one there is no ordinate that none of
-/// them reaches; a higher one has harmonics that are lines by themselves.
-const FEWEST_PERIODS: usize = 4;
-const MOST_PERIODS: usize = 32;
+/// Fundamentals that are sought together, in periods per record: twice the highest harmonic is half the rate of the blocks in whose means
+/// they are sought. Between the harmonics of a lower one there is no ordinate that none of them reaches.
+const RANGES: [Range<usize>; 2] = [4..32, 32..256];
 /// Ordinates to a resolution: the eighth harmonic of a frequency is at most a quarter of a resolution off its ordinate.
 const PADDING: usize = 16;
 /// Steps of the fundamental to a resolution.
@@ -31,8 +29,8 @@ const STEPS: usize = 16;
 const LOBE: f64 = 1.2;
 /// Frequencies that are examined, those with the largest sums over the noise that is fitted to all ordinates.
 const EXAMINED: usize = 8;
-/// White noise, a random walk and seven Markov processes.
-const TERMS: usize = 9;
+/// White noise, a random walk and ten Markov processes.
+const TERMS: usize = 12;
 /// Largest probability by chance of the sum of the even harmonics, which a square wave lacks, and of that of the odd ones, which the harmonics of
 /// twice the frequency lack.
 const EVEN_BY_CHANCE: f64 = 1e-3;
@@ -42,7 +40,8 @@ const ODD_BY_CHANCE: f64 = 0.05;
 const HARMONICS_BY_CHANCE: f64 = 1e-3;
 /// Largest part of one harmonic in the sum: a line of another cause at a multiple would be all of it.
 const LARGEST_SHARE: f64 = 0.8;
-/// Least power of the fundamental over the noise: the sum of its harmonics alone could be that of a multiple of it.
+/// Least power of the fundamental over the noise: the sum of its harmonics alone could be that of a multiple of it. None of them is larger
+/// than it beyond their errors: those of short pulses are all equal.
 const LEAST_FUNDAMENTAL: f64 = 4.0;
 
 /// A periodic signal with harmonics.
@@ -67,39 +66,46 @@ impl PeriodicSignal {
     pub(crate) fn find(series: &UniformSeries) -> Option<Self> {
         // Of a channel that never changes nothing is left.
         let series = series.clone().averaged_until_dithered();
-        let size = series.values().len() / BLOCKS;
-        if size == 0 {
-            return None;
-        }
-        let blocks = series.averaged(size).detrended();
-        let spectrum = PaddedSpectrum::new(&blocks)?;
-        let noise = spectrum.noise(None)?;
-        let candidates = STEPS * FEWEST_PERIODS..=STEPS * MOST_PERIODS;
-        let mut sums: Vec<(f64, f64)> = candidates
-            .clone()
-            .map(|step| {
-                let fundamental = step as f64 / STEPS as f64;
-                let ratios: Vec<f64> =
-                    (1..=HARMONICS).map(|number| spectrum.ratio(&noise, number, fundamental)).collect();
-                (ratios.iter().sum::<f64>() - ratios.iter().copied().fold(0.0, f64::max), fundamental)
-            })
-            .collect();
-        sums.sort_by(|a, b| b.0.total_cmp(&a.0));
-        // Frequencies within half a resolution of the highest harmonic are one.
-        let trials = candidates.count() as f64 * HARMONICS as f64 / STEPS as f64;
-        let examined = sums
-            .iter()
-            .take(EXAMINED)
-            .filter_map(|(_, fundamental)| Self::examine(&blocks, &spectrum, *fundamental, trials));
-        examined.min_by(|a, b| a.p_value.total_cmp(&b.p_value)).filter(|found| found.p_value < SIGNIFICANCE)
+        let found = RANGES.iter().filter_map(|range| Self::find_within(range, &series));
+        found.min_by(|a, b| a.p_value.total_cmp(&b.p_value)).filter(|found| found.p_value < SIGNIFICANCE)
     }
 
-    /// Examines one fundamental, in resolutions: the harmonics are those of the record without it, into which it would leak.
-    fn examine(blocks: &UniformSeries, spectrum: &PaddedSpectrum, fundamental: f64, trials: f64) -> Option<Self> {
+    /// The clearest one of a range of frequencies.
+    fn find_within(periods: &Range<usize>, series: &UniformSeries) -> Option<Self> {
+        let size = (series.values().len() / (4 * HARMONICS * periods.end)).max(1);
+        let blocks = series.averaged(size).detrended();
+        let most = periods.end.min(blocks.values().len() / (4 * HARMONICS));
+        let spectrum = PaddedSpectrum::new(&blocks).filter(|_| most > periods.start)?;
+        let highest = 2 * HARMONICS * most;
+        let noise = spectrum.noise(None, highest)?;
+        let sum = |step: usize| {
+            let fundamental = step as f64 / STEPS as f64;
+            let ratios: Vec<f64> = (1..=HARMONICS).map(|number| spectrum.ratio(&noise, number, fundamental)).collect();
+            (ratios.iter().sum::<f64>() - ratios.iter().copied().fold(0.0, f64::max), fundamental)
+        };
+        let mut sums: Vec<(f64, f64)> = (STEPS * periods.start..STEPS * most).map(sum).collect();
+        sums.sort_by(|a, b| b.0.total_cmp(&a.0));
+        // Signals are spread evenly over the logarithm of the frequency, and so is the false alarm over the steps.
+        let log_range = (RANGES[RANGES.len() - 1].end as f64 / RANGES[0].start as f64).ln();
+        let examined = sums.iter().take(EXAMINED).filter_map(|&(_, fundamental)| {
+            let trials = STEPS as f64 * fundamental * log_range;
+            Self::examine(&blocks, &spectrum, (fundamental, highest), trials)
+        });
+        examined.min_by(|a, b| a.p_value.total_cmp(&b.p_value))
+    }
+
+    /// Examines one fundamental, in resolutions, over the noise up to the `highest` order: the harmonics are those of the record without it, into which it would leak.
+    fn examine(
+        blocks: &UniformSeries,
+        spectrum: &PaddedSpectrum,
+        (fundamental, highest): (f64, usize),
+        trials: f64,
+    ) -> Option<Self> {
         let resolution = 1.0 / blocks.duration();
         let sine = Sine::fit_near(blocks, fundamental * resolution, resolution / PADDING as f64);
         let rest = PaddedSpectrum::at_harmonics(&sine.subtracted_from(blocks).detrended(), fundamental)?;
-        let (noise, between) = rest.noise(Some(fundamental)).map(|noise| (noise, rest.between(fundamental)))?;
+        let (noise, between) =
+            rest.noise(Some(fundamental), highest).map(|noise| (noise, rest.between(fundamental)))?;
         let ratios: Vec<f64> = (2..=HARMONICS).map(|number| rest.ratio(&noise, number, fundamental)).collect();
         let sum: f64 = ratios.iter().sum();
         let by_chance = |first: usize| {
@@ -115,8 +121,16 @@ impl PeriodicSignal {
         };
         let first = excess(spectrum, 1);
         let powers: Vec<f64> = (2..=HARMONICS).map(|number| excess(&rest, number)).collect();
+        // An ordinate of the power P over noise of the density n has the variance n² + 2nP.
+        let variance = |power: f64, number: usize| {
+            let density = noise.density(number as f64 * fundamental);
+            density * (density + 2.0 * power.max(0.0))
+        };
+        let is_no_larger = |(number, power): (usize, &f64)| {
+            *power - first < NORMAL_975 * (variance(first, 1) + variance(*power, number)).sqrt()
+        };
         let is_fundamental =
-            first > (LEAST_FUNDAMENTAL - 1.0) * noise.density(fundamental) && powers.iter().all(|power| *power < first);
+            first > (LEAST_FUNDAMENTAL - 1.0) * noise.density(fundamental) && (2..).zip(&powers).all(is_no_larger);
         if !is_fundamental || !has_both || largest > LARGEST_SHARE {
             return None;
         }
@@ -243,9 +257,9 @@ impl PaddedSpectrum {
         self.density(order) / noise.density(order)
     }
 
-    /// Orders of the independent ordinates up to twice the highest harmonic, without those that harmonics of `fundamental` reach.
-    fn orders(&self, fundamental: Option<f64>) -> impl Iterator<Item = usize> {
-        let last = (2 * HARMONICS * MOST_PERIODS).min((self.power.len() - 1) * self.spacing / PADDING);
+    /// Orders of the independent ordinates below `highest`, without those that harmonics of `fundamental` reach.
+    fn orders(&self, fundamental: Option<f64>, highest: usize) -> impl Iterator<Item = usize> {
+        let last = highest.min((self.power.len() - 1) * self.spacing / PADDING);
         (1..last).filter(move |&order| {
             fundamental.is_none_or(|fundamental| {
                 let order = order as f64;
@@ -255,9 +269,9 @@ impl PaddedSpectrum {
     }
 
     /// The noise by the ordinates that the harmonics of `fundamental` do not reach, or by all of them.
-    fn noise(&self, fundamental: Option<f64>) -> Option<SlowBackground<TERMS>> {
+    fn noise(&self, fundamental: Option<f64>, highest: usize) -> Option<SlowBackground<TERMS>> {
         let mut bands: Vec<(usize, f64, f64, f64)> = Vec::new();
-        for order in self.orders(fundamental) {
+        for order in self.orders(fundamental, highest) {
             let density = self.density(order as f64);
             match bands.last_mut() {
                 // A band is an eighth of its frequency wide.
@@ -280,8 +294,8 @@ impl PaddedSpectrum {
 
     /// Number of ordinates between the harmonics of `fundamental`, up to twice the highest.
     fn between(&self, fundamental: f64) -> usize {
-        let highest = 2.0 * HARMONICS as f64 * fundamental;
-        self.orders(Some(fundamental)).filter(|&order| (order as f64) < highest).count()
+        let highest = (2.0 * HARMONICS as f64 * fundamental).ceil() as usize;
+        self.orders(Some(fundamental), highest).count()
     }
 }
 
@@ -293,16 +307,17 @@ mod tests {
     use rand_distr::StandardNormal;
     use std::f64::consts::TAU;
 
-    /// 16 samples a block: white noise of deviation 1, a random walk with steps of deviation `step`, and a signal of the phase in turns.
+    const SAMPLES: usize = 16 * 1024;
+
+    /// White noise of deviation 1, a random walk with steps of deviation `step`, and a signal of the phase in turns.
     fn series(seed: u64, step: f64, signal: impl Fn(f64) -> f64) -> UniformSeries {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let samples = 16 * BLOCKS;
         let mut walk = 0.0;
         let value = |at: usize| {
             walk += step * random.sample::<f64, _>(StandardNormal);
-            walk + random.sample::<f64, _>(StandardNormal) + signal(at as f64 / samples as f64)
+            walk + random.sample::<f64, _>(StandardNormal) + signal(at as f64 / SAMPLES as f64)
         };
-        UniformSeries::new(0.1, (0..samples).map(value).collect())
+        UniformSeries::new(0.1, (0..SAMPLES).map(value).collect())
     }
 
     #[test]
@@ -310,14 +325,14 @@ mod tests {
         let blocks = series(1, 0.01, |turn| (7.3 * turn).fract()).averaged(16);
         let (all, fundamental) = (PaddedSpectrum::new(&blocks).unwrap(), 7.3);
         let few = PaddedSpectrum::at_harmonics(&blocks, fundamental).unwrap();
-        let orders = (0..=BLOCKS / 2).map(|order| order as f64);
+        let orders = (0..=SAMPLES / 32).map(|order| order as f64);
         let harmonics = (1..=HARMONICS).map(|number| number as f64 * fundamental);
         let largest = all.power.iter().copied().fold(0.0, f64::max);
         for order in orders.chain(harmonics) {
             // Transforms of a thousand numbers are known to some 10⁻¹⁴ of the largest ordinate.
             assert!((few.density(order) - all.density(order)).abs() < 1e-12 * largest, "{order}");
         }
-        assert!(all.orders(None).eq(few.orders(None)));
+        assert!(all.orders(None, 512).eq(few.orders(None, 512)));
     }
 
     #[test]
@@ -327,10 +342,22 @@ mod tests {
             // together; the walk is as large as the white noise at 5 periods per record.
             let found = PeriodicSignal::find(&series(seed, 0.002, |turn| 0.6 * ((periods * turn).fract() - 0.5)))
                 .expect("some ten times the noise");
-            let duration_s = 0.1 * 16.0 * BLOCKS as f64;
+            let duration_s = 0.1 * SAMPLES as f64;
             // Known to less than a tenth of the resolution.
             assert!((found.frequency.value * duration_s - periods).abs() < 0.2, "{periods}: {found:?}");
             assert!(found.has(3.0 * periods / duration_s, 1.0 / duration_s));
+        }
+    }
+
+    /// Pulses of height A for 8 % of a period have the amplitudes `2A·sin(0.08πk)/(πk)`: ordinates of 13, 12, 11, 9, 7, 6, 4 and 3 times the
+    /// noise, of which any of the first may be the largest.
+    #[test]
+    fn short_pulses_are_found_among_many_periods() {
+        for (seed, periods) in [(1, 33.4), (2, 64.2), (3, 121.6), (4, 250.9)] {
+            let pulse = |turn: f64| if (periods * turn).fract() < 0.08 { -0.35 } else { 0.0 };
+            let found = PeriodicSignal::find(&series(seed, 0.002, pulse)).expect("65 times the noise");
+            let duration_s = 0.1 * SAMPLES as f64;
+            assert!((found.frequency.value * duration_s - periods).abs() < 0.2, "{periods}: {found:?}");
         }
     }
 
