@@ -29,6 +29,7 @@ pub(crate) mod decaying_disturbances;
 pub(crate) mod epoch_spectra;
 mod equation_5;
 mod filtered_noise;
+mod found_sines;
 pub(crate) mod frequency_track;
 mod line_envelope;
 mod line_models;

@@ -32,7 +32,7 @@ const LARGEST_OTHER: f64 = 0.25;
 /// Distances of the three points, in ordinates, the vertex of whose parabola is the maximum, one after the other.
 const AROUND: [f64; 3] = [0.5, 0.15, 0.05];
 
-/// Distance in resolutions within which a line is a sideband of a change.
+/// Distance in resolutions within which two frequencies are one, and a line is a sideband of a change.
 const SAME: f64 = 1.5;
 /// Highest multiple of a change that has sidebands: that of a line that is switched on and off has a ninth of the first.
 const HIGHEST: f64 = 9.0;
@@ -48,6 +48,8 @@ pub struct Modulation {
     pub depth: MeasuredValue,
     /// Whether the phase changes, and not the amplitude.
     pub of_phase: bool,
+    /// −2 log-likelihood ratio of the line without the change against the line with it.
+    pub statistic: f64,
 }
 
 impl Modulation {
@@ -60,8 +62,13 @@ impl Modulation {
     }
 
     /// The change of `sine` that `rest`, the record without the sine, shows most clearly; `None` if it may be noise of the one-sided
-    /// `density` around the sine, unit²/Hz, or a line of its own at one of the distances `others`, Hz.
-    pub(super) fn find(sine: &Sine, rest: &UniformSeries, density: f64, others: &[f64]) -> Option<Self> {
+    /// `density` around the sine, unit²/Hz, or a line of its own where `has_line` says that there is one at such a distance, Hz.
+    pub(super) fn find(
+        sine: &Sine,
+        rest: &UniformSeries,
+        density: f64,
+        has_line: impl Fn(f64) -> bool,
+    ) -> Option<Self> {
         let most = MOST_PERIODS.min((sine.frequency * rest.duration()) as usize / OF_FREQUENCY);
         let length = rest.values().len();
         let size = (length / BLOCKS).max(1);
@@ -99,8 +106,7 @@ impl Modulation {
         // Each part has half the power of the noise on both sides of the line.
         let ratio = 2.0 * power * 2.0 * rest.sample_period() / squares / density;
         let frequency = turns(ordinate as f64) / rest.sample_period();
-        let has_line = others.iter().any(|distance| (distance.abs() - frequency).abs() < SAME / rest.duration());
-        if trials * (-ratio).exp() > FALSE_ALARM || (has_line && other > LARGEST_OTHER * power) {
+        if trials * (-ratio).exp() > FALSE_ALARM || (has_line(frequency) && other > LARGEST_OTHER * power) {
             return None;
         }
         let power = |ordinate: f64| if of_phase { sums(ordinate).1 } else { sums(ordinate).0 };
@@ -116,8 +122,19 @@ impl Modulation {
             value: turns(ordinate) / rest.sample_period(),
             error: 3f64.sqrt() / (PI * rest.duration()) * relative,
         };
-        Some(Self { frequency, of_line: 1.0, depth: MeasuredValue { value: depth, error: depth * relative }, of_phase })
+        Some(Self {
+            frequency,
+            of_line: 1.0,
+            depth: MeasuredValue { value: depth, error: depth * relative },
+            of_phase,
+            statistic: 2.0 * ratio,
+        })
     }
+}
+
+/// Whether two distances from a line, Hz, are one in a record of `duration` s.
+pub(super) fn is_same(one: f64, other: f64, duration: f64) -> bool {
+    (one - other).abs() < SAME / duration
 }
 
 #[cfg(test)]
@@ -140,7 +157,7 @@ mod tests {
         };
         let series = UniformSeries::new(0.02, (0..SAMPLES).map(value).collect());
         let sine = Sine::fit_near(&series, 7.3, 0.5 / series.duration());
-        Modulation::find(&sine, &sine.subtracted_from(&series), 2.0 * 0.02, &[])
+        Modulation::find(&sine, &sine.subtracted_from(&series), 2.0 * 0.02, |_| false)
     }
 
     #[test]
@@ -171,17 +188,18 @@ mod tests {
         let rest = sine.subtracted_from(&series);
         let distance = 12.0 / series.duration();
         assert!(
-            Modulation::find(&sine, &rest, 0.04, &[])
+            Modulation::find(&sine, &rest, 0.04, |_| false)
                 .is_some_and(|found| found.is_sideband(distance, series.duration()))
         );
-        assert_eq!(Modulation::find(&sine, &rest, 0.04, &[distance]), None);
+        assert_eq!(Modulation::find(&sine, &rest, 0.04, |of| is_same(of, distance, series.duration())), None);
     }
 
     /// A line that is on for half of the time has sidebands at the odd multiples of the frequency at which it is switched.
     #[test]
     fn lines_at_multiples_of_a_change_are_its_sidebands() {
         let change = |turns: f64| MeasuredValue { value: turns / 400.0, error: 0.01 / 400.0 };
-        let found = Modulation { frequency: change(8.0), of_line: 1.0, depth: change(1.0), of_phase: false };
+        let found =
+            Modulation { frequency: change(8.0), of_line: 1.0, depth: change(1.0), of_phase: false, statistic: 100.0 };
         let is_sideband = |turns: f64| found.is_sideband(turns / 400.0, 400.0);
         assert!([8.0, -24.0, 40.5].into_iter().all(is_sideband));
         assert!(![4.0, 20.0, 88.0].into_iter().any(is_sideband));

@@ -7,7 +7,7 @@
 //! [itself](super::alternation).
 
 use super::alternation::Alternation;
-use super::line_envelope::{MOST_PERIODS, Modulation};
+use super::found_sines::{FoundSines, SKIRTS};
 use super::line_models::Sine;
 use super::periodogram::{PADDING, Periodogram};
 use super::whitened_spectrum::{
@@ -21,8 +21,7 @@ use std::f64::consts::{LN_2, PI};
 pub(super) const MOST: usize = 6;
 /// Largest number of resonances that are refitted when one is added: each refit fits the background of the whole spectrum.
 const REFITTED: usize = 2;
-/// A line within this many widths of a resonance, and with less than this fraction of its statistic, is a residue of it.
-const SKIRTS: f64 = 20.0;
+/// Least part of a line's statistic in that of a resonance on whose [skirts](SKIRTS) it lies: a weaker one is a residue of that.
 const RESIDUE: f64 = 0.02;
 
 /// Fewest periods of a sinusoid in a record, where it is all of the slow variation.
@@ -61,7 +60,7 @@ pub fn find_lines(series: &UniformSeries) -> Vec<SpectralLine> {
 pub(crate) fn find_lines_over(series: &UniformSeries, known: impl Fn(f64) -> f64) -> Vec<SpectralLine> {
     let known: &dyn Fn(f64) -> f64 = &known;
     let (rest, slow) = without_slow_sines(series.clone().averaged_until_dithered());
-    let mut sines: Vec<FoundSine> = Vec::new();
+    let mut sines = FoundSines::default();
     let mut rest = Transformed::new(rest.detrended());
     let mut resonances: Vec<Resonance> = Vec::new();
     while slow.len() + sines.len() + resonances.len() < MOST
@@ -69,24 +68,23 @@ pub(crate) fn find_lines_over(series: &UniformSeries, known: impl Fn(f64) -> f64
         && let Some(spectrum) = WhitenedSpectrum::new(&transformed.spectrum, known, &resonances, None)
     {
         match spectrum.most_significant(&transformed.series) {
-            Some(Candidate::Sine(line, sine)) => {
-                let density = 2.0 * sine.density(&transformed.series) / line.statistic;
-                sines.push(FoundSine { line, sine, density });
-                rest = Transformed::new(sine.subtracted_from(&transformed.series));
-            }
-            Some(Candidate::Resonance(resonance)) => {
-                resonances.push(resonance);
-                if resonances.len() <= REFITTED {
-                    refit(&transformed.spectrum, known, &mut resonances);
+            Some(Candidate::Sine(line, sine)) => rest = Transformed::new(sines.take(line, sine, &transformed.series)),
+            Some(Candidate::Resonance(resonance)) => match sines.take_sidebands(&resonance.line, &transformed.series) {
+                Some(left) => rest = Transformed::new(left),
+                None => {
+                    resonances.push(resonance);
+                    if resonances.len() <= REFITTED {
+                        refit(&transformed.spectrum, known, &mut resonances);
+                    }
                 }
-            }
+            },
             None => break,
         }
     }
-    if let Some(rest) = &rest {
-        find_modulations(&mut sines, &rest.series, &resonances);
-    }
-    let sines = sines.into_iter().map(|found| found.line);
+    let sines = match &rest {
+        Some(rest) => sines.into_lines(&rest.series, &resonances),
+        None => Vec::new(),
+    };
     let at_half_the_rate = Alternation::of(series).line(series.duration(), series.sample_period(), series.rounding());
     let others = resonances.iter().map(|resonance| resonance.line).chain(at_half_the_rate);
     let mut found: Vec<SpectralLine> = slow.into_iter().chain(sines).chain(others).collect();
@@ -225,54 +223,6 @@ fn is_residue(line: &SpectralLine, strong: &SpectralLine) -> bool {
         let distance = (line.frequency.value - strong.frequency.value).abs();
         distance > 0.0 && distance < SKIRTS * width.value && line.statistic < RESIDUE * strong.statistic
     })
-}
-
-/// A sinusoid that was removed from the record.
-struct FoundSine {
-    line: SpectralLine,
-    sine: Sine,
-    /// Of the noise around it, unit²/Hz.
-    density: f64,
-}
-
-/// Sets how each of the sinusoids changes over the record of which `rest` is left, and removes those that are sidebands of another.
-fn find_modulations(sines: &mut Vec<FoundSine>, rest: &UniformSeries, resonances: &[Resonance]) {
-    let duration = rest.duration();
-    let mut at = 0;
-    while let Some(found) = sines.get(at) {
-        let frequency = found.sine.frequency;
-        let distance = |other: &FoundSine| other.sine.frequency - frequency;
-        let is_near =
-            |other: &&FoundSine| (1.0..=MOST_PERIODS as f64 + 1.0).contains(&(distance(other).abs() * duration));
-        let near: Vec<&FoundSine> = sines.iter().filter(is_near).filter(|other| other.is_weaker_than(found)).collect();
-        let with_near = near.iter().fold(rest.clone(), |rest, other| other.sine.negative().subtracted_from(&rest));
-        let distances: Vec<f64> = near.iter().map(|other| distance(other)).collect();
-        // On the skirts of a resonance the noise is not white.
-        let is_skirt = |resonance: &Resonance| {
-            let line = &resonance.line;
-            let distance = (line.frequency.value - frequency).abs();
-            line.width.is_some_and(|width| distance < SKIRTS * width.value)
-        };
-        let is_examined = !resonances.iter().any(is_skirt);
-        let modulation = Modulation::find(&found.sine, &with_near, found.density, &distances).filter(|_| is_examined);
-        sines[at].line.modulation = modulation;
-        if let Some(modulation) = modulation {
-            let power = sines[at].line.deviation.value;
-            let is_sideband = |other: &FoundSine| {
-                other.line.deviation.value < power && modulation.is_sideband(other.sine.frequency - frequency, duration)
-            };
-            let before = sines[..at].iter().filter(|other| is_sideband(other)).count();
-            sines.retain(|other| !is_sideband(other));
-            at -= before;
-        }
-        at += 1;
-    }
-}
-
-impl FoundSine {
-    fn is_weaker_than(&self, other: &Self) -> bool {
-        self.line.deviation.value < other.line.deviation.value
-    }
 }
 
 /// A record with its spectrum.

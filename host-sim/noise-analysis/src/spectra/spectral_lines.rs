@@ -184,6 +184,7 @@ fn sidebands(peaks: &[spectra::SpectralLine], deviation: f64, duration_s: f64) -
         of_line: strongest.deviation.value / deviation,
         depth: MeasuredValue { value: over_line * mean, error: 0.5 * over_line * error },
         of_phase: false,
+        statistic: one.statistic + other.statistic,
     })
 }
 

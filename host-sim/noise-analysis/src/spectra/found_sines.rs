@@ -1,0 +1,192 @@
+//! The sinusoids that a search has taken out of a record, fitted together, and how the amplitude and the phase of each change.
+
+use super::line_envelope::{MOST_PERIODS, Modulation, is_same};
+use super::line_models::Sine;
+use super::whitened_spectrum::{Resonance, SpectralLine, sine_line};
+use crate::samples::uniform_series::UniformSeries;
+
+/// Fits of neighbouring sinusoids, one after the other: each leaves the part of the error that the taper passes from one to the next.
+const REFITS: usize = 3;
+/// Sinusoids that are closer, in resolutions, are one and a residue of it: the taper's lobe hides the phase between them.
+const LOBE: f64 = 2.5;
+/// On the skirts of a resonance, within so many of its widths, the noise is not white.
+pub(super) const SKIRTS: f64 = 20.0;
+
+/// In the order in which they were taken.
+#[derive(Default)]
+pub(super) struct FoundSines {
+    found: Vec<FoundSine>,
+}
+
+/// One of them.
+#[derive(Clone)]
+struct FoundSine {
+    line: SpectralLine,
+    sine: Sine,
+    /// Of the noise around it, unit²/Hz.
+    density: f64,
+}
+
+impl FoundSines {
+    pub(super) fn len(&self) -> usize {
+        self.found.len()
+    }
+
+    /// Takes a sinusoid, a `line` of the spectrum, out of the `series`. Returns what is left, of the sinusoids near it too.
+    pub(super) fn take(&mut self, line: SpectralLine, sine: Sine, series: &UniformSeries) -> UniformSeries {
+        let density = 2.0 * sine.density(series) / line.statistic;
+        self.found.push(FoundSine { line, sine, density });
+        self.refit_near_the_last(sine.subtracted_from(series))
+    }
+
+    /// Takes the two sidebands of a sinusoid out of the `series`, if a change of that sinusoid is likelier than the `resonance`: two lines at
+    /// equal distances from a third that was taken are a band around it. Returns what is left.
+    pub(super) fn take_sidebands(&mut self, resonance: &SpectralLine, series: &UniformSeries) -> Option<UniformSeries> {
+        let duration = series.duration();
+        let is_in_band = |found: &&FoundSine| {
+            let distance = (found.sine.frequency - resonance.frequency.value).abs() * duration;
+            is_on_skirts(&found.sine, resonance) && distance <= MOST_PERIODS as f64
+        };
+        let strongest =
+            self.found.iter().filter(is_in_band).max_by(|a, b| a.line.statistic.total_cmp(&b.line.statistic))?.clone();
+        let change = Modulation::find(&strongest.sine, series, strongest.density, |_| true)?;
+        if change.statistic < resonance.statistic {
+            return None;
+        }
+        let mut left = series.clone();
+        for distance in [-change.frequency.value, change.frequency.value] {
+            let sine = Sine::fit_near(&left, strongest.sine.frequency + distance, 0.5 / duration);
+            let ratio = sine.density(&left) / strongest.density;
+            left = self.take(sine_line(&sine, duration, ratio, resonance.p_value), sine, &left);
+        }
+        Some(left)
+    }
+
+    /// Fits the last sinusoid and those near it again, each to the record without the others, of which `rest` is left: one that was fitted
+    /// before the others were known has part of them, and leaves part of itself. Returns what is left then.
+    fn refit_near_the_last(&mut self, mut rest: UniformSeries) -> UniformSeries {
+        let duration = rest.duration();
+        let Some((last, others)) = self.found.split_last_mut() else { return rest };
+        let frequency = last.sine.frequency;
+        let mut near: Vec<&mut FoundSine> = others
+            .iter_mut()
+            .filter(|of| of.is_near(frequency, duration) && (of.sine.frequency - frequency).abs() * duration > LOBE)
+            .collect();
+        if near.is_empty() {
+            return rest;
+        }
+        near.push(last);
+        for _ in 0..REFITS {
+            for found in &mut near {
+                let with_it = found.sine.negative().subtracted_from(&rest);
+                found.sine = Sine::fit_near(&with_it, found.sine.frequency, 0.5 / duration);
+                let ratio = found.sine.density(&with_it) / found.density;
+                found.line = sine_line(&found.sine, duration, ratio, found.line.p_value);
+                rest = found.sine.subtracted_from(&with_it);
+            }
+        }
+        rest
+    }
+
+    /// The lines, each with the way in which it changes over the record of which `rest` is left, without those that are sidebands of
+    /// another.
+    pub(super) fn into_lines(self, rest: &UniformSeries, resonances: &[Resonance]) -> Vec<SpectralLine> {
+        let Self { mut found } = self;
+        let duration = rest.duration();
+        let mut at = 0;
+        while let Some(line) = found.get(at) {
+            let frequency = line.sine.frequency;
+            let distance = |other: &FoundSine| other.sine.frequency - frequency;
+            let is_near = |other: &&FoundSine| other.is_near(frequency, duration) && other.is_weaker_than(line);
+            let near: Vec<&FoundSine> = found.iter().filter(is_near).collect();
+            let with_near = near.iter().fold(rest.clone(), |rest, other| other.sine.negative().subtracted_from(&rest));
+            let has_line = |of: f64| near.iter().any(|other| is_same(distance(other).abs(), of, duration));
+            let is_examined = !resonances.iter().any(|resonance| is_on_skirts(&line.sine, &resonance.line));
+            let change = Modulation::find(&line.sine, &with_near, line.density, has_line).filter(|_| is_examined);
+            found[at].line.modulation = change;
+            if let Some(change) = change {
+                let deviation = found[at].line.deviation.value;
+                let is_sideband = |other: &FoundSine| {
+                    let distance = other.sine.frequency - frequency;
+                    other.line.deviation.value < deviation && change.is_sideband(distance, duration)
+                };
+                let before = found[..at].iter().filter(|other| is_sideband(other)).count();
+                found.retain(|other| !is_sideband(other));
+                at -= before;
+            }
+            at += 1;
+        }
+        found.into_iter().map(|found| found.line).collect()
+    }
+}
+
+impl FoundSine {
+    /// Whether it is another line than one at `frequency`, Hz, in a record of `duration` s, and may be a sideband of that.
+    fn is_near(&self, frequency: f64, duration: f64) -> bool {
+        (1.0..=MOST_PERIODS as f64 + 1.0).contains(&((self.sine.frequency - frequency).abs() * duration))
+    }
+
+    fn is_weaker_than(&self, other: &Self) -> bool {
+        self.line.deviation.value < other.line.deviation.value
+    }
+}
+
+/// Whether a sinusoid is within [`SKIRTS`] of a resonance.
+fn is_on_skirts(sine: &Sine, resonance: &SpectralLine) -> bool {
+    let distance = (resonance.frequency.value - sine.frequency).abs();
+    resonance.width.is_some_and(|width| distance < SKIRTS * width.value)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::samples::uniform_series::UniformSeries;
+    use crate::spectra::find_lines;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use std::f64::consts::TAU;
+
+    /// 400 s at 50 Hz: white noise of deviation 1 and a sine of this amplitude at 7.3 Hz, which swells and fades by half so many times.
+    fn series(seed: u64, amplitude: f64, changes: f64) -> UniformSeries {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let value = |at: u32| {
+            let turns = f64::from(at) / 20_000.0;
+            let envelope = amplitude * (1.0 + 0.5 * (TAU * changes * turns).sin());
+            envelope * (TAU * 7.3 * 400.0 * turns).sin() + random.sample::<f64, _>(StandardNormal)
+        };
+        UniformSeries::new(0.02, (0..20_000).map(value).collect())
+    }
+
+    /// Sidebands of a quarter of the line, 4 to 9 resolutions away, together have a larger statistic than one of them: 20,000/2·0.3²/16, 56,
+    /// each at an amplitude of 0.3, and 6,000 at 3.
+    #[test]
+    fn two_sidebands_near_a_line_are_a_change_of_it_and_no_band() {
+        for seed in 1..=6 {
+            for (changes, amplitude) in [(4.2, 1.0), (5.6, 3.0), (7.3, 0.3)] {
+                let found = find_lines(&series(seed, amplitude, changes));
+                let [line] = found.as_slice() else { panic!("{changes} {amplitude}: {found:?}") };
+                let change = line.modulation.expect("56 times the noise or more");
+                assert_eq!((line.width, change.of_phase), (None, false));
+                assert!((change.frequency.value * 400.0 - changes).abs() < 0.3, "{changes}: {change:?}");
+                // Of a statistic of 112 the depth is known to 10 %.
+                assert!((change.depth.value - 0.5).abs() < 0.15, "{changes}: {change:?}");
+            }
+        }
+    }
+
+    /// Two sines three resolutions apart, which one fit after the other takes for one at their mean: 0.1 resolutions off.
+    #[test]
+    fn neighbours_are_fitted_together() {
+        let value = |at: u32| {
+            let turns = f64::from(at) / 20_000.0;
+            (TAU * 2_920.0 * turns).sin() + 0.7 * (TAU * 2_923.1 * turns).cos()
+        };
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let noisy = (0..20_000).map(|at| value(at) + 0.1 * random.sample::<f64, _>(StandardNormal));
+        let mut found = find_lines(&UniformSeries::new(0.02, noisy.collect()));
+        found.truncate(2);
+        found.sort_by(|a, b| a.frequency.value.total_cmp(&b.frequency.value));
+        let [low, high] = [&found[0], &found[1]].map(|line| line.frequency.value * 400.0);
+        assert!((low - 2_920.0).abs() < 0.02 && (high - 2_923.1).abs() < 0.02, "{low} {high}");
+    }
+}
