@@ -26,6 +26,9 @@ const FEWEST_CHANGES: usize = 100;
 /// Largest `p`: 0.683 of noise of half a count around a whole one. Of smaller noise a bias between two counts decides how often it is
 /// equal.
 const MOST_EQUAL: f64 = 0.69;
+/// Largest part of the changes that are by one count: 0.918 of noise of half a count around the middle between two, 0.895 around a whole one.
+/// Of smaller noise it is larger wherever the bias is, also where that wanders from one count to the next and `p` is a mean.
+const MOST_BY_ONE: f64 = 0.92;
 /// Fewest samples of a run.
 const FEWEST_SAMPLES: f64 = 3.0;
 
@@ -218,11 +221,18 @@ struct Change {
     /// Whether the sample a lag after it is equal to it. However long a channel is stuck, there are no more such changes than a lag has
     /// samples.
     is_kept: bool,
+    /// Whether it differs by one count.
+    is_by_one: bool,
 }
 
 fn changes(counts: &[i32], lag: usize) -> impl Iterator<Item = Change> + '_ {
     let changed = counts.windows(2 * lag + 1).enumerate().filter(move |(_, of)| of[0] != of[lag]);
-    changed.map(move |(position, of)| Change { position, count: of[lag], is_kept: of[lag] == of[2 * lag] })
+    changed.map(move |(position, of)| Change {
+        position,
+        count: of[lag],
+        is_kept: of[lag] == of[2 * lag],
+        is_by_one: of[lag].abs_diff(of[0]) == 1,
+    })
 }
 
 /// The part of some changes that are followed by an equal sample: a probability of which nothing was seen is one of so many. `None`
@@ -266,6 +276,8 @@ fn shortest_run(counts: &[i32], lag: usize, samples: u64) -> Option<u64> {
     by_count.sort_unstable_by_key(|change| change.count);
     let of_counts = by_count.chunk_by(|one, other| one.count == other.count).filter_map(share);
     let most = of_counts.chain(of_all).reduce(f64::max)?;
+    let share_by_one = by_count.iter().filter(|change| change.is_by_one).count() as f64 / by_count.len() as f64;
     let independent = 1.0 + (SIGNIFICANCE / samples as f64).ln() / most.ln();
-    (most < MOST_EQUAL).then(|| (lag as f64 * independent).ceil().max(FEWEST_SAMPLES) as u64)
+    let is_decidable = most < MOST_EQUAL && share_by_one < MOST_BY_ONE;
+    is_decidable.then(|| (lag as f64 * independent).ceil().max(FEWEST_SAMPLES) as u64)
 }
