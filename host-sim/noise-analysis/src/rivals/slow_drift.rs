@@ -7,8 +7,8 @@ use crate::spectra::common_mode::CrossSpectra;
 use measurement::ChannelId;
 
 /// Smallest gain in ln likelihood of a common-mode drift. Three channels can share a drift in 10 ways, each with a few
-/// distinct correlation times; a gain of 9 in one of them leaves a probability of about 1 in 500 by chance.
-const MIN_GAIN: f64 = 9.0;
+/// distinct correlation times; chance gives a gain of 11.3 in one of them with a probability of about 10·1.6·exp(−11.3), 2·10⁻⁴.
+const MIN_GAIN: f64 = 11.3;
 
 /// Drift that several channels of one quantity have in common, without a measured cause.
 pub(crate) struct ChannelsInCommon {

@@ -32,12 +32,13 @@ pub(super) fn time_constants(shortest: f64, longest: f64) -> impl Iterator<Item 
 
 /// The likeliest process of `fits` of several time constants, with bounds, and its gain over the objective `without` it.
 pub(super) fn most_likely(fits: &[MarkovFit], without: f64) -> Option<MarkovEstimate> {
-    let likeliest = fits.iter().min_by(|a, b| a.objective.total_cmp(&b.objective))?;
+    let likeliest = fits.iter().min_by(|a, b| a.objective.total_cmp(&b.objective)).filter(|of| of.variance > 0.0)?;
     // Mean and standard deviation over all time constants, weighted by their likelihood: in a record of few correlation
-    // times, time constant and variance are uncertain together.
+    // times, time constant and variance are uncertain together. Those without a variance have no process.
+    let with_process = fits.iter().filter(|fit| fit.variance > 0.0);
     let weighted = |value: &dyn Fn(&MarkovFit) -> f64| {
         let mean = |of: &dyn Fn(f64) -> f64| {
-            let (sum, total) = fits.iter().fold((0.0, 0.0), |(sum, total), fit| {
+            let (sum, total) = with_process.clone().fold((0.0, 0.0), |(sum, total), fit| {
                 let weight = (likeliest.objective - fit.objective).exp();
                 (sum + weight * of(value(fit)), total + weight)
             });
@@ -47,7 +48,7 @@ pub(super) fn most_likely(fits: &[MarkovFit], without: f64) -> Option<MarkovEsti
         (middle, mean(&|value| (value - middle).powi(2)).sqrt())
     };
     let (time, of_time) = weighted(&|fit| fit.time.ln());
-    let (deviation, of_deviation) = weighted(&|fit| 0.5 * fit.variance.max(f64::MIN_POSITIVE).ln());
+    let (deviation, of_deviation) = weighted(&|fit| 0.5 * fit.variance.ln());
     let (alone, _) = weighted(&|fit| 0.5 * fit.error);
     Some(MarkovEstimate {
         deviation: bounded(likeliest.variance.sqrt(), (deviation, of_deviation.hypot(alone))),
@@ -82,5 +83,26 @@ impl MarkovFit {
         let fractions = bases.iter().map(|basis| basis[process] * variance / mixture_density(basis, &densities));
         let information: f64 = fractions.zip(bands).map(|(fraction, band)| band.ordinates * fraction * fraction).sum();
         Self { time, variance, error: information.max(LEAST_INFORMATION).sqrt().recip(), objective }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MarkovFit, most_likely};
+
+    /// Of ten time constants those from 8 s on leave no variance for the process, and are e⁻⁹ times as likely: they say nothing of its size.
+    #[test]
+    fn time_constants_without_a_process_do_not_widen_its_bounds() {
+        let fit = |at: i32| MarkovFit {
+            time: f64::from(1 << at),
+            variance: if at < 3 { 4.0 } else { 0.0 },
+            error: 0.1,
+            objective: if at < 3 { 0.0 } else { 9.0 },
+        };
+        let found = most_likely(&(0..10).map(fit).collect::<Vec<_>>(), 9.0).expect("a gain of 9");
+        // The variance is known to 10 % at each time constant, and so the deviation to 5 %.
+        let [low, high] = [found.deviation.low, found.deviation.high].map(|bound| (bound / 2.0).ln() / 1.96);
+        assert!((low + 0.05).abs() < 1e-3 && (high - 0.05).abs() < 1e-3, "{found:?}");
+        assert_eq!(most_likely(&[fit(5)], 9.0), None);
     }
 }
