@@ -17,6 +17,11 @@ const PARTS: [usize; 3] = [256, 1024, 4096];
 const RESOLVED: f64 = 20.0;
 /// Least gain of the two levels in ln likelihood. A larger one has a probability below e⁻¹² where there are none.
 const LEAST_GAIN: f64 = 12.0;
+/// Parts of a record in which two levels are compared with a Gaussian process, at most: 3,000 correlation times.
+const COMPARED_PARTS: usize = 1 << 16;
+/// How many times as likely a Gaussian process is as a telegraph signal, where it is named: a probability of 95 % where the two are as
+/// frequent.
+pub(crate) const TOLD_APART: f64 = 19.0;
 /// Fewest jumps; one or two are steps of the bias.
 const FEWEST_JUMPS: f64 = 6.0;
 /// Least correlation time, in parts.
@@ -55,6 +60,18 @@ pub(crate) fn find(series: &UniformSeries, unit: &'static str, correlation_times
         }
     }
     found
+}
+
+/// Whether a Gaussian process is [`TOLD_APART`] times as likely as two levels, both with about this standard deviation and this correlation
+/// time, in s.
+#[must_use]
+pub(crate) fn is_gaussian(series: &UniformSeries, deviation: f64, time_constant: f64) -> bool {
+    let size = ((time_constant / RESOLVED / series.sample_period()) as usize).max(1);
+    let mut means = PartMeans::new(series, size).means;
+    means.truncate(COMPARED_PARTS);
+    let steps = time_constant / (size as f64 * series.sample_period());
+    let Some(levels) = TwoStateChain::fit_near(&means, deviation, steps) else { return false };
+    gauss_markov_log_likelihood(&means) - levels.log_likelihood > TOLD_APART.ln()
 }
 
 /// Whether a series changes upwards as it changes downwards, as random telegraph noise and every Gaussian process do, over a
@@ -307,5 +324,22 @@ mod tests {
         }
         assert_eq!(find(&UniformSeries::new(PERIOD_S, vec![1.0; 10]), "g", &[]), None);
         assert_eq!(find(&UniformSeries::new(PERIOD_S, vec![1.0; 10_000]), "g", &[]), None);
+    }
+
+    /// A process of 0.4 of the white noise of a sample, over 400 to 4,000 correlation times: the kurtosis of its curve is known to 0.2 at best.
+    #[test]
+    fn two_levels_are_told_from_a_gaussian_process_of_the_same_spectrum() {
+        for time in [0.1, 0.3, 1.0] {
+            for seed in 0..5 {
+                let kept = (-PERIOD_S / time).exp();
+                let mut state = 0.0;
+                let markov = move |random: &mut ChaCha8Rng, _| {
+                    state = kept * state + 0.4 * (1.0 - kept * kept).sqrt() * random.sample::<f64, _>(StandardNormal);
+                    state
+                };
+                assert!(is_gaussian(&series(seed, markov), 0.4, time), "{time} {seed}");
+                assert!(!is_gaussian(&series(seed, telegraph(0.8, time)), 0.4, time), "{time} {seed}");
+            }
+        }
     }
 }

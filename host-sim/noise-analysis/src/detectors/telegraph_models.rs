@@ -60,30 +60,52 @@ impl TwoStateChain {
         let lower = present[..half].iter().map(|value| around((value, levels[0])));
         let upper = present[half..].iter().map(|value| around((value, levels[1])));
         let variance = lower.chain(upper).sum::<f64>() / present.len() as f64;
-        let mut chain = Self {
+        Self::new(levels, variance, FIRST_JUMP).climbed(values, least)
+    }
+
+    /// The likeliest chain, sought from two levels with a standard deviation and a correlation time, in steps, that are known in some way:
+    /// where they are closer than the noise, it does not show them by its halves.
+    pub(super) fn fit_near(values: &[f64], deviation: f64, steps: f64) -> Option<Self> {
+        let present = || values.iter().copied().filter(|value| value.is_finite());
+        let count = present().count() as f64;
+        let mean = present().sum::<f64>() / count;
+        let variance = present().map(|value| (value - mean).powi(2)).sum::<f64>() / count;
+        let deviation = deviation.min((0.5 * variance).sqrt());
+        let leave = (0.5 / steps).min(FIRST_JUMP);
+        let start = Self::new([mean - deviation, mean + deviation], variance - deviation * deviation, leave);
+        start.climbed(values, f64::NEG_INFINITY)
+    }
+
+    /// Two equally frequent levels before they are fitted.
+    fn new(levels: [f64; 2], variance: f64, leave: f64) -> Self {
+        Self {
             levels,
             variance,
-            leave: [FIRST_JUMP; 2],
+            leave: [leave; 2],
             log_likelihood: f64::NEG_INFINITY,
             jumps: 0.0,
             time_error: 0.0,
             distance_error: 0.0,
-        };
+        }
+    }
+
+    /// The chain after the steps of the expectation maximisation; `None` if the ln likelihood does not come near `least`.
+    fn climbed(mut self, values: &[f64], least: f64) -> Option<Self> {
         for _ in 0..ROUNDS {
-            if chain.variance <= 0.0 {
+            if self.variance <= 0.0 {
                 return None;
             }
-            let statistics = chain.expectation(values);
-            let gained = statistics.log_likelihood - chain.log_likelihood;
-            chain.maximise(&statistics);
-            if chain.log_likelihood + LATER_GAINS * gained < least {
+            let statistics = self.expectation(values);
+            let gained = statistics.log_likelihood - self.log_likelihood;
+            self.maximise(&statistics);
+            if self.log_likelihood + LATER_GAINS * gained < least {
                 return None;
             }
             if gained < SETTLED {
                 break;
             }
         }
-        (chain.log_likelihood >= least).then_some(chain)
+        (self.log_likelihood >= least).then_some(self)
     }
 
     /// Sets the likeliest parameters for these expected statistics.

@@ -3,7 +3,7 @@
 
 use crate::OCTAVES;
 use crate::bounds::{BoundedEstimate, ChannelEstimate};
-use crate::detectors::random_telegraph::is_reversible;
+use crate::detectors::random_telegraph::{self, TOLD_APART, is_reversible};
 use crate::effects::findings::SIGNIFICANCE;
 use crate::effects::{
     AccelerationSensitivity, AngleQuantization, BandMismatch, CommonMode, CurveEvidence, Effect, FirstOrderFilter,
@@ -43,10 +43,6 @@ const WIDEST_BAND: f64 = 2.0;
 /// signal that is at one level for a part `p` of the time has `(1/(p·(1−p)) − 2)/2` times as much at averaging times below its
 /// time constant: 1.5 for 28 %. The samples themselves show less even ones.
 const LARGEST_KURTOSIS_RATIO: f64 = 1.5;
-/// How many times as likely a Gaussian process is as a telegraph signal, where it is named: a probability of 95 % where the two are as
-/// frequent.
-const TOLD_APART: f64 = 19.0;
-
 /// What was found in a channel over the whole record.
 pub(crate) struct ChannelFindings<'a> {
     pub channel: ChannelProfile,
@@ -173,7 +169,9 @@ fn markov_effects(
             effects.push(unexplained(Refutation::RareDisturbances { time_constant_s, kurtosis }));
         } else if of.is_telegraph() {
             effects.push(telegraph_effect(term, &of, curve, unit));
-        } else if !is_gaussian(&of) {
+        } else if !is_gaussian(&of)
+            && !rest.is_some_and(|rest| random_telegraph::is_gaussian(rest, term.value, time_constant_s))
+        {
             effects.push(unexplained(Refutation::UndecidedLevels { time_constant_s, kurtosis }));
         }
     }
@@ -320,7 +318,7 @@ fn sensitivity_proposals(
     sensitivities: &[(ChannelProfile, Sensitivity)],
 ) -> Vec<Proposal> {
     let origin = |(regressor, of): &(ChannelProfile, Sensitivity)| Origin::Covariate {
-        is_plausible: is_plausible(profile, channel, regressor.quantity, of),
+        is_plausible: is_plausible(profile, channel, regressor.quantity, of.bounds()),
     };
     let own = |covariate: &(ChannelProfile, Sensitivity)| {
         Some(Proposal::new(sensitivity_effect(channel, covariate)?, origin(covariate)))
@@ -353,20 +351,17 @@ fn sensitivity_effect(channel: ChannelProfile, (regressor, of): &(ChannelProfile
     }
 }
 
-/// Whether a sensitivity of a channel is more probably one of the sensor's than not, by what is known of the sensor: its value, the
-/// middle of its interval, is within the largest plausible multiple of the data sheet's, or the interval includes zero.
+/// Whether a sensitivity of a channel may be one of the sensor's, by what is known of the sensor: its interval, from `low` to `high`, has
+/// values within the largest plausible multiple of the data sheet's.
 fn is_plausible(
     profile: &SensorProfile,
     channel: ChannelProfile,
     regressor: Quantity,
-    sensitivity: &Sensitivity,
+    (low, high): (f64, f64),
 ) -> bool {
-    let (low, high) = sensitivity.bounds();
+    let least = if low * high > 0.0 { low.abs().min(high.abs()) } else { 0.0 };
     let typical = channel.sensitivities.to(regressor);
-    let includes_zero = low * high <= 0.0;
-    typical.is_none_or(|typical| {
-        includes_zero || sensitivity.value.abs() <= profile.largest_sensitivity_multiple * typical
-    })
+    typical.is_none_or(|typical| least <= profile.largest_sensitivity_multiple * typical)
 }
 
 /// Drift that a channel shares with another one, too large to be caused by what that one measures.
@@ -466,8 +461,24 @@ fn common_mode_effect(common: &ChannelsInCommon, channel: ChannelProfile, unit: 
 
 #[cfg(test)]
 mod tests {
-    use super::is_gaussian;
+    use super::{is_gaussian, is_plausible};
     use allan_core::telegraph::KurtosisRatio;
+    use measurement::Quantity;
+    use measurement::adis16405;
+
+    /// The data sheet has 0.01 °/s/°C for the gyroscopes: 0.316 is 31.6 times as much.
+    #[test]
+    fn a_sensitivity_is_refuted_where_its_interval_excludes_what_is_plausible() {
+        let profile = adis16405::profile(0.05);
+        let gyro = *profile.channels.iter().find(|of| of.name == "gyro_x").unwrap();
+        let is_plausible = |low, high| is_plausible(&profile, gyro, Quantity::Temperature, (low, high));
+        for (low, high) in [(0.29, 0.31), (0.30, 0.38), (-0.2, 2.2)] {
+            assert!(is_plausible(low, high) && is_plausible(-high, -low), "{low} … {high}");
+        }
+        for (low, high) in [(0.32, 0.36), (0.4, 1.6)] {
+            assert!(!is_plausible(low, high) && !is_plausible(-high, -low), "{low} … {high}");
+        }
+    }
 
     /// The ratio of two normal densities of one deviation, written out.
     #[test]

@@ -153,7 +153,7 @@ pub static RIVALRIES: [Rivalry; 45] = [
                 .is_some_and(|levels| least(motion.size.estimate()) < levels.amplitude.value),
             _ => false,
         })),
-    row("sensitivity", "shared drift", "no larger than the largest plausible multiple of the data sheet's, or not told from 0",
+    row("sensitivity", "shared drift", "its interval has values within the largest plausible multiple of the data sheet's",
         "the sensor is known to have it",
         Rule::Channel(|of| matches!((of.origin(), of.effect()),
             (Origin::Covariate { is_plausible: true, .. }, Effect::SharedDrift(_))))),
@@ -203,7 +203,7 @@ pub static RIVALRIES: [Rivalry; 45] = [
         Rule::Channel(|of| is_by_kurtosis(of.effect()) && of.term().is_some() && of.others().any(|other|
             matches!(other.effect, Effect::TelegraphNoise(_)) && other.term().is_some_and(|term| Some(term) < of.term())))),
     row("telegraph noise or an unexplained octave by the kurtosis", "Markov process of the curve",
-        "the kurtosis is nearer to that of two levels, or is not 19 times as likely that of a Gaussian process",
+        "the kurtosis is nearer to that of two levels, or neither it nor the samples are 19 times as likely of a Gaussian process",
         "a Gaussian process has no excess kurtosis",
         Rule::Channel(|of| of.loses_to(is_by_kurtosis))),
     row("first unexplained octave", "further ones", "always, except for lines", "of one thing that has no name the clearest octave is enough",
