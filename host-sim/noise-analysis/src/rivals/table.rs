@@ -153,7 +153,7 @@ pub static RIVALRIES: [Rivalry; 45] = [
                 .is_some_and(|levels| least(motion.size.estimate()) < levels.amplitude.value),
             _ => false,
         })),
-    row("sensitivity", "shared drift", "its interval has values within the largest plausible multiple of the data sheet's",
+    row("sensitivity", "shared drift", "no larger than the largest plausible multiple of the data sheet's, or not told from 0",
         "the sensor is known to have it",
         Rule::Channel(|of| matches!((of.origin(), of.effect()),
             (Origin::Covariate { is_plausible: true, .. }, Effect::SharedDrift(_))))),
