@@ -34,7 +34,11 @@ impl FoundSines {
 
     /// Takes a sinusoid, a `line` of the spectrum, out of the `series`. Returns what is left, of the sinusoids near it too.
     pub(super) fn take(&mut self, line: SpectralLine, sine: Sine, series: &UniformSeries) -> UniformSeries {
-        let density = 2.0 * sine.density(series) / line.statistic;
+        self.take_over(2.0 * sine.density(series) / line.statistic, line, sine, series)
+    }
+
+    /// As [`take`](Self::take), over noise of a known density.
+    fn take_over(&mut self, density: f64, line: SpectralLine, sine: Sine, series: &UniformSeries) -> UniformSeries {
         self.found.push(FoundSine { line, sine, density });
         self.refit_near_the_last(sine.subtracted_from(series))
     }
@@ -56,8 +60,8 @@ impl FoundSines {
         let mut left = series.clone();
         for distance in [-change.frequency.value, change.frequency.value] {
             let sine = Sine::fit_near(&left, strongest.sine.frequency + distance, 0.5 / duration);
-            let ratio = sine.density(&left) / strongest.density;
-            left = self.take(sine_line(&sine, duration, ratio, resonance.p_value), sine, &left);
+            let line = sine_line(&sine, duration, sine.density(&left) / strongest.density, resonance.p_value);
+            left = self.take_over(strongest.density, line, sine, &left);
         }
         Some(left)
     }

@@ -1,9 +1,10 @@
 //! A slow periodic signal that is no sinusoid, by the sum of the harmonics of one frequency.
 //!
-//! A thermostat, a pump that comes on every minute, or a radio that draws on the supply every few seconds has harmonics each of which is
-//! too weak for a line of its own, or is one of a few that look like unrelated sinusoids. Together they stand out of the ordinates between them
-//! (the harmonic sum of pulsar searches: J. Taylor and G. Huguenin, "Two new pulsating radio sources", Nature 221, 1969). The noise is a
-//! sum of white and random-walk noise and of Markov processes, fitted to the ordinates between the harmonics.
+//! A thermostat, a pump that comes on every minute, or a radio that draws on the supply every few seconds has harmonics each of
+//! which is too weak for a line of its own, or is one of a few that look like unrelated sinusoids. Together they stand out of the
+//! ordinates between them (the harmonic sum of pulsar searches: J. Taylor and G. Huguenin, "Two new pulsating radio sources",
+//! Nature 221, 1969). The noise is a sum of white and random-walk noise and of Markov processes, fitted to the ordinates between
+//! the harmonics.
 
 use super::line_models::{Sine, transform_at};
 use super::periodogram::taper;
