@@ -170,13 +170,20 @@ fn markov_effects(
             effects.push(unexplained(Refutation::RareDisturbances { time_constant_s, kurtosis }));
         } else if of.is_telegraph() {
             effects.push(telegraph_effect(term, &of, curve, unit));
-        } else if !is_gaussian(&of)
-            && !rest.is_some_and(|rest| random_telegraph::is_gaussian(rest, term.value, time_constant_s))
-        {
+        } else if !is_gaussian(&of) && !are_samples_gaussian(findings, term, markov) {
             effects.push(unexplained(Refutation::UndecidedLevels { time_constant_s, kurtosis }));
         }
     }
     effects
+}
+
+/// Whether the samples of a channel say that a Markov term of its model is a Gaussian process and no two levels. They do not where anything
+/// else in them is correlated: a line, noise behind a filter or a second process are nearer to a Gaussian process than to levels.
+fn are_samples_gaussian(findings: &ChannelFindings, term: &FittedTerm, markov: Markov) -> bool {
+    let is_known = |other: &FittedTerm| other.kind == term.kind || NoiseTerm::BASELINE.contains(&other.kind);
+    let is_alone = findings.lines.is_none_or(<[_]>::is_empty) && findings.fit.after().terms().iter().all(is_known);
+    let is_gaussian = |rest| random_telegraph::is_gaussian(rest, term.value, markov.time_constant);
+    is_alone && findings.rest.is_some_and(is_gaussian)
 }
 
 /// Whether a kurtosis is [`TOLD_APART`] times as likely that of a Gaussian process, 0, as that of a telegraph signal, 1.
