@@ -275,8 +275,11 @@ impl ColumnSelection {
                     known: sensor.channels.iter().map(|channel| channel.name).collect::<Vec<_>>().join(", "),
                 })?,
             };
-            let position = available.iter().position(|column| column.name == *wanted);
-            let position = position
+            // By its name, or by its heading with the unit.
+            let by_name = available.iter().position(|column| column.name == *wanted);
+            let heading = AvailableColumn::from_heading(wanted);
+            let position = by_name
+                .or_else(|| available.iter().position(|column| *column == heading))
                 .ok_or_else(|| SelectionError::NoColumn { wanted: wanted.clone(), available: names(available) })?;
             if let Some((_, other)) = assigned.iter().find(|(known, _)| *known == role) {
                 let (one, other) = (available[*other].name.clone(), wanted.clone());
@@ -564,6 +567,15 @@ mod tests {
         let px4 = ["timestamp", "timestamp_sample", "x"];
         let expected = vec![("time us=1".to_owned(), 1.0), ("gyro_x=2".to_owned(), 1.0)];
         assert_eq!(chosen(&px4, &["gyro_x=x"], &["deg/s", "us"]).expect("columns"), expected);
+    }
+
+    #[test]
+    fn a_column_is_known_by_its_heading_too() {
+        let headings = ["time_s", "wx_dps", "wx [rad/s]"];
+        let expected = vec![("time s=0".to_owned(), 1.0), ("gyro_x=1".to_owned(), 1.0)];
+        assert_eq!(chosen(&headings, &["time=time_s", "gyro_x=wx_dps"], &[]).expect("columns"), expected);
+        let found = chosen(&headings, &["gyro_x=wx [rad/s]"], &[]).expect("columns");
+        assert_eq!(found[0].0, "gyro_x=2");
     }
 
     #[test]
