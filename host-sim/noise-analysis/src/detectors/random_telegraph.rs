@@ -226,6 +226,16 @@ mod tests {
         UniformSeries::new(PERIOD_S, (0..SAMPLES).map(value).collect())
     }
 
+    /// A Gaussian process of this standard deviation, with the correlation time `time_s`.
+    fn markov(deviation: f64, time_s: f64) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
+        let kept = (-PERIOD_S / time_s).exp();
+        let mut state = 0.0;
+        move |random, _| {
+            state = kept * state + deviation * (1.0 - kept * kept).sqrt() * random.sample::<f64, _>(StandardNormal);
+            state
+        }
+    }
+
     /// Two levels at a distance of `amplitude`, with the correlation time `time_s`.
     fn telegraph(amplitude: f64, time_s: f64) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
         let mut up = false;
@@ -304,12 +314,7 @@ mod tests {
             level += 0.02 * random.sample::<f64, _>(StandardNormal);
             level
         });
-        let mut state = 0.0;
-        let kept = (-PERIOD_S / 4.0f64).exp();
-        let markov = series(33, move |random, _| {
-            state = kept * state + (1.0 - kept * kept).sqrt() * random.sample::<f64, _>(StandardNormal);
-            state
-        });
+        let markov = series(33, markov(1.0, 4.0));
         // Disturbances of size 4 that begin at random, 25 s apart on average, and decay within 8 s.
         let mut height = 0.0;
         let decays = series(35, move |random, _| {
@@ -331,13 +336,7 @@ mod tests {
     fn two_levels_are_told_from_a_gaussian_process_of_the_same_spectrum() {
         for time in [0.1, 0.3, 1.0] {
             for seed in 0..5 {
-                let kept = (-PERIOD_S / time).exp();
-                let mut state = 0.0;
-                let markov = move |random: &mut ChaCha8Rng, _| {
-                    state = kept * state + 0.4 * (1.0 - kept * kept).sqrt() * random.sample::<f64, _>(StandardNormal);
-                    state
-                };
-                assert!(is_gaussian(&series(seed, markov), 0.4, time), "{time} {seed}");
+                assert!(is_gaussian(&series(seed, markov(0.4, time)), 0.4, time), "{time} {seed}");
                 assert!(!is_gaussian(&series(seed, telegraph(0.8, time)), 0.4, time), "{time} {seed}");
             }
         }

@@ -66,10 +66,8 @@ impl TwoStateChain {
     /// The likeliest chain, sought from two levels with a standard deviation and a correlation time, in steps, that are known in some way:
     /// where they are closer than the noise, it does not show them by its halves.
     pub(super) fn fit_near(values: &[f64], deviation: f64, steps: f64) -> Option<Self> {
-        let present = || values.iter().copied().filter(|value| value.is_finite());
-        let count = present().count() as f64;
-        let mean = present().sum::<f64>() / count;
-        let variance = present().map(|value| (value - mean).powi(2)).sum::<f64>() / count;
+        let Moments { count, mean, squares } = Moments::of(values);
+        let variance = squares / count;
         let deviation = deviation.min((0.5 * variance).sqrt());
         let leave = (0.5 / steps).min(FIRST_JUMP);
         let start = Self::new([mean - deviation, mean + deviation], variance - deviation * deviation, leave);
@@ -272,11 +270,26 @@ const STRONGEST: f64 = 1e7;
 const TRIED: usize = 9;
 const HALVED: usize = 9;
 
+/// Of the values that are present.
+struct Moments {
+    count: f64,
+    mean: f64,
+    /// Sum of the squared distances from the mean.
+    squares: f64,
+}
+
+impl Moments {
+    fn of(values: &[f64]) -> Self {
+        let present = values.iter().filter(|value| value.is_finite());
+        let (count, sum) = present.clone().fold((0.0, 0.0), |(count, sum), value| (count + 1.0, sum + value));
+        let mean = sum / count;
+        Self { count, mean, squares: present.map(|value| (value - mean).powi(2)).sum() }
+    }
+}
+
 /// ln likelihood of white Gaussian noise of any mean and variance.
 pub(super) fn white_log_likelihood(values: &[f64]) -> f64 {
-    let present = values.iter().filter(|value| value.is_finite());
-    let (count, sum) = present.clone().fold((0.0, 0.0), |(count, sum), value| (count + 1.0, sum + value));
-    let squares: f64 = present.map(|value| (value - sum / count).powi(2)).sum();
+    let Moments { count, squares, .. } = Moments::of(values);
     -0.5 * count * ((2.0 * PI * squares / count).ln() + 1.0)
 }
 

@@ -10,7 +10,7 @@ const REFITS: usize = 3;
 /// Sinusoids that are closer, in resolutions, are one and a residue of it: the taper's lobe hides the phase between them.
 const LOBE: f64 = 2.5;
 /// On the skirts of a resonance, within so many of its widths, the noise is not white.
-pub(super) const SKIRTS: f64 = 20.0;
+const SKIRTS: f64 = 20.0;
 
 /// In the order in which they were taken.
 #[derive(Default)]
@@ -48,8 +48,8 @@ impl FoundSines {
     pub(super) fn take_sidebands(&mut self, resonance: &SpectralLine, series: &UniformSeries) -> Option<UniformSeries> {
         let duration = series.duration();
         let is_in_band = |found: &&FoundSine| {
-            let distance = (found.sine.frequency - resonance.frequency.value).abs() * duration;
-            is_on_skirts(&found.sine, resonance) && distance <= MOST_PERIODS as f64
+            is_on_skirts(found.sine.frequency, resonance)
+                && found.resolutions_from(resonance.frequency.value, duration) <= MOST_PERIODS as f64
         };
         let strongest =
             self.found.iter().filter(is_in_band).max_by(|a, b| a.line.statistic.total_cmp(&b.line.statistic))?.clone();
@@ -74,7 +74,7 @@ impl FoundSines {
         let frequency = last.sine.frequency;
         let mut near: Vec<&mut FoundSine> = others
             .iter_mut()
-            .filter(|of| of.is_near(frequency, duration) && (of.sine.frequency - frequency).abs() * duration > LOBE)
+            .filter(|of| of.is_near(frequency, duration) && of.resolutions_from(frequency, duration) > LOBE)
             .collect();
         if near.is_empty() {
             return rest;
@@ -100,13 +100,14 @@ impl FoundSines {
         let mut at = 0;
         while let Some(line) = found.get(at) {
             let frequency = line.sine.frequency;
-            let distance = |other: &FoundSine| other.sine.frequency - frequency;
             let is_near = |other: &&FoundSine| other.is_near(frequency, duration) && other.is_weaker_than(line);
             let near: Vec<&FoundSine> = found.iter().filter(is_near).collect();
             let with_near = near.iter().fold(rest.clone(), |rest, other| other.sine.negative().subtracted_from(&rest));
-            let has_line = |of: f64| near.iter().any(|other| is_same(distance(other).abs(), of, duration));
-            let is_examined = !resonances.iter().any(|resonance| is_on_skirts(&line.sine, &resonance.line));
-            let change = Modulation::find(&line.sine, &with_near, line.density, has_line).filter(|_| is_examined);
+            let distance = |other: &FoundSine| (other.sine.frequency - frequency).abs();
+            let has_line = |of: f64| near.iter().any(|other| is_same(distance(other), of, duration));
+            let is_examined = !resonances.iter().any(|resonance| is_on_skirts(frequency, &resonance.line));
+            let find = || Modulation::find(&line.sine, &with_near, line.density, has_line);
+            let change = if is_examined { find() } else { None };
             found[at].line.modulation = change;
             if let Some(change) = change {
                 let deviation = found[at].line.deviation.value;
@@ -127,7 +128,12 @@ impl FoundSines {
 impl FoundSine {
     /// Whether it is another line than one at `frequency`, Hz, in a record of `duration` s, and may be a sideband of that.
     fn is_near(&self, frequency: f64, duration: f64) -> bool {
-        (1.0..=MOST_PERIODS as f64 + 1.0).contains(&((self.sine.frequency - frequency).abs() * duration))
+        (1.0..=MOST_PERIODS as f64 + 1.0).contains(&self.resolutions_from(frequency, duration))
+    }
+
+    /// Its distance from a frequency, Hz, in resolutions of a record of `duration` s.
+    fn resolutions_from(&self, frequency: f64, duration: f64) -> f64 {
+        (self.sine.frequency - frequency).abs() * duration
     }
 
     fn is_weaker_than(&self, other: &Self) -> bool {
@@ -135,9 +141,9 @@ impl FoundSine {
     }
 }
 
-/// Whether a sinusoid is within [`SKIRTS`] of a resonance.
-fn is_on_skirts(sine: &Sine, resonance: &SpectralLine) -> bool {
-    let distance = (resonance.frequency.value - sine.frequency).abs();
+/// Whether a frequency, Hz, is on the skirts of a resonance; `false` for a line without a width.
+pub(super) fn is_on_skirts(frequency: f64, resonance: &SpectralLine) -> bool {
+    let distance = (resonance.frequency.value - frequency).abs();
     resonance.width.is_some_and(|width| distance < SKIRTS * width.value)
 }
 

@@ -7,7 +7,7 @@
 //! [itself](super::alternation).
 
 use super::alternation::Alternation;
-use super::found_sines::{FoundSines, SKIRTS};
+use super::found_sines::{FoundSines, is_on_skirts};
 use super::line_models::Sine;
 use super::periodogram::{PADDING, Periodogram};
 use super::whitened_spectrum::{
@@ -21,7 +21,7 @@ use std::f64::consts::{LN_2, PI};
 pub(super) const MOST: usize = 6;
 /// Largest number of resonances that are refitted when one is added: each refit fits the background of the whole spectrum.
 const REFITTED: usize = 2;
-/// Least part of a line's statistic in that of a resonance on whose [skirts](SKIRTS) it lies: a weaker one is a residue of that.
+/// Least part of a line's statistic in that of a resonance on whose skirts it lies: a weaker one is a residue of that.
 const RESIDUE: f64 = 0.02;
 
 /// Fewest periods of a sinusoid in a record, where it is all of the slow variation.
@@ -219,10 +219,8 @@ fn part_left(series: &UniformSeries, sine: &Sine, slow: f64) -> Option<f64> {
 
 /// Whether `line` is what the fit of a far stronger resonance has left on its skirts.
 fn is_residue(line: &SpectralLine, strong: &SpectralLine) -> bool {
-    strong.width.is_some_and(|width| {
-        let distance = (line.frequency.value - strong.frequency.value).abs();
-        distance > 0.0 && distance < SKIRTS * width.value && line.statistic < RESIDUE * strong.statistic
-    })
+    let (own, other) = (line.frequency.value, strong.frequency.value);
+    own != other && is_on_skirts(own, strong) && line.statistic < RESIDUE * strong.statistic
 }
 
 /// A record with its spectrum.
