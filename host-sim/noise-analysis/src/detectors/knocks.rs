@@ -6,8 +6,8 @@
 //! others are tested in that stretch alone.
 
 use super::noise_levels::{
-    DIFFERENCES, HALF_EFFICIENCY, NEIGHBOURS, SquaredDifferences, TRIMMED_MEAN, averaging_factors, doublings,
-    exceedance, freedom_by_scatter, longer_levels, median, neighbouring_level, neighbours_freedom,
+    DIFFERENCES, HALF_EFFICIENCY, LevelScatter, NEIGHBOURS, SquaredDifferences, TRIMMED_MEAN, Wandering,
+    averaging_factors, doublings, exceedance, longer_levels, median, neighbouring_level, neighbours_freedom,
 };
 use super::spikes::Disturbance;
 use crate::bounds::BoundedEstimate;
@@ -79,11 +79,12 @@ struct Scale {
     freedoms: Vec<BlockFreedom>,
 }
 
-/// Degrees of freedom of the level of a block, and of that of its neighbours.
+/// Degrees of freedom of the level of a block, and of that of its neighbours, and how it moves by itself.
 #[derive(Debug, Clone, Copy)]
 struct BlockFreedom {
     block: f64,
     neighbours: f64,
+    wandering: Option<Wandering>,
 }
 
 /// A block that is too loud.
@@ -129,14 +130,23 @@ impl KnockRule {
         for n in averaging_factors(series.period_s) {
             let differences = SquaredDifferences::new(series, n);
             let levels = differences.levels();
+            let noise = differences.freedom();
             let mut freedoms: Vec<BlockFreedom> = Vec::new();
             for doublings in doublings(&differences, series.period_s) {
                 let longer = longer_levels(&levels, doublings);
-                let by_length = freedoms.last().map_or_else(|| differences.freedom(), |freedom| 2.0 * freedom.block);
-                let block = freedom_by_scatter(&longer).map_or(by_length, |freedom| freedom.min(by_length));
+                let of_noise = noise * f64::from(1_u32 << doublings);
+                let by_length = freedoms.last().map_or(noise, |freedom| 2.0 * freedom.block);
+                let scatter = LevelScatter::new(&longer);
+                let block = scatter.as_ref().map_or(by_length, |scatter| scatter.freedom().min(by_length));
                 // Levels that move together at a short length do so at a longer one, which has too few blocks to show it.
                 let neighbours = freedoms.last().map_or(f64::INFINITY, |freedom| 2.0 * freedom.neighbours);
-                freedoms.push(BlockFreedom { block, neighbours: neighbours_freedom(&longer, block).min(neighbours) });
+                let neighbours = neighbours_freedom(&longer, block).min(neighbours);
+                // A level that moves at a short length does so at a longer one, by no more. Of the shortest length the second one of half the
+                // averaging time is as long.
+                let of_half = scales.last().and_then(|scale: &Scale| scale.freedoms.get(1).or(scale.freedoms.last()));
+                let shorter = freedoms.last().or(of_half).and_then(|freedom| freedom.wandering);
+                let wandering = scatter.and_then(|of| of.wandering(of_noise, shorter.is_some())).or(shorter);
+                freedoms.push(BlockFreedom { block, neighbours, wandering });
             }
             let typical = median(levels.into_iter().flatten().collect()) / TRIMMED_MEAN;
             // The Allan variance is half the mean square of the differences.
@@ -176,14 +186,28 @@ impl KnockRule {
     fn loudest(&self, series: &Series) -> Vec<Knock> {
         let scales: Vec<SquaredDifferences> =
             self.scales.iter().map(|scale| SquaredDifferences::new(series, scale.n)).collect();
-        let (mut blocks, mut tests) = (Vec::new(), 0_usize);
+        let (mut blocks, mut tests) = (Vec::<LoudBlock>::new(), 0_usize);
         for (scale, differences) in scales.iter().enumerate() {
             let (found, tested) = self.loud_blocks(scale, differences, series.period_s);
             blocks.extend(found);
             tests += tested;
         }
         let limit = SIGNIFICANCE / tests.max(1) as f64;
-        blocks.retain(|block| block.p_value < limit && self.is_loud_throughout(block, &scales[block.scale]));
+        let slots = |block: &LoudBlock| scales[block.scale].slots(block.differences.clone());
+        // Of a level that moves by itself, where that shows most.
+        let by_itself = |block: &LoudBlock| {
+            let own = slots(block);
+            let is_around = |other: &Range<u64>| {
+                other.start < own.end && own.start < other.end && other.end - other.start >= own.end - own.start
+            };
+            let loudest =
+                blocks.iter().filter(|other| is_around(&slots(other))).max_by(|a, b| a.ratio.total_cmp(&b.ratio));
+            loudest.and_then(|of| Some(of.freedom.wandering?.exceedance(of.ratio))).unwrap_or(0.0)
+        };
+        let is_knock = |block: &&LoudBlock| {
+            block.p_value < limit && self.is_loud_throughout(block, &scales[block.scale]) && by_itself(block) < limit
+        };
+        let mut blocks: Vec<&LoudBlock> = blocks.iter().filter(is_knock).collect();
         // Probabilities below the smallest float are equal; the higher level is then the better located one.
         blocks.sort_by(|a, b| a.p_value.total_cmp(&b.p_value).then(b.ratio.total_cmp(&a.ratio)));
         let mut knocks: Vec<Knock> = Vec::new();
@@ -196,7 +220,7 @@ impl KnockRule {
             };
             // What is near a louder block is tested again without it.
             if !knocks.iter().any(is_near) {
-                knocks.push(knock_around(&block, differences, block.p_value * tests as f64));
+                knocks.push(knock_around(block, differences, block.p_value * tests as f64));
             }
         }
         knocks

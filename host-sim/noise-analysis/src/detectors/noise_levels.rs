@@ -5,6 +5,8 @@
 //! no more than the scatter of the levels from block to block allows, so that filtered noise, lines and a level that moves
 //! by itself have the false-alarm rate that is asked for.
 
+use crate::distributions::{quantile, upper_tail};
+use crate::effects::findings::SIGNIFICANCE;
 use crate::samples::series::Series;
 use statrs::function::beta::checked_beta_reg;
 use std::ops::Range;
@@ -41,6 +43,9 @@ const STRETCHES: usize = 64;
 const STRETCH: usize = 1024;
 /// Degrees of freedom beyond which a level is taken to be exact.
 const MOST_FREEDOM: f64 = 1e6;
+/// Relative standard deviation of a scatter by the distance of the 90 % quantile from the median of n normal numbers, times √n: that distance
+/// has the variance 0.1·0.9/0.1755² + 0.5²/0.3989² − 2·0.1·0.5/(0.1755·0.3989) = 3.07, over [`NORMAL_90`]².
+const SCATTER_ERROR: f64 = 1.37;
 /// The 90 % quantile of the standard normal distribution.
 const NORMAL_90: f64 = 1.2816;
 
@@ -259,33 +264,85 @@ pub(super) fn neighbours_freedom(levels: &[Option<f64>], freedom: f64) -> f64 {
         [Some(before), Some(after)] => Some((after / before).ln()).filter(|change| change.is_finite()),
         _ => None,
     };
-    let mut changes: Vec<f64> = (0..levels.len()).filter_map(change).collect();
-    if changes.len() < FEWEST_FOR_SCATTER {
-        return independent;
-    }
-    changes.sort_by(f64::total_cmp);
-    let quantile = |part: f64| changes[((changes.len() - 1) as f64 * part).round() as usize];
-    let deviation = (quantile(0.9) - quantile(0.1)) / (2.0 * NORMAL_90);
+    let Some(changes) = sorted((0..levels.len()).filter_map(change).collect()) else { return independent };
+    let deviation = (quantile_of(&changes, 0.9) - quantile_of(&changes, 0.1)) / (2.0 * NORMAL_90);
     // The logarithm of a mean square of ν degrees of freedom has the variance 2/ν, and there are two sides.
     independent.min(4.0 / (deviation * deviation))
 }
 
-/// Degrees of freedom of blocks by the scatter of their levels: by the distance of the 90 % quantile from the median of the
-/// logarithm of level over neighbours, which a tenth of disturbed blocks does not move. `None` for few blocks.
-pub(super) fn freedom_by_scatter(levels: &[Option<f64>]) -> Option<f64> {
-    let around = |at: usize| {
-        let nearby = at.saturating_sub(NEIGHBOURS)..(at + NEIGHBOURS + 1).min(levels.len());
-        median(levels[nearby].iter().copied().flatten().collect())
-    };
-    let ratio = |(at, level): (usize, &Option<f64>)| level.map(|level| (level / around(at)).ln());
-    let mut ratios: Vec<f64> = levels.iter().enumerate().filter_map(ratio).filter(|ratio| ratio.is_finite()).collect();
-    if ratios.len() < FEWEST_FOR_SCATTER {
-        return None;
+/// How the levels of the blocks of one length scatter around those nearby.
+pub(super) struct LevelScatter {
+    /// Of each level over the median of those around it, in ascending order.
+    ratios: Vec<f64>,
+}
+
+impl LevelScatter {
+    /// `None` for few blocks.
+    pub(super) fn new(levels: &[Option<f64>]) -> Option<Self> {
+        let around = |at: usize| {
+            let nearby = at.saturating_sub(NEIGHBOURS)..(at + NEIGHBOURS + 1).min(levels.len());
+            median(levels[nearby].iter().copied().flatten().collect())
+        };
+        let ratio = |(at, level): (usize, &Option<f64>)| level.map(|level| level / around(at));
+        let is_measured = |ratio: &f64| *ratio > 0.0 && ratio.is_finite();
+        let ratios = sorted(levels.iter().enumerate().filter_map(ratio).filter(is_measured).collect())?;
+        Some(Self { ratios })
     }
-    ratios.sort_by(f64::total_cmp);
-    let quantile = |part: f64| ratios[((ratios.len() - 1) as f64 * part).round() as usize];
-    let deviation = (quantile(0.9) - quantile(0.5)) / NORMAL_90;
-    Some(2.0 / (deviation * deviation))
+
+    /// Standard deviation of the logarithm of a ratio, by the distance of the 90 % quantile from the median, which a tenth of disturbed blocks does
+    /// not move.
+    fn deviation(&self) -> f64 {
+        (quantile_of(&self.ratios, 0.9) / quantile_of(&self.ratios, 0.5)).ln() / NORMAL_90
+    }
+
+    /// Degrees of freedom of a mean square that scatters as much.
+    pub(super) fn freedom(&self) -> f64 {
+        2.0 / self.deviation().powi(2)
+    }
+
+    /// How the level moves by itself, where its noise has `freedom` degrees of freedom in a block; `None` where it scatters as that noise does,
+    /// unless it is `known` to move from shorter blocks.
+    pub(super) fn wandering(&self, freedom: f64, known: bool) -> Option<Wandering> {
+        let most = 1.0 + quantile(SIGNIFICANCE) * SCATTER_ERROR / (self.ratios.len() as f64).sqrt();
+        if !known && self.deviation() < most * (2.0 / freedom).sqrt() {
+            return None;
+        }
+        let lowest = quantile_of(&self.ratios, 0.1);
+        let excess = |part: f64| (quantile_of(&self.ratios, part) - lowest).ln();
+        let deviation = (excess(0.9) - excess(0.5)) / NORMAL_90;
+        // Counts that seldom change have half of the levels at their lowest.
+        (deviation > 0.0 && deviation.is_finite()).then(|| Wandering { lowest, median: excess(0.5), deviation })
+    }
+}
+
+/// In ascending order; `None` of fewer than [`FEWEST_FOR_SCATTER`].
+fn sorted(mut values: Vec<f64>) -> Option<Vec<f64>> {
+    values.sort_by(f64::total_cmp);
+    (values.len() >= FEWEST_FOR_SCATTER).then_some(values)
+}
+
+/// Of values in ascending order.
+fn quantile_of(values: &[f64], part: f64) -> f64 {
+    values[((values.len() - 1) as f64 * part).round() as usize]
+}
+
+/// A level that moves by itself, as that of a vibration. Most of it may be other noise, which does not move, so that it is high for a short
+/// time more often than its median scatter tells: the logarithm of what it has above its lowest tenth is taken as normal.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wandering {
+    /// Level over those around it, in the lowest tenth of the blocks.
+    lowest: f64,
+    /// Median and deviation of the logarithm of what there is above.
+    median: f64,
+    deviation: f64,
+}
+
+impl Wandering {
+    /// Probability of a level of at least `ratio` times those around it.
+    pub(super) fn exceedance(&self, ratio: f64) -> f64 {
+        let excess = (ratio - self.lowest).max(0.0).ln();
+        upper_tail((excess - self.median) / self.deviation)
+    }
 }
 
 /// Probability that a mean square of `freedom` degrees of freedom exceeds another one of `of_other`, of the same
