@@ -276,7 +276,7 @@ impl Wording {
             ),
             Effect::NoiseBelowCount(of) => text(
                 format!(
-                    "the Allan deviation is at most {:.2} counts at the shortest averaging times, less than the {:.2} counts from which \
+                    "the Allan deviation at the shortest averaging times is {:.2} counts where it is nearest to the {:.2} counts from which \
                      on rounding adds white noise alone",
                     of.counts, of.dithered_counts
                 ),

@@ -7,6 +7,7 @@ use crate::distributions::poisson_bounds;
 use crate::effects::findings::{Detection, SIGNIFICANCE};
 use crate::effects::{MissingCodes, NoiseBelowCount, Saturation};
 use crate::samples::gapped_cascade::GappedCascade;
+use crate::samples::rounding::{DITHERED_OCTAVES, dithered_avar};
 use crate::samples::series::Series;
 use measurement::ChannelProfile;
 
@@ -24,8 +25,6 @@ const MOST_BINS: i64 = 1 << 14;
 const FEWEST_MISSING: usize = 2;
 /// Fewest samples whose noise is compared with a count.
 const FEWEST_SAMPLES: usize = 100;
-/// Octaves in which noise behind a filter can reach from one count to the next: the longest filters average 64 samples.
-const NOISE_OCTAVES: usize = 7;
 
 /// How often each value of a channel occurs, in memory that does not grow with their number: values far apart are counted in bins
 /// of several counts.
@@ -146,25 +145,26 @@ impl ValueCounts {
     }
 }
 
-/// Noise that does not reach from one count to the next: its Allan variance at the shortest octaves is below
-/// `dithered_avar_counts2` counts².
+/// Noise that does not reach from one count to the next: its Allan variance at the shortest octaves is below that of
+/// [dithered](dithered_avar) samples, whose variance is `dithered_avar_counts2` counts².
 #[must_use]
 pub(crate) fn find_noise_below_count(series: &Series, dithered_avar_counts2: f64) -> Option<Detection> {
     if series.values.len() < FEWEST_SAMPLES {
         return None;
     }
     let curve = GappedCascade::of_series(series, 0..series.values.len()).curve(series.period_s);
-    let largest = curve.points().iter().take(NOISE_OCTAVES).map(|point| point.avar).fold(0.0, f64::max);
-    if largest > dithered_avar_counts2 {
+    let octaves = curve.points().iter().take(DITHERED_OCTAVES);
+    let deviations = octaves.map(|point| (point.avar.sqrt(), dithered_avar(dithered_avar_counts2, point.n).sqrt()));
+    // The nearest to its limit.
+    let (counts, dithered_counts) = deviations.max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)))?;
+    if counts > dithered_counts {
         return None;
     }
-    let deviation = largest.sqrt() * series.resolution;
-    let dithered_counts = dithered_avar_counts2.sqrt();
     // Before the rounding it may be anything up to the limit.
-    let limit = dithered_counts * series.resolution;
+    let [deviation, limit] = [counts, dithered_counts].map(|counts| counts * series.resolution);
     let noise = NoiseBelowCount {
         deviation: BoundedEstimate::new(deviation, 0.0, limit).in_unit(series.unit),
-        counts: largest.sqrt(),
+        counts,
         dithered_counts,
     };
     Some(Detection { effect: noise.into(), correction: None })

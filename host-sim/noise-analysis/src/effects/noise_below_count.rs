@@ -6,8 +6,8 @@ use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 /// Noise below a count.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoiseBelowCount {
-    /// Largest Allan deviation at the shortest averaging times; 0 if the value never changes. Before the rounding it may be anything up
-    /// to the upper bound.
+    /// Allan deviation at the shortest averaging times, where it is nearest to what dithers; 0 if the value never changes. Before the
+    /// rounding it may be anything up to the upper bound.
     pub deviation: ChannelEstimate,
     /// The same in counts.
     pub counts: f64,

@@ -16,8 +16,9 @@ use crate::distributions::ROUNDING;
 use allan_core::Curve;
 use std::f64::consts::PI;
 
-/// A channel is dithered if its Allan deviation exceeds the limit of the profile at any of the first octaves, this many.
-/// Behind a filter neighbouring samples are correlated, so that the limit is exceeded only at longer averaging times.
+/// A channel is dithered if its Allan variance exceeds the [limit](dithered_avar) at any of the first octaves, this many.
+/// Behind a filter neighbouring samples are correlated, so that the limit is exceeded only at longer averaging times: the longest filters
+/// average 64 samples.
 pub(crate) const DITHERED_OCTAVES: usize = 7;
 /// Mean square of a difference, counts², beyond which its rounding errors are uncorrelated to 0.2 %.
 const UNCORRELATED: f64 = 0.3;
@@ -112,6 +113,12 @@ impl Rounding {
         let correlated = (1..2 * n).zip(covariances).map(|(lag, covariance)| 2.0 * share(n, lag) * covariance);
         self.resolution.powi(2) * (ROUNDING / n as f64 - correlated.sum::<f64>()).max(0.0)
     }
+}
+
+/// The Allan variance of means of `n` samples, counts², above which the noise reaches from one count to the next, where that of samples is
+/// `of_samples`: the noise before the rounding is the same, and that of the rounding an n-th.
+pub(crate) fn dithered_avar(of_samples: f64, n: u64) -> f64 {
+    of_samples - ROUNDING * (1.0 - 1.0 / n as f64)
 }
 
 /// Mean squares of the differences of samples at lags of 1, 2, …, counts², as far as the errors are correlated. `None` where those of
