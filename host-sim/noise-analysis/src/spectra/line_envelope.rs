@@ -13,11 +13,11 @@ use crate::samples::uniform_series::UniformSeries;
 use realfft::num_complex::Complex;
 use std::f64::consts::{PI, TAU};
 
-/// Blocks of the record in whose sums the changes are sought, at least: the sums lose `(π·32/512)²/3`, 1.3 %, of the power of the
+/// Blocks of the record in whose sums the changes are sought, at least: the sums lose `(π·64/1024)²/3`, 1.3 %, of the power of the
 /// fastest change.
-const BLOCKS: usize = 512;
+const BLOCKS: usize = 1024;
 /// Fastest change that is sought, in periods per record.
-pub(super) const MOST_PERIODS: usize = 32;
+pub(super) const MOST_PERIODS: usize = 64;
 /// The fastest change is slower than this part of the line itself: so near to the line its noise is as good as white.
 const OF_FREQUENCY: usize = 8;
 /// Ordinates to a resolution: between two of them a change loses at most 0.9 dB.

@@ -23,6 +23,9 @@ const LARGEST_RISE: f64 = 1.5;
 pub(super) const NARROWEST: f64 = 1.5;
 /// Least −2 log-likelihood ratio of a sinusoid against a resonance for the latter to be taken.
 const PREFERENCE: f64 = 10.0;
+/// Least −2 log-likelihood ratio of a resonance against a sinusoid that changes for the latter to be taken: the frequency of the change was
+/// chosen among 256, 2·ln 256, and its size and phase were fitted to some hundred ordinates, ln 100 for each.
+const COST_OF_A_CHANGE: f64 = 20.0;
 /// Least relative excess of a broad peak over the density around it; a smaller one may be an error of the background's shape.
 const LEAST_EXCESS: f64 = 0.1;
 /// An average is no peak within so many standard deviations of the level around it, which chance exceeds in one of a thousand.
@@ -175,12 +178,20 @@ impl<'a> WhitenedSpectrum<'a> {
             let bin = line.frequency.value / self.resolution;
             let widths =
                 (0..).map(|power| 2f64.powi(2 * power)).take_while(|width| *width < self.whitened.len() as f64 / 32.0);
-            let resonance = self.resonance(bin, widths);
-            return Some(match resonance {
-                Some(lorentz) if lorentz.statistic > line.statistic + PREFERENCE => {
+            // A sinusoid that is switched, or swells and fades, is a band of a few lines.
+            let change = || {
+                let density = 2.0 * sine.density(series) / line.statistic;
+                Modulation::find(&sine, &sine.subtracted_from(series), density, |_| false)
+            };
+            let is_likelier = |lorentz: &Lorentz| {
+                let over_sine = lorentz.statistic - line.statistic;
+                over_sine > PREFERENCE && change().is_none_or(|change| over_sine > change.statistic - COST_OF_A_CHANGE)
+            };
+            return Some(match self.resonance(bin, widths).filter(is_likelier) {
+                Some(lorentz) => {
                     Candidate::Resonance(Resonance { line: self.resonance_line(&lorentz, line.p_value), lorentz })
                 }
-                _ => Candidate::Sine(line, sine),
+                None => Candidate::Sine(line, sine),
             });
         }
         let (bin, width, p_value) = self.broad_peak(1)?;
