@@ -43,9 +43,15 @@ pub(crate) fn fit_with_lines(
         fit.correlation_times().next().is_some() || fit.after().terms().iter().any(|of| is_read_slowly(&of.kind));
     if is_shaped && lines.iter().any(MergedLine::is_broad) {
         // A broad line may be a part of a Markov process or the edge of a null of a filter that is read slowly, which the background of
-        // the first search has no form for.
-        lines.retain(|line| !line.is_broad());
-        lines.extend(find(series, Some(fit.after())).into_iter().filter(MergedLine::is_broad));
+        // the first search has no form for. Of what both searches find, that of the spectrum that has more of a resonance's shape counts: the
+        // process may be a wrong one.
+        let (first, others): (Vec<MergedLine>, Vec<MergedLine>) = lines.iter().partition(|line| line.is_broad());
+        let likelier = |line: MergedLine| {
+            let same = first.iter().filter(|other| line.is_same(other));
+            same.chain([&line]).max_by(|a, b| a.shape_p_value.total_cmp(&b.shape_p_value)).copied().unwrap_or(line)
+        };
+        lines = others;
+        lines.extend(find(series, Some(fit.after())).into_iter().filter(MergedLine::is_broad).map(likelier));
         lines.extend(faster.iter().filter(|line| line.is_broad()));
         fit = ChannelFit::fit_traced(fit.covariates, &kinds(&lines), &filters);
     }
