@@ -359,8 +359,11 @@ fn sensitivity_effect(channel: ChannelProfile, (regressor, of): &(ChannelProfile
     }
 }
 
-/// Whether a sensitivity of a channel is more probably one of the sensor's than not, by what is known of the sensor: its value, the
-/// middle of its interval, is within the largest plausible multiple of the data sheet's, or the interval includes zero.
+/// Whether a sensitivity of a channel is more probably one of the sensor's than not, by what is known of the sensor: its value is at most
+/// a standard error beyond the largest plausible multiple of the data sheet's, or its interval includes zero.
+///
+/// One of the sensor's is anywhere up to that multiple m; the ratio of a drift that both channels share is of any size, as often in one
+/// decade as in another, of three. A measured ratio r is as probable from either where `Φ((m − r)/error)·r/m = 1/ln 1000`: at r = m + error.
 fn is_plausible(
     profile: &SensorProfile,
     channel: ChannelProfile,
@@ -371,7 +374,7 @@ fn is_plausible(
     let typical = channel.sensitivities.to(regressor);
     let includes_zero = low * high <= 0.0;
     typical.is_none_or(|typical| {
-        includes_zero || sensitivity.value.abs() <= profile.largest_sensitivity_multiple * typical
+        includes_zero || sensitivity.value.abs() - sensitivity.error <= profile.largest_sensitivity_multiple * typical
     })
 }
 
