@@ -22,9 +22,9 @@ use crate::rivals::unexplained;
 use crate::samples::rounding::DITHERED_OCTAVES;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
-use crate::spectra::Welch;
 use crate::spectra::cosine_spectrum::CosineSpectrum;
 use crate::spectra::spectral_lines::MergedLine;
+use crate::spectra::{Welch, without_sines};
 use allan_core::model::FittedTerm;
 use allan_core::regression::Sensitivity;
 use measurement::{ChannelId, PerChannel, SensorProfile};
@@ -200,13 +200,19 @@ impl ChannelTrace {
         let (mut telegraph, mut signals) = (None, Vec::new());
         if samples.seeks_signals {
             let correlation_times: Vec<f64> = fit.correlation_times().collect();
-            telegraph = random_telegraph::find(&rest, own.unit, &correlation_times);
+            telegraph = telegraph_noise(&rest, own.unit, &correlation_times);
             let found = standing_in_spectrum(SpectrumProposals::find(&rest, lines, fit.bands()));
             (lines, signals) = found.into_lines_and_signals();
         }
         let spectrum = samples.record.spectrum_within(channel, own.span.clone());
         Self { fit, lines, telegraph, slowest: CosineSpectrum::new(&rest), rest: Some(rest), signals, spectrum }
     }
+}
+
+/// Two levels of a channel, which are there without its sinusoids too: these are near their extremes for most of the time.
+fn telegraph_noise(series: &UniformSeries, unit: &'static str, correlation_times: &[f64]) -> Option<TelegraphNoise> {
+    let find = |series: &UniformSeries| random_telegraph::find(series, unit, correlation_times);
+    find(series).filter(|_| find(&without_sines(series.clone())).is_some())
 }
 
 /// Gives the models of the inertial channels in a part of a recording the filter that the sensor has once, as they show it together.
@@ -237,4 +243,30 @@ fn agree_on_filter(part: &PartData, channels: &mut PerChannel<ChannelTrace>) -> 
         channels[channel].fit.agree(filter.as_ref().ok(), is_dithered);
     }
     filter
+}
+
+#[cfg(test)]
+mod tests {
+    use super::telegraph_noise;
+    use crate::samples::uniform_series::UniformSeries;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use std::f64::consts::TAU;
+
+    const PERIOD_S: f64 = 0.01;
+
+    /// A sinusoid of 108 periods is hidden in the noise of each sample, and between its extremes in that of each part.
+    #[test]
+    fn a_weak_sinusoid_is_no_telegraph_noise() {
+        for amplitude in [0.3, 0.5, 0.8] {
+            for seed in 40..60 {
+                let mut random = ChaCha8Rng::seed_from_u64(seed);
+                let sine = |at: u32| amplitude * (TAU * f64::from(at) * PERIOD_S / 3.7).sin();
+                let values = (0..40_000).map(|at| sine(at) + random.sample::<f64, _>(StandardNormal)).collect();
+                let found = telegraph_noise(&UniformSeries::new(PERIOD_S, values), "g", &[0.6]);
+                assert_eq!(found, None, "{amplitude} {seed}");
+            }
+        }
+    }
 }
