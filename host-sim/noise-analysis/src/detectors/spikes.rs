@@ -22,6 +22,9 @@ const FEWEST_ON_A_SIDE: u32 = REACH as u32 / 2;
 /// Errors above this many standard deviations are left out of the estimate of the standard deviation; of normal errors it is
 /// 7·10⁻⁶.
 const CLIP: f64 = 4.5;
+/// Samples around whose median values are clipped for the autocovariance: over several of them a drift that is larger than the noise of a
+/// sample is not.
+const CLIPPED_BLOCK: usize = 256;
 
 /// The means of the neighbours before and after a spike differ by less than this fraction of it; otherwise it is a jump of
 /// the bias.
@@ -345,6 +348,7 @@ impl Interpolation {
         for (position, error) in errors.iter().enumerate().filter(|(_, error)| error.abs() > CLIP * rough) {
             Arc::make_mut(&mut clean)[position] -= error;
         }
+        clip(Arc::make_mut(&mut clean), series.resolution);
         let covariance = covariance(series, &clean, mean);
         interpolation.weights = weights(&covariance)?;
         interpolation.covariance = Some(covariance);
@@ -453,16 +457,17 @@ impl Interpolation {
             spikes.push((position, error.abs()));
         }
         spikes.sort_unstable_by_key(|(position, _)| *position);
-        let mut least = |position: usize, hole: usize| {
+        // What a filter spreads over the neighbours of a spike is no noise, and a jump is in the errors of the samples that are interpolated
+        // over it.
+        let mut least = |position: usize| {
             let around = position.saturating_sub(FARTHEST)..(position + FARTHEST + 1).min(values.len());
-            let around = around.map(|at| (at.abs_diff(position), at)).filter(|(distance, _)| *distance >= hole);
+            let around = around.map(|at| (at.abs_diff(position), at)).filter(|(distance, _)| *distance > REACH);
             let error = |(distance, at)| (distance, self.normalised_error(series, &values, at, &mut partial));
             threshold * self.louder_around(&around.map(error).collect::<Vec<(usize, f64)>>())
         };
-        // A jump is in the errors of the samples that are interpolated over it.
-        jumps.retain(|&(position, height)| height > SETTLED * least(position, REACH + 1));
+        jumps.retain(|&(position, height)| height > SETTLED * least(position));
         let found =
-            |(position, size)| FoundSpike { slot: series.slots[position], size, stands_out: size > least(position, 1) };
+            |(position, size)| FoundSpike { slot: series.slots[position], size, stands_out: size > least(position) };
         FoundSpikes { spikes: spikes.into_iter().map(found).collect(), jumps: jumps.len() }
     }
 }
@@ -490,6 +495,27 @@ fn clipped_deviation(errors: &[f64]) -> f64 {
         limit = CLIP * deviation;
     }
     deviation
+}
+
+/// Brings the values that are more than [`CLIP`] standard deviations off the median of their block back to there: what lasts longer than an
+/// interpolation reaches would tell itself. The deviation is that of the typical block, at least half a count.
+fn clip(values: &mut [f64], resolution: f64) {
+    let middle = |values: &mut [f64]| {
+        let at = values.len() / 2;
+        *values.select_nth_unstable_by(at, f64::total_cmp).1
+    };
+    let median_and_deviation = |block: &[f64]| {
+        let median = middle(&mut block.to_vec());
+        let mut distances: Vec<f64> = block.iter().map(|value| (value - median).abs()).collect();
+        // Half of normal values are within the third quartile.
+        (median, middle(&mut distances) / quantile(0.25))
+    };
+    let blocks: Vec<(f64, f64)> = values.chunks(CLIPPED_BLOCK).map(median_and_deviation).collect();
+    let typical = middle(&mut blocks.iter().map(|(_, deviation)| *deviation).collect::<Vec<f64>>());
+    let most = CLIP * typical.max(0.5 * resolution);
+    for (block, (median, _)) in values.chunks_mut(CLIPPED_BLOCK).zip(blocks) {
+        block.iter_mut().for_each(|value| *value = value.clamp(median - most, median + most));
+    }
 }
 
 /// Autocovariance at lags 0 to 2·[`REACH`].

@@ -15,6 +15,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use simulation::{HostClock, Simulation};
+use std::f64::consts::TAU;
 use virtual_sensor::{Environment, InjectedEffect, OutputRegister, SensorScenario, TemperatureProfile};
 
 const GYRO: Channel = Channel::GyroY;
@@ -127,6 +128,34 @@ fn a_spike_of_1_7_sigma_is_found_in_filtered_noise() {
     series.values_mut()[20_000] += 0.5 * white();
     let detection = spikes::find(&series).unwrap();
     assert_eq!(detection.correction, Some(Correction::Exclude(vec![20_000])));
+}
+
+/// Two averages of two samples leave half of a spike in its own sample and a quarter in either neighbour, as of a sample of the noise.
+#[test]
+fn spikes_before_the_filter_are_counted() {
+    let spikes = InjectedEffect::Spikes { channel: SENSED_GYRO, rate_per_hour: 300.0, size: 25.0 * white() };
+    let case = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2: 1 }, spikes], 600.0, 5);
+    assert_covers(&spikes::find(&case.series(GYRO)).expect("50 spikes"), "rate", 300.0);
+}
+
+/// A blow that rings at 6.4 Hz and decays within 0.1 s, and a pulse of half a sine of 0.3 s: neighbouring samples differ by a fifth of the one and
+/// a twentieth of the other.
+#[test]
+fn a_blow_does_not_tell_itself() {
+    let rings = |since_s: f64| (-10.0 * since_s).exp() * (TAU * 6.4 * since_s).sin();
+    let pushes = |since_s: f64| (TAU * since_s / 0.6).sin().max(0.0) * f64::from(u8::from(since_s < 0.3));
+    for (seed, blow) in [(6, &rings as &dyn Fn(f64) -> f64), (7, &pushes)] {
+        let mut series = Case::hiding(Vec::new(), 400.0, seed).series(GYRO);
+        for (at, value) in series.values_mut()[40_000..].iter_mut().enumerate() {
+            *value += 30.0 * white() * blow(at as f64 / 204.8);
+        }
+        let rule = spikes::SpikeRule::fit(&series).expect("samples that change");
+        let (_, disturbances) = rule.separate(rule.find(&series), series.values.len() as u64);
+        let [found] = disturbances.as_slice() else { panic!("{disturbances:?}") };
+        // It is six times the noise after 2 or 4 samples, and less after 32 or 57.
+        assert!((40_000..40_010).contains(&found.certain.start), "{found:?}");
+        assert!((40_020..40_062).contains(&found.certain.end), "{found:?}");
+    }
 }
 
 /// White noise, and noise whose level wanders by a factor of two in half a second.
