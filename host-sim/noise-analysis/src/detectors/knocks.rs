@@ -193,15 +193,15 @@ impl KnockRule {
             tests += tested;
         }
         let limit = SIGNIFICANCE / tests.max(1) as f64;
-        let slots = |block: &LoudBlock| scales[block.scale].slots(block.differences.clone());
+        let slots_of = |block: &LoudBlock| scales[block.scale].slots(block.differences.clone());
         // Of a level that moves by itself, where that shows most.
         let by_itself = |block: &LoudBlock| {
-            let own = slots(block);
+            let own = slots_of(block);
             let is_around = |other: &Range<u64>| {
                 other.start < own.end && own.start < other.end && other.end - other.start >= own.end - own.start
             };
             let loudest =
-                blocks.iter().filter(|other| is_around(&slots(other))).max_by(|a, b| a.ratio.total_cmp(&b.ratio));
+                blocks.iter().filter(|other| is_around(&slots_of(other))).max_by(|a, b| a.ratio.total_cmp(&b.ratio));
             loudest.and_then(|of| Some(of.freedom.wandering?.exceedance(of.ratio))).unwrap_or(0.0)
         };
         let is_knock = |block: &&LoudBlock| {
@@ -212,15 +212,14 @@ impl KnockRule {
         blocks.sort_by(|a, b| a.p_value.total_cmp(&b.p_value).then(b.ratio.total_cmp(&a.ratio)));
         let mut knocks: Vec<Knock> = Vec::new();
         for block in blocks {
-            let differences = &scales[block.scale];
-            let slots = differences.slots(block.differences.clone());
+            let slots = slots_of(block);
             let reach = 2 * (slots.end - slots.start);
             let is_near = |other: &Knock| {
                 slots.start < other.slots.end + reach && other.slots.start < slots.end.saturating_add(reach)
             };
             // What is near a louder block is tested again without it.
             if !knocks.iter().any(is_near) {
-                knocks.push(knock_around(block, differences, block.p_value * tests as f64));
+                knocks.push(knock_around(block, &scales[block.scale], block.p_value * tests as f64));
             }
         }
         knocks

@@ -5,6 +5,7 @@
 //! interpolation error is normal, so the threshold for N samples comes from N times the normal tail. Where the noise is louder, as in a
 //! vibration whose level wanders, it is as many deviations of the errors around a sample.
 
+use super::noise_levels::median;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, density, poisson_bounds, poisson_tail, quantile, upper_tail};
 use crate::effects::Spikes;
@@ -497,24 +498,18 @@ fn clipped_deviation(errors: &[f64]) -> f64 {
     deviation
 }
 
-/// Brings the values that are more than [`CLIP`] standard deviations off the median of their block back to there: what lasts longer than an
-/// interpolation reaches would tell itself. The deviation is that of the typical block, at least half a count.
+/// Limits the values to [`CLIP`] standard deviations from the median of their block: a disturbance that is longer than the interpolation reaches
+/// would be interpolated from its own samples. The deviation is that of the typical block, at least half a count.
 fn clip(values: &mut [f64], resolution: f64) {
-    let middle = |values: &mut [f64]| {
-        let at = values.len() / 2;
-        *values.select_nth_unstable_by(at, f64::total_cmp).1
-    };
     let median_and_deviation = |block: &[f64]| {
-        let median = middle(&mut block.to_vec());
-        let mut distances: Vec<f64> = block.iter().map(|value| (value - median).abs()).collect();
+        let middle = median(block.to_vec());
         // Half of normal values are within the third quartile.
-        (median, middle(&mut distances) / quantile(0.25))
+        (middle, median(block.iter().map(|value| (value - middle).abs()).collect()) / quantile(0.25))
     };
-    let blocks: Vec<(f64, f64)> = values.chunks(CLIPPED_BLOCK).map(median_and_deviation).collect();
-    let typical = middle(&mut blocks.iter().map(|(_, deviation)| *deviation).collect::<Vec<f64>>());
-    let most = CLIP * typical.max(0.5 * resolution);
-    for (block, (median, _)) in values.chunks_mut(CLIPPED_BLOCK).zip(blocks) {
-        block.iter_mut().for_each(|value| *value = value.clamp(median - most, median + most));
+    let (middles, deviations): (Vec<f64>, Vec<f64>) = values.chunks(CLIPPED_BLOCK).map(median_and_deviation).unzip();
+    let most = CLIP * median(deviations).max(0.5 * resolution);
+    for (block, middle) in values.chunks_mut(CLIPPED_BLOCK).zip(middles) {
+        block.iter_mut().for_each(|value| *value = value.clamp(middle - most, middle + most));
     }
 }
 

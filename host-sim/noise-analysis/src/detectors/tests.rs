@@ -141,7 +141,7 @@ fn spikes_before_the_filter_are_counted() {
 /// A blow that rings at 6.4 Hz and decays within 0.1 s, and a pulse of half a sine of 0.3 s: neighbouring samples differ by a fifth of the one and
 /// a twentieth of the other.
 #[test]
-fn a_blow_does_not_tell_itself() {
+fn a_blow_is_not_interpolated_from_its_own_samples() {
     let rings = |since_s: f64| (-10.0 * since_s).exp() * (TAU * 6.4 * since_s).sin();
     let pushes = |since_s: f64| (TAU * since_s / 0.6).sin().max(0.0) * f64::from(u8::from(since_s < 0.3));
     for (seed, blow) in [(6, &rings as &dyn Fn(f64) -> f64), (7, &pushes)] {

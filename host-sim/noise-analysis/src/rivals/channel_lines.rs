@@ -48,7 +48,7 @@ pub(crate) fn fit_with_lines(
         let (first, others): (Vec<MergedLine>, Vec<MergedLine>) = lines.iter().partition(|line| line.is_broad());
         let likelier = |line: MergedLine| {
             let same = first.iter().filter(|other| line.is_same(other));
-            same.chain([&line]).max_by(|a, b| a.shape_p_value.total_cmp(&b.shape_p_value)).copied().unwrap_or(line)
+            same.fold(line, |best, other| if other.shape_p_value > best.shape_p_value { *other } else { best })
         };
         lines = others;
         lines.extend(find(series, Some(fit.after())).into_iter().filter(MergedLine::is_broad).map(likelier));
