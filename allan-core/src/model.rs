@@ -101,8 +101,8 @@ impl Model {
         filter_of(self.terms.iter().map(|term| &term.kind))
     }
 
-    /// The part of a term in the Allan variance at averaging factor `n`; that of flicker noise and of a random walk behind the
-    /// [`filter`](Self::filter).
+    /// The part of a term in the Allan variance at averaging factor `n`, behind the [`filter`](Self::filter) if it
+    /// [passes](NoiseTerm::passes_filter) it.
     #[must_use]
     pub fn part(&self, term: &FittedTerm, n: u64) -> f64 {
         term.value * term.value * term.kind.avar_behind(self.filter().as_ref(), n, self.sample_period)

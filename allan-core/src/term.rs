@@ -37,7 +37,7 @@ pub enum NoiseTerm {
     RateRandomWalk,
     /// R: a linear trend, in unit/s.
     RateRamp,
-    /// N after a digital low-pass filter, in unit·√s. In a model with this term B and K have passed the filter too.
+    /// N after a digital low-pass filter, in unit·√s. In a model with this term B, K and Markov processes have passed the filter too.
     Filtered(MovingAverageFilter),
     /// Exponentially correlated noise; its standard deviation, in the unit itself.
     Markov(Markov),
@@ -193,11 +193,11 @@ impl NoiseTerm {
         with_process!(self, process => process.avar(n, sample_period))
     }
 
-    /// Whether noise of this kind arises before the filter of a model and passes it: flicker noise and random walks do, rounding and
-    /// what is added to the samples do not. White noise that does is [`Filtered`](Self::Filtered).
+    /// Whether noise of this kind arises before the filter of a model and passes it: flicker noise, random walks and Gauss–Markov processes
+    /// do, rounding and what is added to the samples do not. White noise that does is [`Filtered`](Self::Filtered).
     #[must_use]
     pub const fn passes_filter(&self) -> bool {
-        matches!(self, Self::BiasInstability | Self::RateRandomWalk)
+        matches!(self, Self::BiasInstability | Self::RateRandomWalk | Self::Markov(_))
     }
 
     /// Allan variance as [`avar`](Self::avar) has it, of a term that stands in a model with this `filter`, which
@@ -206,6 +206,7 @@ impl NoiseTerm {
     pub(crate) fn avar_behind(&self, filter: Option<&MovingAverageFilter>, n: u64, sample_period: f64) -> f64 {
         match (self, filter) {
             (_, None) => self.avar(n, sample_period),
+            (Self::Markov(markov), Some(filter)) => filter.avar_of_markov(n, markov, sample_period),
             (_, Some(filter)) if filter.is_short_against(n) => self.avar(n, sample_period),
             (Self::BiasInstability, Some(filter)) => filter.avar_of_flicker(n),
             (Self::RateRandomWalk, Some(filter)) => filter.avar_of_walk(n, sample_period),

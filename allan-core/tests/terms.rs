@@ -54,12 +54,13 @@ fn the_allan_variance_is_that_of_the_autocovariance() {
     }
 }
 
-/// Flicker noise and random walks arise before the filter whose white noise the model has.
+/// Flicker noise, random walks and Gauss–Markov processes arise before the filter whose white noise the model has.
 #[test]
 fn what_passes_the_filter_of_a_model_has_the_allan_variance_of_its_spectrum() {
     for (stages, taps) in [(1, 5), (2, 2), (2, 4), (2, 16), (2, 64)] {
         let filter = NoiseTerm::Filtered(MovingAverageFilter { stages, taps, decimation: 1.0 });
-        for kind in [NoiseTerm::BiasInstability, NoiseTerm::RateRandomWalk] {
+        let slow = [NoiseTerm::BiasInstability, NoiseTerm::RateRandomWalk];
+        for kind in slow.into_iter().chain(MARKOV.map(NoiseTerm::Markov)) {
             let model = Model::new(PERIOD, [filter, kind].map(|kind| FittedTerm::exact(kind, 1.0)));
             let gain = |f: f64| {
                 let box_gain = |f: f64| {
@@ -81,12 +82,14 @@ fn what_passes_the_filter_of_a_model_has_the_allan_variance_of_its_spectrum() {
     }
 }
 
-/// The walk by its covariances, sample by sample; flicker noise by the spectrum of the filter's values, of which some are read.
+/// The walk by its covariances, sample by sample; the others by the spectrum of the filter's values, of which some are read.
 #[test]
 fn what_passes_a_filter_that_is_read_slowly_has_the_allan_variance_of_its_samples() {
     for (taps, decimation) in [(4_u16, 2_u16), (8, 4), (16, 9), (64, 9)] {
         let of = MovingAverageFilter { decimation: decimation.into(), ..MovingAverageFilter::bartlett(taps) };
-        let terms = [NoiseTerm::Filtered(of), NoiseTerm::BiasInstability, NoiseTerm::RateRandomWalk];
+        let slow = [NoiseTerm::RateRandomWalk, NoiseTerm::BiasInstability];
+        let passing: Vec<NoiseTerm> = slow.into_iter().chain(MARKOV.map(NoiseTerm::Markov)).collect();
+        let terms = [NoiseTerm::Filtered(of)].into_iter().chain(passing.iter().copied());
         let model = Model::new(PERIOD, terms.map(|kind| FittedTerm::exact(kind, 1.0)));
         let response = impulse_response(&of);
         // Mean square of the difference of two filtered values of a walk with steps of 1, a lag apart.
@@ -99,15 +102,21 @@ fn what_passes_a_filter_that_is_read_slowly_has_the_allan_variance_of_its_sample
             (0..response.len() + lag).map(|at| weight(at).powi(2)).sum()
         };
         let walk = 0.5 * structure(decimation.into()) * PERIOD / f64::from(decimation);
-        let found = model.part(&model.terms()[2], 1);
+        let found = model.part(&model.terms()[1], 1);
         assert!((found / walk - 1.0).abs() < 0.005, "{of:?}: {found} and {walk}");
         let value_s = PERIOD / f64::from(decimation);
-        let passed = |f: f64| of.gain(f, PERIOD) * NoiseTerm::BiasInstability.process().density(f, value_s);
-        for n in FACTORS {
-            let (found, integral) = (model.part(&model.terms()[1], n), integral(passed, n, value_s));
-            // Of a filter of that length the closed form leaves out what reading at intervals folds beyond the first order.
-            let tolerance = if n < 4 { 0.031 } else { 2e-3 };
-            assert!((found / integral - 1.0).abs() < tolerance, "{of:?}, n = {n}: {found} and {integral}");
+        for term in &model.terms()[2..] {
+            let passed = |f: f64| of.gain(f, PERIOD) * term.kind.process().density(f, value_s);
+            for n in FACTORS {
+                let (found, integral) = (model.part(term, n), integral(passed, n, value_s));
+                // Of a filter of that length the closed form leaves out what reading at intervals folds beyond the first order.
+                let tolerance = if n < 4 { 0.031 } else { 2e-3 };
+                assert!(
+                    (found / integral - 1.0).abs() < tolerance,
+                    "{:?} behind {of:?}, n = {n}: {found} and {integral}",
+                    term.kind
+                );
+            }
         }
     }
 }

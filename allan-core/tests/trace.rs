@@ -9,7 +9,7 @@ use allan_core::model::FittedTerm;
 use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm, Resonance, Shape, Sinusoid};
 use allan_core::trace::{LineCandidates, Trace, trace};
 use allan_core::{Model, telegraph};
-use simulation::{Noise, curve, telegraph_signal};
+use simulation::{Noise, curve, impulse_response, telegraph_signal};
 
 const SAMPLES: usize = 1 << 17;
 /// Starting shapes of a sensor with Bartlett windows of 2 to 64 taps, or with one of 8 taps that is read at a lower rate.
@@ -194,6 +194,42 @@ fn a_telegraph_signal_is_distinguished_from_a_gaussian_process() {
         };
         let (smooth, two) = (ratio(&|k| 0.2 * gaussian[k]), ratio(&|k| levels[k]));
         assert!(two.is_telegraph() && !smooth.is_telegraph(), "{two:?}, {smooth:?}");
+    }
+}
+
+/// A process and two levels with a correlation time of 25 samples, each with white noise behind a filter, which is known, of up to 16 of
+/// them.
+#[test]
+fn a_process_before_a_filter_is_found_with_its_size_its_time_constant_and_its_kurtosis() {
+    let (shape, deviation, white) = (Markov { time_constant: 0.25 }, 2.0, 0.05);
+    for (seed, (stages, taps)) in (0..).zip([(2, 4), (2, 8), (2, 16)]) {
+        let filter = MovingAverageFilter { stages, taps, decimation: 1.0 };
+        let response = impulse_response(&filter);
+        let mut noise = Noise::new(700 + seed);
+        let samples = SAMPLES + response.len();
+        let rest = noise.series(&NoiseTerm::AngleRandomWalk, samples);
+        let gaussian = noise.series(&NoiseTerm::Markov(shape), samples);
+        let levels = telegraph_signal(&mut noise, samples, shape.time_constant, 2.0 * deviation);
+        let ratio = |signal: &dyn Fn(usize) -> f64| {
+            let sum: Vec<f64> = rest.iter().enumerate().map(|(k, rest)| white * rest + signal(k)).collect();
+            let filtered = sum.windows(response.len()).map(|of| of.iter().zip(&response).map(|(a, b)| a * b).sum());
+            let curve = curve(&filtered.collect::<Vec<f64>>());
+            let trace = trace(&curve, LineCandidates::Curve, &[filter]);
+            assert_eq!(trace.after.filter(), Some(filter), "{:?}", trace.after);
+            let process = trace.after.terms().iter().find_map(|term| match term.kind {
+                NoiseTerm::Markov(markov) => Some((*term, markov)),
+                _ => None,
+            });
+            let (term, markov) = process.unwrap_or_else(|| panic!("no correlated term in {:?}", trace.after));
+            // The record has 5,000 correlation times: four deviations of a variance, and of a time constant, are 4·√(2/5,000).
+            assert!((term.value / deviation - 1.0).abs() < 0.04, "{filter:?}: {term:?}");
+            assert!((markov.time_constant / shape.time_constant - 1.0).abs() < 0.08, "{filter:?}: {term:?}");
+            telegraph::kurtosis_ratio(&curve, &trace.after, markov).expect("fourth moments")
+        };
+        let (smooth, two) = (ratio(&|k| deviation * gaussian[k]), ratio(&|k| levels[k]));
+        assert!(!smooth.is_telegraph() && two.is_telegraph(), "{filter:?}: {smooth:?} {two:?}");
+        // The table has two digits, and two lengths in one root are good to a sixth in the simulations of filters of these lengths.
+        assert!((two.ratio - 1.0).abs() < 0.2 + 3.0 * two.error, "{filter:?}: {two:?}");
     }
 }
 

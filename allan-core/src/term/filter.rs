@@ -1,7 +1,8 @@
 //! A digital low-pass filter of moving averages: white rate noise behind it, and slower noise that passes it.
 
+use super::exponential::Markov;
 use super::process::Process;
-use crate::math::{abs, cos, floor, ln, sin};
+use crate::math::{abs, cos, floor, ln, sin, sqrt};
 use core::f64::consts::PI;
 
 /// One or two cascaded moving averages whose output is read at the same or at a lower rate. Two equal averages have a
@@ -66,6 +67,11 @@ impl MovingAverageFilter {
         (choose(position) - 4 * choose(position - taps)) as f64 / (area * area)
     }
 
+    /// Length of each of the two equal averages, in s, that smooth as much: their impulse response has the same width, by its variance.
+    pub(crate) fn smoothing(&self, sample_period: f64) -> f64 {
+        f64::from(self.taps) / self.decimation * sample_period * sqrt(f64::from(self.stages) / 2.0)
+    }
+
     /// Power gain at `frequency` in Hz for what passes the filter.
     #[must_use]
     pub fn gain(&self, frequency: f64, sample_period: f64) -> f64 {
@@ -89,13 +95,31 @@ impl MovingAverageFilter {
     /// Allan variance at averaging factor `n` of a random walk that has passed the filter, for K = 1.
     pub(super) fn avar_of_walk(&self, n: u64, sample_period: f64) -> f64 {
         let linear = (1.0 + 1.0 / (self.decimation * self.decimation)) / 12.0;
-        sample_period * self.avar_of_passed(n, &|m| m * (linear - m * m / 6.0))
+        sample_period * self.avar_of_passed(n, f64::INFINITY, &|m| m * (linear - m * m / 6.0))
+    }
+
+    /// Allan variance at averaging factor `n` of a Gauss–Markov process of variance 1 that has passed the filter.
+    pub(super) fn avar_of_markov(&self, n: u64, markov: &Markov, sample_period: f64) -> f64 {
+        let steps = markov.time_constant / sample_period;
+        if n as f64 * self.decimation > LONG_AGAINST_WHITE * f64::from(self.taps) {
+            return markov.avar(n, sample_period);
+        }
+        if self.reach_of_differences(n) < WALKS * steps {
+            return 2.0 / markov.time_constant * self.avar_of_walk(n, sample_period);
+        }
+        let between = (1.0 - 1.0 / (self.decimation * self.decimation)) / (6.0 * steps);
+        self.avar_of_passed(n, steps, &|m| markov.sum_variance(m, sample_period) - between * m)
+    }
+
+    /// The longest lag, in samples, between values on which a second difference of averages over `n` samples depends.
+    fn reach_of_differences(&self, n: u64) -> f64 {
+        2.0 * n as f64 + f64::from(self.stages) * f64::from(self.taps) / self.decimation
     }
 
     /// Allan variance at averaging factor `n` of flicker noise that has passed the filter, for B = 1.
     pub(super) fn avar_of_flicker(&self, n: u64) -> f64 {
         let between = (1.0 - 1.0 / (self.decimation * self.decimation)) / 12.0;
-        self.avar_of_passed(n, &|m| {
+        self.avar_of_passed(n, f64::INFINITY, &|m| {
             let (log, square) = (if m > 0.0 { ln(m) } else { 0.0 }, m * m);
             // The second difference of m² ln m, and its first terms for a distant m.
             let second = match m {
@@ -113,12 +137,14 @@ impl MovingAverageFilter {
     /// Of a filter that is read slowly, samples are not averages of the values between them: to first order (Euler and Maclaurin) the
     /// variance of their sum is lower by a twelfth of its second difference, which `sum_variance` has to contain. At `n = 1` and a
     /// decimation of the number of taps, a thirtieth of the result is missing.
-    fn avar_of_passed(&self, n: u64, sum_variance: &dyn Fn(f64) -> f64) -> f64 {
+    ///
+    /// Over `smooth` samples `sum_variance` may bend.
+    fn avar_of_passed(&self, n: u64, smooth: f64, sum_variance: &dyn Fn(f64) -> f64) -> f64 {
         let (n, taps) = (n as f64, f64::from(self.taps));
         if self.stages == 2 && self.decimation == 1.0 && n < taps {
             // The autocorrelation of two averages and the fourth difference are products of the same four factors, and change places.
             let changed = Self { taps: n as u16, ..*self };
-            return n / taps * n / taps * changed.avar_of_passed(self.taps.into(), sum_variance);
+            return n / taps * n / taps * changed.avar_of_passed(self.taps.into(), smooth, sum_variance);
         }
         let reach = usize::from(self.stages) * usize::from(self.taps);
         let most = reach as f64 / self.decimation;
@@ -126,7 +152,7 @@ impl MovingAverageFilter {
         // Far from 0 a pair is a parabola over the lags: its value at 0, and its curvature.
         let parabola = |m: f64| (pair(m, 0.0), (pair(m, most) - pair(m, 0.0)) / (most * most));
         let parabolas = (n > 2.0 * most).then(|| [n, 2.0 * n].map(parabola));
-        let stride = ((taps.min(n * self.decimation) / STEPS_IN_AVERAGE) as usize).max(1);
+        let stride = ((taps.min(n.min(smooth) * self.decimation) / STEPS_IN_AVERAGE) as usize).max(1);
         let (mut sum, mut weights) = (0.0, 0.0);
         for j in (0..reach).step_by(stride) {
             let lag = j as f64 / self.decimation;
@@ -158,6 +184,11 @@ fn square_log(m: f64) -> f64 {
 const STEPS_IN_AVERAGE: f64 = 4.0;
 /// Averaging factor over the number of taps from which on the filter does not matter to slow noise.
 const LONG: f64 = 32.0;
+/// The same for noise that is white over many samples, of which two averages over L samples take at most `0.7·L/n`, 1/1,500.
+const LONG_AGAINST_WHITE: f64 = 1024.0;
+/// Lag over the time constant up to which a Gauss–Markov process is a random walk, to this part of its variance: there the closed form
+/// is a small difference.
+const WALKS: f64 = 1e-3;
 
 impl Process for MovingAverageFilter {
     fn sum_variance(&self, m: f64, sample_period: f64) -> f64 {

@@ -248,8 +248,7 @@ impl<'a> Shapes<'a> {
                     return samples.density(frequency);
                 }
                 let density = kind.process().density(frequency, self.spectrum.period);
-                let passes = kind.passes_filter() || matches!(kind, NoiseTerm::Markov(_));
-                if passes { density * self.gain(frequency) } else { density }
+                if kind.passes_filter() { density * self.gain(frequency) } else { density }
             }
         }
     }
