@@ -6,7 +6,7 @@
 //! against the other candidates: the one that explains the data best is accepted, then the next one given the first.
 
 use super::bias_response::BiasResponse;
-use super::bias_step::{self, StepPosition};
+use super::bias_step::{self, BiasStep, StepPosition};
 use super::block_means::BlockMeans;
 use super::gls_regression::{GlsRegression, RegressionEstimate};
 use super::noise_grid::{NoiseGrid, NoiseGrids};
@@ -82,13 +82,15 @@ struct Accepted {
 
 /// Looks for what changes the bias of `series`. `regressors` are other channels that may influence it. Samples that one of
 /// them lacks are not used; a regressor that lacks more than a tenth of the samples of `series` is left out. `accelerations`
-/// may shake the channel.
+/// may shake the channel. Of slow changes rounding makes steps smaller than `least_step`, in the channel's unit, which is asked for where
+/// there is a step.
 #[must_use]
 pub(crate) fn find(
     series: &Series,
     regressors: &[&Series],
     accelerations: &[Acceleration],
     grids: &NoiseGrids,
+    least_step: &dyn Fn() -> f64,
 ) -> BiasChanges {
     let regressors: Vec<(usize, &Series)> =
         regressors.iter().copied().enumerate().filter(|(_, regressor)| covers(regressor, series)).collect();
@@ -99,9 +101,9 @@ pub(crate) fn find(
             regressors.iter().map(|&(index, regressor)| (index, regressor.clone().in_common(&[&series]))).collect();
         let regressors: Vec<(usize, &Series)> =
             regressors.iter().map(|(index, regressor)| (*index, regressor)).collect();
-        return find_on_common_samples(&series, &regressors, accelerations, grids);
+        return find_on_common_samples(&series, &regressors, accelerations, grids, least_step);
     }
-    find_on_common_samples(series, &regressors, accelerations, grids)
+    find_on_common_samples(series, &regressors, accelerations, grids, least_step)
 }
 
 /// Whether `regressor` has at least the fraction [`LEAST_COMMON`] of the samples of `series`.
@@ -115,6 +117,7 @@ fn find_on_common_samples(
     regressors: &[(usize, &Series)],
     accelerations: &[Acceleration],
     grids: &NoiseGrids,
+    least_step: &dyn Fn() -> f64,
 ) -> BiasChanges {
     // Beside a large bias the squares of its changes would be lost.
     let (first, bias) = series.slots.first().copied().zip(series.values.first().copied()).unwrap_or_default();
@@ -136,7 +139,7 @@ fn find_on_common_samples(
     let covariates = Covariates { regressors, temperature, vibrations };
     let mut accepted: Vec<Accepted> = Vec::new();
     while accepted.len() < MOST
-        && let Some(next) = best_candidate(series, &blocks, &grid, &covariates, &accepted)
+        && let Some(next) = best_candidate(series, &blocks, &grid, &covariates, &accepted, least_step)
     {
         accepted.push(next);
     }
@@ -210,6 +213,7 @@ fn best_candidate(
     grid: &NoiseGrid,
     covariates: &Covariates,
     accepted: &[Accepted],
+    least_step: &dyn Fn() -> f64,
 ) -> Option<Accepted> {
     let Covariates { regressors, temperature, vibrations } = covariates;
     let known: Vec<DVector<f64>> = accepted.iter().map(|accepted| accepted.regressor.clone()).collect();
@@ -275,7 +279,9 @@ fn best_candidate(
     }
     let has_step = accepted.iter().any(|accepted| matches!(accepted.candidate, Candidate::Step(_)));
     let step = if has_step { None } else { bias_step::find(series, blocks, grid, &known, &regression) };
-    if let Some(step) = step {
+    let is_large =
+        |step: &BiasStep| regression.estimate(&step.regressor).is_some_and(|of| of.size.abs() >= least_step());
+    if let Some(step) = step.filter(is_large) {
         let accepted =
             Accepted { candidate: Candidate::Step(step.position), regressor: step.regressor, p_value: step.p_value };
         rivals.push((step.deviance + bias_step::ADVANTAGE, accepted));

@@ -15,6 +15,7 @@ use crate::distributions::NORMAL_975;
 use crate::effects::NoisyInterval;
 use crate::effects::findings::{Correction, Detection, SIGNIFICANCE};
 use crate::parallel::in_parallel;
+use crate::samples::rounding::dithered_avar;
 use crate::samples::series::Series;
 use std::ops::Range;
 
@@ -125,7 +126,8 @@ pub(crate) fn find_by(rules: &[KnockRule], channels: &[Series]) -> Vec<Vec<Knock
 impl KnockRule {
     /// Fits the rule to a channel.
     pub(crate) fn fit(series: &Series, dithered_avar_counts2: f64) -> Self {
-        let mut largest = 0.0_f64;
+        let count = series.resolution * series.resolution;
+        let mut is_dithered = false;
         let mut scales = Vec::new();
         for n in averaging_factors(series.period_s) {
             let differences = SquaredDifferences::new(series, n);
@@ -150,14 +152,13 @@ impl KnockRule {
             }
             let typical = median(levels.into_iter().flatten().collect()) / TRIMMED_MEAN;
             // The Allan variance is half the mean square of the differences.
-            largest = largest.max(0.5 * typical);
+            is_dithered |= 0.5 * typical > dithered_avar(dithered_avar_counts2, n as u64) * count;
             if freedoms.is_empty() {
                 break;
             }
             scales.push(Scale { n, freedoms });
         }
-        let count = series.resolution * series.resolution;
-        let floor = if largest > dithered_avar_counts2 * count { 0.0 } else { count };
+        let floor = if is_dithered { 0.0 } else { count };
         Self { scales, floor }
     }
 

@@ -66,7 +66,7 @@ impl Case {
 }
 
 fn bias_changes(series: &Series) -> BiasChanges {
-    bias::find(series, &[], &[], &NoiseGrids::default())
+    bias::find(series, &[], &[], &NoiseGrids::default(), &|| 0.0)
 }
 
 fn value_of(detection: &Detection, name: &str) -> Parameter {
@@ -203,7 +203,10 @@ fn ramps_telegraph_noise_and_temperature_are_no_steps() {
     simulation.scenario.environment.temperature =
         TemperatureProfile { rise_c: 6.0, time_constant_s: 60.0, ..TemperatureProfile::default() };
     let case = Case::of(simulation);
-    assert_eq!(bias::find(&case.series(GYRO), &[&case.series(Channel::Temp)], &[], &NoiseGrids::default()).step, None);
+    assert_eq!(
+        bias::find(&case.series(GYRO), &[&case.series(Channel::Temp)], &[], &NoiseGrids::default(), &|| 0.0).step,
+        None
+    );
 }
 
 #[test]
@@ -250,7 +253,7 @@ fn dependence_on_temperature_is_no_ramp() {
     };
     let case = warming(InjectedEffect::Temperature { channel: SENSED_GYRO, sensitivity: -0.05 }, 8.0, 17);
     let follows = |case: &Case, channel: Channel| {
-        bias::find(&case.series(channel), &[&case.series(Channel::Temp)], &[], &NoiseGrids::default())
+        bias::find(&case.series(channel), &[&case.series(Channel::Temp)], &[], &NoiseGrids::default(), &|| 0.0)
     };
     let BiasChanges { ramp, sensitivities, .. } = follows(&case, GYRO);
     assert_eq!(ramp, None);

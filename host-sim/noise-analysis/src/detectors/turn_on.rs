@@ -105,7 +105,7 @@ mod tests {
         let values = slots.clone().map(value).collect();
         let series =
             Series { slots: slots.clone().collect(), values, span: slots, period_s: 0.1, resolution: 1e-3, unit: "g" };
-        let changes = bias::find(&series, &[], &[], &NoiseGrids::default());
+        let changes = bias::find(&series, &[], &[], &NoiseGrids::default(), &|| 0.0);
         let detections = changes.step.into_iter().chain(changes.ramp).map(|found| found.effect);
         changes.responses.into_iter().map(|of| of.effect).chain(detections).collect()
     }

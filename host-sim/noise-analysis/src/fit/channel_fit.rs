@@ -9,7 +9,7 @@ use crate::fit::part_filter::PartFilter;
 use crate::fit::sample_coefficients::{CoefficientsFrom, SamplesOfCurve, by_samples};
 use crate::fit::traced_model::{Addition, PlannedTerm, Shapes, TracedModel, residual, within_measured};
 use crate::record::estimators::RecordEstimators;
-use crate::samples::rounding::dithered_avar;
+use crate::samples::rounding::is_dithered;
 use crate::spectra::MarkovEstimate;
 use crate::spectra::cosine_spectrum::CosineSpectrum;
 use allan_core::fit::fit;
@@ -180,9 +180,7 @@ impl ChannelFit {
     /// Whether the noise of the first `octaves` is large enough against the channel's `resolution` (in its unit) that
     /// rounding adds white noise and nothing else.
     pub(crate) fn is_dithered(&self, profile: &SensorProfile, resolution: f64, octaves: usize) -> bool {
-        let exceeds =
-            |at: &AllanPoint| at.avar > dithered_avar(profile.dithered_avar_counts2, at.n) * resolution * resolution;
-        self.covariates.curve.points().iter().take(octaves).any(exceeds)
+        is_dithered(&self.covariates.curve, resolution, profile.dithered_avar_counts2, octaves)
     }
 
     /// The Allan deviation of the model with the added terms at each point of the curve of the `whole` record, with the share of the

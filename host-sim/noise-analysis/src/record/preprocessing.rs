@@ -16,6 +16,8 @@ use crate::effects::findings::{Correction, Detection};
 use crate::parallel::{in_parallel, per_channel};
 use crate::record::condensed_record::CondensedRecord;
 use crate::samples::exclusion::Exclusion;
+use crate::samples::gapped_cascade::GappedCascade;
+use crate::samples::rounding::{DITHERED_OCTAVES, NEIGHBOURING_COUNTS, is_dithered};
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra;
@@ -197,15 +199,16 @@ impl ChannelPreprocessing {
         let regressors: Vec<ChannelId> =
             measurement.ids().filter(|&regressor| may_depend(measurement, channel, regressor)).collect();
         let others: Vec<&Series> = regressors.iter().map(|&regressor| &quiet[regressor]).collect();
+        let least_step = || smallest_step(&series[channel], measurement.profile.dithered_avar_counts2);
         let own = without_lines(quiet[channel].clone().without(&exclusion.spikes));
-        let whole = bias::find(&own, &others, &accelerations(measurement, series, channel), noise_grids);
+        let whole = bias::find(&own, &others, &accelerations(measurement, series, channel), noise_grids, &least_step);
         let half = {
             let all = series.map(|of| of.before(middle));
             let quiet = |&of: &ChannelId| all[of].clone().without(&slots_within(&all[of], &knocks.by_first_half[of]));
             let others: Vec<Series> = regressors.iter().map(quiet).collect();
             let others: Vec<&Series> = others.iter().collect();
             let own = without_lines(all[channel].clone().without(&exclusion.by_first_half));
-            bias::find(&own, &others, &accelerations(measurement, &all, channel), noise_grids)
+            bias::find(&own, &others, &accelerations(measurement, &all, channel), noise_grids, &least_step)
         };
         // The differences measure a sensitivity to motion better; the slow part of an accelerometer's signal is its own drift.
         let is_slow = |regressor: ChannelId| measurement[regressor].profile.quantity.is_environment();
@@ -235,6 +238,16 @@ impl ChannelPreprocessing {
         let [first_half, whole] = &self.bias;
         if exclusion == Exclusion::ByWhole { whole } else { first_half }
     }
+}
+
+/// The smallest step that rounding cannot make of a slow change, in the unit of `series`: any, where its noise reaches from one count to
+/// the next.
+fn smallest_step(series: &Series, dithered_avar_counts2: f64) -> f64 {
+    let curve = GappedCascade::of_series(series, 0..series.values.len()).curve(series.period_s);
+    if is_dithered(&curve, 1.0, dithered_avar_counts2, DITHERED_OCTAVES) {
+        return 0.0;
+    }
+    NEIGHBOURING_COUNTS * series.resolution
 }
 
 /// The first sample period behind a step, and its size.

@@ -9,6 +9,7 @@ use crate::fit::noise_terms::{is_filter, is_line, line_frequency};
 use crate::rivals::cause::{Cause, Shown};
 use crate::rivals::proposal::{ChannelFacts, Origin, Proposal, Signal};
 use crate::rivals::signals::{SpectrumClaim, SpectrumProposals};
+use crate::samples::rounding::NEIGHBOURING_COUNTS;
 use crate::spectra::decaying_disturbances::DecayingDisturbances;
 use crate::spectra::frequency_track::FrequencyTrack;
 use crate::spectra::periodic_signal::PeriodicSignal;
@@ -19,8 +20,6 @@ use std::f64::consts::{PI, TAU};
 #[cfg(test)]
 mod tests;
 
-/// In a channel that is not dithered, two levels closer than this, in steps of its resolution, are two neighbouring counts.
-const NEIGHBOURING_COUNTS: f64 = 1.5;
 /// Farthest that an octave of the curve and the time constant that it may belong to are apart, in octaves: either is known to a factor
 /// of 2.
 const SAME_TIME_OCTAVES: f64 = 2.0;

@@ -13,13 +13,15 @@
 
 use crate::OCTAVES;
 use crate::distributions::ROUNDING;
-use allan_core::Curve;
+use allan_core::{AllanPoint, Curve};
 use std::f64::consts::PI;
 
 /// A channel is dithered if its Allan variance exceeds the [limit](dithered_avar) at any of the first octaves, this many.
 /// Behind a filter neighbouring samples are correlated, so that the limit is exceeded only at longer averaging times: the longest filters
 /// average 64 samples.
 pub(crate) const DITHERED_OCTAVES: usize = 7;
+/// Counts between two levels up to which they are neighbouring counts: the next ones are two apart.
+pub(crate) const NEIGHBOURING_COUNTS: f64 = 1.5;
 /// Mean square of a difference, counts², beyond which its rounding errors are uncorrelated to 0.2 %.
 const UNCORRELATED: f64 = 0.3;
 /// Mean square of a difference, counts², below which it reaches over more than one count once in 10¹² times.
@@ -119,6 +121,13 @@ impl Rounding {
 /// `of_samples`: the noise before the rounding is the same, and that of the rounding an n-th.
 pub(crate) fn dithered_avar(of_samples: f64, n: u64) -> f64 {
     of_samples - ROUNDING * (1.0 - 1.0 / n as f64)
+}
+
+/// Whether the noise of the first `octaves` of a curve reaches from one count of `resolution` to the next at an averaging time, so that
+/// rounding adds white noise and nothing else; `of_samples` as [`dithered_avar`] has it.
+pub(crate) fn is_dithered(curve: &Curve<OCTAVES>, resolution: f64, of_samples: f64, octaves: usize) -> bool {
+    let exceeds = |at: &AllanPoint| at.avar > dithered_avar(of_samples, at.n) * resolution * resolution;
+    curve.points().iter().take(octaves).any(exceeds)
 }
 
 /// Mean squares of the differences of samples at lags of 1, 2, …, counts², as far as the errors are correlated. `None` where those of
