@@ -190,6 +190,27 @@ fn a_step_is_located_measured_and_removed() {
     assert_eq!(bias_changes(&case.series(Channel::GyroZ)).step, None);
 }
 
+/// A bias that drifts over the middle between two counts, in noise of an eighth of one, is one count and then the next.
+#[test]
+fn where_the_noise_is_below_a_count_neighbouring_counts_are_no_step() {
+    let series = |counts: f64| {
+        let mut series = Case::hiding(Vec::new(), 600.0, 23).series(GYRO);
+        let mut random = ChaCha8Rng::seed_from_u64(24);
+        let (resolution, half) = (series.resolution, series.values.len() / 2);
+        for (at, value) in series.values_mut().iter_mut().enumerate() {
+            let bias = 0.3 + if at < half { 0.0 } else { counts };
+            *value = (bias + random.sample::<f64, _>(StandardNormal) / 8.0).round() * resolution;
+        }
+        series
+    };
+    let found = |series: &Series, least_counts: f64| {
+        bias::find(series, &[], &[], &NoiseGrids::default(), &|| least_counts * series.resolution).step.is_some()
+    };
+    let (near, far) = (series(0.4), series(3.0));
+    assert!(found(&near, 0.0) && !found(&near, 1.5));
+    assert!(found(&far, 0.0) && found(&far, 1.5));
+}
+
 #[test]
 fn ramps_telegraph_noise_and_temperature_are_no_steps() {
     let ramp = InjectedEffect::RateRamp { channel: SENSED_GYRO, slope: 1e-3 };
