@@ -6,7 +6,7 @@
 //! by itself have the false-alarm rate that is asked for.
 
 use crate::distributions::{quantile, upper_tail};
-use crate::effects::findings::SIGNIFICANCE;
+use crate::effects::findings::REFUTED;
 use crate::samples::series::Series;
 use statrs::function::beta::checked_beta_reg;
 use std::ops::Range;
@@ -303,7 +303,7 @@ impl LevelScatter {
     /// How the level moves by itself, where its noise has `freedom` degrees of freedom in a block; `None` where it scatters as that noise does,
     /// unless it is `known` to move from shorter blocks.
     pub(super) fn wandering(&self, freedom: f64, known: bool) -> Option<Wandering> {
-        let most = 1.0 + quantile(SIGNIFICANCE) * SCATTER_ERROR / (self.ratios.len() as f64).sqrt();
+        let most = 1.0 + quantile(REFUTED) * SCATTER_ERROR / (self.ratios.len() as f64).sqrt();
         if !known && self.deviation() < most * (2.0 / freedom).sqrt() {
             return None;
         }

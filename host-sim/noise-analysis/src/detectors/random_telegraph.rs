@@ -7,7 +7,7 @@
 use super::telegraph_models::{TwoStateChain, gauss_markov_log_likelihood, white_log_likelihood};
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, quantile};
-use crate::effects::findings::SIGNIFICANCE;
+use crate::effects::findings::REFUTED;
 use crate::effects::{Spikes, TelegraphEvidence, TelegraphNoise};
 use crate::samples::uniform_series::UniformSeries;
 
@@ -89,7 +89,7 @@ pub(crate) fn is_reversible(series: &UniformSeries, time_constant: f64) -> bool 
         let cube = change.powi(3);
         (cubes + cube, sixths + cube * cube)
     });
-    sixths <= 0.0 || cubes.abs() < quantile(0.5 * SIGNIFICANCE) * sixths.sqrt()
+    sixths <= 0.0 || cubes.abs() < quantile(0.5 * REFUTED) * sixths.sqrt()
 }
 
 /// Whether visits to a level of `telegraph` noise that last no longer than a sample are as frequent and as large as `spikes`. With
@@ -187,7 +187,7 @@ fn stays_at_levels(chain: &TwoStateChain, parts: &PartMeans) -> bool {
         let (sum, information) = &mut sums[usize::from(visit[0])];
         (*sum, *information) = (*sum + weight * fall, *information + weight);
     }
-    sums.iter().all(|(sum, information)| sum.abs() <= quantile(0.25 * SIGNIFICANCE) * information.sqrt())
+    sums.iter().all(|(sum, information)| sum.abs() <= quantile(0.25 * REFUTED) * information.sqrt())
 }
 
 /// The telegraph noise of `chain`, for parts of `part_s` seconds.

@@ -9,7 +9,7 @@ use super::noise_levels::median;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, density, poisson_bounds, poisson_tail, quantile, upper_tail};
 use crate::effects::Spikes;
-use crate::effects::findings::{Correction, Detection, SIGNIFICANCE};
+use crate::effects::findings::{Correction, Detection, REFUTED, SIGNIFICANCE};
 use crate::samples::interpolation::{ALL_NEIGHBOURS, Autocovariance, Neighbours, PartialInterpolation, REACH};
 use crate::samples::series::Series;
 use nalgebra::{SMatrix, SVector};
@@ -150,7 +150,7 @@ impl FoundSpikes {
         let events = self.events();
         let joined = (self.spikes.len() - events.len()) as u64;
         let expected = events.len() as f64 * near_by_chance(events.len(), samples);
-        if poisson_tail(joined, expected) >= SIGNIFICANCE {
+        if poisson_tail(joined, expected) >= REFUTED {
             return self.spikes.iter().map(|spike| spike.size).collect();
         }
         events.into_iter().map(|event| self.spikes[event].iter().map(|spike| spike.size).fold(0.0, f64::max)).collect()
@@ -174,7 +174,7 @@ impl SpikeRule {
             return None;
         }
         let interpolation = Interpolation::fit(series)?;
-        let threshold = interpolation.deviation * quantile(0.5 * SIGNIFICANCE / samples as f64);
+        let threshold = interpolation.deviation * quantile(0.5 * REFUTED / samples as f64);
         Some(Self { interpolation, threshold, difference: typical_difference(series) })
     }
 
@@ -211,7 +211,7 @@ impl SpikeRule {
             let certain = found.spikes[event.start].slot..found.spikes[event.end - 1].slot + 1;
             let length = certain.end - certain.start;
             let p_value = (events.len() as f64 * near.powi(event.len() as i32 - 1)).min(1.0);
-            if length <= 2 * REACH as u64 || p_value >= SIGNIFICANCE {
+            if length <= 2 * REACH as u64 || p_value >= REFUTED {
                 return None;
             }
             let sizes = || found.spikes[event.clone()].iter().map(|spike| spike.size / self.interpolation.deviation);
@@ -268,6 +268,13 @@ impl SpikeRule {
         known.iter().filter_map(part).collect()
     }
 
+    /// Whether chance finds as many, or one as large, in `samples` samples with less than [`SIGNIFICANCE`]. Beyond the threshold it has
+    /// one in a channel with [`REFUTED`], and two with half of its square.
+    fn is_beyond_chance(&self, found: &FoundSpikes, samples: u64) -> bool {
+        let large = self.interpolation.deviation * quantile(0.5 * SIGNIFICANCE / samples as f64);
+        found.spikes.len() > 1 || found.spikes.iter().any(|spike| spike.size > large)
+    }
+
     /// The spikes of a channel in `unit` that was looked at for `hours`, in `samples` samples, as they are reported; `None` if there are
     /// none, or if jumps of the bias are at least as frequent.
     pub(crate) fn detection(
@@ -276,7 +283,7 @@ impl SpikeRule {
         (hours, samples): (f64, u64),
         unit: &'static str,
     ) -> Option<Detection> {
-        if !found.are_spikes() {
+        if !found.are_spikes() || !self.is_beyond_chance(found, samples) {
             return None;
         }
         let Self { interpolation, threshold, .. } = self;
@@ -423,7 +430,7 @@ impl Interpolation {
             let near = errors.iter().filter(|(distance, error)| *distance <= reach && *error != 0.0);
             let squares = near.map(|(_, error)| (error / self.deviation).powi(2));
             let (count, sum) = squares.fold((0.0, 0.0), |(count, sum), square| (count + 1.0, sum + square));
-            let is_louder = count > 0.0 && upper_tail((sum - count) / f64::sqrt(2.0 * count)) < SIGNIFICANCE;
+            let is_louder = count > 0.0 && upper_tail((sum - count) / f64::sqrt(2.0 * count)) < REFUTED;
             if is_louder { f64::sqrt(sum / count) } else { 1.0 }
         };
         AROUND.map(louder).into_iter().fold(1.0, f64::max)

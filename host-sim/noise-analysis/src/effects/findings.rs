@@ -4,8 +4,11 @@ use crate::effects::Effect;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Highest probability that chance alone produces a [`Detection`] anywhere in the record of one channel.
-pub const SIGNIFICANCE: f64 = 2e-4;
+/// Highest probability that chance alone gives a name anywhere in the record of a channel: of six channels and a dozen kinds of effects it
+/// gives one in 1 of 700 recordings.
+pub const SIGNIFICANCE: f64 = 2e-5;
+/// Highest probability that chance alone refutes a model or a shape that is true.
+pub const REFUTED: f64 = 2e-4;
 
 /// An effect by which a channel shows a cause.
 #[derive(Debug, Clone, PartialEq)]

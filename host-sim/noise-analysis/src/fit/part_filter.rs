@@ -22,7 +22,7 @@ pub(crate) use channel_deviance::FilteredChannel;
 
 use crate::OCTAVES;
 use crate::bounds::BoundedEstimate;
-use crate::effects::findings::SIGNIFICANCE;
+use crate::effects::findings::{REFUTED, SIGNIFICANCE};
 use crate::parallel;
 use allan_core::Curve;
 use allan_core::term::MovingAverageFilter;
@@ -134,7 +134,7 @@ pub(crate) fn estimate(
 /// Those of `tried` whose deviance is above `least`, in units of its `scatter`, by no more than chance, with the decimations of which that
 /// holds.
 fn allowed(joint: &mut [ChannelDeviance], tried: &[Hypothesis], (least, scatter): (f64, f64)) -> Vec<AllowedFilter> {
-    let limit = least + scatter * chi_squared_quantile(1.0 - SIGNIFICANCE, 1.0);
+    let limit = least + scatter * chi_squared_quantile(1.0 - REFUTED, 1.0);
     let filters = tried.iter().filter(|of| of.total() <= limit).map(|of| of.filter);
     filters.map(|filter| (filter, decimation::allowed(filter, limit, |read| total(joint, read)))).collect()
 }
@@ -183,7 +183,7 @@ fn contradictions(
     if filter.decimation == 1.0 {
         return found;
     }
-    let required = chi_squared_quantile(1.0 - SIGNIFICANCE, 1.0);
+    let required = chi_squared_quantile(1.0 - REFUTED, 1.0);
     let fits = joint.iter_mut().zip(&common.deviances).zip(scatters).zip(shown).filter(|(_, shown)| **shown);
     for (((channel, deviance), scatter), _) in fits {
         let is_same = |of: &&MovingAverageFilter| (of.stages, of.taps) == (filter.stages, filter.taps);

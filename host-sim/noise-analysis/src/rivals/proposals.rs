@@ -4,7 +4,7 @@
 use crate::OCTAVES;
 use crate::bounds::{BoundedEstimate, ChannelEstimate};
 use crate::detectors::random_telegraph::{self, TOLD_APART, is_reversible};
-use crate::effects::findings::SIGNIFICANCE;
+use crate::effects::findings::REFUTED;
 use crate::effects::{
     AccelerationSensitivity, AngleQuantization, BandMismatch, CommonMode, CurveEvidence, Effect, FirstOrderFilter,
     LineEvidence, LineSource, LinearDrift, LinearDriftEvidence, MarkovEvidence, MarkovProcess, ModulatedLine,
@@ -397,7 +397,7 @@ fn shared_drift_effect(
 /// A line of the spectrum beside what `fit` has.
 fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &'static str) -> Effect {
     let model = fit.after();
-    if line.shape_p_value < SIGNIFICANCE {
+    if line.shape_p_value < REFUTED {
         return unexplained_band(line, model, BandMismatch::Shape { p_value: line.shape_p_value });
     }
     if line.is_broad() && fit.refutes(&line.kind()) {

@@ -3,7 +3,7 @@
 
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, ROUNDING, quantile, upper_tail};
-use crate::effects::findings::SIGNIFICANCE;
+use crate::effects::findings::REFUTED;
 use crate::effects::{Observation, Unexplained, UnexplainedPlace};
 use crate::fit::channel_fit::ChannelFit;
 use crate::samples::rounding::DITHERED_OCTAVES;
@@ -38,7 +38,7 @@ struct Residual<'a> {
 }
 
 /// The deviation of the curve of a channel of this `resolution` from the model with its added terms that is least likely by
-/// chance, if it is by less than [`SIGNIFICANCE`] anywhere in the curve. `of_covariates` is the square of the resolutions of its
+/// chance, if it is by less than [`REFUTED`] anywhere in the curve. `of_covariates` is the square of the resolutions of its
 /// covariates, each times its sensitivity: a temperature is as good as constant between two counts, so that the rounding error of its
 /// share stays the same over long averaging times.
 pub(crate) fn by_curve(
@@ -56,7 +56,7 @@ pub(crate) fn by_curve(
     let measured = curve.points().iter().filter(|point| point.replaced < 0.5);
     let residuals: Vec<Residual> = measured.filter_map(|point| residual(point, model, rounding)).collect();
     // Neighbouring octaves are nearly independent.
-    let limit = SIGNIFICANCE / residuals.len() as f64;
+    let limit = REFUTED / residuals.len() as f64;
     let is_unexplained = |of: &&Residual| of.p_value < limit && (of.ratio.sqrt() - 1.0).abs() > MIN_EXCESS;
     let (at, worst) = residuals
         .iter()
@@ -64,7 +64,7 @@ pub(crate) fn by_curve(
         .filter(|(_, of)| is_unexplained(of))
         .min_by(|a, b| a.1.p_value.total_cmp(&b.1.p_value))?;
     // The octaves around it that deviate in the same direction, each by itself.
-    let is_part = |of: &&Residual| of.p_value < SIGNIFICANCE && (of.ratio > 1.0) == (worst.ratio > 1.0);
+    let is_part = |of: &&Residual| of.p_value < REFUTED && (of.ratio > 1.0) == (worst.ratio > 1.0);
     let first = residuals[..at].iter().rev().take_while(is_part).last().unwrap_or(worst);
     let last = residuals[at..].iter().take_while(is_part).last().unwrap_or(worst);
     let percent = |avar: f64| 100.0 * ((avar / model.avar(worst.point.n)).sqrt() - 1.0);
@@ -121,7 +121,7 @@ pub(crate) fn level_by_temperature(series: &Series, temperature: &Series) -> Opt
     // The deviation has half the logarithm of the variance.
     let percent = |slope: f64| 100.0 * (0.5 * slope * (warmest - coldest)).exp_m1();
     let error = ((yy / xx) * (1.0 - explained) / (count - 2.0)).sqrt();
-    let is_shown = explained > LEAST_EXPLAINED && slope.abs() > quantile(0.5 * SIGNIFICANCE) * error;
+    let is_shown = explained > LEAST_EXPLAINED && slope.abs() > quantile(0.5 * REFUTED) * error;
     if !is_shown || percent(slope.abs()) < LEAST_CHANGE {
         return None;
     }
