@@ -32,6 +32,7 @@ mod response;
 mod sample_clock;
 mod saturation;
 mod shared_drift;
+mod shot_noise;
 mod sinusoid;
 mod spikes;
 mod square_wave;
@@ -70,6 +71,7 @@ pub use response::ResponseVariance;
 pub use sample_clock::{ClockDeviation, RateChange};
 pub use saturation::Saturation;
 pub use shared_drift::SharedDrift;
+pub use shot_noise::ShotNoise;
 pub use sinusoid::SinusoidalLine;
 pub use spikes::Spikes;
 pub use square_wave::SquareWave;
@@ -105,6 +107,8 @@ pub enum Effect {
     SquareWave(SquareWave),
     /// Jumps to and fro between two levels.
     TelegraphNoise(TelegraphNoise),
+    /// Disturbances that begin at once and decay, at random times.
+    ShotNoise(ShotNoise),
     /// Exponentially correlated noise.
     MarkovProcess(MarkovProcess),
     /// Drift that channels have in common.
@@ -224,6 +228,7 @@ kinds!(
     Periodic,
     SquareWave,
     TelegraphNoise,
+    ShotNoise,
     MarkovProcess,
     CommonMode,
     SharedDrift,

@@ -11,7 +11,7 @@
 //!               ├► sine tapers ─► common_mode            drift that several channels share
 //!               ├► periodic_signal                       a slow signal that repeats and is no sinusoid
 //!               ├► frequency_track                       a line whose frequency runs
-//!               ├► decaying_disturbances                 disturbances that begin at once and decay
+//!               ├► decaying_disturbances                 shot noise: disturbances that begin at once and decay
 //!               ├► cosine_spectrum                       a Markov process that the curve does not tell from a walk
 //!               ├► SampleSpectrum ─► sample_likelihood   the coefficients of a model by all samples
 //!               ├► Welch ─► white_noise                  N, independent of the Allan variance

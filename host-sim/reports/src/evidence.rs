@@ -137,6 +137,18 @@ impl Wording {
                 ),
                 format!("; {}", self.line(&of.line).sentence()),
             ),
+            Effect::ShotNoise(of) => text(
+                format!(
+                    "the third moment behind a filter for disturbances {} that decay within {:.2} s is {:.1} standard deviations from \
+                     that of a Gaussian process, by chance {}, and {:.1} behind the same filter in reversed time",
+                    if of.sum > 0.0 { "upwards" } else { "downwards" },
+                    of.time_constant_s.value,
+                    of.sum.abs(),
+                    self.chance(of.p_value),
+                    of.reversed.abs()
+                ),
+                "; shocks, or a load that comes on at random times",
+            ),
             Effect::TelegraphNoise(of) => match &of.evidence {
                 TelegraphEvidence::Kurtosis { ratio, error, curve } => text(
                     format!(
@@ -482,18 +494,6 @@ impl Wording {
                     "",
                 )
             }
-            Observation::DecayingDisturbances { time_constant_s, sum, reversed, p_value } => text(
-                format!(
-                    "disturbances {} that begin at once and decay within {time_constant_s:.2} s: the third moment behind a filter for \
-                     such is {:.1} standard deviations from that of a Gaussian process, by chance {}, and {:.1} behind the same filter \
-                     in reversed time",
-                    if *sum > 0.0 { "upwards" } else { "downwards" },
-                    sum.abs(),
-                    self.chance(*p_value),
-                    reversed.abs()
-                ),
-                "",
-            ),
             Observation::LevelByTemperature { range_degc: [coldest, warmest], explained } => text(
                 format!(
                     "the level of the noise changes by {percent:+.0} % from {coldest:.1} to {warmest:.1} degC: {:.0} % of its changes \

@@ -261,6 +261,18 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
                 "; try another part, or model it as a Markov process of this time constant.",
             ),
         ),
+        Effect::ShotNoise(of) => (
+            format!(
+                "Disturbances of {} begin at once and decay with a time constant of {}, {}.",
+                size(of.size),
+                seconds(of.time_constant_s),
+                amount(&of.rate_per_hour.parameter("1/h"))
+            ),
+            Advice::new(
+                "Look for what strikes the part or draws from its supply at random times",
+                format!("; a Gauss-Markov state of this time constant has the same spectrum.{}", off()),
+            ),
+        ),
         Effect::MarkovProcess(of) => (
             format!(
                 "A noise with a memory of {} and a size of {} (1 σ).",

@@ -55,17 +55,6 @@ pub enum Observation {
         /// What contradicts a resonance.
         mismatch: BandMismatch,
     },
-    /// Disturbances that begin at once and decay.
-    DecayingDisturbances {
-        /// s
-        time_constant_s: f64,
-        /// Third moment behind a filter for such, in standard deviations; above 0 of disturbances upwards.
-        sum: f64,
-        /// The same behind the filter in reversed time.
-        reversed: f64,
-        /// Probability by chance.
-        p_value: f64,
-    },
     /// A level of the noise that follows the temperature.
     LevelByTemperature {
         /// Lowest and highest temperature, °C.

@@ -2,6 +2,15 @@
 
 use allan_core::{Model, NoiseTerm};
 
+/// Farthest that a time constant and another one, or the octave of the curve that it may belong to, are apart to be one, in octaves:
+/// either is known to a factor of 2.
+const SAME_TIME_OCTAVES: f64 = 2.0;
+
+/// Whether two time constants, s, may be those of one process.
+pub(crate) fn is_same_time(one_s: f64, other_s: f64) -> bool {
+    (one_s / other_s).log2().abs() <= SAME_TIME_OCTAVES
+}
+
 /// Whether a term is a digital filter.
 pub(crate) fn is_filter(kind: &NoiseTerm) -> bool {
     matches!(kind, NoiseTerm::Filtered(_))

@@ -50,13 +50,13 @@ pub(crate) enum Origin {
     },
     /// What the model leaves of the curve.
     Residual,
-    /// A signal that no term of the model has.
+    /// A signal in the samples.
     Signal(Signal),
     /// The level of the noise in blocks.
     Level,
 }
 
-/// A signal in the samples of a channel that no term of the noise model has.
+/// A signal in the samples of a channel: no term of the noise model has it, but for the variance of the last one.
 #[derive(Debug, Clone)]
 pub(crate) enum Signal {
     /// A slow periodic one that is no sinusoid.
@@ -65,6 +65,13 @@ pub(crate) enum Signal {
     Chirp(FrequencyTrack),
     /// Disturbances that begin at once and decay.
     Decays(DecayingDisturbances),
+}
+
+impl Signal {
+    /// The disturbances that decay.
+    pub(crate) const fn decays(&self) -> Option<&DecayingDisturbances> {
+        if let Self::Decays(of) = self { Some(of) } else { None }
+    }
 }
 
 impl Proposal {

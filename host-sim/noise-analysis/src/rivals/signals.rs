@@ -1,14 +1,17 @@
-//! Signals in the samples of a channel that no term of the noise model has: a slow periodic one that is no sinusoid, a line whose
-//! frequency runs, and disturbances that begin at once and decay; and the lines of the spectrum beside them.
+//! Signals in the samples of a channel: a slow periodic one that is no sinusoid, a line whose frequency runs, and disturbances that begin
+//! at once and decay; and the lines of the spectrum beside them.
 
 use crate::bounds::BoundedEstimate;
-use crate::effects::{Chirp, MarkovProcess, Observation, Periodic, Unexplained, UnexplainedPlace};
+use crate::effects::{Chirp, Periodic, ShotNoise};
 use crate::rivals::proposal::{Origin, Proposal, Signal};
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::decaying_disturbances::DecayingDisturbances;
 use crate::spectra::frequency_track::FrequencyTrack;
 use crate::spectra::periodic_signal::PeriodicSignal;
 use crate::spectra::spectral_lines::MergedLine;
+
+/// Seconds in an hour.
+const HOUR_S: f64 = 3600.0;
 
 /// Lines of the spectrum of a channel and signals in its samples.
 #[derive(Clone)]
@@ -63,7 +66,7 @@ pub(crate) fn proposal(signal: &Signal, unit: &'static str) -> Proposal {
     match signal {
         Signal::Periodic(found) => Proposal::new(periodic(found, unit), origin),
         Signal::Chirp(track) => Proposal::new(chirp(track, unit), origin),
-        Signal::Decays(decays) => Proposal::new(decays_effect(decays), origin),
+        Signal::Decays(decays) => Proposal::new(shot_noise(decays, unit), origin),
     }
 }
 
@@ -92,16 +95,15 @@ fn chirp(track: &FrequencyTrack, unit: &'static str) -> Chirp {
     }
 }
 
-fn decays_effect(decays: &DecayingDisturbances) -> Unexplained {
-    Unexplained {
-        place: UnexplainedPlace::AveragingTime(decays.time_constant.scaled(MarkovProcess::PEAK)),
-        excess_percent: None,
-        observation: Observation::DecayingDisturbances {
-            time_constant_s: decays.time_constant.value,
-            sum: decays.sum,
-            reversed: decays.reversed,
-            p_value: decays.p_value,
-        },
+fn shot_noise(decays: &DecayingDisturbances, unit: &'static str) -> ShotNoise {
+    ShotNoise {
+        rate_per_hour: decays.rate_hz.scaled(HOUR_S),
+        size: decays.size.in_unit(unit),
+        time_constant_s: decays.time_constant,
+        deviation: decays.deviation.in_unit(unit),
+        sum: decays.sum,
+        reversed: decays.reversed,
+        p_value: decays.p_value,
     }
 }
 

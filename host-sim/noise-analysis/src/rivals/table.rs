@@ -5,7 +5,7 @@ use crate::bounds::BoundedEstimate;
 use crate::detectors::random_telegraph::explains_spikes;
 use crate::effects::{CommonMode, Effect, MarkovProcess, Observation, Refutation, TelegraphNoise, Unexplained};
 use crate::fit::channel_fit::FREQUENCY_BY_OCTAVES;
-use crate::fit::noise_terms::{is_filter, is_line, line_frequency};
+use crate::fit::noise_terms::{is_filter, is_line, is_same_time, line_frequency};
 use crate::rivals::cause::{Cause, Shown};
 use crate::rivals::proposal::{ChannelFacts, Origin, Proposal, Signal};
 use crate::rivals::signals::{SpectrumClaim, SpectrumProposals};
@@ -20,9 +20,6 @@ use std::f64::consts::{PI, TAU};
 #[cfg(test)]
 mod tests;
 
-/// Farthest that an octave of the curve and the time constant that it may belong to are apart, in octaves: either is known to a factor
-/// of 2.
-const SAME_TIME_OCTAVES: f64 = 2.0;
 /// Shortest time constant of a process, in periods of a periodic signal, that may be the signal's: its jumps and slopes have the
 /// spectrum of one with its time scale.
 const LEAST_OF_PERIOD: f64 = 0.02;
@@ -136,11 +133,11 @@ pub static RIVALRIES: [Rivalry; 45] = [
         "a frequency that runs leaves peaks all along its range",
         Rule::Spectrum(|claim, all| matches!((claim, &all.track),
             (SpectrumClaim::Line(line), Some(of)) if of.passes(line.frequency.value) && 0.5 * line.statistic <= of.energy))),
-    row("slow periodic signal", "disturbances that decay", "always", "its falls begin at once, as they do",
+    row("slow periodic signal", "shot noise", "always", "its falls begin at once, as they do",
         Rule::Spectrum(|claim, all| matches!(claim, SpectrumClaim::Decays) && all.periodic.is_some())),
 
     // What the samples of one channel show.
-    row("disturbances without a name", "telegraph noise of the samples", "the samples change upwards as they do not change downwards",
+    row("irreversible changes", "telegraph noise of the samples", "the samples change upwards as they do not change downwards",
         "two levels are the same when time runs backwards",
         Rule::Channel(|of| matches!(of.origin(), Origin::Levels { is_reversible: false }))),
     row("drift of the bias", "motion", "in one channel, and not sudden",
@@ -246,7 +243,7 @@ pub static RIVALRIES: [Rivalry; 45] = [
             let ([shortest, longest], [first, last]) = (OF_TRACK_PERIOD, track.frequencies);
             (shortest / first.max(last)..=longest / first.min(last)).contains(&time_constant_s)
         }))),
-    row("disturbances that decay", "Markov process, telegraph noise, unexplained octave", "time constants within a factor of 4",
+    row("shot noise", "Markov process, telegraph noise, unexplained octave", "time constants within a factor of 4",
         "an exponential decay has the spectrum of a Markov process",
         Rule::Channel(|of| of.decays().is_some_and(|decays| {
             let own_s = decays.time_constant.value;
@@ -488,7 +485,7 @@ impl<'a> Claim<'a> {
     }
 
     fn decays(&self) -> Option<&'a DecayingDisturbances> {
-        self.signal(|signal| if let Signal::Decays(of) = signal { Some(of) } else { None })
+        self.signal(Signal::decays)
     }
 }
 
@@ -563,8 +560,4 @@ fn telegraph(effect: &Effect) -> Option<&TelegraphNoise> {
 /// The end of an interval that is nearer to 0.
 fn least(size: BoundedEstimate) -> f64 {
     size.low.abs().min(size.high.abs())
-}
-
-fn is_same_time(one_s: f64, other_s: f64) -> bool {
-    (one_s / other_s).log2().abs() <= SAME_TIME_OCTAVES
 }

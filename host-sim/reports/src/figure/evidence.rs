@@ -43,7 +43,8 @@ pub(crate) fn evidence(report: &Report, index: usize) -> Option<Plot> {
             let label = format!("{} … {}", span(from_s), span(to_s));
             in_time(report, channel, finding, Some(TimePlace { label, from_s, to_s }))
         }
-        Effect::LinearDrift(_)
+        Effect::ShotNoise(_)
+        | Effect::LinearDrift(_)
         | Effect::TurnOnTransient(_)
         | Effect::CommonMode(_)
         | Effect::SharedDrift(_)

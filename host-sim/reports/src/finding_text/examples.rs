@@ -111,6 +111,16 @@ pub(super) fn examples() -> Vec<Effect> {
             evidence: TelegraphEvidence::Levels { jumps: 80.0, gain: 20.0 },
         }
         .into(),
+        ShotNoise {
+            rate_per_hour: estimate(),
+            size: size(),
+            time_constant_s: estimate(),
+            deviation: size(),
+            sum: 9.0,
+            reversed: 1.0,
+            p_value: 1e-9,
+        }
+        .into(),
         MarkovProcess { deviation: size(), time_constant_s: estimate(), evidence: MarkovEvidence::Curve(CURVE) }.into(),
         CommonMode { deviation: size(), time_constant_s: estimate(), others: vec!["gyro_x"], gain: 20.0 }.into(),
         SharedDrift { ratio: size(), per: "g", with: "accl_x", sigmas: 9.0, largest_multiple: 10.0 }.into(),

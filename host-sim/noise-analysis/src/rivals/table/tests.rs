@@ -30,7 +30,7 @@ impl Claims {
                 let signals = signals.iter().map(|signal| match signal {
                     Signal::Periodic(_) => "periodic",
                     Signal::Chirp(_) => "chirp",
-                    Signal::Decays(_) => "decays",
+                    Signal::Decays(_) => "shot_noise",
                 });
                 lines.iter().map(|_| "line").chain(signals).collect()
             }
@@ -181,7 +181,15 @@ fn track() -> FrequencyTrack {
 }
 
 fn decays() -> DecayingDisturbances {
-    DecayingDisturbances { time_constant: known(5.0), sum: 8.0, reversed: 1.0, p_value: 1e-9 }
+    DecayingDisturbances {
+        time_constant: known(5.0),
+        size: known(0.1),
+        rate_hz: known(0.02),
+        deviation: known(0.02),
+        sum: 8.0,
+        reversed: 1.0,
+        p_value: 1e-9,
+    }
 }
 
 fn signal(signal: &Signal) -> Proposal {
@@ -279,10 +287,10 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
         (["chirp", "line of the spectrum"],
             Claims::Spectrum(SpectrumProposals { track: Some(track()), ..spectrum(vec![spectral_line(6.0, None, 100.0)]) }),
             vec!["chirp"]),
-        (["slow periodic signal", "disturbances that decay"],
+        (["slow periodic signal", "shot noise"],
             Claims::Spectrum(SpectrumProposals { periodic: Some(periodic()), decays: Some(decays()), ..spectrum(Vec::new()) }),
             vec!["periodic"]),
-        (["disturbances without a name", "telegraph noise of the samples"],
+        (["irreversible changes", "telegraph noise of the samples"],
             channel([of(levels(1.0, 1.0), Origin::Levels { is_reversible: false })]), vec![]),
         (["drift of the bias", "motion"], channel([of(motion(0.7), alone(false))]), vec![]),
         (["telegraph noise of the samples", "motion"],
@@ -331,8 +339,8 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
         (["slow periodic signal", "Markov process, telegraph noise"],
             channel([of_term(0, markov(9.0)), of_periodic.clone()]), vec!["periodic"]),
         (["chirp", "Markov process, telegraph noise"], channel([of_term(0, markov(0.05)), of_track.clone()]), vec!["chirp"]),
-        (["disturbances that decay", "Markov process, telegraph noise, unexplained octave"],
-            channel([of_term(0, markov(5.0)), of(point(9.0), Origin::Residual), of_decays]), vec!["unexplained"]),
+        (["shot noise", "Markov process, telegraph noise, unexplained octave"],
+            channel([of_term(0, markov(5.0)), of(point(9.0), Origin::Residual), of_decays]), vec!["shot_noise"]),
         (["slow periodic signal", "line of the curve"],
             channel([of(resonance(0.05), of_resonance(0.05)), of_periodic.clone()]), vec!["periodic"]),
         (["chirp", "line of the curve"], channel([of(resonance(6.0), of_resonance(6.0)), of_track]), vec!["chirp"]),

@@ -1,0 +1,154 @@
+//! The matched filter for an exponential decay in noise of a record's own spectrum (G. Turin, "An introduction to matched filters", IRE
+//! Trans. IT-6, 1960).
+
+use crate::spectra::periodogram::{smooth_length, taper};
+use crate::spectra::slow_background::SlowBackground;
+use crate::spectra::transforms;
+use crate::spectra::whittle::SpectralBand;
+use realfft::num_complex::Complex;
+use std::f64::consts::TAU;
+
+/// Largest part of the blocks that may have no samples.
+const MOST_EMPTY: f64 = 1.0 / 32.0;
+/// Lowest order, in periods per record, that the filters pass: below, the density is known to the scatter of a few ordinates.
+const LOWEST: usize = 6;
+/// White noise, a random walk and ten Markov processes.
+const TERMS: usize = 12;
+/// An ordinate over the noise that is a line, which chance exceeds at one of 10⁶, and ordinates on either side that its taper reaches.
+const LINE: f64 = 14.0;
+const LINE_REACH: usize = 2;
+/// Ordinates on either side whose mean is a band of its own above this multiple of the noise, by chance with 10⁻⁴.
+const BAND_REACH: usize = 8;
+const BAND: f64 = 2.0;
+/// Time constants, and blocks beyond them, at either end of the record in which the filters respond to the ends.
+const END_TIMES: f64 = 4.0;
+const END_BLOCKS: usize = 16;
+
+/// The Fourier transform of a record in blocks and the density of its noise.
+pub(super) struct WhitenedRecord {
+    length: usize,
+    transform: Vec<Complex<f64>>,
+    /// One over the density, 0 at lines.
+    weights: Vec<f64>,
+    /// What a delay of a block turns each order by.
+    turns: Vec<Complex<f64>>,
+}
+
+/// What a filter makes of a record.
+pub(super) struct FilteredRecord {
+    pub output: Vec<f64>,
+    /// Autocovariance of the output in noise of the density. It is also the response to a decay of height 1 that begins with a block.
+    pub covariance: Vec<f64>,
+}
+
+impl WhitenedRecord {
+    /// Of the means of blocks; `None` if too many are missing, or if they have no noise.
+    pub(super) fn new(means: &[f64]) -> Option<Self> {
+        let mut values = filled(means)?;
+        let length = values.len();
+        let forward = transforms::forward(length);
+        // A periodic continuation without a jump.
+        let end = length / 256;
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let (first, last) = (mean(values.get(..end)?), mean(values.get(length - end..)?));
+        let slope = (last - first) / (length - end) as f64;
+        values.iter_mut().enumerate().for_each(|(at, value)| *value -= first + slope * at as f64);
+        let level = mean(&values);
+        values.iter_mut().for_each(|value| *value -= level);
+        let mut tapered: Vec<f64> = values.iter().enumerate().map(|(at, value)| taper(at, length) * value).collect();
+        let squares: f64 = (0..length).map(|at| taper(at, length).powi(2)).sum();
+        let mut transform = forward.make_output_vec();
+        // An error means buffers of the wrong length; these are the plan's own.
+        forward.process(&mut tapered, &mut transform).ok()?;
+        let ordinates: Vec<f64> = transform.iter().map(|bin| bin.norm_sqr() / squares).collect();
+        forward.process(&mut values, &mut transform).ok()?;
+        let turns = (0..transform.len()).map(|order| Complex::cis(-TAU * order as f64 / length as f64)).collect();
+        Some(Self { length, transform, weights: weights(&ordinates)?, turns })
+    }
+
+    /// By the filter for a decay of `time` blocks, or for one in reversed time.
+    pub(super) fn filtered(&self, time: f64, is_reversed: bool) -> Option<FilteredRecord> {
+        let decays = self.decays(time);
+        let of_filter = |order: usize| if is_reversed { decays[order] } else { decays[order].conj() };
+        let output = self.inverse(|order| self.weights[order] * self.transform[order] * of_filter(order))?;
+        let covariance = self.inverse(|order| (self.weights[order] * decays[order].norm_sqr()).into())?;
+        Some(FilteredRecord { output, covariance })
+    }
+
+    /// What the filter for a decay of `time` blocks makes of one that is `first` in the block in which it begins and `second` in the
+    /// next one.
+    pub(super) fn response(&self, time: f64, [first, second]: [f64; 2]) -> Option<Vec<f64>> {
+        let decays = self.decays(time);
+        let of_decay = |order: usize| first + second * self.turns[order] * decays[order];
+        self.inverse(|order| self.weights[order] * decays[order].conj() * of_decay(order))
+    }
+
+    /// The blocks at which a filter for a decay of `time` blocks does not respond to the ends of the record.
+    pub(super) fn inner<'a>(&self, output: &'a [f64], time: f64) -> Option<&'a [f64]> {
+        let ends = (END_TIMES * time) as usize + END_BLOCKS;
+        output.get(ends..self.length.checked_sub(ends)?)
+    }
+
+    /// Blocks of a stretch of four time constants, in which the filter's responses to a disturbance lie.
+    pub(super) fn stretch(time: f64) -> usize {
+        ((END_TIMES * time) as usize).max(END_BLOCKS)
+    }
+
+    /// The transform of a decay of height 1.
+    fn decays(&self, time: f64) -> Vec<Complex<f64>> {
+        let kept = (-1.0 / time).exp();
+        self.turns.iter().map(|turn| 1.0 / (1.0 - kept * turn)).collect()
+    }
+
+    fn inverse(&self, bin: impl Fn(usize) -> Complex<f64>) -> Option<Vec<f64>> {
+        let inverse = transforms::inverse(self.length);
+        let last = self.transform.len() - 1;
+        // The first and the last order of real values are real.
+        let real_end = |order: usize| if order == last { bin(order).re.into() } else { bin(order) };
+        let mut bins: Vec<Complex<f64>> = (0..=last).map(real_end).collect();
+        let mut values = inverse.make_output_vec();
+        inverse.process(&mut bins, &mut values).ok()?;
+        Some(values)
+    }
+}
+
+/// The means without their gaps, each of which continues the one before; `None` if too many are missing.
+fn filled(means: &[f64]) -> Option<Vec<f64>> {
+    let present = means.iter().filter(|mean| mean.is_finite()).count();
+    if ((means.len() - present) as f64) > MOST_EMPTY * means.len() as f64 {
+        return None;
+    }
+    let mut latest = means.iter().copied().find(|mean| mean.is_finite())?;
+    let fill = |mean: &f64| {
+        latest = if mean.is_finite() { *mean } else { latest };
+        latest
+    };
+    Some(means.iter().take(smooth_length(means.len())).map(fill).collect())
+}
+
+/// One over the density of the noise at each order, up to a factor; 0 at lines and where the density is not known.
+fn weights(ordinates: &[f64]) -> Option<Vec<f64>> {
+    let mut bands: Vec<SpectralBand> = Vec::new();
+    let mut first = 1;
+    while first + 1 < ordinates.len() {
+        // A band is an eighth of its frequency wide.
+        let next = (first + first / 8 + 1).min(ordinates.len() - 1);
+        let count = (next - first) as f64;
+        let density = ordinates[first..next].iter().sum::<f64>() / count;
+        bands.push(SpectralBand { frequency: 0.5 * (first + next - 1) as f64, density, ordinates: count });
+        first = next;
+    }
+    let background = SlowBackground::<TERMS>::fit(&bands)?;
+    let noise: Vec<f64> = (0..ordinates.len()).map(|order| background.density(order as f64)).collect();
+    let ratios: Vec<f64> = ordinates.iter().zip(&noise).map(|(ordinate, noise)| ordinate / noise).collect();
+    let around = |at: usize, reach: usize| &ratios[at.saturating_sub(reach)..(at + reach + 1).min(ratios.len())];
+    let weight = |(order, noise): (usize, &f64)| {
+        if order < LOWEST || around(order, LINE_REACH).iter().any(|ratio| *ratio > LINE) {
+            return 0.0;
+        }
+        let near = around(order, BAND_REACH);
+        let level = near.iter().sum::<f64>() / near.len() as f64;
+        1.0 / (noise * if level > BAND { level } else { 1.0 })
+    };
+    Some(noise.iter().enumerate().map(weight).collect())
+}
