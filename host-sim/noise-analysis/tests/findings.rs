@@ -4,7 +4,7 @@
 use measurement::{MeasuredChannel, Measurement, adis16405};
 use noise_analysis::analysis::analyze;
 use noise_analysis::effects::Effect;
-use noise_analysis::report::{Report, Validation};
+use noise_analysis::report::{Finding, Report, Validation};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -328,7 +328,7 @@ fn a_chirp_is_not_a_resonance() {
 }
 
 #[test]
-fn decaying_disturbances_are_no_telegraph() {
+fn decaying_disturbances_are_shot_noise() {
     // One in 20 s on average, of 30 mg, that decays with 1.5 s.
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let mut times = Vec::new();
@@ -342,6 +342,26 @@ fn decaying_disturbances_are_no_telegraph() {
     };
     let waveform = |name: &str, time: f64| if name == "accl_z" { disturbance(time) } else { 0.0 };
     let report = analyze(&recorded(600.0, 6, &waveform));
-    assert!(!report.findings.is_empty());
-    assert!(report.findings.iter().all(|finding| finding.effect.name() != "telegraph"), "{:?}", kinds(&report));
+    let shot_noise = report.findings.iter().find_map(|finding| match &finding.effect {
+        Effect::ShotNoise(of) => Some(*of),
+        _ => None,
+    });
+    let shot_noise = shot_noise.unwrap_or_else(|| panic!("{:?}", kinds(&report)));
+    let (size, deviation) = (shot_noise.size.estimate(), shot_noise.deviation.estimate());
+    let rate = shot_noise.rate_per_hour;
+    // The deviation is the root of λA²T/2.
+    let truths = [
+        (rate, 180.0),
+        (size, 0.03),
+        (shot_noise.time_constant_s, 1.5),
+        (deviation, 0.03 * (0.5f64 * 1.5 / 20.0).sqrt()),
+    ];
+    for (of, truth) in truths {
+        assert!((of.low..=of.high).contains(&truth), "{truth}: {of:?}");
+    }
+    let is_other = |finding: &Finding| ["telegraph", "markov", "unexplained"].contains(&finding.effect.name());
+    assert!(!report.findings.iter().any(is_other), "{:?}", kinds(&report));
+    // The model has the variance of them.
+    let accl_z = report.channels.iter().find(|of| of.name == "accl_z").expect("recorded");
+    assert!(accl_z.refitted.terms.iter().any(|of| of.term.kind.name() == "markov"), "{:?}", accl_z.refitted.terms);
 }

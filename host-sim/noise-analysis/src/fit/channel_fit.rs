@@ -4,7 +4,7 @@ use crate::OCTAVES;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::DESCRIBED;
 use crate::fit::covariates::CovariateFit;
-use crate::fit::noise_terms::{filter_length_s, is_filter, is_line, is_white, line_frequency};
+use crate::fit::noise_terms::{filter_length_s, is_filter, is_line, is_same_time, is_white, line_frequency};
 use crate::fit::part_filter::PartFilter;
 use crate::fit::sample_coefficients::{CoefficientsFrom, SamplesOfCurve, by_samples};
 use crate::fit::traced_model::{Addition, PlannedTerm, Shapes, TracedModel, residual, within_measured};
@@ -12,6 +12,7 @@ use crate::record::estimators::RecordEstimators;
 use crate::samples::rounding::is_dithered;
 use crate::spectra::MarkovEstimate;
 use crate::spectra::cosine_spectrum::CosineSpectrum;
+use crate::spectra::decaying_disturbances::DecayingDisturbances;
 use allan_core::fit::fit;
 use allan_core::model::FittedTerm;
 use allan_core::term::{Markov, MovingAverageFilter, Shape};
@@ -271,34 +272,50 @@ impl ChannelFit {
 
     /// Adds the Markov process that the lowest frequencies of the spectrum show, where the model of the curve has none: the curve
     /// tells it from a random walk by its longest octaves alone. Its time constant is that of the spectrum, the coefficients of
-    /// all terms are fitted again with their shapes as they are; a process to which the curve gives no variance is left out. `lines` are the frequencies of
-    /// those of the spectrum, Hz.
+    /// all terms are fitted again with their shapes as they are; a process to which the curve gives no variance is left out. `lines` are the
+    /// frequencies of those of the spectrum, Hz.
     pub(crate) fn add_markov_of_spectrum(&mut self, spectrum: &CosineSpectrum, lines: impl Iterator<Item = f64>) {
-        let (curve, model) = (&self.covariates.curve, self.after());
+        let model = self.after();
         if !self.traced.has_room() || self.correlation_times().next().is_some() {
             return;
         }
         let of_model = model.terms().iter().filter_map(|term| line_frequency(&term.kind));
         let lines: Vec<f64> = of_model.chain(lines).collect();
         let Some(found) = spectrum.find_markov(&lines, FILTER_LENGTHS * filter_length_s(model)) else { return };
-        let octave = curve.points().iter().min_by(|a, b| {
-            let distance = |point: &AllanPoint| (point.tau / found.time_constant.value).ln().abs();
-            distance(a).total_cmp(&distance(b))
-        });
-        let Some(octave) = octave else { return };
-        let added = self.traced.next_addition(2.0 * found.gain, residual(model, octave));
-        let markov = NoiseTerm::Markov(Markov { time_constant: found.time_constant.value });
-        // The curve leaves the bounds of its deviation open; those of the spectrum hold.
-        let by_spectrum = |term: &FittedTerm| FittedTerm {
-            low: found.deviation.low.min(term.value),
-            high: found.deviation.high.max(term.value),
-            shape: Shape::Markov { time_constant: (found.time_constant.low, found.time_constant.high) },
-            ..*term
-        };
-        if let Some(with) = self.traced.added_to(curve, (markov, Some(added)), by_spectrum) {
-            self.traced = with;
+        if self.add_markov([found.deviation, found.time_constant], 2.0 * found.gain) {
             self.markov_by_spectrum = Some(found);
         }
+    }
+
+    /// Adds the Markov process that has the spectrum of shot noise, where the model has none of nearly its time constant.
+    pub(crate) fn add_shot_noise(&mut self, decays: &DecayingDisturbances) {
+        let time_constant = decays.time_constant.value;
+        if self.traced.has_room() && !self.correlation_times().any(|own_s| is_same_time(own_s, time_constant)) {
+            self.add_markov([decays.deviation, decays.time_constant], decays.sum * decays.sum);
+        }
+    }
+
+    /// Adds a Markov process of this deviation and time constant: the coefficients of all terms are fitted again with their shapes as they
+    /// are. Says whether the curve gives it variance.
+    fn add_markov(&mut self, [deviation, time_constant]: [BoundedEstimate; 2], score: f64) -> bool {
+        let curve = &self.covariates.curve;
+        let octave = curve.points().iter().min_by(|a, b| {
+            let distance = |point: &AllanPoint| (point.tau / time_constant.value).ln().abs();
+            distance(a).total_cmp(&distance(b))
+        });
+        let Some(octave) = octave else { return false };
+        let added = self.traced.next_addition(score, residual(self.after(), octave));
+        let markov = NoiseTerm::Markov(Markov { time_constant: time_constant.value });
+        // The curve leaves the bounds of its deviation open; those that are known otherwise hold.
+        let as_found = |term: &FittedTerm| FittedTerm {
+            low: deviation.low.min(term.value),
+            high: deviation.high.max(term.value),
+            shape: Shape::Markov { time_constant: (time_constant.low, time_constant.high) },
+            ..*term
+        };
+        let Some(with) = self.traced.added_to(curve, (markov, Some(added)), as_found) else { return false };
+        self.traced = with;
+        true
     }
 
     /// Adds those of `lines`, the lines of the spectrum, that the model has not: too weak to be traced in the curve, their power

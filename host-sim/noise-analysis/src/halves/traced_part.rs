@@ -23,6 +23,7 @@ use crate::samples::rounding::DITHERED_OCTAVES;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::cosine_spectrum::CosineSpectrum;
+use crate::spectra::decaying_disturbances::DecayingDisturbances;
 use crate::spectra::spectral_lines::MergedLine;
 use crate::spectra::{Welch, without_sines};
 use allan_core::model::FittedTerm;
@@ -43,7 +44,7 @@ pub(crate) struct PartSamples<'a> {
     pub series: &'a PerChannel<Series>,
     /// What block means show of each channel.
     pub biases: PerChannel<BiasByBlocks>,
-    /// Whether signals are looked for that the model has no term for.
+    /// Whether signals are looked for that the model has no term for, beside shot noise.
     pub seeks_signals: bool,
 }
 
@@ -71,7 +72,7 @@ pub(crate) struct ChannelTrace {
     pub rest: Option<UniformSeries>,
     /// Random telegraph noise.
     pub telegraph: Option<TelegraphNoise>,
-    /// Signals that no term of the model has.
+    /// Signals in the samples.
     pub signals: Vec<Signal>,
     slowest: Option<CosineSpectrum>,
     /// The spectrum of the samples where their means alone are kept.
@@ -93,7 +94,9 @@ impl TracedPart {
             return Self { channels, filter: Err(Unidentified::NotSought) };
         }
         let filter = agree_on_filter(part, &mut channels);
-        for ChannelTrace { fit, slowest, lines, .. } in &mut channels {
+        for ChannelTrace { fit, slowest, lines, signals, .. } in &mut channels {
+            // Before the spectrum shows the same process.
+            signals.iter().filter_map(Signal::decays).for_each(|decays| fit.add_shot_noise(decays));
             let frequencies = || lines.iter().map(|line| line.frequency.value);
             slowest.iter().for_each(|spectrum| fit.add_markov_of_spectrum(spectrum, frequencies()));
         }
@@ -203,6 +206,8 @@ impl ChannelTrace {
             telegraph = telegraph_noise(&rest, own.unit, &correlation_times);
             let found = standing_in_spectrum(SpectrumProposals::find(&rest, lines, fit.bands()));
             (lines, signals) = found.into_lines_and_signals();
+        } else {
+            signals.extend(DecayingDisturbances::find(&rest).map(Signal::Decays));
         }
         let spectrum = samples.record.spectrum_within(channel, own.span.clone());
         Self { fit, lines, telegraph, slowest: CosineSpectrum::new(&rest), rest: Some(rest), signals, spectrum }
