@@ -11,7 +11,7 @@ use allan_core::term::{Markov, Resonance, Sinusoid};
 /// What claims one variance, in a case that one row decides.
 enum Claims {
     Line { line: MergedLine, faster: Vec<MergedLine>, left: Option<Vec<MergedLine>>, gain: f64 },
-    Spectrum(SpectrumProposals),
+    Spectrum(Box<SpectrumProposals>),
     Channel(ChannelFacts, Vec<Proposal>),
     Cause { effect: Effect, shown_by: Option<usize>, periodic: Vec<Cause> },
 }
@@ -25,7 +25,7 @@ impl Claims {
                 if rows.iter().any(|row| row.applies_to_line(&claim)) { Vec::new() } else { vec!["line"] }
             }
             Self::Spectrum(of) => {
-                let of = rows.iter().fold(of.clone(), |of, row| row.applied_to_spectrum(of));
+                let of = rows.iter().fold(SpectrumProposals::clone(of), |of, row| row.applied_to_spectrum(of));
                 let (lines, signals) = of.into_lines_and_signals();
                 let signals = signals.iter().map(|signal| match signal {
                     Signal::Periodic(_) => "periodic",
@@ -229,6 +229,10 @@ fn channel(proposals: impl IntoIterator<Item = Proposal>) -> Claims {
     Claims::Channel(DITHERED, proposals.into_iter().collect())
 }
 
+fn in_spectrum(of: SpectrumProposals) -> Claims {
+    Claims::Spectrum(Box::new(of))
+}
+
 fn later(effect: Effect, origin: Origin) -> Claims {
     Claims::Channel(DITHERED_LATER, vec![of(effect, origin)])
 }
@@ -279,16 +283,16 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
         (["filter", "band of the spectrum"],
             Claims::Line { line: spectral_line(0.3, Some(0.1), 50.0), faster: Vec::new(), left: None, gain: 0.05 }, vec![]),
         (["slow periodic signal", "line of the spectrum"],
-            Claims::Spectrum(SpectrumProposals { periodic: Some(periodic()), ..spectrum(vec![spectral_line(0.05, None, 50.0)]) }),
+            in_spectrum(SpectrumProposals { periodic: Some(periodic()), ..spectrum(vec![spectral_line(0.05, None, 50.0)]) }),
             vec!["periodic"]),
         (["band", "chirp"],
-            Claims::Spectrum(SpectrumProposals { track: Some(track()), ..spectrum(vec![spectral_line(6.0, Some(0.5), 1000.0)]) }),
+            in_spectrum(SpectrumProposals { track: Some(track()), ..spectrum(vec![spectral_line(6.0, Some(0.5), 1000.0)]) }),
             vec!["line"]),
         (["chirp", "line of the spectrum"],
-            Claims::Spectrum(SpectrumProposals { track: Some(track()), ..spectrum(vec![spectral_line(6.0, None, 100.0)]) }),
+            in_spectrum(SpectrumProposals { track: Some(track()), ..spectrum(vec![spectral_line(6.0, None, 100.0)]) }),
             vec!["chirp"]),
         (["slow periodic signal", "shot noise"],
-            Claims::Spectrum(SpectrumProposals { periodic: Some(periodic()), decays: Some(decays()), ..spectrum(Vec::new()) }),
+            in_spectrum(SpectrumProposals { periodic: Some(periodic()), decays: Some(decays()), ..spectrum(Vec::new()) }),
             vec!["periodic"]),
         (["irreversible changes", "telegraph noise of the samples"],
             channel([of(levels(1.0, 1.0), Origin::Levels { is_reversible: false })]), vec![]),
