@@ -18,6 +18,8 @@ use std::f64::consts::{PI, TAU};
 const BLOCKS: usize = 1024;
 /// Fastest change that is sought, in periods per record.
 pub(super) const MOST_PERIODS: usize = 64;
+/// Slowest change that is sought, in periods per record: fewer are a line whose amplitude or frequency drifts.
+const FEWEST_PERIODS: usize = 3;
 /// The fastest change is slower than this part of the line itself: so near to the line its noise is as good as white.
 const OF_FREQUENCY: usize = 8;
 /// Ordinates to a resolution: between two of them a change loses at most 0.9 dB.
@@ -96,7 +98,7 @@ impl Modulation {
             }
             (in_phase.norm_sqr(), quadrature.norm_sqr())
         };
-        let ordinates = PADDING..=PADDING * most;
+        let ordinates = PADDING * FEWEST_PERIODS..=PADDING * most;
         let trials = 2.0 * ordinates.clone().count() as f64;
         let candidates = ordinates.flat_map(|ordinate| {
             let (in_phase, quadrature) = sums(ordinate as f64);
