@@ -5,7 +5,9 @@ use benchmarks::contradictions::ContradictionPlan;
 use benchmarks::filtered_noise::{FilteredNoisePlan, READ_EVERY, TAPS};
 use benchmarks::losses::LossPlan;
 use benchmarks::reproduction::Reproduction;
-use benchmarks::undeclared::{EffectKind, MeasuredNoisePlan, NoiseRecording, SEEDS_PER_GROUP, UndeclaredPlan};
+use benchmarks::undeclared::{
+    EffectKind, MeasuredNoisePlan, NoiseRecording, SEEDS_PER_GROUP, StretchLength, UndeclaredPlan,
+};
 use clap::{Args, Parser, Subcommand, value_parser};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -84,7 +86,7 @@ struct UndeclaredArguments {
 
 #[derive(Debug, Args)]
 struct MeasuredArguments {
-    /// Recordings of sensors at rest, in files of any format that `analyze` reads.
+    /// Recordings of any format that `analyze` reads; of those that are no register counts, the longest part at rest.
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
     /// Sample rate of those without time stamps, Hz.
@@ -93,9 +95,12 @@ struct MeasuredArguments {
     /// Stretches, in each of which every kind of effect is hidden alone; they are taken from the recordings in turn.
     #[arg(long, default_value_t = 6, value_parser = value_parser!(u64).range(1..=MOST_RECORDINGS))]
     stretches: u64,
-    /// Length of a stretch, s.
+    /// Length of a stretch, s; a shorter recording is one stretch.
     #[arg(long, default_value_t = 600.0, value_parser = positive)]
     seconds: f64,
+    /// The same in samples, for recordings of different rates.
+    #[arg(long, conflicts_with = "seconds", value_parser = value_parser!(u64).range(1..))]
+    samples: Option<u64>,
     /// Size of each effect over the detection limit in the noise of its channel.
     #[arg(long, default_value_t = 3.0, value_parser = positive)]
     strength: f64,
@@ -247,10 +252,12 @@ fn run(Cli { benchmark, json }: Cli) -> Result<()> {
             bar.finish_and_clear();
             conclude(&table, json, |out| table.write(out))
         }
-        Benchmark::Measured(MeasuredArguments { recordings, rate, stretches, seconds, strength, seed, jobs }) => {
+        Benchmark::Measured(arguments) => {
+            let MeasuredArguments { recordings, rate, stretches, seconds, samples, strength, seed, jobs } = arguments;
             let recordings =
                 recordings.iter().map(|file| NoiseRecording::read(file, rate)).collect::<Result<_, _>>()?;
-            let plan = MeasuredNoisePlan { recordings, stretches, seconds, strength, seed, jobs: threads(jobs) };
+            let length = samples.map_or(StretchLength::Seconds(seconds), StretchLength::Samples);
+            let plan = MeasuredNoisePlan { recordings, stretches, length, strength, seed, jobs: threads(jobs) };
             let table = plan.run(progress);
             bar.finish_and_clear();
             conclude(&table, json, |out| table.write(out))

@@ -31,7 +31,7 @@ pub use effect::EffectKind;
 pub use generator::{Sampling, TrueRecording};
 pub use measured::{
     HiddenKind, MeasuredErrors, MeasuredNoiseError, MeasuredNoisePlan, MeasuredNoiseTable, MeasuredScore,
-    NoiseRecording,
+    NoiseRecording, StretchLength,
 };
 pub use outside::{OutsideEffect, OutsideKind};
 pub use score::{EffectScore, OutsideScore, ParameterScore, RecordingScore, ScoreError, UnseenErrors, score_recording};

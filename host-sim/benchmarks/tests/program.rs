@@ -19,6 +19,8 @@ fn benchmarks_have_limits() {
         &["paper", "--seeds", "18446744073709551615"],
         &["losses", "--records", "18446744073709551615"],
         &["measured", "noise.csv", "--stretches", "1000000000"],
+        &["measured", "noise.csv", "--samples", "0"],
+        &["measured", "noise.csv", "--samples", "1000", "--seconds", "10"],
         &["measured"],
         &["contradictions", "--records", "1000000000"],
         &["filters", "--records", "1000000000"],

@@ -37,10 +37,10 @@ impl RecordLength {
     }
 }
 
-/// Two-sided density of N, B and K of `noise`, sampled, unit²/Hz.
-pub(super) fn baseline_density(noise: &ChannelNoise, period_s: f64, frequency: f64) -> f64 {
+/// Two-sided density of N, B and K of `noise`, sampled, unit²/Hz; the white noise has passed a filter of power gain `white_gain`.
+pub(super) fn baseline_density(noise: &ChannelNoise, white_gain: f64, period_s: f64, frequency: f64) -> f64 {
     let [white, flicker, walk] = baseline_densities(period_s, frequency);
-    noise.angle_random_walk.powi(2) * white
+    noise.angle_random_walk.powi(2) * white_gain * white
         + noise.bias_instability.powi(2) * flicker
         + noise.rate_random_walk.powi(2) * walk
 }
@@ -75,6 +75,11 @@ pub(super) fn filter_gain(taps_log2: u8, period_s: f64, frequency: f64) -> f64 {
     let taps = f64::from(1u32 << taps_log2);
     let half = PI * frequency * period_s;
     ((taps * half).sin() / (taps * half.sin())).powi(4)
+}
+
+/// Power gain of a filter of first order that halves the power at `corner_hz`.
+pub(super) fn low_pass_gain(corner_hz: f64, frequency: f64) -> f64 {
+    1.0 / (1.0 + (frequency / corner_hz).powi(2))
 }
 
 /// Densities of an observed and a modelled output at one frequency, or the variances of one cosine.
@@ -158,20 +163,20 @@ impl RecordLength {
         edges.windows(2).map(interval).filter(|(_, count)| *count > 0.0).collect()
     }
 
-    /// Expected log likelihood ratio (Whittle) of noise of density `truth` against the best fit of N, B and K behind a
-    /// filter of power gain `gain`, to which noise of density `known` is added. The fit starts from the coefficients of
+    /// Expected log likelihood ratio (Whittle) of noise of density `truth` against the best fit of N, B and K behind
+    /// filters of the power gains `gains`, to which noise of density `known` is added. The fit starts from the coefficients of
     /// `noise`.
     pub(super) fn ratio_against_baseline(
         self,
         noise: &ChannelNoise,
-        (gain, known): (impl Fn(f64) -> f64, impl Fn(f64) -> f64),
+        (gains, known): (impl Fn(f64) -> [f64; 3], impl Fn(f64) -> f64),
         peak: Option<(f64, f64)>,
         truth: impl Fn(f64) -> f64,
     ) -> f64 {
         let grid = self.grid(peak);
         let at = |&(frequency, _): &(f64, f64)| {
-            let gain = gain(frequency);
-            let baseline = baseline_densities(self.period_s, frequency).map(|density| gain * density);
+            let (gains, unfiltered) = (gains(frequency), baseline_densities(self.period_s, frequency));
+            let baseline = std::array::from_fn(|at| gains[at] * unfiltered[at]);
             Densities { baseline, known: known(frequency), truth: truth(frequency) }
         };
         let densities: Vec<Densities> = grid.iter().map(at).collect();
@@ -223,6 +228,8 @@ pub(super) struct ChannelUnderTest<'a> {
     channel: OutputRegister,
     /// Size of a count, in the unit of the channel.
     resolution: f64,
+    /// Of the filter of its noise, Hz.
+    corner_hz: f64,
     pub(super) noise: &'a ChannelNoise,
     pub(super) record: RecordLength,
     others: &'a [InjectedEffect],
@@ -230,9 +237,10 @@ pub(super) struct ChannelUnderTest<'a> {
 
 impl<'a> ChannelUnderTest<'a> {
     pub(super) fn new(recording: &'a TrueRecording, channel: OutputRegister, others: &'a [InjectedEffect]) -> Self {
-        let resolution = recording.sampling.resolutions[simulation::channel(channel) as usize];
+        let at = simulation::channel(channel) as usize;
+        let (resolution, corner_hz) = (recording.sampling.resolutions[at], recording.sampling.corners_hz[at]);
         let (noise, record) = (recording.noise.channel(channel), RecordLength::new(recording));
-        Self { channel, resolution, noise, record, others }
+        Self { channel, resolution, corner_hz, noise, record, others }
     }
 
     /// Size of a count, in the unit of the channel.
@@ -251,6 +259,12 @@ impl<'a> ChannelUnderTest<'a> {
             _ => 1.0,
         };
         self.others.iter().map(filter).product()
+    }
+
+    /// Power gains of what N, B and K have passed: all that filter, the white noise one before it, which no effect passes.
+    pub(super) fn noise_gains(&self, frequency: f64) -> [f64; 3] {
+        let gain = self.gain(frequency);
+        [gain * low_pass_gain(self.corner_hz, frequency), gain, gain]
     }
 
     /// Correlation time in s and variance of each Markov, common-mode and telegraph process among the other effects.
@@ -317,7 +331,8 @@ impl<'a> ChannelUnderTest<'a> {
 
     /// Density of the output.
     pub(super) fn density(&self, frequency: f64) -> f64 {
-        let baseline = baseline_density(self.noise, self.record.period_s, frequency);
+        let white_gain = low_pass_gain(self.corner_hz, frequency);
+        let baseline = baseline_density(self.noise, white_gain, self.record.period_s, frequency);
         self.gain(frequency) * baseline + self.known_density(frequency)
     }
 
@@ -340,7 +355,7 @@ impl<'a> ChannelUnderTest<'a> {
         self.record.mean(|frequency| {
             let half = PI * frequency * period_s;
             let transfer = 2.0 * (n * half).sin().powi(4) / (n * half.sin()).powi(2);
-            self.gain(frequency) * self.white_density() / period_s * transfer
+            self.noise_gains(frequency)[0] * self.white_density() / period_s * transfer
         })
     }
 

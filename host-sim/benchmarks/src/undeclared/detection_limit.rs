@@ -203,7 +203,7 @@ fn ratio_of_process(
 
 fn ratio_against_baseline(place: &ChannelUnderTest<'_>, peak: Option<(f64, f64)>, truth: impl Fn(f64) -> f64) -> f64 {
     let known = |frequency: f64| place.known_density(frequency);
-    place.record.ratio_against_baseline(place.noise, (|frequency| place.gain(frequency), known), peak, truth)
+    place.record.ratio_against_baseline(place.noise, (|frequency| place.noise_gains(frequency), known), peak, truth)
 }
 
 /// Log likelihood ratio `z²/2` at which an effect that could be at `places` places is detected in half of the recordings.

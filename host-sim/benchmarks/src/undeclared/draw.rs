@@ -24,8 +24,8 @@ const STRENGTH_OF_PAIR: (f64, f64) = (2.0, 30.0);
 /// Fraction of the recordings with a motion although no effect depends on it.
 const MOVED: f64 = 0.2;
 
-/// Largest quantum of the angle, over the standard deviation of the white angle increment of a sample. The error of a
-/// coarser quantum is not white.
+/// Largest quantum of the angle, over the standard deviation of the angle increment of a sample by its white noise. The error of a coarser
+/// quantum is not white.
 const LARGEST_QUANTUM: f64 = 1.0;
 /// Largest fraction of dropped or repeated samples.
 const LARGEST_FRACTION: f64 = 0.02;
@@ -34,8 +34,8 @@ const LARGEST_FRACTION: f64 = 0.02;
 const LARGEST_SENSITIVITIES: [f64; 3] = [0.3, 9.6, 1.5];
 /// Largest relative error of the sample clock.
 const LARGEST_CLOCK_ERROR: f64 = 0.01;
-/// Largest size of an effect in counts, a tenth of the output's range: what no test sees at any size is not hidden at all sizes.
-const LARGEST_COUNTS: f64 = 819.2;
+/// Largest size of an effect, as a part of the output's full scale: what no test sees at any size is not hidden at all sizes.
+const LARGEST_PART: f64 = 0.1;
 /// Number of draws after which a set of effects is accepted although an effect is too weak.
 const DRAWS: usize = 100;
 
@@ -92,7 +92,7 @@ impl DrawnRecording {
         let gyros = &OutputRegister::INERTIAL[..3];
         let channel = gyros.choose(&mut random).copied().unwrap_or(OutputRegister::GyroX);
         let strength = log_uniform(&mut random, STRENGTH_OF_PAIR.0, STRENGTH_OF_PAIR.1);
-        let mut unit = OutsideEffect::draw_unit(kind, channel, seconds, &mut random);
+        let mut unit = OutsideEffect::draw_unit(kind, channel, (seconds, simulation.sampling.period_s()), &mut random);
         if kind == OutsideKind::Knock {
             unit.shares = knock_shares(channel, &simulation.noise, &mut random);
         }
@@ -160,7 +160,7 @@ pub(super) fn knock_shares(
 /// Effects of `kinds`, each in a channel from `channel`, with their strengths beside the other effects. The strength of an effect
 /// beside the effects before it is drawn from `range`, as far as the size of its kind has no upper limit. Sets with a strength
 /// below `at_least` are drawn again, and those of which an effect is in a channel whose noise is below a count, as no detection limit
-/// holds there, or is larger than [`LARGEST_COUNTS`]. The last draw is returned in any case, with whether it is as asked for.
+/// holds there, or is larger than [`LARGEST_PART`] of its full scale. The last draw is returned in any case, with whether it is as asked for.
 pub(super) fn draw_effects(
     kinds: &[EffectKind],
     range: (f64, f64),
@@ -181,11 +181,13 @@ pub(super) fn draw_effects(
         }
         let strengths: Vec<f64> = (0..effects.len()).map(|at| strength_beside(&effects, at, recording)).collect();
         let is_outside = effects.iter().any(|effect| {
-            let place = |&channel: &OutputRegister| ChannelUnderTest::new(recording, channel, &effects);
-            let is_large = |place: &ChannelUnderTest<'_>| {
-                largest_change(effect, recording.seconds) > LARGEST_COUNTS * place.resolution()
-            };
-            effect.channels().iter().map(place).any(|place| place.is_below_a_count() || is_large(&place))
+            let full_scale =
+                |channel: OutputRegister| recording.sampling.full_scales[simulation::channel(channel) as usize];
+            let change = largest_change(effect, recording.seconds);
+            effect.channels().iter().any(|&channel| {
+                change > LARGEST_PART * full_scale(channel)
+                    || ChannelUnderTest::new(recording, channel, &effects).is_below_a_count()
+            })
         });
         let is_as_asked = !is_outside && strengths.iter().all(|strength| *strength >= at_least);
         drawn = (effects, strengths, is_as_asked);
@@ -224,8 +226,10 @@ fn with_strength(unit: InjectedEffect, strength: f64, limit: f64, recording: &Tr
     let squared = strength * strength * limit;
     let size = match unit {
         InjectedEffect::Quantization { channel, .. } => {
-            let white = recording.noise.channel(channel).angle_random_walk * recording.sampling.period_s().sqrt();
-            (strength * limit).min(LARGEST_QUANTUM * white / 12f64.sqrt())
+            let place = ChannelUnderTest::new(recording, channel, &[]);
+            let white = place.white_density() * place.record.mean(|frequency| place.noise_gains(frequency)[0]);
+            let increment = (white * recording.sampling.period_s()).sqrt();
+            (strength * limit).min(LARGEST_QUANTUM * increment / 12f64.sqrt())
         }
         InjectedEffect::DroppedSamples { .. } | InjectedEffect::RepeatedSamples { .. } => squared.min(LARGEST_FRACTION),
         InjectedEffect::SampleClock { .. } => squared.min(LARGEST_CLOCK_ERROR),

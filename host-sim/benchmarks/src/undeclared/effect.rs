@@ -1,7 +1,7 @@
 //! The effects that are hidden: their kinds, how their parameters are drawn, and their sizes.
 
 use super::channel_under_test::RecordLength;
-use super::environment::log_uniform;
+use super::environment::{frequency_factor, log_uniform};
 use clap::ValueEnum;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -92,26 +92,29 @@ pub(super) fn draw_unit(
     let of_gyros = matches!(kind, EffectKind::Quantization | EffectKind::Acceleration);
     let channel = if of_gyros && !GYROS.contains(&channel) { GYROS[random.random_range(0..3)] } else { channel };
     let nyquist = 0.5 / record.period_s;
+    let factor = frequency_factor(record.seconds, record.period_s);
     let sign = |random: &mut ChaCha8Rng| if random.random_bool(0.5) { 1.0 } else { -1.0 };
     match kind {
         EffectKind::Sinusoid => {
-            let frequency_hz = log_uniform(random, 0.1, 0.9 * nyquist);
+            let frequency_hz = log_uniform(random, 0.1 * factor, 0.9 * nyquist);
             InjectedEffect::Sinusoid { channel, frequency_hz, amplitude: 1.0, phase_rad: random.random_range(-PI..PI) }
         }
         EffectKind::Resonance => {
-            let frequency_hz = log_uniform(random, 1.0, 0.8 * nyquist);
+            let frequency_hz = log_uniform(random, factor, 0.8 * nyquist);
             let bandwidth_hz = frequency_hz * log_uniform(random, 0.02, 0.2);
             InjectedEffect::Resonance { channel, frequency_hz, bandwidth_hz, deviation: 1.0 }
         }
         EffectKind::Markov => {
-            InjectedEffect::Markov { channel, time_constant_s: log_uniform(random, 0.05, 60.0), deviation: 1.0 }
+            let time_constant_s = log_uniform(random, 0.05, 60.0) / factor;
+            InjectedEffect::Markov { channel, time_constant_s, deviation: 1.0 }
         }
         EffectKind::Telegraph => {
-            InjectedEffect::Telegraph { channel, time_constant_s: log_uniform(random, 0.05, 20.0), amplitude: 1.0 }
+            let time_constant_s = log_uniform(random, 0.05, 20.0) / factor;
+            InjectedEffect::Telegraph { channel, time_constant_s, amplitude: 1.0 }
         }
         EffectKind::CommonMode => {
-            let channels = GYROS.to_vec();
-            InjectedEffect::CommonMode { channels, time_constant_s: log_uniform(random, 10.0, 100.0), deviation: 1.0 }
+            let time_constant_s = log_uniform(random, 10.0, 100.0) / factor;
+            InjectedEffect::CommonMode { channels: GYROS.to_vec(), time_constant_s, deviation: 1.0 }
         }
         EffectKind::Quantization => InjectedEffect::Quantization { channel, coefficient: 1.0 },
         EffectKind::FilterBandwidth => InjectedEffect::FilterBandwidth { taps_log2: random.random_range(1..=6) },
@@ -128,7 +131,8 @@ pub(super) fn draw_unit(
             InjectedEffect::Acceleration { channel, sensitivity: direction.map(|part| part / length) }
         }
         EffectKind::Spikes => {
-            InjectedEffect::Spikes { channel, rate_per_hour: log_uniform(random, 10.0, 2000.0), size: 1.0 }
+            let rate_per_hour = factor * log_uniform(random, 10.0, 2000.0);
+            InjectedEffect::Spikes { channel, rate_per_hour, size: 1.0 }
         }
         EffectKind::DroppedSamples => InjectedEffect::DroppedSamples { fraction: 1.0 },
         EffectKind::RepeatedSamples => InjectedEffect::RepeatedSamples { fraction: 1.0 },

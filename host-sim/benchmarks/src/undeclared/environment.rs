@@ -47,6 +47,17 @@ pub(super) fn log_uniform(random: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
     low * (random.random::<f64>() * (high / low).ln()).exp()
 }
 
+/// Sample rate in Hz and length in s of a record in which every frequency and time constant that is drawn can be seen.
+const USUAL_RATE_HZ: f64 = 100.0;
+const USUAL_S: f64 = 120.0;
+
+/// Factor on the frequencies that are drawn, and divisor of the time constants, in a record of `seconds` s with a sample every
+/// `period_s` s: below 1 where the sample rate is lower than [`USUAL_RATE_HZ`], above 1 where the record is shorter than [`USUAL_S`]
+/// and its rate allows it, else 1.
+pub(super) fn frequency_factor(seconds: f64, period_s: f64) -> f64 {
+    (USUAL_S / seconds).max(1.0).min(1.0 / (USUAL_RATE_HZ * period_s))
+}
+
 /// A signal that jumps between two levels after exponentially distributed times of the mean `2·time_constant_s`: its
 /// autocorrelation is `exp(−t/time_constant)`.
 pub(super) fn two_levels(time_constant_s: f64, samples: usize, period_s: f64, random: &mut ChaCha8Rng) -> Vec<bool> {
@@ -83,6 +94,17 @@ pub(super) fn gauss_markov(time_constant_s: f64, samples: usize, period_s: f64, 
 mod tests {
     use super::*;
     use rand::SeedableRng;
+
+    /// The runs of the ADIS16405, simulated half hours, a phone at 5 Hz, half a minute at 400 Hz, and one at 40 Hz.
+    #[test]
+    fn frequencies_follow_the_rate_and_the_length_of_the_record() {
+        for (seconds, rate_hz, expected) in
+            [(120.0, 100.0, 1.0), (1800.0, 204.8, 1.0), (2400.0, 5.0, 0.05), (30.0, 400.0, 4.0), (30.0, 40.0, 0.4)]
+        {
+            let factor = frequency_factor(seconds, 1.0 / rate_hz);
+            assert!((factor - expected).abs() < 1e-12, "{seconds} s at {rate_hz} Hz: {factor}");
+        }
+    }
 
     /// 20,000 correlation times of 10 samples: the correlation at one of them is known to about 1/√20,000.
     #[test]

@@ -28,20 +28,27 @@ const REPEATED: u64 = 33;
 const HOST: u64 = 34;
 const EFFECTS: u64 = 64;
 
-/// At which rate the outputs are sampled, and to which steps they are rounded.
+/// At which rate the outputs are sampled, to which steps they are rounded, how large they can be, and how their noise is filtered.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sampling {
     /// Nominal sample rate, Hz.
     pub rate_hz: f64,
     /// Size of a count of each channel, in its unit, in the order of the burst.
     pub resolutions: [f64; 12],
+    /// Largest value of each channel, in its unit, in the same order.
+    pub full_scales: [f64; 12],
+    /// Frequency at which a filter of first order in the sensor halves the density of the white noise of each channel, Hz, for the
+    /// detection limit in noise that was measured; infinite without one, as in all noise of this generator.
+    pub corners_hz: [f64; 12],
 }
 
 impl Sampling {
     /// Of the virtual sensor.
     #[must_use]
     pub fn adis16405() -> Self {
-        Self { rate_hz: SAMPLE_RATE_HZ, resolutions: Channel::ALL.map(|channel| channel.lsb(GyroRange::Dps300)) }
+        let resolutions = Channel::ALL.map(|channel| channel.lsb(GyroRange::Dps300));
+        let full_scales = resolutions.map(|lsb| f64::from(LARGEST_COUNT + 1) * lsb);
+        Self { rate_hz: SAMPLE_RATE_HZ, resolutions, full_scales, corners_hz: [f64::INFINITY; 12] }
     }
 
     /// Sample period, s.

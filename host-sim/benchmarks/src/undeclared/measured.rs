@@ -34,6 +34,15 @@ use stretch::Stretch;
 /// Random stream of the stretches; those of the effects are in `stretch` and `hide`.
 const STRETCHES: u64 = u64::MAX;
 
+/// Length of a stretch; a shorter recording is one stretch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum StretchLength {
+    /// In s.
+    Seconds(f64),
+    /// In sample periods.
+    Samples(u64),
+}
+
 /// Which effects to hide in which recordings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredNoisePlan {
@@ -41,8 +50,8 @@ pub struct MeasuredNoisePlan {
     pub recordings: Vec<NoiseRecording>,
     /// Number of stretches, in each of which every kind is hidden alone.
     pub stretches: u64,
-    /// Length of a stretch, s; a shorter recording is one stretch.
-    pub seconds: f64,
+    /// Length of every stretch.
+    pub length: StretchLength,
     /// Size of every effect over the detection limit for the N, B and K of its channel in the stretch.
     pub strength: f64,
     /// Seed of the first stretch.
@@ -83,13 +92,17 @@ impl MeasuredNoisePlan {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(STRETCHES);
         let whole = &recording.samples;
-        let length = ((self.seconds * whole.sample_rate_hz).round() as u64).clamp(1, whole.periods());
+        let length = match self.length {
+            StretchLength::Seconds(seconds) => (seconds * whole.sample_rate_hz).round() as u64,
+            StretchLength::Samples(samples) => samples,
+        };
+        let length = length.clamp(1, whole.periods());
         let from = random.random_range(0..=whole.periods() - length);
         let samples = recording::part(whole, from..from + length);
-        let (noise, channels) = noise_estimate::noise_model(&samples);
+        let noise = noise_estimate::noise_estimate(&samples);
         let report = analyze(&samples);
         let from_s = from as f64 / whole.sample_rate_hz;
-        Stretch { recording: &recording.name, seed, from_s, samples, channels, noise, report }
+        Stretch { recording: &recording.name, seed, from_s, samples, noise, report }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Effects outside the vocabulary of the report: the right answer is `unexplained`, or the name that describes the effect, where
 //! the report has one ([`OutsideKind::right_names`]). Every other name is wrong.
 
-use super::environment::{EnvironmentCourse, gauss_markov, log_uniform};
+use super::environment::{EnvironmentCourse, frequency_factor, gauss_markov, log_uniform};
 use crate::spectral_noise::normal;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -12,8 +12,10 @@ use virtual_sensor::OutputRegister;
 
 /// Standard deviation of the logarithm of the level of a band that wanders: by a factor of 2 either way.
 const LEVEL_DEVIATION: f64 = std::f64::consts::LN_2;
-/// Time constant of a knock's decay, s: half a second until it is below a hundredth.
+/// Time constant of a knock's decay, s, where the sample rate shows it: half a second until it is below a hundredth.
 const KNOCK_DECAY_S: f64 = 0.1;
+/// Fewest periods of a supply's droop in a record.
+const FEWEST_DROOPS: f64 = 6.0;
 
 /// Kinds of effects that the analysis was not made for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -130,7 +132,7 @@ pub struct OutsideEffect {
     /// modulation, Hz; of what comes at random times one over the mean time between them and one over their time constant; of a
     /// band its centre and its width. One over the modulus of missing codes.
     pub(super) frequencies_hz: [f64; 2],
-    /// When it begins, s from the first sample, and the time constant or the length of a part of it, s.
+    /// When it begins, s from the first sample, and the time constant of it or of its decay or the length of a part of it, s.
     pub(super) times_s: [f64; 2],
     /// Of the random numbers that the effect itself has.
     pub(super) seed: u64,
@@ -152,12 +154,18 @@ impl OutsideEffect {
         self.shares.is_empty() || self.channels().any(|of| of == channel)
     }
 
-    /// With random parameters, of size 1, in a record of `seconds` s.
-    pub(super) fn draw_unit(kind: OutsideKind, channel: OutputRegister, seconds: f64, random: &mut ChaCha8Rng) -> Self {
+    /// With random parameters, of size 1, in a record of `seconds` s with a sample every `period_s` s.
+    pub(super) fn draw_unit(
+        kind: OutsideKind,
+        channel: OutputRegister,
+        (seconds, period_s): (f64, f64),
+        random: &mut ChaCha8Rng,
+    ) -> Self {
+        let factor = frequency_factor(seconds, period_s);
         let mut times_s = [0.0; 2];
         let frequencies_hz = match kind {
             OutsideKind::Chirp => {
-                let first = log_uniform(random, 1.0, 10.0);
+                let first = factor * log_uniform(random, 1.0, 10.0);
                 [first, first * log_uniform(random, 2.0, 5.0)]
             }
             // Ten to forty in a record, each of a fiftieth to a fifth of the time between them.
@@ -166,10 +174,12 @@ impl OutsideEffect {
                 [rate, rate * log_uniform(random, 5.0, 50.0)]
             }
             OutsideKind::Sawtooth => [log_uniform(random, 4.0, 20.0) / seconds, 0.0],
-            OutsideKind::ModulatedLine => [log_uniform(random, 2.0, 40.0), log_uniform(random, 3.0, 30.0) / seconds],
+            OutsideKind::ModulatedLine => {
+                [factor * log_uniform(random, 2.0, 40.0), log_uniform(random, 3.0, 30.0) / seconds]
+            }
             OutsideKind::HeldValue | OutsideKind::ClockStep | OutsideKind::Knock => {
-                times_s[0] = seconds * random.random_range(0.15..0.85);
-                [log_uniform(random, 5.0, 40.0), 0.0]
+                times_s = [seconds * random.random_range(0.15..0.85), KNOCK_DECAY_S / factor];
+                [factor * log_uniform(random, 5.0, 40.0), 0.0]
             }
             OutsideKind::SelfHeating => {
                 times_s[1] = seconds * log_uniform(random, 0.02, 0.2);
@@ -178,15 +188,18 @@ impl OutsideEffect {
             OutsideKind::DeadTime => [log_uniform(random, 10.0, 40.0) / seconds, 0.0],
             // A twentieth to a fifth of the time.
             OutsideKind::SupplyDroop => {
-                let frequency = log_uniform(random, 0.05, 0.5);
+                let lowest = (0.05 * factor).max(FEWEST_DROOPS / seconds);
+                let frequency = log_uniform(random, lowest, 10.0 * lowest);
                 times_s[1] = random.random_range(0.05..0.2) / frequency;
                 [frequency, 0.0]
             }
-            OutsideKind::SwitchedLine => [log_uniform(random, 2.0, 40.0), log_uniform(random, 5.0, 50.0) / seconds],
+            OutsideKind::SwitchedLine => {
+                [factor * log_uniform(random, 2.0, 40.0), log_uniform(random, 5.0, 50.0) / seconds]
+            }
             OutsideKind::MissingCodes => [0.5f64.powi(random.random_range(2..=4)), 0.0],
             OutsideKind::WanderingBand => {
                 times_s[1] = seconds * log_uniform(random, 0.01, 0.05);
-                let centre = log_uniform(random, 5.0, 40.0);
+                let centre = factor * log_uniform(random, 5.0, 40.0);
                 [centre, centre * log_uniform(random, 0.1, 0.4)]
             }
             OutsideKind::LevelByTemperature | OutsideKind::AlternatingConverters => [0.0; 2],
@@ -248,7 +261,7 @@ impl OutsideEffect {
             }
             OutsideKind::Knock => signal(&mut |time_s| {
                 let since_s = time_s - begin_s;
-                if since_s < 0.0 { 0.0 } else { (-since_s / KNOCK_DECAY_S).exp() * (TAU * first * since_s).sin() }
+                if since_s < 0.0 { 0.0 } else { (-since_s / part_s).exp() * (TAU * first * since_s).sin() }
             }),
             OutsideKind::HeldValue | OutsideKind::ClockStep | OutsideKind::DeadTime | OutsideKind::MissingCodes => {
                 vec![0.0; samples]
@@ -281,13 +294,16 @@ impl OutsideEffect {
                 }
             }
             OutsideKind::MissingCodes => {
-                let modulus = (1.0 / self.frequencies_hz[0]).round() as i32;
-                for count in counts.iter_mut().filter(|count| count.rem_euclid(modulus) == modulus - 1) {
-                    *count += 1;
-                }
+                counts.iter_mut().filter(|count| self.is_missing(**count)).for_each(|count| *count += 1);
             }
             _ => {}
         }
+    }
+
+    /// Whether the converter of missing codes never gives `code`.
+    pub(super) fn is_missing(&self, code: i32) -> bool {
+        let modulus = (1.0 / self.frequencies_hz[0]).round() as i32;
+        code.rem_euclid(modulus) == modulus - 1
     }
 
     /// True time at which a sample is taken that is nominally taken at `time_s`: later by the clock that got slower.
@@ -340,7 +356,7 @@ mod tests {
 
     fn effect(kind: OutsideKind) -> OutsideEffect {
         let mut random = ChaCha8Rng::seed_from_u64(5);
-        OutsideEffect::draw_unit(kind, OutputRegister::GyroX, SAMPLES as f64 * PERIOD_S, &mut random)
+        OutsideEffect::draw_unit(kind, OutputRegister::GyroX, (SAMPLES as f64 * PERIOD_S, PERIOD_S), &mut random)
     }
 
     fn environment() -> EnvironmentCourse {
@@ -374,6 +390,24 @@ mod tests {
         let events = standing(&changed) as f64 / 19.0;
         let expected = dead.frequencies_hz[0] * SAMPLES as f64 * PERIOD_S;
         assert!((events - expected).abs() < 3.5 * expected.sqrt(), "{events}, {expected}");
+    }
+
+    /// 12,000 samples at 5 Hz, of 2.5 Hz at most.
+    #[test]
+    fn no_frequency_is_above_half_of_a_low_sample_rate() {
+        for (kind, seed) in OutsideKind::ALL.into_iter().flat_map(|kind| (0..20).map(move |seed| (kind, seed))) {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let drawn = OutsideEffect::draw_unit(kind, OutputRegister::GyroX, (2400.0, 0.2), &mut random);
+            assert!(drawn.frequencies_hz.iter().all(|frequency| *frequency <= 2.5), "{drawn:?}");
+            let signal = drawn.signal(&environment(), 12_000, 0.2);
+            let is_of_codes = matches!(
+                kind,
+                OutsideKind::HeldValue | OutsideKind::DeadTime | OutsideKind::ClockStep | OutsideKind::MissingCodes
+            );
+            // Without a change of temperature its level is 0.
+            let changes = signal.iter().filter(|value| value.abs() > 0.1).count();
+            assert!(is_of_codes || kind == OutsideKind::LevelByTemperature || changes > 5, "{kind:?}: {changes}");
+        }
     }
 
     #[test]

@@ -54,7 +54,7 @@ fn densities_are_those_of_the_terms() {
         ..ChannelNoise::default()
     };
     for frequency in [0.01, 0.3, 5.0, 40.0, 99.0] {
-        let baseline = |n, b, k| baseline_density(&one(n, b, k), PERIOD_S, frequency);
+        let baseline = |n, b, k| baseline_density(&one(n, b, k), 1.0, PERIOD_S, frequency);
         let pairs = [
             (baseline(1.0, 0.0, 0.0), Term::AngleRandomWalk),
             (baseline(0.0, 0.0, 1.0), Term::RateRandomWalk),
@@ -72,22 +72,22 @@ fn densities_are_those_of_the_terms() {
         }
     }
     // The two treat the aliasing of flicker noise differently; far below the sample rate both are B²/(2πf).
-    let flicker = baseline_density(&one(0.0, 1.0, 0.0), PERIOD_S, 0.01);
+    let flicker = baseline_density(&one(0.0, 1.0, 0.0), 1.0, PERIOD_S, 0.01);
     assert!((flicker / Term::BiasInstability.process().density(0.01, PERIOD_S) - 1.0).abs() < 0.01);
 }
 
 #[test]
 fn noise_that_n_b_and_k_describe_has_no_likelihood_ratio() {
     let noise = gyro();
-    let baseline = |frequency: f64| baseline_density(&noise, PERIOD_S, frequency);
+    let baseline = |frequency: f64| baseline_density(&noise, 1.0, PERIOD_S, frequency);
     let stronger = |frequency: f64| 2.0 * baseline(frequency);
-    let (unfiltered, nothing) = (|_: f64| 1.0, |_: f64| 0.0);
+    let (unfiltered, nothing) = (|_: f64| [1.0; 3], |_: f64| 0.0);
     assert!(RECORD.ratio_against_baseline(&noise, (unfiltered, nothing), None, stronger) < 1e-3);
     // The same holds behind a known filter with known noise added.
     let filter = |frequency: f64| filter_gain(3, PERIOD_S, frequency);
     let known = |frequency: f64| 0.01 * markov_density(1.0, PERIOD_S, frequency);
     let truth = |frequency: f64| 2.0 * baseline(frequency) * filter(frequency) + known(frequency);
-    assert!(RECORD.ratio_against_baseline(&noise, (filter, known), None, truth) < 1e-3);
+    assert!(RECORD.ratio_against_baseline(&noise, (|frequency| [filter(frequency); 3], known), None, truth) < 1e-3);
     // A Markov process much shorter than a sample is white noise; one of 1 s is not.
     let markov = |time_s: f64| {
         let truth = |frequency: f64| baseline(frequency) + 0.01 * markov_density(time_s, PERIOD_S, frequency);
@@ -106,7 +106,7 @@ fn likelihood_ratios_in_white_noise_equal_their_closed_forms() {
 
     let white = ChannelNoise { angle_random_walk: 0.5, ..ChannelNoise::default() };
     // A sinusoid of amplitude A in M samples: half of A²·M/2/σ².
-    let density = baseline_density(&white, PERIOD_S, 10.0);
+    let density = baseline_density(&white, 1.0, PERIOD_S, 10.0);
     assert!((RECORD.ratio_of_sinusoid(density) / (0.5 * 0.5 * 1800.0 / 0.25) - 1.0).abs() < 1e-9);
     // A white waveform of standard deviation 0.1 in white noise.
     let matched = RECORD.ratio_of_waveform(|_| 0.01 * PERIOD_S, |_| density);

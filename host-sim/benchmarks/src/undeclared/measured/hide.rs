@@ -78,6 +78,11 @@ fn read_again(stretch: &Measurement, quantity: Quantity) -> Vec<bool> {
     if are_read_again { equal } else { vec![false; equal.len()] }
 }
 
+/// Whether samples of gyros or of accelerometers were read twice.
+pub(super) fn has_samples_read_again(stretch: &Measurement) -> bool {
+    [Quantity::AngularRate, Quantity::SpecificForce].into_iter().any(|of| read_again(stretch, of).contains(&true))
+}
+
 fn random(seed: u64, stream: u64) -> ChaCha8Rng {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(stream);

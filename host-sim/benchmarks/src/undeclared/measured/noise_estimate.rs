@@ -1,7 +1,7 @@
-//! N, B and K of measured noise, for the detection limit: Whittle's fit to the medians of the periodogram in narrow bands, which
-//! lines and other narrow disturbances do not move.
+//! N, B and K of measured noise and the filter that N has passed, for the detection limit: Whittle's fit to the medians of the
+//! periodogram in narrow bands, which lines and other narrow disturbances do not move.
 
-use crate::undeclared::channel_under_test::{Densities, baseline_densities, fit_baseline};
+use crate::undeclared::channel_under_test::{Densities, baseline_densities, fit_baseline, low_pass_gain};
 use adis16405_driver::Channel;
 use measurement::{MeasuredChannel, Measurement};
 use realfft::RealFftPlanner;
@@ -12,21 +12,38 @@ use virtual_sensor::{NoiseModel, OutputRegister};
 const BANDS_PER_OCTAVE: f64 = 6.0;
 /// Fewest ordinates of a band.
 const FEWEST: usize = 5;
+/// Corners of the filter that are tried: from the highest, in half the sample rate, each so many times the next.
+const HIGHEST_CORNER: f64 = 1.5;
+const CORNERS: usize = 24;
+const CORNER_RATIO: f64 = 1.15;
+/// Log likelihood that a filter must gain.
+const LEAST_GAIN: f64 = 10.0;
 
-/// N, B and K of every gyro and accelerometer of `samples` that changes, and which these are.
-pub(super) fn noise_model(samples: &Measurement) -> (NoiseModel, Vec<OutputRegister>) {
-    let (mut model, mut changing) = (NoiseModel::noiseless(), Vec::new());
+/// Noise of the gyros and accelerometers of a recording.
+pub(super) struct NoiseEstimate {
+    /// N before its filter, B and K.
+    pub(super) model: NoiseModel,
+    /// Corner of the filter of each channel, in the order of the burst, Hz; infinite where none shows.
+    pub(super) corners_hz: [f64; 12],
+    /// Those that change.
+    pub(super) channels: Vec<OutputRegister>,
+}
+
+/// The noise of every gyro and accelerometer of `samples` that changes.
+pub(super) fn noise_estimate(samples: &Measurement) -> NoiseEstimate {
+    let (mut model, mut channels) = (NoiseModel::noiseless(), Vec::new());
+    let mut corners_hz = [f64::INFINITY; 12];
     for channel in Channel::INERTIAL {
         let Some(measured) = samples.channels.iter().find(|of| of.profile.name == channel.name()) else { continue };
-        let Some([n, b, k]) = coefficients(&values(measured), samples.period_s(), measured.profile.lsb) else {
-            continue;
-        };
+        let found = coefficients(&values(measured), samples.period_s(), measured.profile.lsb);
+        let Some(([n, b, k], corner_hz)) = found else { continue };
         let output = simulation::output_register(channel);
         let noise = model.channel_mut(output);
         [noise.angle_random_walk, noise.bias_instability, noise.rate_random_walk] = [n, b, k];
-        changing.push(output);
+        corners_hz[channel as usize] = corner_hz;
+        channels.push(output);
     }
-    (model, changing)
+    NoiseEstimate { model, corners_hz, channels }
 }
 
 /// The values of a channel in its unit, one after the other.
@@ -34,20 +51,36 @@ fn values(channel: &MeasuredChannel) -> Vec<f64> {
     channel.counts.iter().map(|&count| f64::from(count) * channel.profile.lsb).collect()
 }
 
-/// N, B and K of values that are `period_s` s apart and rounded to multiples of `resolution`; `None` of a constant.
-fn coefficients(values: &[f64], period_s: f64, resolution: f64) -> Option<[f64; 3]> {
+/// N, B and K of values that are `period_s` s apart and rounded to multiples of `resolution`, and the corner of a filter that N has
+/// passed, Hz; `None` of a constant.
+fn coefficients(values: &[f64], period_s: f64, resolution: f64) -> Option<([f64; 3], f64)> {
     let bands = bands(values, period_s)?;
     let rounding = resolution * resolution / 12.0 * period_s;
-    let of_band = |band: &Band| Densities {
-        baseline: baseline_densities(period_s, band.frequency_hz),
-        known: rounding,
-        truth: band.density,
-    };
-    let densities: Vec<Densities> = bands.iter().map(of_band).collect();
     let counts: Vec<f64> = bands.iter().map(|band| band.ordinates).collect();
     // From the density at the highest frequencies and nothing else.
     let white = bands.last().map_or(0.0, |band| band.density);
-    Some(fit_baseline(&densities, &counts, [white, 0.0, 0.0]).map(f64::sqrt))
+    // The squares of N, B and K behind a filter, and their log likelihood but for a constant.
+    let fit = |corner_hz: f64| {
+        let of_band = |band: &Band| {
+            let [white, flicker, walk] = baseline_densities(period_s, band.frequency_hz);
+            let baseline = [low_pass_gain(corner_hz, band.frequency_hz) * white, flicker, walk];
+            Densities { baseline, known: rounding, truth: band.density }
+        };
+        let densities: Vec<Densities> = bands.iter().map(of_band).collect();
+        let squares = fit_baseline(&densities, &counts, [white, 0.0, 0.0]);
+        let deviance = |(densities, count): (&Densities, &f64)| {
+            let modelled = densities.modelled(&squares);
+            count * (modelled.ln() + densities.truth / modelled)
+        };
+        let likelihood = -densities.iter().zip(&counts).map(deviance).sum::<f64>();
+        (squares.map(f64::sqrt), corner_hz, likelihood)
+    };
+    let corner = |step: usize| HIGHEST_CORNER * 0.5 / period_s / CORNER_RATIO.powi(step as i32);
+    let (unfiltered, filtered) = (fit(f64::INFINITY), (0..CORNERS).map(|step| fit(corner(step))));
+    let likeliest = filtered.max_by(|one, other| one.2.total_cmp(&other.2));
+    let filtered = likeliest.filter(|filtered| filtered.2 > unfiltered.2 + LEAST_GAIN);
+    let (coefficients, corner_hz, _) = filtered.unwrap_or(unfiltered);
+    Some((coefficients, corner_hz))
 }
 
 /// A band of the periodogram.
@@ -96,6 +129,7 @@ fn bands(values: &[f64], period_s: f64) -> Option<Vec<Band>> {
 #[cfg(test)]
 mod tests {
     use super::coefficients;
+    use crate::spectral_noise::gaussian_noise;
     use crate::undeclared::generator::baseline;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
@@ -119,12 +153,27 @@ mod tests {
             let mut values = baseline(&noise, 100.0, 1 << 17, &mut random);
             let line = |at: usize| 2.0 * (TAU * 7.3 * at as f64 / 100.0).sin();
             values.iter_mut().enumerate().for_each(|(at, value)| *value += line(at));
-            let found = coefficients(&values, 0.01, 0.001).expect("noise");
+            let (found, corner_hz) = coefficients(&values, 0.01, 0.001).expect("noise");
+            assert_eq!(corner_hz, f64::INFINITY);
             sums.iter_mut().zip(found).for_each(|(sum, value)| *sum += value.ln() / 8.0);
         }
         let ratios: Vec<f64> = sums.iter().zip(truth).map(|(sum, truth)| sum.exp() / truth).collect();
         let allowed = [0.02, 0.2, 0.2];
         assert!(ratios.iter().zip(allowed).all(|(ratio, allowed)| (ratio - 1.0).abs() < allowed), "{ratios:?}");
         assert_eq!(coefficients(&[1.0; 100], 0.01, 1.0), None);
+    }
+    /// White noise behind a filter of first order, as of an inertial sensor for a drone: 2·N²/(1 + (f/f₀)²) from one side.
+    #[test]
+    fn the_filter_of_the_noise_is_found() {
+        let (n, truth_hz) = (0.004, 45.0);
+        for seed in 0..4 {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let density = |frequency: f64| 2.0 * n * n / (1.0 + (frequency / truth_hz).powi(2));
+            let values = gaussian_noise(density, 250.0, 12_000, &mut random);
+            let ([found, ..], corner_hz) = coefficients(&values, 0.004, 1e-4).expect("noise");
+            // The corners that are tried are 15 % apart, and a lower one takes a larger N.
+            assert!((corner_hz / truth_hz).ln().abs() < 0.15, "{corner_hz}");
+            assert!((found / n - 1.0).abs() < 0.1, "{found}");
+        }
     }
 }

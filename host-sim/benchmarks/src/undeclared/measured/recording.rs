@@ -4,7 +4,8 @@ use adis16405_driver::GyroRange;
 use measurement::{MeasuredChannel, Measurement, SensorProfile};
 use recordings::any_sensor::ReadOptions;
 use recordings::file_format::{FileFormat, InputFile};
-use recordings::time_base::{TimeBaseError, measurement};
+use recordings::inspection::{InspectedTable, SteadyPart};
+use recordings::time_base::{TimeBaseError, TimeRange, measurement};
 use recordings::{ColumnSelection, InputError, count_table};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -26,6 +27,9 @@ pub enum MeasuredNoiseError {
     /// It cannot be read.
     #[error(transparent)]
     Input(#[from] InputError),
+    /// Its sensor always moves.
+    #[error("{0}: the sensor is never at rest")]
+    Moving(String),
     /// It has no time base.
     #[error("{file}: {reason}")]
     TimeBase {
@@ -37,26 +41,52 @@ pub enum MeasuredNoiseError {
 }
 
 impl NoiseRecording {
-    /// Reads a file of any format that the reader of recordings knows. `rate_hz` is the sample rate of a recording without time
-    /// stamps.
+    /// Reads a file of any format that the reader of recordings knows: of register counts all, of other files the longest part at
+    /// rest. `rate_hz` is the sample rate of a recording without time stamps. Columns and units that a file with one sensor does not
+    /// say are those that its inspection proposes.
     ///
     /// # Errors
-    /// The file cannot be read, or neither its time stamps nor `rate_hz` tell the sample rate.
+    /// The file cannot be read, neither its time stamps nor `rate_hz` tell the sample rate, or the sensor is never at rest.
     pub fn read(file: &Path, rate_hz: Option<f64>) -> Result<Self, MeasuredNoiseError> {
+        let file_name = || file.display().to_string();
         let input = InputFile::open(file)?;
         let samples = if input.format() == FileFormat::CountTable {
             let recording = count_table::read(input.path(), GyroRange::Dps300).map_err(|error| input.rename(error))?;
             with_rate(rate_hz, |rate_hz| measurement(&recording, rate_hz))
         } else {
-            let selection = ColumnSelection::default();
-            let recording = input.read(&ReadOptions { sensor: SensorProfile::generic(), selection, topic: None })?;
-            with_rate(rate_hz, |rate_hz| recording.clone().time_base(rate_hz).map(|(base, _)| base.measurement))
+            let tables = input.inspect(None, &ColumnSelection::default())?;
+            let (options, rest) = only_sensor(&tables, rate_hz);
+            let recording = input.read(&options)?;
+            if rest.is_some_and(|rest| rest.to_s <= rest.from_s) {
+                return Err(MeasuredNoiseError::Moving(file_name()));
+            }
+            with_rate(rate_hz, |rate_hz| {
+                let recording = recording.clone();
+                let at_rest = rest.map_or(Ok(recording.clone()), |rest| recording.within(rest, rate_hz))?;
+                at_rest.time_base(rate_hz).map(|(base, _)| base.measurement)
+            })
         };
-        let file_name = || file.display().to_string();
         let samples = samples.map_err(|reason| MeasuredNoiseError::TimeBase { file: file_name(), reason })?;
         let name = file.file_name().map_or_else(file_name, |name| name.to_string_lossy().into_owned());
         Ok(Self { name, samples })
     }
+}
+
+/// How the only sensor in `tables` is read, and when it is at rest, where that is not all the time.
+fn only_sensor(tables: &[InspectedTable], rate_hz: Option<f64>) -> (ReadOptions, Option<TimeRange>) {
+    let mut proposals = tables.iter().flat_map(|table| table.proposals.iter().map(move |proposal| (table, proposal)));
+    let (mut selection, mut topic, mut rest) = (ColumnSelection::default(), None, None);
+    // Which of several is meant, the error of the reader asks.
+    if let (Some((table, proposal)), None) = (proposals.next(), proposals.next()) {
+        selection = ColumnSelection::parse(&proposal.columns, &proposal.units).unwrap_or_default();
+        topic.clone_from(&proposal.topic);
+        let rate_hz = table.rate.map(|rate| rate.hz).or(table.stated_rate_hz).or(rate_hz);
+        rest = table.steady.as_ref().zip(rate_hz).and_then(|(SteadyPart { rows, .. }, rate_hz)| {
+            let [from_s, to_s] = [rows.start, rows.end].map(|row| row as f64 / rate_hz);
+            (rows.len() < table.rows).then_some(TimeRange { from_s, to_s })
+        });
+    }
+    (ReadOptions { sensor: SensorProfile::generic(), selection, topic }, rest)
 }
 
 /// The samples on the time base of their stamps; without stamps, at `rate_hz`.

@@ -47,6 +47,8 @@ pub struct MeasuredScore {
     /// Whether it was named; of an effect that the analysis was not made for, whether it is reported as unexplained or by a name that
     /// describes it.
     pub named: bool,
+    /// What the report says in the channels of the effect, as `channel: kind`.
+    pub found: Vec<String>,
     /// Names that the report gives and the report of the untouched stretch does not, other than the right one, as `channel: kind`.
     pub wrong_names: Vec<String>,
     /// Parameters of an effect that was named.
@@ -60,7 +62,7 @@ pub(super) fn hidden(stretch: &Stretch<'_>, kind: HiddenKind, effect: &HiddenEff
     let report = analyze(&hide(&stretch.samples, effect, stretch.seed));
     let is_in = |channel: &Channel| {
         let output = simulation::output_register(*channel);
-        stretch.channels.contains(&output) && effect.shows_in(output)
+        stretch.noise.channels.contains(&output) && effect.shows_in(output)
     };
     let own: Vec<Channel> = Channel::INERTIAL.into_iter().filter(is_in).collect();
     let (named, right, estimates) = answer(kind, effect, strength, &own, &report, &stretch.report);
@@ -72,6 +74,7 @@ pub(super) fn hidden(stretch: &Stretch<'_>, kind: HiddenKind, effect: &HiddenEff
         channels: own.iter().map(|channel| channel.name()).collect(),
         strength,
         named,
+        found: named_as(&names(&report, &own)),
         wrong_names: wrong_names(&own, &right, &report, &stretch.report),
         estimates,
         errors,
@@ -115,33 +118,41 @@ fn answer(
     }
 }
 
-/// Whether none of `others` is of the same kind with parameters whose intervals meet those of `effect`.
+/// Whether none of `others` is of the same kind with the parameters of `effect`: with two estimates of each of which one at least is within
+/// the interval of the other.
 fn is_new(effect: &Effect, others: &[ChannelEffect]) -> bool {
     let parameters = effect.parameters();
     let is_same = |other: &ChannelEffect| {
         let of_other = other.effect.parameters();
-        let meets = |(name, parameter): (&&str, &Parameter)| {
-            of_other.get(name).is_none_or(|of| of.low <= parameter.high && parameter.low <= of.high)
+        let is_in = |one: &Parameter, another: &Parameter| (another.low..=another.high).contains(&one.value);
+        let agrees = |(name, parameter): (&&str, &Parameter)| {
+            of_other.get(name).is_none_or(|of| is_in(of, parameter) || is_in(parameter, of))
         };
-        other.effect.name() == effect.name() && parameters.iter().all(meets)
+        other.effect.name() == effect.name() && parameters.iter().all(agrees)
     };
     !others.iter().any(is_same)
 }
 
 /// The names of `report` that neither `untouched` has in the same channel nor are `right` in one of the channels `own`.
 fn wrong_names(own: &[Channel], right: &[&str], report: &Report, untouched: &Report) -> Vec<String> {
-    let names = |report: &Report| -> BTreeSet<(Channel, &'static str)> {
-        let of_channel = |channel: Channel| {
-            let effects = channel_report(report, channel).map(|of| of.effects.as_slice()).unwrap_or_default();
-            effects.iter().map(move |shown| (channel, shown.effect.name())).collect::<Vec<_>>()
-        };
-        Channel::INERTIAL.into_iter().flat_map(of_channel).collect()
+    let known = names(untouched, &Channel::INERTIAL);
+    let is_right = |(channel, kind): &(Channel, &str)| own.contains(channel) && right.contains(kind);
+    let mut new = names(report, &Channel::INERTIAL);
+    new.retain(|name| !known.contains(name) && !is_right(name));
+    named_as(&new)
+}
+
+/// The effects that `report` lists in `channels`.
+fn names(report: &Report, channels: &[Channel]) -> BTreeSet<(Channel, &'static str)> {
+    let of_channel = |channel: &Channel| {
+        let effects = channel_report(report, *channel).map(|of| of.effects.as_slice()).unwrap_or_default();
+        effects.iter().map(|shown| (*channel, shown.effect.name())).collect::<Vec<_>>()
     };
-    let known = names(untouched);
-    let is_right = |channel: &Channel, kind: &str| own.contains(channel) && right.contains(&kind);
-    let new = names(report).into_iter().filter(|name| !known.contains(name));
-    let wrong = new.filter(|(channel, kind)| !is_right(channel, kind));
-    wrong.map(|(channel, kind)| format!("{}: {kind}", channel.name())).collect()
+    channels.iter().flat_map(of_channel).collect()
+}
+
+fn named_as(names: &BTreeSet<(Channel, &'static str)>) -> Vec<String> {
+    names.iter().map(|(channel, kind)| format!("{}: {kind}", channel.name())).collect()
 }
 
 fn errors(channel: Channel, report: &Report, untouched: &Report) -> MeasuredErrors {

@@ -81,7 +81,8 @@ impl MeasuredNoiseTable {
                 "  not hidden, as no channel can have it at this strength: {kind}, in {stretches} stretches"
             )?;
         }
-        self.write_wrong_names(out)
+        self.write_rest(out, "wrong", |score| (!score.wrong_names.is_empty()).then_some(&score.wrong_names))?;
+        self.write_rest(out, "missed", |score| (!score.named).then_some(&score.found))
     }
 
     fn write_row(&self, out: &mut dyn Write, name: &str, is_of_row: &dyn Fn(&MeasuredScore) -> bool) -> io::Result<()> {
@@ -112,18 +113,20 @@ impl MeasuredNoiseTable {
         writeln!(out)
     }
 
-    /// What was named wrongly beside each kind.
-    fn write_wrong_names(&self, out: &mut dyn Write) -> io::Result<()> {
-        for score in self.scores.iter().filter(|score| !score.wrong_names.is_empty()) {
+    /// A line for each effect of which there are names of the sort `what`.
+    fn write_rest(
+        &self,
+        out: &mut dyn Write,
+        what: &str,
+        names: impl Fn(&MeasuredScore) -> Option<&Vec<String>>,
+    ) -> io::Result<()> {
+        for (score, names) in self.scores.iter().filter_map(|score| Some((score, names(score)?))) {
+            let MeasuredScore { recording, from_s, strength, .. } = score;
+            let (kind, channels) = (score.kind.name(), score.channels.join(", "));
+            let names = if names.is_empty() { "nothing".to_owned() } else { names.join(", ") };
             writeln!(
                 out,
-                "  {} of strength {:.1} in {} of {} from {:.0} s: {}",
-                score.kind.name(),
-                score.strength,
-                score.channels.join(", "),
-                score.recording,
-                score.from_s,
-                score.wrong_names.join(", "),
+                "  {what}: {kind} of strength {strength:.1} in {channels} of {recording} from {from_s:.0} s: {names}"
             )?;
         }
         Ok(())

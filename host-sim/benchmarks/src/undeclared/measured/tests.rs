@@ -1,6 +1,6 @@
 //! The parts of a recording, the effects in its counts, and the whole benchmark, on generated noise in place of a recording.
 
-use super::hide::{HiddenEffect, hide};
+use super::hide::{HiddenEffect, has_samples_read_again, hide};
 use super::recording::part;
 use super::*;
 use crate::undeclared::effect::EffectKind;
@@ -54,6 +54,7 @@ fn samples_that_were_read_twice_stay_so() {
         |of: &Measurement| of.channels.iter().find(|of| of.profile.name == "gyro_y").expect("gyro y").counts.clone();
     let repeated =
         |counts: &[i32]| (1..counts.len()).filter(|&at| is_read_again(at) && counts[at] == counts[at - 1]).count();
+    assert!(has_samples_read_again(&samples) && !has_samples_read_again(&recorded(20.0, 4).samples));
     let changed = gyro_y(&hide(&samples, &sinusoid(0.5), 7));
     assert_ne!(changed, gyro_y(&samples));
     assert_eq!(repeated(&changed), samples.len() / 3);
@@ -81,7 +82,14 @@ fn a_part_has_its_own_periods_and_gaps() {
 #[test]
 fn every_kind_is_hidden_in_every_stretch_or_counted() {
     let recordings = vec![recorded(60.0, 3)];
-    let plan = MeasuredNoisePlan { recordings, stretches: 1, seconds: 40.0, strength: 3.0, seed: 11, jobs: 2 };
+    let plan = MeasuredNoisePlan {
+        recordings,
+        stretches: 1,
+        length: StretchLength::Seconds(40.0),
+        strength: 3.0,
+        seed: 11,
+        jobs: 2,
+    };
     let table = plan.run(|_, _| ());
     assert_eq!(table.scores.len() + table.not_hidden.len(), HiddenKind::ALL.len());
     assert!(table.not_hidden.len() <= 3, "{:?}", table.not_hidden);
