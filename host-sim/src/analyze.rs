@@ -5,7 +5,9 @@ use crate::inspect::{self, read_or_ask};
 use crate::output::{self, note};
 use crate::output_files::{OutputFiles, is_standard_stream};
 use crate::progress::{self, Progress};
+use crate::tip::UnknownSensor;
 use crate::{many, streaming};
+use adis16405_driver::GyroRange;
 use anyhow::{Context, Result, bail};
 use measurement::{Measurement, SensorProfile, adis16405, profile_file};
 use noise_analysis::analysis::{analyze_and_release, analyze_condensed};
@@ -21,7 +23,7 @@ use recordings::{ColumnSelection, Printable, ReadMonitor, count_table};
 use serde::Serialize;
 use simulation::Replay;
 use std::fs::File;
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 /// Name of the sensor whose register counts need no profile.
@@ -240,7 +242,7 @@ enum Opened {
 /// Opens a file of any format. What the user should know of an SPI log is noted.
 fn open(arguments: &InputArguments, monitor: &ReadMonitor) -> Result<Opened> {
     let InputArguments { file, range, sensor, columns, units, topic, .. } = arguments;
-    let sensor = sensor.as_deref().map(sensor_profile).transpose()?;
+    let sensor = sensor.as_deref().map(|name| sensor_profile(name, (*range).into())).transpose()?;
     let selection = ColumnSelection::parse(columns, units)?;
     let input = InputFile::open_monitored(file, monitor)?;
     if let Some(topic) = topic.as_ref().filter(|_| input.format().is_text() && input.format() != FileFormat::TextTable)
@@ -326,10 +328,10 @@ fn on_time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<(Measurem
     Ok((base.measurement, notes))
 }
 
-/// The profile of a known sensor, or of a profile file.
-fn sensor_profile(name: &str) -> Result<SensorProfile> {
+/// The profile of a known sensor, or of a profile file; `range` is that of an ADIS16405's gyros.
+fn sensor_profile(name: &str, range: GyroRange) -> Result<SensorProfile> {
     match name.to_lowercase().as_str() {
-        ADIS16405 => return Ok(adis16405::profile(adis16405::GYRO_LSB_300)),
+        ADIS16405 => return Ok(adis16405::profile(range.lsb())),
         GENERIC => return Ok(SensorProfile::generic()),
         known => {
             if let Some(profile) = profile_file::included(known) {
@@ -339,13 +341,12 @@ fn sensor_profile(name: &str) -> Result<SensorProfile> {
     }
     let mut text = String::new();
     let read = |file: File| file.take(PROFILE_BYTES + 1).read_to_string(&mut text);
-    File::open(name).and_then(read).with_context(|| {
-        let included: Vec<&str> = profile_file::included_names().collect();
-        format!(
-            "sensor {}: neither {ADIS16405}, {GENERIC}, {} nor a profile file",
-            Printable(name),
-            included.join(", ")
-        )
+    File::open(name).and_then(read).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => {
+            let known = [ADIS16405, GENERIC].into_iter().chain(profile_file::included_names());
+            UnknownSensor(name.to_owned(), known.collect()).into()
+        }
+        _ => anyhow::Error::from(error).context(format!("sensor {}", Printable(name))),
     })?;
     if text.len() as u64 > PROFILE_BYTES {
         bail!("{}: a profile is not longer than {PROFILE_BYTES} bytes", Printable(name));

@@ -1,5 +1,6 @@
 //! The arguments of the command line.
 
+use crate::tip::similar_name;
 use adis16405_driver::GyroRange;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
@@ -21,20 +22,75 @@ const OUTPUT: &str = "Output";
 /// Below the options of the program; each line is a command.
 const EXAMPLES: &str = "\
 Examples:
-  host-sim                                   an hour of the virtual sensor; its page in ./report
+  host-sim                                   an hour of the virtual sensor
   host-sim analyze imu.bag --page report     a recording of any inertial sensor
-  host-sim monitor /dev/ttyACM0              a device that runs the firmware, live";
+  host-sim monitor /dev/ttyACM0              a device that runs the firmware";
 
-/// Below the options of `analyze`; each line is a command.
+/// Below the options of `analyze`.
 const EXAMPLES_OF_ANALYZE: &str = "\
 Examples:
   host-sim analyze flight.ulg --page report --export kalibr=imu.yaml
-  host-sim analyze imu.csv --columns gyro_x=wx,gyro_y=wy,time=t --units deg/s,ms --sensor bmi088
+  host-sim analyze imu.csv --columns gyro_x=wx,time=t --units deg/s,ms
   host-sim analyze run1.csv.gz run2.csv.gz --rate 100";
 
-/// Noise analysis of the ADIS16405 and other inertial sensors, and a virtual ADIS16405.
+/// Below the options of `inspect`.
+const EXAMPLES_OF_INSPECT: &str = "\
+Examples:
+  host-sim inspect imu.bag
+  host-sim inspect flight.ulg --topic sensor_gyro:1";
+
+/// Below the options of `compare`.
+const EXAMPLES_OF_COMPARE: &str = "\
+Examples:
+  host-sim compare before.json after.json
+  host-sim compare report.json --data-sheet";
+
+/// Below the options of `export`.
+const EXAMPLES_OF_EXPORT: &str = "\
+Examples:
+  host-sim export report.json imu.yaml --format kalibr";
+
+/// Below the options of `convert`.
+const EXAMPLES_OF_CONVERT: &str = "\
+Examples:
+  host-sim convert flight.ulg still.csv.gz --from 8.2 --to 60
+  host-sim convert imu.bag imu.npy";
+
+/// Below the options of `monitor`.
+const EXAMPLES_OF_MONITOR: &str = "\
+Examples:
+  host-sim monitor /dev/ttyACM0
+  host-sim monitor run1.csv.gz --rate 100 --speed 60";
+
+/// Below the options of `record`.
+const EXAMPLES_OF_RECORD: &str = "\
+Examples:
+  host-sim record cable.csv.gz --port /dev/ttyACM0 --seconds 3600
+  host-sim record virtual.csv.gz --page report";
+
+/// Below the options of `replay`.
+const EXAMPLES_OF_REPLAY: &str = "\
+Examples:
+  host-sim replay counts.csv.gz --rate 100
+  host-sim replay bus.csv.gz --json report.json";
+
+/// Below the options of `simulate`.
+const EXAMPLES_OF_SIMULATE: &str = "\
+Without --gyro and --accl the noise is that of a published part.
+--effect, --environment and --fault may be given several times.
+
+Examples:
+  host-sim simulate hour.csv.gz --gyro 0.037,0.009,0.0013
+  host-sim simulate fan.csv --effect sinusoid:gyro_z:frequency=20,amplitude=0.1";
+
+/// Below the options of `completions`.
+const EXAMPLES_OF_COMPLETIONS: &str = "\
+Examples:
+  host-sim completions bash";
+
+/// Noise analysis of inertial sensors, with a virtual ADIS16405.
 #[derive(Debug, Parser)]
-#[command(name = "host-sim", version, args_conflicts_with_subcommands = true, disable_help_subcommand = true)]
+#[command(name = "host-sim", version, args_conflicts_with_subcommands = true)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Cli {
     /// The subcommand.
@@ -51,24 +107,30 @@ pub(crate) struct Cli {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Analyse a recording of any format, or compare the noise of several
+    /// Analyse a recording, or compare the noise of several
     #[command(after_help = EXAMPLES_OF_ANALYZE)]
     Analyze(AnalyzeArguments),
-    /// Show what is in a file: topics, columns, units, rate, gaps, where it is at rest
+    /// Show what is in a file: topics, columns, units, rate, gaps
+    #[command(after_help = EXAMPLES_OF_INSPECT)]
     Inspect(InspectArguments),
-    /// Compare the coefficients of a report with those of another, or with the data sheet
+    /// Compare the coefficients of two reports, or with the data sheet
+    #[command(after_help = EXAMPLES_OF_COMPARE)]
     Compare(CompareArguments),
-    /// Write the noise of a report in the file format of another program
+    /// Write the noise of a report in the format of another program
+    #[command(after_help = EXAMPLES_OF_EXPORT)]
     Export(ExportArguments),
-    /// Write a recording of any format as a table, a NumPy array or an SPI frame log
+    /// Write a recording as a table, a NumPy array or an SPI frame log
+    #[command(after_help = EXAMPLES_OF_CONVERT)]
     Convert(ConvertArguments),
-    /// Show a device that runs the firmware, or a recording, while its record grows
+    /// Show a device or a recording live, while its record grows
+    #[command(after_help = EXAMPLES_OF_MONITOR)]
     Monitor(MonitorArguments),
-    /// Record the bus of the virtual sensor, or of a device on a serial port, and analyse it
+    /// Record the SPI bus of a device or the virtual sensor; analyse it
+    #[command(after_help = EXAMPLES_OF_RECORD)]
     Record {
         /// The SPI frame log to write; gzip if it ends in .gz.
         out: PathBuf,
-        /// Serial port of a device that runs the firmware, such as /dev/ttyUSB0.
+        /// Serial port of a device, such as /dev/ttyUSB0.
         #[arg(long, help_heading = INPUT, conflicts_with_all = ["seed", "plain"])]
         port: Option<String>,
         /// Baud rate of the port.
@@ -81,11 +143,14 @@ pub(crate) enum Command {
         #[command(flatten)]
         output: OutputArguments,
     },
-    /// Send a table or an SPI log through the emulated bus and the driver, and analyse it
+    /// Send a table or an SPI log through the emulated bus and driver
+    #[command(after_help = EXAMPLES_OF_REPLAY)]
     Replay(ReplayArguments),
-    /// Write a recording of the virtual sensor with the noise, effects and faults described
+    /// Simulate a recording with stated noise, effects and faults
+    #[command(after_help = EXAMPLES_OF_SIMULATE)]
     Simulate(Box<SimulateArguments>),
     /// Print the completions for a shell
+    #[command(after_help = EXAMPLES_OF_COMPLETIONS)]
     Completions {
         /// The shell.
         shell: Shell,
@@ -98,16 +163,16 @@ pub(crate) struct AnalyzeArguments {
     /// The first recording, and how to read it and the others.
     #[command(flatten)]
     pub(crate) recording: RecordingArguments,
-    /// More recordings: does the sensor show the same noise in all of them?
+    /// More recordings: is their noise the same?
     #[arg(value_name = "FILE")]
     pub(crate) more: Vec<PathBuf>,
-    /// Each sensor of the file as a recording of its own.
+    /// Each sensor of the file as its own recording.
     #[arg(long, help_heading = INPUT, conflicts_with = "topic")]
     pub(crate) each_sensor: bool,
-    /// With motors running: its noise over that of the others.
+    /// Recording with motors on: noise ratio to FILE.
     #[arg(long, help_heading = INPUT, value_name = "RUNNING", conflicts_with = "reports")]
     pub(crate) against: Option<PathBuf>,
-    /// Curves and models alone, in memory that does not grow.
+    /// Curves and models only, for records of any length.
     #[arg(long, help_heading = OUTPUT)]
     pub(crate) quick: bool,
     /// Write the report of each recording as DIR/NAME.json.
@@ -124,7 +189,7 @@ pub(crate) struct InspectArguments {
     /// The files, of any format.
     #[arg(value_name = "FILE", required = true)]
     pub(crate) files: Vec<PathBuf>,
-    /// Topic, message or array [default: all with an inertial sensor].
+    /// Topic, message or array [default: every inertial sensor].
     #[arg(long, help_heading = INPUT)]
     pub(crate) topic: Option<String>,
 }
@@ -134,11 +199,11 @@ pub(crate) struct InspectArguments {
 pub(crate) struct ReplayArguments {
     /// Register counts of an ADIS16405, or a log of its SPI bus.
     pub(crate) file: PathBuf,
-    /// Sample rate; overrides what the time stamps say.
+    /// Sample rate; overrides the time stamps.
     #[arg(long, help_heading = INPUT, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate: Option<f64>,
-    /// Range of the gyros, deg/s: 300, 150 or 75; a log says it itself.
-    #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true)]
+    /// Gyro range of counts: 300 [default], 150 or 75 deg/s.
+    #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true, hide_default_value = true)]
     pub(crate) range: GyroRangeArgument,
     /// Where the report goes besides the terminal.
     #[command(flatten)]
@@ -181,7 +246,7 @@ pub(crate) struct ConvertArguments {
     pub(crate) recording: RecordingArguments,
     /// The file to write.
     pub(crate) out: PathBuf,
-    /// Its format: table, frames or npy [default: by its name, npy or table].
+    /// Format: table, frames or npy [default: by OUT's name].
     #[arg(long, help_heading = OUTPUT, value_name = "FORMAT", value_enum, hide_possible_values = true)]
     pub(crate) format: Option<RecordingFormat>,
 }
@@ -191,7 +256,7 @@ pub(crate) struct ConvertArguments {
 pub(crate) struct SimulateArguments {
     /// The file to write.
     pub(crate) out: PathBuf,
-    /// Its format: table, frames or npy [default: by its name, npy or table].
+    /// Format: table, frames or npy [default: by OUT's name].
     #[arg(long, help_heading = OUTPUT, value_name = "FORMAT", value_enum, hide_possible_values = true)]
     pub(crate) format: Option<RecordingFormat>,
     /// Virtual time in s [default: 3600].
@@ -200,16 +265,16 @@ pub(crate) struct SimulateArguments {
     /// Seed of all random numbers.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// Sample rate; the nearest one that the part has.
+    /// Sample rate; the part's nearest is taken.
     #[arg(long, help_heading = SENSOR, value_name = "HZ", default_value_t = simulation::SAMPLE_RATE_HZ, allow_negative_numbers = true)]
     pub(crate) rate: f64,
     /// Range of the gyros, deg/s: 300, 150 or 75.
     #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true)]
     pub(crate) range: GyroRangeArgument,
-    /// Taps of a stage of the filter, 1 to 64 [default: the fewest of the range].
+    /// Taps per filter stage, 1 to 64 [default: by the range].
     #[arg(long, help_heading = SENSOR)]
     pub(crate) taps: Option<u32>,
-    /// All gyros: deg/√s, deg/s, deg/s/√s [default: a published part].
+    /// All gyros: deg/√s, deg/s, deg/s/√s.
     #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
     gyro: Option<String>,
     /// Gyro x.
@@ -221,7 +286,7 @@ pub(crate) struct SimulateArguments {
     /// Gyro z.
     #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
     gyro_z: Option<String>,
-    /// All accelerometers: g/√Hz, g, g/√s [default: a published part].
+    /// All accelerometers: g/√Hz, g, g/√s.
     #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
     accl: Option<String>,
     /// Accelerometer x.
@@ -233,13 +298,13 @@ pub(crate) struct SimulateArguments {
     /// Accelerometer z.
     #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
     accl_z: Option<String>,
-    /// As in sinusoid:gyro_z:frequency=20.5,amplitude=0.2; repeatable.
+    /// As in markov:gyro_x:time_constant=9,deviation=1.
     #[arg(long, help_heading = NOISE, value_name = "EFFECT")]
     pub(crate) effect: Vec<String>,
-    /// As in temperature:rise=8,time_constant=900; repeatable.
+    /// As in temperature:rise=8,time_constant=900.
     #[arg(long, help_heading = NOISE, value_name = "PROFILE")]
     pub(crate) environment: Vec<String>,
-    /// Of the bus, as in stuck_low:from=10,bursts=5; repeatable.
+    /// Of the bus, as in stuck_low:from=10,bursts=5.
     #[arg(long, help_heading = NOISE, value_name = "FAULT")]
     pub(crate) fault: Vec<String>,
 }
@@ -267,7 +332,7 @@ pub(crate) struct ExportArguments {
     /// The program.
     #[arg(long, help_heading = OUTPUT, value_enum)]
     pub(crate) format: ExportFormat,
-    /// Where the program has one number a sensor: rms or worst.
+    /// One number for three axes: rms or worst.
     #[arg(long, help_heading = OUTPUT, value_enum, default_value_t, hide_possible_values = true)]
     pub(crate) axis: AxisChoice,
     /// A report that `analyze --json` wrote.
@@ -282,13 +347,13 @@ pub(crate) struct RecordingArguments {
     /// The recording.
     #[command(flatten)]
     pub(crate) input: InputArguments,
-    /// Sample rate; overrides what the time stamps say.
+    /// Sample rate; overrides the time stamps.
     #[arg(long, help_heading = INPUT, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate: Option<f64>,
-    /// Leave out what comes before this time, s from the first sample.
+    /// Begin here, s from the first sample.
     #[arg(long, help_heading = INPUT, value_name = "S", value_parser = time_in_recording)]
     pub(crate) from: Option<f64>,
-    /// Leave out what comes then or later, s from the first sample.
+    /// End before this, s from the first sample.
     #[arg(long, help_heading = INPUT, value_name = "S", value_parser = time_in_recording)]
     pub(crate) to: Option<f64>,
 }
@@ -311,22 +376,22 @@ impl RecordingArguments {
 pub(crate) struct InputArguments {
     /// The recording, of any format; - for standard input.
     pub(crate) file: PathBuf,
-    /// As in gyro_x=wx,gyro_y=1,gyro_z=gyro.2 [default: by name].
+    /// As in gyro_x=wx,gyro_y=1 [default: by name].
     #[arg(long, help_heading = INPUT, value_name = "CHANNEL=COLUMN", value_delimiter = ',')]
     pub(crate) columns: Vec<String>,
-    /// One a quantity, as in rad/s,m/s^2,us [default: by name].
+    /// Per quantity, as deg/s,g,us [default: by name].
     #[arg(long, help_heading = INPUT, value_name = "UNIT", value_delimiter = ',')]
     pub(crate) units: Vec<String>,
     /// Topic, message or array of a file with several.
     #[arg(long, help_heading = INPUT)]
     pub(crate) topic: Option<String>,
-    /// Take a guess of column or unit if no other is plausible.
+    /// Accept a guess if no other is plausible.
     #[arg(long, help_heading = INPUT)]
     pub(crate) yes: bool,
-    /// Range of the gyros of an ADIS16405, deg/s: 300, 150 or 75.
-    #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true)]
+    /// Gyros of an ADIS16405: 300 [default], 150, 75 deg/s.
+    #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true, hide_default_value = true)]
     pub(crate) range: GyroRangeArgument,
-    /// adis16405, adis16470, bmi088, mpu6050, generic or a file.
+    /// adis16405, adis16470, bmi088, mpu6050 or a TOML file.
     #[arg(long, help_heading = SENSOR, value_name = "NAME|FILE")]
     pub(crate) sensor: Option<String>,
 }
@@ -361,20 +426,20 @@ pub(crate) struct MonitorArguments {
     /// Baud rate of the port.
     #[arg(long, help_heading = INPUT, default_value_t = serial::BAUD)]
     pub(crate) baud: u32,
-    /// Command to send to the device first, such as "f 819.2"; may be repeated.
+    /// Command for the device, such as "f 819.2"; repeatable.
     #[arg(long, help_heading = INPUT, value_name = "COMMAND")]
     pub(crate) send: Vec<String>,
-    /// End after so many seconds [default: with the connection or the recording].
+    /// End after so many seconds [default: at the end].
     #[arg(long)]
     pub(crate) seconds: Option<f64>,
-    /// Seconds of a recording in a second, or max for no waiting.
+    /// Of a recording: times real time, or max.
     #[arg(long, help_heading = INPUT, value_name = "TIMES|max", default_value = "1", value_parser = replay_speed)]
     pub(crate) speed: f64,
-    /// Sample rate of a recording; overrides what the time stamps say.
+    /// Sample rate of a recording; overrides time stamps.
     #[arg(long, help_heading = INPUT, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate: Option<f64>,
-    /// Range of the gyros of a recording, deg/s: 300, 150 or 75.
-    #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true)]
+    /// Gyro range of a recording: 300 [default], 150 or 75 deg/s.
+    #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true, hide_default_value = true)]
     pub(crate) range: GyroRangeArgument,
 }
 
@@ -430,7 +495,7 @@ pub(crate) struct SimulationArguments {
     /// Seed of the noise.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// N, B and K alone, without the line and the effect of temperature.
+    /// N, B and K alone: no line, no effect of temperature.
     #[arg(long)]
     pub(crate) plain: bool,
 }
@@ -447,29 +512,36 @@ impl SimulationArguments {
 #[derive(Debug, Args)]
 #[command(next_help_heading = OUTPUT)]
 pub(crate) struct OutputArguments {
-    /// Print every table of every channel instead of one screen.
+    /// Print every table of every channel.
     #[arg(long, conflicts_with_all = ["quiet", "explain"])]
     pub(crate) full: bool,
-    /// Print sentences: what was found, what changes, what is foretold.
+    /// Print sentences: what was found, what it changes.
     #[arg(long, conflicts_with = "quiet")]
     pub(crate) explain: bool,
     /// Print nothing.
     #[arg(long)]
     pub(crate) quiet: bool,
-    /// Write every figure as SVG into this folder; the page saves them as PNG.
+    /// Write every figure as SVG into this folder.
     #[arg(long, value_name = "DIR")]
     pub(crate) pictures: Option<PathBuf>,
     /// Write the report as JSON; - for standard output.
     #[arg(long, value_name = "OUT")]
     pub(crate) json: Option<PathBuf>,
-    /// Write the report as a page into this folder.
+    /// Write the report as a web page, DIR/index.html.
     #[arg(long, value_name = "DIR")]
     pub(crate) page: Option<PathBuf>,
-    /// Write the noise for a program, as in kalibr=imu.yaml; repeatable.
+    /// Noise for a program, as kalibr=imu.yaml; repeatable.
     #[arg(long = "export", value_name = "FORMAT=OUT", value_parser = export_target)]
     pub(crate) exports: Vec<ExportTarget>,
-    /// Where --export has one number a sensor: rms or worst.
-    #[arg(long, value_enum, default_value_t, requires = "exports", hide_possible_values = true)]
+    /// One number for three axes: rms [default] or worst.
+    #[arg(
+        long,
+        value_enum,
+        default_value_t,
+        requires = "exports",
+        hide_possible_values = true,
+        hide_default_value = true
+    )]
     pub(crate) axis: AxisChoice,
 }
 
@@ -483,15 +555,16 @@ pub(crate) struct ExportTarget {
 }
 
 fn export_target(text: &str) -> Result<ExportTarget, String> {
-    let formats = || {
-        let names = ExportFormat::value_variants().iter().filter_map(ValueEnum::to_possible_value);
-        names.map(|name| name.get_name().to_owned()).collect::<Vec<_>>().join(", ")
-    };
     let (name, file) = text
         .split_once('=')
         .filter(|(_, file)| !file.is_empty())
         .ok_or("expected FORMAT=OUT, as in kalibr=imu.yaml")?;
-    let format = ExportFormat::from_str(name, true).map_err(|_| format!("`{name}` is none of {}", formats()))?;
+    let format = ExportFormat::from_str(name, true).map_err(|_| {
+        let names = ExportFormat::value_variants().iter().filter_map(ValueEnum::to_possible_value);
+        let names: Vec<String> = names.map(|name| name.get_name().to_owned()).collect();
+        let tip = similar_name(name, &names).map_or(String::new(), |similar| format!("; did you mean {similar}?"));
+        format!("`{name}` is none of {}{tip}", names.join(", "))
+    })?;
     Ok(ExportTarget { format, file: file.into() })
 }
 
@@ -505,17 +578,21 @@ pub(crate) struct JsonArgument {
 
 #[cfg(test)]
 mod tests {
-    use super::{Cli, EXAMPLES, EXAMPLES_OF_ANALYZE};
+    use super::Cli;
     use clap::{CommandFactory, Parser};
 
     #[test]
-    fn the_examples_are_commands_that_the_program_takes() {
+    fn every_command_has_examples_that_the_program_takes() {
         Cli::command().debug_assert();
-        let lines = EXAMPLES.lines().chain(EXAMPLES_OF_ANALYZE.lines()).filter(|line| line.starts_with("  "));
-        let commands: Vec<&str> = lines.filter_map(|line| line.trim_start().split("   ").next()).collect();
-        assert_eq!(commands.len(), 6);
-        for command in commands {
-            assert!(Cli::try_parse_from(command.split_whitespace()).is_ok(), "{command}");
+        let program = Cli::command();
+        for command in std::iter::once(&program).chain(program.get_subcommands()) {
+            let text = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            let lines = text.lines().filter(|line| line.starts_with("  host-sim"));
+            let examples: Vec<&str> = lines.filter_map(|line| line.trim_start().split("   ").next()).collect();
+            assert!(!examples.is_empty(), "{}", command.get_name());
+            for example in examples {
+                assert!(Cli::try_parse_from(example.split_whitespace()).is_ok(), "{example}");
+            }
         }
     }
 }

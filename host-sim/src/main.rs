@@ -17,6 +17,7 @@ mod record;
 mod recording_file;
 mod simulate;
 mod streaming;
+mod tip;
 
 use anyhow::{Context, Result};
 use clap::{CommandFactory, Parser};
@@ -27,7 +28,6 @@ use live::{DeviceSource, GrowingRecording};
 use mimalloc::MiMalloc;
 use output_files::OutputFiles;
 use recordings::Printable;
-use recordings::serial::{self, SerialLink};
 use std::ffi::c_long;
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -61,7 +61,10 @@ const DEFAULT_PAGE: &str = "report";
 
 /// Exit code 0 for success, 1 for an error; the argument parser ends the process with 2 for wrong usage.
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = Cli::try_parse().unwrap_or_else(|mut error| {
+        tip::suggest(&mut error);
+        error.exit()
+    });
     let delay_ms = if cli.command.is_none() { PURGE_DELAY_OF_SIMULATION_MS } else { PURGE_DELAY_OF_ANALYSIS_MS };
     // SAFETY: no other thread runs yet, and an option that mimalloc does not know has no effect.
     unsafe { libmimalloc_sys::mi_option_set(PURGE_DELAY, delay_ms) };
@@ -72,9 +75,8 @@ fn main() -> ExitCode {
         Err(error) => {
             // Where standard error is closed too, the exit code alone shows the error.
             let _ = writeln!(io::stderr(), "error: {}", Printable(&output::brief(&format!("{error:#}"))));
-            if let Some(file) = input_file::similar_file(&error) {
-                let _ =
-                    writeln!(io::stderr(), "  tip: a similar file exists: {}", Printable(&file.display().to_string()));
+            if let Some(tip) = tip::tip(&error) {
+                let _ = writeln!(io::stderr(), "  tip: {}", Printable(&tip));
             }
             if let Some(question) = error.downcast_ref::<Question>() {
                 let _ = io::stderr().write_all(question.text.as_bytes());
@@ -154,7 +156,7 @@ fn monitor_source(arguments: &MonitorArguments) -> Result<()> {
 fn monitor_device(arguments: &MonitorArguments, deadline: Option<Instant>) -> Result<()> {
     let MonitorArguments { source, baud, send, .. } = arguments;
     let port = source.to_str().context("a name of a port that is not UTF-8")?;
-    let mut cable = SerialLink::new(serial::open(port, *baud)?);
+    let mut cable = record::open_link(port, *baud)?;
     for command in send {
         cable.send_command(command)?;
     }

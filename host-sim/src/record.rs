@@ -3,13 +3,15 @@
 use crate::analyze::analyze_recording;
 use crate::interrupt;
 use crate::output::{note, progress_bar};
+use crate::tip::UnknownPort;
 use adis16405_driver::GyroRange;
-use anyhow::{Context, Result};
+use anyhow::{Context, Error, Result};
 use host_sim::monitor;
 use noise_analysis::report::Report;
 use recordings::recording::Recording;
 use recordings::serial::{self, SerialLink};
 use simulation::Simulation;
+use std::io::{ErrorKind, Read, Write};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -39,9 +41,18 @@ fn run(simulation: &Simulation, log: Option<&Path>) -> Result<Recording> {
     Ok(recording?)
 }
 
+/// A link to the device on a serial port. If there is no such port, the error leads to the names of those that there are.
+pub(crate) fn open_link(port: &str, baud: u32) -> Result<SerialLink<impl Read + Write + use<>>> {
+    let port = serial::open(port, baud).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => UnknownPort.into(),
+        _ => Error::from(error),
+    })?;
+    Ok(SerialLink::new(port))
+}
+
 /// Writes `seconds` of the raw bursts of the device on `port` to the frame log `log` and reports on them.
 pub(crate) fn record_device(log: &Path, port: &str, baud: u32, seconds: f64) -> Result<Report> {
-    let mut link = SerialLink::new(serial::open(port, baud).with_context(|| port.to_owned())?);
+    let mut link = open_link(port, baud).with_context(|| port.to_owned())?;
     // At a signal the recording ends, the device is told, and what came until then is analysed; a second one ends the program.
     let is_interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&is_interrupted);

@@ -22,22 +22,22 @@ pub enum ExportFormat {
     /// `kalibr_imu_chain.yaml` of OpenVINS.
     #[value(name = "openvins")]
     OpenVins,
-    /// The lines on the IMU in the configuration of VINS-Mono and VINS-Fusion.
+    /// The IMU's lines in the settings of VINS-Mono and -Fusion.
     Vins,
-    /// The lines on the IMU in the settings of ORB-SLAM3.
+    /// The IMU's lines in the settings of ORB-SLAM3.
     #[value(name = "orbslam3")]
     OrbSlam3,
-    /// A script for MATLAB that makes `gyroparams` and `accelparams`.
+    /// A script for MATLAB with `gyroparams` and `accelparams`.
     Matlab,
     /// The block `imunoise` in the configuration of KF-GINS.
     KfGins,
-    /// A Python module that makes GTSAM's `PreintegrationCombinedParams`.
+    /// A Python module: GTSAM's `PreintegrationCombinedParams`.
     Gtsam,
-    /// The entries on the IMU's noise in Basalt's calibration file.
+    /// The IMU's noise in the calibration file of Basalt.
     Basalt,
     /// A Gazebo model with an IMU sensor, in SDF.
     Gazebo,
-    /// A table of every parameter of every channel with its bounds.
+    /// A table of all parameters of all channels with bounds.
     Csv,
 }
 

@@ -53,6 +53,8 @@ pub enum ScenarioTextError {
         kind: String,
         /// The key.
         key: &'static str,
+        /// Keys that are given and not of the kind, or not yet read.
+        given: Vec<String>,
     },
     /// A key or a channel is named twice.
     #[error("{kind} names {name} twice")]
@@ -69,6 +71,8 @@ pub enum ScenarioTextError {
         kind: String,
         /// The key.
         key: String,
+        /// The keys that it has.
+        known: Vec<&'static str>,
     },
     /// A value is out of range.
     #[error("{key}: `{value}` is not {expected}")]
@@ -252,6 +256,8 @@ struct Fields<'a> {
     kind: &'a str,
     channel: Option<&'a str>,
     values: BTreeMap<&'a str, &'a str>,
+    /// Keys that the kind has.
+    known: Vec<&'static str>,
 }
 
 impl<'a> Fields<'a> {
@@ -273,7 +279,7 @@ impl<'a> Fields<'a> {
                 return Err(ScenarioTextError::Twice { kind: kind.to_owned(), name: key.to_owned() });
             }
         }
-        Ok(Self { kind, channel, values })
+        Ok(Self { kind, channel, values, known: Vec::new() })
     }
 
     fn channels(&mut self) -> Result<Vec<OutputRegister>> {
@@ -298,6 +304,7 @@ impl<'a> Fields<'a> {
     }
 
     fn optional(&mut self, key: &'static str, allowed: (f64, f64), expected: &'static str) -> Result<Option<f64>> {
+        self.known.push(key);
         let Some(text) = self.values.remove(key) else { return Ok(None) };
         let (low, high) = allowed;
         let value = text.parse::<f64>().ok().filter(|value| (low..=high).contains(value));
@@ -306,8 +313,10 @@ impl<'a> Fields<'a> {
     }
 
     fn within(&mut self, key: &'static str, low: f64, high: f64, expected: &'static str) -> Result<f64> {
-        let missing = ScenarioTextError::Missing { kind: self.kind.to_owned(), key };
-        self.optional(key, (low, high), expected)?.ok_or(missing)
+        self.optional(key, (low, high), expected)?.ok_or_else(|| {
+            let given = self.values.keys().map(|&key| key.to_owned()).collect();
+            ScenarioTextError::Missing { kind: self.kind.to_owned(), key, given }
+        })
     }
 
     fn number(&mut self, key: &'static str) -> Result<f64> {
@@ -339,12 +348,8 @@ impl<'a> Fields<'a> {
 
     /// Refuses what no one has asked for.
     fn finish(self) -> Result<()> {
-        let unknown = |key: &str| ScenarioTextError::Unknown { kind: self.kind.to_owned(), key: key.to_owned() };
-        match (self.values.keys().next(), self.channel) {
-            (Some(key), _) => Err(unknown(key)),
-            (None, Some(channel)) => Err(unknown(channel)),
-            (None, None) => Ok(()),
-        }
+        let Some(&key) = self.values.keys().next().or(self.channel.as_ref()) else { return Ok(()) };
+        Err(ScenarioTextError::Unknown { kind: self.kind.to_owned(), key: key.to_owned(), known: self.known })
     }
 }
 

@@ -182,3 +182,20 @@ fn the_gyro_range_is_read_from_the_log() {
     let ratio = adev(&log("")) / adev(&log("0.5,B901,0000\n"));
     assert!((ratio - 4.0).abs() < 1e-12, "0.05 over 0.0125 deg/s: {ratio}");
 }
+
+/// As [`docs/own-logger.md`] has it: register counts with a logger's own names.
+#[test]
+fn counts_of_other_names_have_the_stated_range() {
+    let dir = tempdir().expect("a folder");
+    let rows: String = (0..64).map(|i| format!("{},{}\n", 4883 * i, i * i % 7)).collect();
+    let file = program::write(&dir, "log.csv", format!("t_us,wx\n{rows}").as_bytes());
+    let adev = |range: &str| {
+        let columns = ["--sensor", "adis16405", "--columns", "gyro_x=wx,time=t_us", "--units", "counts,us"];
+        let file = file.to_str().expect("UTF-8");
+        let report = json_of(&dir, &[&["analyze", file, "--range", range][..], &columns].concat());
+        let report: Value = serde_json::from_slice(&report).expect("JSON");
+        report["channels"][0]["curve"][0]["adev"].as_f64().expect("a deviation")
+    };
+    let ratio = adev("300") / adev("75");
+    assert!((ratio - 4.0).abs() < 1e-12, "0.05 over 0.0125 deg/s: {ratio}");
+}

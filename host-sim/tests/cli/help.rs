@@ -4,7 +4,7 @@ use crate::program::{host_sim, write};
 use std::process::Output;
 
 /// Lines and columns of a terminal window in which a help is read without scrolling.
-const SCREEN: (usize, usize) = (45, 100);
+const SCREEN: (usize, usize) = (45, 80);
 
 fn text(bytes: Vec<u8>) -> String {
     String::from_utf8(bytes).expect("UTF-8")
@@ -28,7 +28,7 @@ fn the_help_of_every_command_fits_one_screen() {
     let program = help(&[]);
     let commands = section(&program, "Commands:");
     assert!(commands.len() >= 10 && commands[0] == "analyze", "{commands:?}");
-    for command in commands.iter().map(|name| vec![name.as_str()]).chain([Vec::new()]) {
+    for command in commands.iter().filter(|name| *name != "help").map(|name| vec![name.as_str()]).chain([Vec::new()]) {
         let help = help(&command);
         assert!(help.lines().count() <= SCREEN.0, "{} lines: {help}", help.lines().count());
         for line in help.lines() {
@@ -38,9 +38,11 @@ fn the_help_of_every_command_fits_one_screen() {
 }
 
 #[test]
-fn options_are_grouped_and_three_examples_follow() {
-    for command in [&[][..], &["analyze"]] {
-        assert_eq!(section(&help(command), "Examples:"), ["host-sim"; 3], "{command:?}");
+fn options_are_grouped_and_examples_follow() {
+    let commands = section(&help(&[]), "Commands:");
+    for command in commands.iter().map(String::as_str).filter(|command| *command != "help") {
+        let examples = section(&help(&[command]), "Examples:");
+        assert!(!examples.is_empty() && examples.iter().all(|word| word == "host-sim"), "{command}: {examples:?}");
     }
     let help = help(&["analyze"]);
     for (heading, option) in [("Input:", "--rate"), ("Sensor:", "--sensor"), ("Output:", "--page")] {
@@ -56,17 +58,52 @@ fn a_misspelt_command_option_or_file_gets_a_suggestion() {
     let file = write(&dir, "hover_2.csv", b"gyro_x_counts\n1\n");
     write(&dir, "notes.txt", b"");
     let misspelt = file.to_str().expect("UTF-8").replace("hover_2", "hoover2");
-    let path = file.display();
+    let path = file.display().to_string();
+    let misspelt_folder = dir.path().join("flihgts").join("hover.csv").display().to_string();
+    std::fs::create_dir(dir.path().join("flights")).expect("a folder");
+    let in_folder = dir.path().join("flights/hover.csv").display().to_string();
+    std::fs::write(&in_folder, "gyro_x_counts\n1\n").expect("written");
     for (arguments, status, suggestion) in [
         (vec!["analize", "x.csv"], 2, "'analyze'".to_owned()),
         (vec!["analyze", "--pagge", "d", "x.csv"], 2, "'--page'".to_owned()),
+        // Other names of what the program has.
+        (vec!["analyze", "--html", "d", "x.csv"], 2, "'--page'".to_owned()),
+        (vec!["--htlm", "d"], 2, "'--page'".to_owned()),
+        (vec!["explain", "report.json"], 2, "'analyze FILE --explain'".to_owned()),
+        (vec!["analyze", &path, "--export", "kalib=x.yaml"], 2, "did you mean kalibr?".to_owned()),
+        (vec!["analyze", &path, "--sensor", "bmi08"], 1, "tip: a similar sensor exists: bmi088\n".to_owned()),
+        (vec!["simulate", "x.csv", "--effect", "sinusiod:gyro_x:a=1"], 1, "tip: did you mean sinusoid?\n".to_owned()),
+        (vec!["simulate", "x.csv", "--fault", "stuck_lo:from=1"], 1, "tip: did you mean stuck_low?\n".to_owned()),
+        (
+            vec!["simulate", "x.csv", "--effect", "sinusoid:gyro_z:frequncy=1,amplitude=1"],
+            1,
+            "tip: `frequncy` is no parameter of it; did you mean frequency?\n".to_owned(),
+        ),
+        (vec!["simulate", "x.csv", "--environment", "supply:lod=1"], 1, "tip: did you mean load?\n".to_owned()),
+        (vec!["simulate", "x.csv", "--effect", "rate_ramp:gyrox:slope=1"], 1, "tip: did you mean gyro_x?\n".to_owned()),
         (vec!["analyze", &misspelt], 1, format!("tip: a similar file exists: {path}\n")),
+        (vec!["analyze", &misspelt_folder], 1, format!("tip: a similar file exists: {in_folder}\n")),
         (vec!["compare", &misspelt, "--data-sheet"], 1, format!("tip: a similar file exists: {path}\n")),
     ] {
         let output = host_sim(&arguments);
         let errors = text(output.stderr);
         assert!(output.status.code() == Some(status) && errors.contains(&suggestion), "{arguments:?}: {errors}");
     }
-    let errors = text(host_sim(&["analyze", "/nowhere/hover.csv"]).stderr);
-    assert!(!errors.contains("tip"), "{errors}");
+    for unlike in ["/nowhere/hover.csv", "/"] {
+        let errors = text(host_sim(&["analyze", unlike]).stderr);
+        assert!(!errors.contains("tip"), "{errors}");
+    }
+}
+
+#[test]
+fn a_port_that_is_not_there_is_answered_with_those_that_are() {
+    for arguments in [&["monitor", "/dev/ttyNONE"][..], &["record", "x.csv", "--port", "/dev/ttyNONE"]] {
+        let errors = text(host_sim(arguments).stderr);
+        assert!(errors.contains("/dev/ttyNONE") && errors.contains("tip: serial ports of this machine: "), "{errors}");
+    }
+}
+
+#[test]
+fn help_is_a_command_too() {
+    assert!(text(host_sim(&["help", "analyze"]).stdout).contains("--rate"));
 }

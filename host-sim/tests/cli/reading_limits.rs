@@ -288,6 +288,7 @@ fn an_unknown_binary_is_named_with_a_way_to_convert_it() {
     words(b"\xFF\xFEt\0,\0x\0\n\0", &["UTF-16", "iconv"]);
     words(b"\x80\x05\x95\xAA\0\0\0", &["pickle", "read_pickle"]);
     words(b"[{\"gx\": 1}, {\"gx\": 2}]", &["JSON document", "lines=True"]);
+    words(b"{\n  \"schema\": 1,\n  \"samples\": 9\n}\n", &["report of this program", "`compare` and `export`"]);
     words(b"{\n \"gx\": [1, 2, 3]\n}\n", &["JSON document", "lines=True"]);
     // As numpy writes a dict.
     let header = format!("{:<117}\n", "{'descr': '|O', 'fortran_order': False, 'shape': (), }");

@@ -28,6 +28,16 @@ pub fn open(port: &str, baud: u32) -> io::Result<Box<dyn serialport::SerialPort>
     serialport::new(port, baud).timeout(READ_TIMEOUT).open().map_err(io::Error::from)
 }
 
+/// Names of the serial ports of this machine, as far as the system says them.
+#[must_use]
+pub fn ports() -> Vec<String> {
+    // The crate panics where Linux does not have this folder.
+    if cfg!(target_os = "linux") && !Path::new("/sys/class/tty").is_dir() {
+        return Vec::new();
+    }
+    serialport::available_ports().unwrap_or_default().into_iter().map(|port| port.port_name).collect()
+}
+
 /// Receives the messages and text lines of a device and sends it commands.
 pub struct SerialLink<P> {
     port: P,

@@ -184,6 +184,9 @@ impl InputFile {
                 copy = Some(log);
                 FileFormat::FrameLog
             }
+            None if foreign_format::is_report(&head) => {
+                return Err(InputError::file(name, foreign_format::REPORT));
+            }
             None if foreign_format::is_json_document(&head) => {
                 return Err(InputError::file(name, foreign_format::JSON_DOCUMENT));
             }

@@ -60,6 +60,18 @@ pub(crate) const JSON_DOCUMENT: Reason = Reason::Foreign {
           pandas.read_json(\"FILE\").to_json(\"FILE.jsonl\", orient=\"records\", lines=True)",
 };
 
+/// What is said of [a report](is_report).
+pub(crate) const REPORT: Reason = Reason::Foreign {
+    what: "a report of this program",
+    how: "`compare` and `export` take it; `analyze` takes the recording that it was made of",
+};
+
+/// Whether a text begins as the JSON of a report does.
+pub(crate) fn is_report(head: &[u8]) -> bool {
+    let mut signs = head.iter().filter(|byte| !byte.is_ascii_whitespace());
+    br#"{"schema":"#.iter().all(|sign| signs.next() == Some(sign))
+}
+
 /// Whether a text begins a JSON object of several lines, or of one that is longer than `head`, or a list of objects or lists.
 pub(crate) fn is_json_document(head: &[u8]) -> bool {
     let text = head.trim_ascii_start();
