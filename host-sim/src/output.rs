@@ -55,7 +55,7 @@ pub(crate) fn write_report(
     let exports = write_exports(report, output, files);
     let write_page = |folder: &PathBuf| -> Result<PathBuf> {
         let file = folder.join(page::FILE);
-        files.write(&file, page::html(report).as_bytes())?;
+        files.write(&file, page::html(report, source).as_bytes())?;
         Ok(file)
     };
     let page = output.page.as_ref().map(write_page).transpose();

@@ -1,7 +1,7 @@
 //! Two reports, or a report and the data sheet, coefficient by coefficient: rows for programs, and a table for the terminal.
 
 use crate::formatting::number;
-use crate::rounding::probability;
+use crate::rounding::{probability, significant};
 use crate::saved_report::{SavedChannel, SavedPoint, SavedReport};
 use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::report::comparison::{Verdict, verdicts};
@@ -173,7 +173,7 @@ impl Comparison {
     pub fn write(&self, first: &str, second: &str, out: &mut impl Write) -> io::Result<()> {
         let mut table = comfy_table::Table::new();
         table.load_preset(comfy_table::presets::NOTHING);
-        table.set_header(["channel", "coefficient", first, second, "unit", second, "p"]);
+        table.set_header(["channel", "coefficient", first, second, "unit", "ratio", second, "p"]);
         for row in &self.coefficients {
             let verdict = match row.verdict {
                 Verdict::Better => "better",
@@ -186,6 +186,7 @@ impl Comparison {
                 bounded(row.first),
                 bounded(row.second),
                 row.unit.clone(),
+                significant(row.second.value / row.first.value, 3),
                 verdict.to_owned(),
                 probability(row.p_value),
             ]);

@@ -1,7 +1,7 @@
 //! What an effect was told by, in words: what was measured, against which threshold, and the usual causes.
 
 use crate::formatting::enumerated;
-use crate::rounding::{quantity_digits, significant};
+use crate::rounding::{probability, quantity_digits, significant};
 use noise_analysis::effects::{
     BandMismatch, ClockDeviation, CurveEvidence, Effect, LineEvidence, LineSource, LinearDriftEvidence, MarkovEvidence,
     ModulatedLine, ModulationEvidence, MotionScale, Multiples, Observation, OutputFilter, Refutation,
@@ -74,15 +74,27 @@ fn added(curve: &CurveEvidence, meaning: &str) -> EvidenceText {
 /// What a Markov process usually is.
 const CORRELATED: &str = "a correlated fluctuation: thermal or electronic";
 
+/// Times as likely from which a sentence says no number.
+const MILLION: f64 = 1e6;
+
 /// How the numbers of a sentence are written, and the sentences.
 struct Wording(NumberStyle);
 
 impl Wording {
-    /// A probability; one below the smallest number is not 0.
+    /// A probability; on the screen and the page without an exponent.
     fn chance(&self, p_value: f64) -> String {
-        match (self.0, format!("{p_value:.0e}")) {
-            (NumberStyle::Prefixed, none) if none == "0e0" => "below 1e-300".to_owned(),
-            (_, some) => some,
+        match self.0 {
+            NumberStyle::Plain => format!("{p_value:.0e}"),
+            NumberStyle::Prefixed => probability(p_value).replace('<', "below"),
+        }
+    }
+
+    /// How many times as likely a description is whose logarithm of the likelihood is larger by `gain`.
+    fn likelier(&self, gain: f64) -> String {
+        match self.0 {
+            NumberStyle::Plain => format!("e^{gain:.0}"),
+            NumberStyle::Prefixed if gain > MILLION.ln() => "more than a million".to_owned(),
+            NumberStyle::Prefixed => significant(gain.exp(), 2),
         }
     }
 
@@ -158,9 +170,10 @@ impl Wording {
                 ),
                 TelegraphEvidence::Levels { jumps, gain } => text(
                     format!(
-                        "two levels {} apart with {jumps:.0} jumps between them, e^{gain:.0} times as likely as a Gaussian process of \
-                         any correlation time",
-                        self.amount(of.amplitude.value, of.amplitude.unit, 3)
+                        "two levels {} apart with {jumps:.0} jumps between them, {} times as likely as a Gaussian process of any \
+                         correlation time",
+                        self.amount(of.amplitude.value, of.amplitude.unit, 3),
+                        self.likelier(*gain)
                     ),
                     "; charges that are caught and let go in a transistor or a crystal",
                 ),
@@ -169,18 +182,19 @@ impl Wording {
                 MarkovEvidence::Curve(curve) => added(curve, CORRELATED),
                 MarkovEvidence::Spectrum { corner_hz, gain } => text(
                     format!(
-                        "the spectrum is flat below {} Hz, where a random walk would rise: e^{gain:.0} times as likely",
-                        seconds(*corner_hz)
+                        "the spectrum is flat below {} Hz, where a random walk would rise: {} times as likely",
+                        seconds(*corner_hz),
+                        self.likelier(*gain)
                     ),
                     format!("; {CORRELATED}"),
                 ),
             },
             Effect::CommonMode(of) => text(
                 format!(
-                    "moves with {}: their spectra are e^{:.0} times as likely as those of channels with nothing in common, and no \
+                    "moves with {}: their spectra are {} times as likely as those of channels with nothing in common, and no \
                      measured cause explains it",
                     of.others.join(" and "),
-                    of.gain
+                    self.likelier(of.gain)
                 ),
                 "; a shared reference, supply or temperature gradient",
             ),

@@ -6,6 +6,7 @@ mod channel;
 mod evidence;
 mod plot;
 
+use crate::finding_text::channel_list;
 use crate::summary;
 use axis::{Axis, has_logarithm};
 use channel::{allan_deviation_plot, bias_plot, measured, spectrum_plot};
@@ -103,15 +104,24 @@ pub fn allan_deviation(report: &Report, channel: &ChannelReport) -> String {
 }
 
 /// The channel whose error on the unseen half its effects lower most, by their ratio: measured, the model before, the model after.
-/// `None` where no error is lowered.
+/// Where no error is lowered, that with the largest error of the baseline model. `None` where there is no error.
 pub(crate) fn story(report: &Report) -> Option<Plot> {
-    let lowered = |channel: &'_ ChannelReport| {
-        let [before, after] = summary::unseen_errors(channel);
-        before.zip(after).filter(|(before, after)| before > after).map(|(before, after)| [before, after])
-    };
-    let gains = summary::inertial(report).filter_map(|channel| Some((channel, lowered(channel)?)));
-    let (channel, errors) = gains.max_by(|(_, a), (_, b)| (a[0] / a[1]).total_cmp(&(b[0] / b[1])))?;
-    Some(channel::story_plot(channel, errors))
+    let errors: Vec<(&ChannelReport, [f64; 2])> = summary::inertial(report)
+        .filter_map(|channel| match summary::unseen_errors(channel) {
+            [Some(before), Some(after)] => Some((channel, [before, after])),
+            _ => None,
+        })
+        .collect();
+    let gains = errors.iter().filter(|(_, [before, after])| before > after);
+    let shown = gains
+        .max_by(|(_, a), (_, b)| (a[0] / a[1]).total_cmp(&(b[0] / b[1])))
+        .or_else(|| errors.iter().max_by(|(_, a), (_, b)| a[0].total_cmp(&b[0])));
+    shown.map(|&(channel, errors)| channel::story_plot(channel, errors))
+}
+
+/// The name of a channel as the sentences and the tables have it, such as `accel x`.
+pub(crate) fn channel_name(channel: &ChannelReport) -> String {
+    channel_list(std::slice::from_ref(&channel.name))
 }
 
 /// The gyros' curves, or the accelerometers' where there is no gyro, beside the data sheet's. `None` without either.
@@ -133,9 +143,10 @@ pub(crate) fn overview(report: &Report) -> Option<Plot> {
     let mut lines: Vec<Line> = channels
         .iter()
         .zip(looks.into_iter().cycle())
-        .map(|(channel, look)| measured(channel, look, &crate::formatting::words(&channel.name)))
+        .map(|(channel, look)| measured(channel, look, &channel_name(channel)))
         .collect();
-    if let Some(sheet) = &first.figure_data.data_sheet {
+    let sheet = first.figure_data.data_sheet.as_ref();
+    if let Some(sheet) = sheet {
         let taus: Vec<f64> = first.curve.iter().map(|point| point.tau_s).filter(|tau| has_logarithm(*tau)).collect();
         lines.push(data_sheet_line(sheet, &taus));
     }
@@ -147,7 +158,7 @@ pub(crate) fn overview(report: &Report) -> Option<Plot> {
         .iter()
         .filter_map(|channel| {
             let lowest = channel.curve.iter().min_by(|a, b| a.adev.total_cmp(&b.adev))?;
-            let name = crate::formatting::words(&channel.name);
+            let name = channel_name(channel);
             let (deviation, tau) =
                 (crate::rounding::quantity(lowest.adev, &channel.unit), crate::rounding::span(lowest.tau_s));
             Some(format!("{name} is lowest at {tau} with {deviation}"))
@@ -155,7 +166,7 @@ pub(crate) fn overview(report: &Report) -> Option<Plot> {
         .collect();
     Some(Plot {
         id: "overview".to_owned(),
-        title: format!("Allan deviation of the {name}, beside the data sheet"),
+        title: format!("Allan deviation of the {name}{}", if sheet.is_some() { ", beside the data sheet" } else { "" }),
         description: format!("Measured with 95 % bounds: {}.", each.join("; ")),
         panels: vec![Panel::new(across, up, lines)],
     })

@@ -665,21 +665,24 @@ mod tests {
         let line = SinusoidalLine { evidence: LineEvidence { source, ..line.evidence }, ..line };
         let [plain, prefixed] = [NumberStyle::Plain, NumberStyle::Prefixed]
             .map(|style| EvidenceText::of_finding(&finding(line.clone()), style).measured);
-        // A probability below the smallest number is not 0.
         let beginning =
             "line at 20.5000 Hz in the spectrum, no wider than the record resolves, 220 sigma, by chance anywhere";
         assert_eq!(plain, format!("{beginning} 0e0"));
-        assert_eq!(prefixed, format!("{beginning} below 1e-300"));
+        assert_eq!(prefixed, format!("{beginning} below 0.001"));
         let step = LevelStep {
             time_s: BoundedEstimate::exact(333.0),
             size: BoundedEstimate::exact(-3.1e-5).in_unit("g"),
             p_value: 3e-9,
         };
         let of_step = |style| EvidenceText::of_finding(&finding(step), style).sentence();
-        let rest = "at 333.0 s and stays, by chance anywhere 3e-9 in white, flicker and walking noise of any mixture; a mechanical or \
-                    thermal shock, or a fault that begins";
-        assert_eq!(of_step(NumberStyle::Plain), format!("the level changes by -3.100e-5 g {rest}"));
-        assert_eq!(of_step(NumberStyle::Prefixed), format!("the level changes by −31.0 µg {rest}"));
+        let rest = |chance: &str| {
+            format!(
+                "at 333.0 s and stays, by chance anywhere {chance} in white, flicker and walking noise of any mixture; a mechanical or \
+                 thermal shock, or a fault that begins"
+            )
+        };
+        assert_eq!(of_step(NumberStyle::Plain), format!("the level changes by -3.100e-5 g {}", rest("3e-9")));
+        assert_eq!(of_step(NumberStyle::Prefixed), format!("the level changes by −31.0 µg {}", rest("below 0.001")));
         // Where nothing else is known, the weight is what was measured, as far as there is room.
         let text = describe(&finding(step));
         assert_eq!(

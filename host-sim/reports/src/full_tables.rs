@@ -10,7 +10,7 @@ use crate::formatting::{
     TextTable, capital, count, duration, filter_consistency, interval, missing_samples, number, optional,
     parameter_name, percent, recording_advice, words, worst_deviations, wrap,
 };
-use crate::rounding::{NONE, Scale, bounded_quantity, parameter_magnitude, probability, quantity_digits, unit};
+use crate::rounding::{NONE, Scale, bounded_quantity, p_value, parameter_magnitude, quantity_digits, unit};
 use crate::summary;
 use noise_analysis::report::assessment::navigation::CALIBRATION_S;
 use noise_analysis::report::assessment::{Assessment, Coefficient, NavigationDrift};
@@ -234,11 +234,11 @@ fn write_assessment(assessment: &Assessment, out: &mut impl Write) -> io::Result
     if let Some(innovations) = &assessment.innovations {
         let text = format!(
             "• Kalman filter of the model on the unseen half: {} innovations, {} of the expected variance ({} for a true \
-             model), whiteness p = {}: {}.",
+             model), whiteness {}: {}.",
             innovations.count,
             number(innovations.normalised),
             interval(innovations.low, innovations.high),
-            probability(innovations.whiteness_p),
+            p_value(innovations.whiteness_p),
             filter_consistency(innovations)
         );
         writeln!(out, "{}", wrap(&text, WIDTH.into()))?;

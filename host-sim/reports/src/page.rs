@@ -6,13 +6,13 @@ mod tables;
 use crate::coefficient_notes::coefficient_notes;
 use crate::evidence::{EvidenceText, NumberStyle};
 use crate::explanation;
-use crate::figure::{self, Plot};
+use crate::figure::{self, Plot, channel_name};
 use crate::finding_text::{FindingText, describe};
 use crate::formatting::{
     capital, count, filter_consistency, interval, missing_samples, number, parameter_name, recording_advice, words,
     worst_deviations,
 };
-use crate::rounding::{bounded_quantity, probability, unit};
+use crate::rounding::{bounded_quantity, p_value, unit};
 use crate::summary;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use noise_analysis::report::assessment::Assessment;
@@ -27,10 +27,10 @@ const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 
 /// Name of the page in its folder.
 pub const FILE: &str = "index.html";
 
-/// The report as a page.
+/// The report on the recording `source` as a page.
 #[must_use]
-pub fn html(report: &Report) -> String {
-    render(report).into_string()
+pub fn html(report: &Report, source: Option<&str>) -> String {
+    render(report, source).into_string()
 }
 
 /// The page could not be written.
@@ -43,12 +43,12 @@ pub struct PageError {
     pub reason: std::io::Error,
 }
 
-/// Writes [`FILE`] into `dir`, which is made if it is missing, and returns its path.
+/// Writes [`FILE`] on the recording `source` into `dir`, which is made if it is missing, and returns its path.
 ///
 /// # Errors
 /// The folder or the file cannot be written.
-pub fn write(report: &Report, dir: &Path) -> Result<PathBuf, PageError> {
-    let page = html(report);
+pub fn write(report: &Report, source: Option<&str>, dir: &Path) -> Result<PathBuf, PageError> {
+    let page = html(report, source);
     let path = dir.join(FILE);
     std::fs::create_dir_all(dir)
         .and_then(|()| std::fs::write(&path, page))
@@ -56,9 +56,12 @@ pub fn write(report: &Report, dir: &Path) -> Result<PathBuf, PageError> {
     Ok(path)
 }
 
-fn render(report: &Report) -> Markup {
+fn render(report: &Report, source: Option<&str>) -> Markup {
     let [light, dark] = figure::style();
-    let part = if report.part.name.is_empty() { "Sensor" } else { &report.part.name };
+    let (title, headline) = {
+        let headline = summary::headline(report, source);
+        (format!("{} noise report", headline[0]), headline[1..].join(" · "))
+    };
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -67,7 +70,7 @@ fn render(report: &Report) -> Markup {
                 meta http-equiv="Content-Security-Policy" content=(POLICY);
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
-                title { (part) " noise report" }
+                title { (title) @if let Some(source) = source { " · " (source) } }
                 style { (PreEscaped(STYLE)) }
                 style id="figures" { (PreEscaped(light)) }
                 style { "@media screen and (prefers-color-scheme: dark){" (PreEscaped(dark)) "}" }
@@ -75,8 +78,8 @@ fn render(report: &Report) -> Markup {
             body {
                 a.skip href="#findings" { "To the findings" }
                 header {
-                    h1 { (part) " noise report" }
-                    p.headline { (summary::headline(report, None)[1..].join(" · ")) }
+                    h1 { (title) }
+                    p.headline { (headline) }
                 }
                 (contents(report))
                 main {
@@ -113,7 +116,7 @@ fn contents(report: &Report) -> Markup {
     html! {
         nav aria-label="Sections" {
             a href="#findings" { "Findings" }
-            @for channel in in_reading_order(report) { a href={ "#" (channel.name) } { (words(&channel.name)) } }
+            @for channel in in_reading_order(report) { a href={ "#" (channel.name) } { (channel_name(channel)) } }
             a href="#reading" { "How to read this" }
         }
     }
@@ -220,7 +223,7 @@ fn parameters(finding: &Finding) -> Markup {
 fn channel_section(report: &Report, channel: &ChannelReport) -> Markup {
     html! {
         section.channel id=(channel.name) {
-            h2 { (words(&channel.name)) " " small { (unit(&channel.unit)) " · " (count(channel.samples)) " samples" } }
+            h2 { (channel_name(channel)) " " small { (unit(&channel.unit)) " · " (count(channel.samples)) " samples" } }
             @let missing = missing_samples(&channel.missing);
             @if !missing.is_empty() { p.faint { "Missing: " (missing) "." } }
             @if channel.curve.is_empty() { p { "The record is too short for a point of the curve." } }
@@ -274,7 +277,7 @@ fn assessment(assessment: &Assessment) -> Markup {
                 li { b { "Kalman filter of the model" } ", unseen half: " (filter_consistency(innovations)) "."
                     span.parameter { (count(innovations.count as u64)) " innovations, " (number(innovations.normalised))
                         " of the expected variance (" (interval(innovations.low, innovations.high))
-                        " for a true model), whiteness p = " (probability(innovations.whiteness_p)) }
+                        " for a true model), whiteness " (p_value(innovations.whiteness_p)) }
                 }
             }
             @if let Some(spectrum) = &assessment.angle_random_walk_by_spectrum {

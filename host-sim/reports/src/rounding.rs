@@ -119,15 +119,21 @@ pub fn plain(value: f64, digits: i32) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// A probability with two digits, as a decimal fraction from 0.001 on. One below the smallest number is not 0.
+/// A probability with two digits; `< 0.001` for all below.
 #[must_use]
 pub fn probability(p: f64) -> String {
     match p {
         p if !p.is_finite() => NONE.to_owned(),
-        p if p < 1e-300 => "< 1e-300".to_owned(),
-        p if p < 9.95e-4 => format!("{p:.1e}"),
+        p if p < 9.95e-4 => "< 0.001".to_owned(),
         p => significant(p, 2),
     }
+}
+
+/// The same in a sentence: `p = 0.21`, `p < 0.001`.
+#[must_use]
+pub fn p_value(p: f64) -> String {
+    let text = probability(p);
+    if text.starts_with('<') { format!("p {text}") } else { format!("p = {text}") }
 }
 
 /// Prefixes and their factors.
@@ -361,17 +367,19 @@ mod tests {
     }
 
     #[test]
-    fn probabilities_have_two_digits_and_are_never_zero() {
+    fn probabilities_have_two_digits_and_no_exponent() {
         for (p, text) in [
             (1.0, "1.0"),
             (0.633, "0.63"),
             (0.028_3, "0.028"),
-            (1.63e-7, "1.6e-7"),
-            (0.0, "< 1e-300"),
+            (0.001, "0.0010"),
+            (1.63e-7, "< 0.001"),
+            (0.0, "< 0.001"),
             (f64::NAN, NONE),
         ] {
             assert_eq!(probability(p), text, "{p:e}");
         }
+        assert_eq!([0.21, 1e-9].map(p_value), ["p = 0.21", "p < 0.001"]);
     }
 
     #[test]

@@ -105,12 +105,13 @@ impl Axis {
             2 | 5 => shown < 3,
             _ => shown == 0,
         };
+        let is_plain = self.from >= 1e-4 * (1.0 - 1e-9) && self.to < 1e5;
         let grid = (first..=last).flat_map(|decade| (1..=9_u8).map(move |digit| (decade, digit)));
         grid.map(|(decade, digit)| (decade, digit, f64::from(digit) * 10f64.powi(decade)))
             .filter(|(_, digit, value)| inside(*value) && (every == 1 || *digit == 1))
             .map(|(decade, digit, value)| Tick {
                 value,
-                label: is_labelled(decade, digit).then(|| decade_label(digit, decade)),
+                label: is_labelled(decade, digit).then(|| decade_label(digit, decade, is_plain)),
             })
             .collect()
     }
@@ -136,8 +137,9 @@ impl Axis {
     }
 }
 
-fn decade_label(digit: u8, decade: i32) -> String {
-    if (-4..=4).contains(&decade) {
+/// `0.002` or `2·10⁻³`: all labels of an axis are written in one way.
+fn decade_label(digit: u8, decade: i32, is_plain: bool) -> String {
+    if is_plain {
         return significant(f64::from(digit) * 10f64.powi(decade), 1);
     }
     let power = format!("10{}", superscript(decade));
@@ -164,6 +166,8 @@ mod tests {
         assert_eq!(labels(&axis), ["0.001", "0.01", "0.1", "1", "10", "100", "1,000", "10,000"]);
         let tiny = Axis::logarithmic("", [2e-7, 3e-6].into_iter(), [0.0, 100.0]);
         assert_eq!(labels(&tiny), ["2·10⁻⁷", "5·10⁻⁷", "10⁻⁶", "2·10⁻⁶"]);
+        let wide = Axis::logarithmic("", [1e-5, 1e-1].into_iter(), [0.0, 100.0]);
+        assert_eq!(labels(&wide), ["10⁻⁵", "10⁻⁴", "10⁻³", "10⁻²", "10⁻¹"]);
     }
 
     #[test]

@@ -1,13 +1,14 @@
 //! The figures of one channel: Allan deviation with its terms and its residual, spectrum, bias over time.
 
 use super::axis::{Axis, has_logarithm};
+use super::channel_name;
 use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, frames, heights, places};
 use crate::formatting::{capital, words};
 use crate::rounding::{quantity, quantity_digits, span, unit};
 use crate::summary::deviance_per_point;
 use allan_core::model::{FittedTerm, cube_root_deviation};
 use allan_core::{Model, NoiseTerm};
-use noise_analysis::report::{ChannelReport, Finding, ModelReport, Report};
+use noise_analysis::report::{ChannelReport, Finding, ModelReport, Report, SlopeMethodReport, SlopeMethodValue};
 use std::f64::consts::{LN_2, PI};
 
 /// Standard deviations that the panel of the residual shows at least and at most.
@@ -30,65 +31,96 @@ pub(super) fn allan_deviation_plot(report: &Report, channel: &ChannelReport) -> 
     // The terms may lead out of the panel, but for the flat line of B.
     let shown = lines.iter().filter(|line| line.look != Look::Term || line.mark == "B").flat_map(heights);
     let up = Axis::logarithmic(&format!("Allan deviation σ(τ), {}", unit(&channel.unit)), shown, curve);
-    lines.extend(slopes(channel));
+    lines.extend(slopes(channel).into_iter().flatten());
     let lower = residual_panel(channel, has_terms, across.clone(), residual);
-    let description = describe(channel);
+    let description = format!("{} {}", describe(channel), describe_slopes(channel));
     Plot {
         id: format!("{}-allan", channel.name),
-        title: format!("{} · Allan deviation", words(&channel.name)),
+        title: format!("{} · Allan deviation", channel_name(channel)),
         description,
         panels: vec![Panel::new(across, up, lines), lower],
     }
 }
 
 /// What was measured, the baseline model and the model with its effects, both fitted to the first half, and the error of each on the
-/// second.
+/// second; the baseline model alone where the effects do not lower its error.
 pub(super) fn story_plot(channel: &ChannelReport, [before, after]: [f64; 2]) -> Plot {
-    let lines = vec![
+    let is_lowered = after < before;
+    let mut lines = vec![
         model_line(channel, &channel.before, "before: N, B, K", Look::Before),
-        model_line(channel, &channel.after, "after: with effects", Look::Model),
-        measured(channel, Look::Measured, "measured, 95 % bounds"),
+        measured(channel, Look::Measured, "measured, whole record"),
     ];
+    if is_lowered {
+        lines.insert(1, model_line(channel, &channel.after, "after: with effects", Look::Model));
+    }
     let [frame] = frames([330.0]);
     let across = Axis::logarithmic("averaging time τ, s", lines.iter().flat_map(places), [LEFT, RIGHT]);
     let label = format!("Allan deviation σ(τ), {}", unit(&channel.unit));
     let up = Axis::logarithmic(&label, lines.iter().flat_map(heights), frame);
-    Plot {
-        id: "story".to_owned(),
-        title: format!("{}: what was measured, and the model before and after", capital(&words(&channel.name))),
-        description: format!(
-            "Both models are fitted to the first half. Their error on the second half, which they have not seen: {} before, {} after the \
-             effects were added. A true model has about 1.",
-            deviance_per_point(before),
-            deviance_per_point(after)
-        ),
-        panels: vec![Panel::new(across, up, lines)],
-    }
+    lines.extend(slopes(channel).into_iter().flatten());
+    let name = capital(&channel_name(channel));
+    let [before, after] = [before, after].map(deviance_per_point);
+    const MEASURED: &str =
+        "A true model has about 1. The measured curve is that of the whole record with its 95 % bounds.";
+    let (title, description) = if is_lowered {
+        (
+            format!("{name}: what was measured, and the model before and after"),
+            format!(
+                "Both models are fitted to the first half. Their error on the second half, which they have not seen: {before} before, \
+                 {after} after the effects were added. {MEASURED}"
+            ),
+        )
+    } else {
+        (
+            format!("{name}: what was measured, and the model of N, B and K"),
+            format!(
+                "The model is fitted to the first half. Its error on the second half, which it has not seen: {before}, the largest of all \
+                 channels. No effect was found that lowers it. {MEASURED}"
+            ),
+        )
+    };
+    Plot { id: "story".to_owned(), title, description, panels: vec![Panel::new(across, up, lines)] }
 }
 
-/// The slopes that the slope method reads off: −½ at 1 s, flat at the minimum, +½ at 3 s, each over a factor of four to both sides.
-fn slopes(channel: &ChannelReport) -> Vec<Line> {
-    let read_off = &channel.read_off;
-    let line = |name: &str, tau: f64, deviation: &dyn Fn(f64) -> f64| {
-        let points = [0.25, 1.0, 4.0].map(|factor| (factor * tau, deviation(factor * tau))).to_vec();
-        Line {
-            mark: if tau == 1.0 {
-                "−½"
-            } else if tau == 3.0 {
-                "+½"
-            } else {
-                "0"
-            },
-            ..Line::new(name, Look::Reference, points).unlisted()
+/// The slopes by which the slope method reads N, B and K: −½ through N at 1 s, flat at the minimum, +½ through K at 3 s. Each reaches
+/// a factor of four to both sides of that time, and on to where the curve has it if that is farther off. `None` where no such slope
+/// occurs.
+fn slopes(channel: &ChannelReport) -> [Option<Line>; 3] {
+    let SlopeMethodReport { angle_random_walk, bias_instability, rate_random_walk } = &channel.read_off;
+    let line = |mark, found: &SlopeMethodValue, at_s: f64, deviation: &dyn Fn(f64) -> f64| {
+        let (mut from, mut to) = (0.25 * at_s, 4.0 * at_s);
+        if found.to_s < from {
+            from = found.from_s;
+        } else if found.from_s > to {
+            to = found.to_s;
         }
+        let octaves = (to / from).log2().ceil().clamp(1.0, 64.0) as i32;
+        let points = (0..=octaves).map(|step| from * (to / from).powf(f64::from(step) / f64::from(octaves)));
+        let points: Vec<(f64, f64)> = points.map(|tau| (tau, deviation(tau))).collect();
+        let line = Line { mark, ..Line::new(format!("slope {mark}"), Look::Reference, points).unlisted() };
+        line.points.iter().all(|&(tau, of)| has_logarithm(tau) && has_logarithm(of)).then_some(line)
     };
-    let n = read_off.angle_random_walk.as_ref().map(|n| line("slope −½", 1.0, &|tau| n.value / tau.sqrt()));
-    let b = read_off
-        .bias_instability
-        .as_ref()
-        .map(|b| line("slope 0", (b.from_s * b.to_s).sqrt(), &|_| b.value * (2.0 * LN_2 / PI).sqrt()));
-    let k = read_off.rate_random_walk.as_ref().map(|k| line("slope +½", 3.0, &|tau| k.value * (tau / 3.0).sqrt()));
-    [n, b, k].into_iter().flatten().filter(|line| line.points.iter().all(|&(_, of)| has_logarithm(of))).collect()
+    [
+        angle_random_walk.as_ref().and_then(|n| line(SLOPES[0], n, 1.0, &|tau| n.value / tau.sqrt())),
+        bias_instability
+            .as_ref()
+            .and_then(|b| line(SLOPES[1], b, (b.from_s * b.to_s).sqrt(), &|_| b.value * (2.0 * LN_2 / PI).sqrt())),
+        rate_random_walk.as_ref().and_then(|k| line(SLOPES[2], k, 3.0, &|tau| k.value * (tau / 3.0).sqrt())),
+    ]
+}
+
+/// The slopes of N, B and K, as they stand beside their lines.
+const SLOPES: [&str; 3] = ["−½", "0", "+½"];
+
+/// The slopes that are not drawn; empty where all are.
+fn describe_slopes(channel: &ChannelReport) -> String {
+    let lines = slopes(channel);
+    let absent: Vec<&str> =
+        SLOPES.into_iter().zip(&lines).filter(|(_, line)| line.is_none()).map(|(slope, _)| slope).collect();
+    if absent.is_empty() || channel.curve.is_empty() {
+        return String::new();
+    }
+    format!("The slope method finds no slope {} in it.", absent.join(", "))
 }
 
 fn describe(channel: &ChannelReport) -> String {
@@ -208,7 +240,7 @@ pub(super) fn spectrum_plot(report: &Report, channel: &ChannelReport) -> Option<
     let panel = Panel { places: traced, ..Panel::new(across, up, lines) };
     Some(Plot {
         id: format!("{}-spectrum", channel.name),
-        title: format!("{} · spectrum", words(&channel.name)),
+        title: format!("{} · spectrum", channel_name(channel)),
         description,
         panels: vec![panel],
     })
@@ -245,7 +277,7 @@ pub(super) fn bias_plot(channel: &ChannelReport) -> Option<Plot> {
     let (low, high) = bias.mean.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &of| (a.min(of), b.max(of)));
     Some(Plot {
         id: format!("{}-bias", channel.name),
-        title: format!("{} · bias over time", words(&channel.name)),
+        title: format!("{} · bias over time", channel_name(channel)),
         description: format!(
             "Means of {} less the mean of the record, over a range of {}{}.",
             span(bias.block_s),

@@ -3,6 +3,7 @@
 
 use super::axis::Axis;
 use super::channel::{allan_deviation_plot, spectrum_plot, time_unit};
+use super::channel_name;
 use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, frames, heights, places};
 use crate::finding_text::channel_list;
 use crate::formatting::words;
@@ -92,11 +93,13 @@ fn line_in_spectrum(report: &Report, channel: &ChannelReport, frequency: f64) ->
     let cut = |line: &Line| {
         let near = |at: &f64| (AROUND * frequency..=frequency / AROUND).contains(at);
         let kept: Vec<usize> = (0..line.points.len()).filter(|&at| near(&line.points[at].0)).collect();
-        Line {
-            points: kept.iter().map(|&at| line.points[at]).collect(),
-            bounds: kept.iter().filter_map(|&at| line.bounds.get(at).copied()).collect(),
-            ..line.clone()
+        // The average of the band with the line stands where the line is, not in the middle of the band.
+        let mut points: Vec<(f64, f64)> = kept.iter().map(|&at| line.points[at]).collect();
+        let distance = |at: f64| (at / frequency).ln().abs();
+        if let Some(nearest) = points.iter_mut().min_by(|a, b| distance(a.0).total_cmp(&distance(b.0))) {
+            nearest.0 = frequency;
         }
+        Line { points, bounds: kept.iter().filter_map(|&at| line.bounds.get(at).copied()).collect(), ..line.clone() }
     };
     let lines: Vec<Line> = panel.lines.iter().map(cut).collect();
     if lines.iter().all(|line| line.points.len() < 2) {
@@ -109,7 +112,7 @@ fn line_in_spectrum(report: &Report, channel: &ChannelReport, frequency: f64) ->
     Some(Plot {
         description: format!(
             "The spectrum of {} around {}.",
-            words(&channel.name),
+            channel_name(channel),
             quantity_digits(frequency, "Hz", 3)
         ),
         panels: vec![Panel { places: vec![place], ..Panel::new(across, up, lines) }],
@@ -140,7 +143,7 @@ fn in_time(report: &Report, channel: &ChannelReport, finding: &Finding, at: Opti
         .zip(looks.into_iter().cycle())
         .map(|((other, bias), look)| {
             let points = bias.time_s.iter().map(|time| time / scale).zip(bias.mean.iter().copied()).collect();
-            Line::new(words(&other.name), look, points)
+            Line::new(channel_name(other), look, points)
         })
         .collect();
     let first = lines.first()?;
@@ -181,7 +184,7 @@ fn beside(report: &Report, channel: &ChannelReport, covariate: &str) -> Option<P
         followed.sort_by(|a, b| a.0.total_cmp(&b.0));
         lines.push(Line::new("what the findings explain", Look::Followed, followed).with_dots().unjoined());
     }
-    let name = if covariate == "temp" { "temperature".to_owned() } else { words(covariate) };
+    let name = if covariate == "temp" { "temperature".to_owned() } else { channel_name(other) };
     let [frame] = frames([240.0]);
     let label = format!("{name} less its mean, {}", unit(&other.unit));
     let across = Axis::linear(&label, lines.iter().flat_map(places), [LEFT, RIGHT]);
@@ -189,7 +192,7 @@ fn beside(report: &Report, channel: &ChannelReport, covariate: &str) -> Option<P
     Some(Plot {
         id: String::new(),
         title: String::new(),
-        description: format!("The bias of {} over the {name}, block by block.", words(&channel.name)),
+        description: format!("The bias of {} over the {name}, block by block.", channel_name(channel)),
         panels: vec![Panel::new(across, up, lines)],
     })
 }

@@ -8,14 +8,20 @@
     const takes = !["", "σ", "1", "min", "h", "d"].includes(unit) && size < 0.1 && size > 0;
     return takes ? prefixes.find(([factor]) => size >= factor) ?? prefixes.at(-1) : prefixes[0];
   };
-  const number = (value, factor) => value === null ? "–"
-    : (value / factor).toLocaleString("en-US", { maximumSignificantDigits: 4 }).replace("-", "−");
+  const number = (value, factor, digits) => value === null ? "–"
+    : (value / factor).toLocaleString("en-US", { maximumSignificantDigits: digits }).replace("-", "−");
+  // As many digits as the bounds support, and one more; three without bounds.
+  const digitsOf = (value, bounds) => {
+    const half = bounds && (bounds[1] - bounds[0]) / 2;
+    return half > 0 && value ? Math.min(4, Math.max(2, 2 + Math.floor(Math.log10(Math.abs(value) / half)))) : 3;
+  };
   const nameOf = (axis) => axis.label.slice(0, axis.label.lastIndexOf(", "));
   const unitOf = (axis) => axis.label.slice(axis.label.lastIndexOf(", ") + 2);
   const format = (axis, value, bounds) => {
     const [factor, prefix] = scale([value], unitOf(axis));
-    const between = bounds ? ` (${bounds.map((bound) => number(bound, factor)).join(" … ")})` : "";
-    return `${number(value, factor)}${between} ${prefix}${unitOf(axis)}`.trimEnd();
+    const digits = digitsOf(value, bounds);
+    const between = bounds ? ` (${bounds.map((bound) => number(bound, factor, digits)).join(" … ")})` : "";
+    return `${number(value, factor, digits)}${between} ${prefix}${unitOf(axis)}`.trimEnd();
   };
   const at = (axis, value) => {
     const part = axis.log ? Math.log(value / axis.from) / Math.log(axis.to / axis.from)
@@ -33,8 +39,9 @@
     for (const { lines } of panels) lines.forEach((line, position) => { line.x ??= lines[position - 1].x; });
     let panel = 0;
     let index = -1;
-    // The places of a panel are those of its line with the most of them.
-    const places = (of) => of.lines.reduce((most, line) => line.x.length > most.length ? line.x : most, []);
+    // The places of a panel are those that were measured, which have bounds; else those of its line with the most of them.
+    const places = (of) => of.lines.find((line) => line.low)?.x
+      ?? of.lines.reduce((most, line) => line.x.length > most.length ? line.x : most, []);
     const show = () => {
       const of = panels[panel];
       const xs = places(of);
@@ -88,6 +95,13 @@
       show();
     });
   }
+  // What is folded away is printed too.
+  let opened = [];
+  addEventListener("beforeprint", () => {
+    opened = [...document.querySelectorAll("details:not([open])")];
+    for (const folded of opened) folded.open = true;
+  });
+  addEventListener("afterprint", () => { for (const folded of opened) folded.open = false; });
   const button = (text, done, act) => {
     const made = document.createElement("button");
     made.type = "button";

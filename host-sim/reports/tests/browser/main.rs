@@ -89,7 +89,7 @@ fn report() -> Report {
 /// What Chromium shows of the page of `report` at each of the widths.
 fn facts(program: &str, report: &Report, is_dark: bool, widths: &[u32]) -> Vec<Value> {
     let dir = tempfile::tempdir().expect("a folder");
-    let page = reports::page::write(report, dir.path()).expect("a page");
+    let page = reports::page::write(report, Some("fan.csv"), dir.path()).expect("a page");
     let page = std::fs::read_to_string(page).expect("the page");
     assert!(page.len() < 1_000_000, "{} bytes", page.len());
     let escaped = page.replace('&', "&amp;").replace('"', "&quot;");
@@ -241,7 +241,7 @@ fn the_page_of_an_hour_of_twelve_channels_is_below_a_megabyte() {
     }
     assert_eq!(report.channels.len(), 12);
     let dir = tempfile::tempdir().expect("a folder");
-    let page = reports::page::write(&report, dir.path()).expect("a page");
+    let page = reports::page::write(&report, None, dir.path()).expect("a page");
     let bytes = std::fs::metadata(page).expect("the page").len();
     assert!(bytes < 1_000_000, "{bytes} bytes");
 }

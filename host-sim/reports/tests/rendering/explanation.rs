@@ -184,7 +184,8 @@ fn every_report_tells_how_the_noise_changes() {
     reports::full_tables::write(&report, None, &mut out).expect("a vector can be written");
     let full = String::from_utf8(out).expect("text").split_whitespace().collect::<Vec<_>>().join(" ");
     let folder = tempfile::tempdir().expect("a folder");
-    let page = std::fs::read_to_string(reports::page::write(&report, folder.path()).expect("a page")).expect("text");
+    let page =
+        std::fs::read_to_string(reports::page::write(&report, None, folder.path()).expect("a page")).expect("text");
     // The fixture's curve of the first half leaves 1.711.
     for told in [
         "fitted to the later quarter",

@@ -5,7 +5,7 @@ mod fixture;
 mod phrases;
 
 use fixture::{channel, empty, report};
-use noise_analysis::report::{ChannelReport, ModelErrorReport, Report, TermReport};
+use noise_analysis::report::{ChannelReport, ModelErrorReport, Report, SlopeMethodValue, TermReport};
 use reports::{figure, full_tables, page};
 use roxmltree::{Document, Node};
 
@@ -17,7 +17,7 @@ fn text(report: &Report) -> String {
 
 fn html(report: &Report) -> String {
     let dir = tempfile::tempdir().expect("a folder");
-    let path = page::write(report, &dir.path().join("new/page")).expect("a page");
+    let path = page::write(report, Some("fan <1>.csv"), &dir.path().join("new/page")).expect("a page");
     assert!(path.ends_with("new/page/index.html"));
     std::fs::read_to_string(path).expect("the page that was written")
 }
@@ -276,7 +276,7 @@ fn the_terminal_shows_every_channel_and_coefficient() {
 #[test]
 fn the_page_shows_every_channel_and_coefficient() {
     let page = html(&report());
-    for channel in ["gyro x", "gyro y", "gyro z", "accl x", "accl y", "accl z"] {
+    for channel in ["gyro x", "gyro y", "gyro z", "accel x", "accel y", "accel z"] {
         assert!(page.contains(&format!("{channel} · Allan deviation")), "{channel}");
     }
     // N of `final` in the units of its users: 0.0368 deg/√s (0.0346 … 0.0394) are 2.208 °/√h; 36.8 mg·√s are 36.8 µg/√Hz.
@@ -311,6 +311,60 @@ fn the_gyros_stand_beside_the_curve_that_the_data_sheet_draws() {
 }
 
 #[test]
+fn the_page_names_its_recording() {
+    let page = html(&report());
+    assert!(page.contains("noise report · fan &lt;1&gt;.csv</title>") && page.contains("fan &lt;1&gt;.csv · "));
+}
+
+/// A figure of the report, with its name.
+fn picture(report: &Report, name: &str) -> String {
+    figure::pictures(report).into_iter().find(|picture| picture.name == name).expect(name).svg
+}
+
+#[test]
+fn the_first_picture_is_there_without_a_gain() {
+    let mut report = report();
+    assert!(picture(&report, "story").contains("the model before and after"));
+    for channel in &mut report.channels {
+        channel.after = channel.before.clone();
+    }
+    let story = picture(&report, "story");
+    assert!(story.contains("the model of N, B and K") && story.contains("No effect was found that lowers it."));
+    assert!(!story.contains("after: with effects"));
+}
+
+#[test]
+fn the_data_sheet_is_in_the_title_where_it_is_drawn() {
+    let mut report = report();
+    for channel in &mut report.channels {
+        channel.figure_data.data_sheet = None;
+    }
+    assert!(!picture(&report, "overview").contains("data sheet"));
+}
+
+/// The line of slope +½ through K at 3 s reaches to where the curve has the slope, far beyond 3 s, and is inside the panel there.
+#[test]
+fn a_slope_reaches_to_where_the_curve_has_it_or_is_said_to_be_absent() {
+    let mut channel = channel("gyro_x", "deg/s");
+    let (from_s, to_s) = (1000.0, 4000.0);
+    let tau = channel.curve[0].tau_s;
+    let unit = String::new();
+    let value = channel.curve[0].adev * (3.0 / tau).sqrt() / 1e3;
+    channel.read_off.rate_random_walk = Some(SlopeMethodValue { value, unit, from_s, to_s });
+    let drawn = svg(&channel);
+    let document = Document::parse(&drawn).expect("well-formed");
+    let group = document.descendants().find(|node| node.attribute("data-line") == Some("slope +½")).expect("the line");
+    let points = named_child(group, "polyline").attribute("points").expect("points").to_owned();
+    assert!(points.split(' ').count() > 8, "{points}");
+    channel.read_off.rate_random_walk = None;
+    assert!(svg(&channel).contains("The slope method finds no slope +½ in it."));
+}
+
+fn named_child<'a>(node: Node<'a, 'a>, name: &str) -> Node<'a, 'a> {
+    node.children().find(|child| child.has_tag_name(name)).expect("a child")
+}
+
+#[test]
 fn the_page_needs_no_other_file_and_is_reproducible() {
     let page = html(&report());
     assert_eq!(page, html(&report()));
@@ -336,7 +390,7 @@ fn a_page_that_cannot_be_written_names_its_path() {
     let dir = tempfile::tempdir().expect("a folder");
     let file = dir.path().join("taken");
     std::fs::write(&file, "").expect("a file");
-    let error = page::write(&report(), &file).expect_err("a file is not a folder").to_string();
+    let error = page::write(&report(), None, &file).expect_err("a file is not a folder").to_string();
     assert!(error.contains(&file.join("index.html").display().to_string()), "{error}");
     assert!(error.starts_with("cannot write the page"), "{error}");
 }
