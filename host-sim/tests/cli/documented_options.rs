@@ -1,6 +1,6 @@
 //! The options that the documentation uses are those that the program has, and those of a recording are all in the documentation.
 
-use crate::program::host_sim;
+use crate::program::{host_sim, write};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -64,4 +64,16 @@ fn options_of_the_documentation_are_those_of_the_program() {
     }
     assert!(options("convert").is_superset(&["from", "to", "format", "rate"].map(str::to_owned).into()));
     assert!(options("inspect").contains("topic"));
+}
+
+#[test]
+fn the_table_of_the_page_for_a_logger_is_read_as_register_counts() {
+    let page =
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/own-logger.md")).expect("a page");
+    let table = page.split("```\n").find(|block| block.starts_with("time_s,")).expect("a table");
+    let dir = tempfile::tempdir().expect("a folder");
+    let file = write(&dir, "log.csv", table.as_bytes());
+    let output = host_sim(&["inspect", file.to_str().expect("UTF-8")]);
+    let text = String::from_utf8(output.stdout).expect("UTF-8");
+    assert!(output.status.success() && text.contains("register counts of an ADIS16405"), "{text}");
 }

@@ -47,7 +47,12 @@ pub(super) fn allan_deviation_plot(report: &Report, channel: &ChannelReport) -> 
 pub(super) fn story_plot(channel: &ChannelReport, [before, after]: [f64; 2]) -> Plot {
     let is_lowered = after < before;
     let mut lines = vec![
-        model_line(channel, &channel.before, "before: N, B, K", Look::Before),
+        model_line(
+            channel,
+            &channel.before,
+            if is_lowered { "before: N, B, K" } else { "model: N, B, K" },
+            Look::Before,
+        ),
         measured(channel, Look::Measured, "measured, whole record"),
     ];
     if is_lowered {
