@@ -30,7 +30,8 @@ pub(crate) struct EvidenceText {
 impl EvidenceText {
     /// For an effect of one channel.
     pub(crate) fn of_effect(effect: &Effect, style: NumberStyle) -> Self {
-        Wording(style).effect(effect)
+        let Self { measured, rest } = Wording(style).effect(effect);
+        Self { measured: Wording(style).displayed(&measured), rest: Wording(style).displayed(&rest) }
     }
 
     /// For a finding, which may be in several channels.
@@ -39,7 +40,7 @@ impl EvidenceText {
         match finding.channels.len() {
             0 | 1 => Self { measured, rest },
             count => Self {
-                measured: format!("{}: {measured}", finding.channels[finding.clearest]),
+                measured: Wording(style).displayed(&format!("{}: {measured}", finding.channels[finding.clearest])),
                 rest: format!("{rest}; one cause in {count} channels"),
             },
         }
@@ -71,6 +72,15 @@ fn added(curve: &CurveEvidence, meaning: &str) -> EvidenceText {
     text(excess(curve), format!(" before it was added, which takes {gain:.0} sigma off the fit; {meaning}"))
 }
 
+/// Such as `1 run` and `2 runs`.
+fn counted(count: u64, one: &str) -> String {
+    format!("{count} {one}{}", if count == 1 { "" } else { "s" })
+}
+
+/// Names and symbols of the JSON, and those of the screen and the page.
+const DISPLAYED: [(&str, &str); 6] =
+    [("gyro_", "gyro "), ("accl_", "accel "), ("magn_", "magn "), ("tau =", "τ ="), (" sigma", " σ"), (" -", " −")];
+
 /// What a Markov process usually is.
 const CORRELATED: &str = "a correlated fluctuation: thermal or electronic";
 
@@ -96,6 +106,15 @@ impl Wording {
             NumberStyle::Prefixed if gain > MILLION.ln() => "more than a million".to_owned(),
             NumberStyle::Prefixed => significant(gain.exp(), 2),
         }
+    }
+
+    /// A sentence with the names and symbols of its readers.
+    fn displayed(&self, text: &str) -> String {
+        if self.0 == NumberStyle::Plain {
+            return text.to_owned();
+        }
+        let text = text.strip_prefix('-').map_or_else(|| text.to_owned(), |number| format!("−{number}"));
+        DISPLAYED.iter().fold(text, |text, (name, shown)| text.replace(name, shown))
     }
 
     /// A number with its unit, with so many decimals in front of an exponent.
@@ -310,8 +329,10 @@ impl Wording {
             ),
             Effect::Spikes(of) => text(
                 format!(
-                    "{} samples off by more than {:.1} σ from what their neighbours tell, the largest by {:.1} σ",
-                    of.count, of.threshold_sigmas, of.largest_sigmas
+                    "{} off by more than {:.1} σ from what their neighbours tell, the largest by {:.1} σ",
+                    counted(of.count as u64, "sample"),
+                    of.threshold_sigmas,
+                    of.largest_sigmas
                 ),
                 "; an electrical disturbance or a damaged word",
             ),
@@ -335,8 +356,8 @@ impl Wording {
             }
             Effect::MotionInterval(of) => text(
                 format!(
-                    "the mean of a second leaves the median by up to {:.3} {unit}, {}, in {} stretches of together {} s: the \
-                     platform was moved",
+                    "the mean of a second leaves the median by up to {:.3} {unit}, {}, in {} {} s: the platform was \
+                     moved",
                     of.size.value,
                     match of.scale {
                         MotionScale::BiasError(error) => format!(
@@ -346,7 +367,11 @@ impl Wording {
                         MotionScale::Scatter(scatter) =>
                             format!("where such means scatter by {} {}", significant(scatter, 2), of.size.unit),
                     },
-                    of.stretches,
+                    if of.stretches == 1 {
+                        "one stretch of".to_owned()
+                    } else {
+                        format!("{} stretches of together", of.stretches)
+                    },
                     of.moved_s,
                     unit = of.size.unit
                 ),
@@ -366,18 +391,31 @@ impl Wording {
                 "",
             ),
             Effect::MissingCodes(of) => text(
-                format!("{} codes without a sample, beside {:.0} in their rarer neighbours", of.codes, of.expected),
+                format!(
+                    "{} without a sample, beside {:.0} in their rarer neighbours",
+                    counted(of.codes.into(), "code"),
+                    of.expected
+                ),
                 "",
             ),
             Effect::StuckOutput(of) => text(
                 format!(
-                    "{} of {} samples are in {} runs of equal values that noise does not make, the longest from {:.2} s to {:.2} s",
-                    of.stuck, of.samples, of.runs, of.from_s.value, of.to_s.value
+                    "{} of {} samples are in {} of equal values that noise does not make, the longest from {:.2} s to {:.2} s",
+                    of.stuck,
+                    of.samples,
+                    counted(of.runs, "run"),
+                    of.from_s.value,
+                    of.to_s.value
                 ),
                 "; they are left out",
             ),
             Effect::DroppedSamples(of) => text(
-                format!("{} of {} samples never arrived, in {} gaps", of.missing, of.samples, of.gaps),
+                format!(
+                    "{} of {} samples never arrived, in {}",
+                    of.missing,
+                    of.samples,
+                    counted(of.gaps as u64, "gap")
+                ),
                 "; a reader that comes too late, or a full queue",
             ),
             Effect::RepeatedSamples(of) => text(

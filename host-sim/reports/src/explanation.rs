@@ -3,7 +3,7 @@
 
 use crate::finding_text::{FindingText, channel_list};
 use crate::formatting::{capital, count, duration, words, wrap};
-use crate::rounding::{NONE, quantity_digits, significant, span};
+use crate::rounding::{NONE, quantity_digits, signed, significant, span};
 use crate::summary;
 use noise_analysis::nonstationarity::{FittedPart, RelatedLine, TrackedSet};
 use noise_analysis::report::{ChannelReport, CommonModeRegression, ModelErrorReport, Nonstationarity, Report};
@@ -74,7 +74,8 @@ fn sentence(text: &str) -> String {
 }
 
 fn found(FindingText { channels, physics, advice, weight, .. }: &FindingText) -> String {
-    format!("{channels}: {physics} {} {advice}", sentence(weight))
+    let weight = if weight.is_empty() { String::new() } else { format!(" {}", sentence(weight)) };
+    format!("{channels}: {physics}{weight} {advice}")
 }
 
 /// Two significant digits of a deviance per point.
@@ -146,7 +147,7 @@ fn stationarity(changes: &Nonstationarity) -> String {
     let difference = format!(
         "Between the two quarters of the first half the Allan variance differs most at τ = {}: by {} %; {}.",
         span(quarters.tau_s),
-        signed(100.0 * (quarters.variance_ratio - 1.0)),
+        signed(100.0 * (quarters.variance_ratio - 1.0), 2),
         chance(quarters.p_value),
     );
     let part = match changes.fitted_to {
@@ -160,10 +161,6 @@ fn stationarity(changes: &Nonstationarity) -> String {
     format!("{difference} {part}")
 }
 
-fn signed(value: f64) -> String {
-    format!("{}{}", if value < 0.0 { "−" } else { "+" }, significant(value.abs(), 2))
-}
-
 /// The range of the parameters over the record.
 fn movement(changes: &Nonstationarity) -> String {
     let range = |values: &mut dyn Iterator<Item = f64>| {
@@ -175,8 +172,8 @@ fn movement(changes: &Nonstationarity) -> String {
         "from one stretch of {} to the next the variance of the white noise lies between {} % and {} % of the model's own (each \
          ± {} %)",
         span(changes.epoch_s),
-        signed(low),
-        signed(high),
+        signed(low, 2),
+        signed(high, 2),
         significant(100.0 * error, 2),
     );
     let lines = changes.epochs.iter().filter_map(|epoch| epoch.line_hz);

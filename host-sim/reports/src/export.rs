@@ -11,7 +11,8 @@ mod visual_inertial;
 
 pub use exported_file::{AxisChoice, Export, ExportError};
 
-use crate::saved_report::SavedReport;
+use crate::saved_report::{SavedChannel, SavedReport};
+use crate::summary::{HIGH_DEVIANCE, deviance_per_point};
 use std::fmt::Write;
 
 /// A file format.
@@ -47,7 +48,7 @@ pub enum ExportFormat {
 /// See [`ExportError`].
 pub fn export(report: &SavedReport, format: ExportFormat, axes: AxisChoice) -> Result<Export, ExportError> {
     check(report)?;
-    match format {
+    let export = match format {
         ExportFormat::Kalibr => visual_inertial::kalibr(report, axes),
         ExportFormat::OpenVins => visual_inertial::openvins(report, axes),
         ExportFormat::Vins => visual_inertial::vins(report, axes),
@@ -58,6 +59,35 @@ pub fn export(report: &SavedReport, format: ExportFormat, axes: AxisChoice) -> R
         ExportFormat::Gtsam => filters::gtsam(report),
         ExportFormat::Basalt => filters::basalt(report),
         ExportFormat::Csv => Ok(Export { text: table(report), missing: Vec::new() }),
+    }?;
+    Ok(Export { text: warned(export.text, report, format), ..export })
+}
+
+/// `text` with a comment after its first line on the models that fail on the unseen half.
+fn warned(text: String, report: &SavedReport, format: ExportFormat) -> String {
+    let error = |channel: &SavedChannel| channel.unseen_error.filter(|of| *of > HIGH_DEVIANCE);
+    let is_inertial = |channel: &&SavedChannel| ["gyro_", "accl_"].iter().any(|of| channel.name.starts_with(of));
+    let failing: Vec<String> = report
+        .channels
+        .iter()
+        .filter(is_inertial)
+        .filter_map(|channel| Some(format!("{} {}", channel.name, deviance_per_point(error(channel)?))))
+        .collect();
+    if failing.is_empty() {
+        return text;
+    }
+    let warning = format!(
+        "WARNING: models that fail on the half of the record that they were not fitted to, with their errors (1 is that of a true model): {}",
+        failing.join(", ")
+    );
+    let after_first_line = |comment: String| text.replacen('\n', &format!("\n{comment}\n"), 1);
+    match format {
+        // A table has no comments.
+        ExportFormat::Csv => text,
+        ExportFormat::Basalt => text.replacen("\"comment\": \"", &format!("\"comment\": \"{warning}; "), 1),
+        ExportFormat::Gazebo => after_first_line(format!("<!-- {warning} -->")),
+        ExportFormat::Matlab => after_first_line(format!("% {warning}")),
+        _ => after_first_line(format!("# {warning}")),
     }
 }
 
@@ -129,6 +159,23 @@ mod tests {
         let channels = [axes("gyro", "deg/s"), axes("accl", "g"), own].join(",");
         SavedReport::from_json(&format!(r#"{{"schema":1,"sample_rate_hz":100.0,"channels":[{channels}]}}"#))
             .expect("a report")
+    }
+
+    /// Whoever has the file alone knows of it.
+    #[test]
+    fn a_model_that_fails_is_named_in_the_file() {
+        let mut failing = report("0.01", "gyro_w");
+        let written = |report: &SavedReport, format| export(report, format, AxisChoice::Rms).map(|export| export.text);
+        let sound = failing.clone();
+        failing.channels[0].unseen_error = Some(14.2);
+        failing.channels[1].unseen_error = Some(1.4);
+        for format in ExportFormat::value_variants() {
+            let (Ok(before), Ok(after)) = (written(&sound, *format), written(&failing, *format)) else { continue };
+            assert!(!before.contains("WARNING"), "{before}");
+            let is_told = after.contains("errors (1 is that of a true model): gyro_x 14");
+            assert!(is_told == (*format != ExportFormat::Csv) && !after.contains("gyro_y 1"), "{after}");
+            assert_eq!(before.lines().next(), after.lines().next());
+        }
     }
 
     /// A report may have been changed by hand. What no file can hold as what it is ends in an error of every format.

@@ -4,11 +4,10 @@
 #[cfg(test)]
 mod examples;
 
-use crate::evidence::{EvidenceText, NumberStyle};
-use crate::formatting::words;
-use crate::rounding::{bounded_quantity, plain, quantity, rounded_quantity, significant, span};
+use crate::formatting::{capital, moment, words};
+use crate::rounding::{bounded_quantity, plain, quantity, rounded_quantity, signed, significant, span};
 use noise_analysis::bounds::{BoundedEstimate, ChannelEstimate};
-use noise_analysis::effects::{Effect, Unexplained, UnexplainedPlace};
+use noise_analysis::effects::{Effect, Observation, Unexplained, UnexplainedPlace};
 use noise_analysis::report::{Finding, Parameter, Validation};
 use std::f64::consts::SQRT_2;
 
@@ -23,18 +22,18 @@ const CYCLING: &str =
 pub struct FindingText {
     /// The channels that show it, such as `gyro z` or `accel x y`.
     pub channels: String,
+    /// How many these are.
+    pub channel_count: usize,
     /// What it is, with its size.
     pub physics: String,
-    /// The same without intervals, for one line.
+    /// The same without intervals and details, for one line of a narrow screen.
     pub brief: String,
     /// What to do about it, or what to look for.
     pub advice: String,
     /// The first of that, as a sentence; `None` where nothing is left to do.
     pub step: Option<String>,
-    /// How much of the variance it makes, and whether the second half confirms it; where neither is known, the evidence in short.
+    /// How much of the variance it makes, and whether the second half confirms it; empty where neither is known.
     pub weight: String,
-    /// Whether the weight is not the evidence.
-    pub is_weighed: bool,
 }
 
 /// What to do about a finding.
@@ -62,21 +61,19 @@ impl Advice {
 pub fn describe(finding: &Finding) -> FindingText {
     let (physics, advice) = sentences(finding, &bounded_quantity, &reaches(finding));
     let (brief, _) = sentences(finding, &rounded_quantity, "");
-    let weighed = weight(finding);
-    let is_weighed = weighed.is_some();
     FindingText {
         channels: channel_list(&finding.channels),
-        physics,
-        brief,
+        channel_count: finding.channels.len(),
+        physics: physics.replace(DETAIL, ""),
+        brief: brief.split(DETAIL).step_by(2).collect(),
         step: (!advice.is_done).then(|| format!("{}.", advice.first)),
         advice: format!("{}{}", advice.first, advice.rest),
-        weight: weighed.unwrap_or_else(|| evidence_in_short(finding)),
-        is_weighed,
+        weight: weight(finding),
     }
 }
 
-/// The largest share of the variance, and what the second half says; `None` where neither is known.
-fn weight(finding: &Finding) -> Option<String> {
+/// The largest share of the variance, and what the second half says; empty where neither is known.
+fn weight(finding: &Finding) -> String {
     let largest = finding.share_percent.values().copied().filter(|share| share.is_finite()).fold(0.0, f64::max);
     let share = (largest >= 0.5).then(|| format!("up to {} % of σ²", significant(largest.min(100.0), 2)));
     let held = match finding.validated {
@@ -84,22 +81,7 @@ fn weight(finding: &Finding) -> Option<String> {
         Validation::No => Some("the second half does not confirm it".to_owned()),
         Validation::Untestable => None,
     };
-    let told = share.into_iter().chain(held).collect::<Vec<_>>().join("; ");
-    (!told.is_empty()).then_some(told)
-}
-
-/// Characters of the evidence that a line has room for.
-const CLAUSE: usize = 70;
-
-/// What was measured, or as much of it as there is room for.
-fn evidence_in_short(finding: &Finding) -> String {
-    let EvidenceText { measured, .. } = EvidenceText::of_finding(finding, NumberStyle::Prefixed);
-    if measured.chars().count() <= CLAUSE {
-        return measured;
-    }
-    let cut: String = measured.chars().take(CLAUSE).collect();
-    let whole = cut.rsplit_once(' ').map_or(cut.as_str(), |(whole, _)| whole);
-    format!("{} …", whole.trim_end_matches([',', ':']))
+    share.into_iter().chain(held).collect::<Vec<_>>().join("; ")
 }
 
 /// By how much σ falls without a part of the variance, %, of the channel with the largest share; `None` where it is not known.
@@ -113,7 +95,10 @@ fn reaches(finding: &Finding) -> String {
     format!(" reaches {these}")
 }
 
-/// The sentence of physics and the advice; `amount` writes a parameter, and `reaches` comes after what reaches the channels from
+/// Stands on either side of what the brief form of a sentence leaves out.
+const DETAIL: char = '|';
+
+/// The sentence of physics, with its details between two [`DETAIL`]s, and the advice; `amount` writes a parameter, and `reaches` comes after what reaches the channels from
 /// outside.
 fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: &str) -> (String, Advice) {
     let off = || {
@@ -130,7 +115,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
     match &finding.effect {
         Effect::OutputFilter(of) if (of.decimation.value - 1.0).abs() > 1e-9 => (
             format!(
-                "The part's low-pass filter of {} taps, read every {} of its samples.",
+                "The part's low-pass filter of {} taps|, read every {} of its samples|.",
                 plain(of.taps.value, 3),
                 amount(&of.decimation.parameter(""))
             ),
@@ -140,7 +125,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
             ),
         ),
         Effect::OutputFilter(of) => (
-            format!("The part's low-pass filter of {} taps smooths neighbouring samples.", plain(of.taps.value, 3)),
+            format!("The part's low-pass filter of {} taps| smooths neighbouring samples|.", plain(of.taps.value, 3)),
             Advice::done(
                 "Nothing to repair",
                 "; take N from averaging times longer than the filter, or use fewer taps for more bandwidth.",
@@ -155,7 +140,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         ),
         Effect::SinusoidalLine(of) if of.frequency_hz.value < SLOW_HZ => (
             format!(
-                "A periodic change at {}, every {}{reaches}: an amplitude of {}.",
+                "A periodic change at {}|, every {}{reaches}|: an amplitude of {}.",
                 hertz(of.frequency_hz),
                 period(of.frequency_hz),
                 size(of.amplitude)
@@ -164,7 +149,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         ),
         Effect::SinusoidalLine(of) if of.is_at_half_rate() => (
             format!(
-                "Every second sample is off by {}: a line at half of the sample rate, {}.",
+                "Every second sample is off by {}|: a line at half of the sample rate, {}|.",
                 // The deviation of the line is half of the offset.
                 size(of.amplitude.scaled(SQRT_2)),
                 hertz(of.frequency_hz)
@@ -184,7 +169,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         ),
         Effect::ResonantLine(of) if of.frequency_hz.value < SLOW_HZ => (
             format!(
-                "A fluctuation around {}, every {} or so{}: {} (1 σ).",
+                "A fluctuation around {}|, every {} or so{}|: {} (1 σ).",
                 hertz(of.frequency_hz),
                 period(of.frequency_hz),
                 reaching(),
@@ -206,14 +191,14 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
             ),
         ),
         Effect::ModulatedLine(of) => {
-            let (changes, depth) = if of.of_phase {
-                ("phase goes to and fro", of.depth.parameter("rad"))
+            let (what, depth) = if of.of_phase {
+                ("phase", of.depth.parameter("rad"))
             } else {
-                ("amplitude swells and fades", of.depth.scaled(100.0).parameter("%"))
+                ("amplitude", of.depth.scaled(100.0).parameter("%"))
             };
             (
                 format!(
-                    "A vibration or hum at {}{reaches}: a line of {} whose {changes} by {} every {}.",
+                    "A vibration or hum at {}{reaches}, a line of changing {what}|: {}, changing by {} every {}|.",
                     hertz(of.frequency_hz),
                     size(of.amplitude),
                     amount(&depth),
@@ -227,7 +212,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         }
         Effect::Chirp(of) => (
             format!(
-                "A line whose frequency runs from {} to {}, by {}{reaches}: an amplitude of {}.",
+                "A line whose frequency runs from {} to {}|, by {}{reaches}: an amplitude of {}|.",
                 hertz(of.start_hz),
                 hertz(of.end_hz),
                 amount(&of.rate_hz_per_s.parameter("Hz/s")),
@@ -237,7 +222,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         ),
         Effect::Periodic(of) => (
             format!(
-                "A change that repeats every {} and is no sinusoid{reaches}: a fundamental at {} with an amplitude of {}.",
+                "A change that repeats every {} and is no sinusoid|{reaches}: a fundamental at {} with an amplitude of {}|.",
                 span(1.0 / of.frequency_hz.value),
                 hertz(of.frequency_hz),
                 size(of.amplitude)
@@ -251,14 +236,14 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         Effect::TelegraphNoise(of) => (
             // Between two jumps of a symmetrical telegraph signal lie two correlation times on average.
             format!(
-                "The bias jumps between two levels {} apart, on average every {}: a time constant of {}.",
+                "The bias jumps between two levels {} apart|, on average every {}: a time constant of {}|.",
                 size(of.amplitude),
                 span(2.0 * of.time_constant_s.value),
                 seconds(of.time_constant_s)
             ),
             Advice::new(
-                "Random telegraph noise lies in the part",
-                "; try another part, or model it as a Markov process of this time constant.",
+                "Try another part, or model this as a Markov process of this time constant",
+                "; this is random telegraph noise of the part.",
             ),
         ),
         Effect::ShotNoise(of) => (
@@ -275,19 +260,19 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         ),
         Effect::MarkovProcess(of) => (
             format!(
-                "A noise with a memory of {} and a size of {} (1 σ).",
+                "A noise with a memory of {} and a size of {}| (1 σ)|.",
                 seconds(of.time_constant_s),
                 size(of.deviation)
             ),
             Advice::new("Give the filter a first-order Gauss-Markov state of this time constant and size", "."),
         ),
         Effect::CommonMode(of) => (
-            format!("A slow drift of {} in common, which nothing recorded explains.", size(of.deviation)),
+            format!("A slow drift of {} in common|, which nothing recorded explains|.", size(of.deviation)),
             Advice::new(RECORD_CONDITIONS, "; look for a slow change in the room or the mount."),
         ),
         Effect::SharedDrift(of) => (
             format!(
-                "A slow drift in common with {}, {} of it, which nothing recorded explains.",
+                "A slow drift in common with {}|, {} of it, which nothing recorded explains|.",
                 channel_list(&[of.with.to_owned()]),
                 per(of.ratio, of.per)
             ),
@@ -301,7 +286,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
             ),
         ),
         Effect::LevelStep(of) => (
-            format!("The bias stepped by {} at {}.", size(of.size), span(of.time_s.value)),
+            format!("The bias stepped by {} at {}.", size(of.size), moment(of.time_s.value)),
             Advice::new(
                 "Look for a shock, a changed supply or a touched cable at that time",
                 "; cut the record there.",
@@ -309,8 +294,8 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         ),
         Effect::LevelChange(of) => (
             format!(
-                "From {} on the noise is {} times as large as before.",
-                span(of.time_s.value),
+                "From {} on the noise is {} times as large| as before|.",
+                moment(of.time_s.value),
                 amount(&of.ratio.parameter(""))
             ),
             Advice::new(
@@ -324,7 +309,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         ),
         Effect::TemperatureCurvature(of) => (
             format!(
-                "The bias follows the temperature by a parabola: {} and {}.",
+                "The bias follows the temperature by a parabola|: {} and {}|.",
                 per(of.sensitivity, "degC"),
                 per(of.curvature, "degC^2")
             ),
@@ -335,7 +320,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         ),
         Effect::TurnOnTransient(of) => (
             format!(
-                "The bias begins {} off and settles with a time constant of {}.",
+                "The bias begins {} off and settles| with a time constant of {}|.",
                 size(of.size),
                 seconds(of.time_constant_s)
             ),
@@ -346,7 +331,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         ),
         Effect::ThermalLag(of) => (
             format!(
-                "The bias follows the temperature with {} through a lag of {}.",
+                "The bias follows the temperature with {}| through a lag of {}|.",
                 per(of.sensitivity, "degC"),
                 seconds(of.time_constant_s)
             ),
@@ -362,7 +347,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         Effect::AccelerationSensitivity(of) => {
             let axes: Vec<String> = of.axes().map(|(axis, of)| format!("{} ({axis})", per(of, "g"))).collect();
             (
-                format!("The rate follows the specific force: {}.", axes.join(", ")),
+                format!("The rate follows the specific force|: {}|.", axes.join(", ")),
                 Advice::new(
                     "Subtract these sensitivities times the accelerometers, or mount the part more stiffly",
                     format!(".{}", off()),
@@ -371,7 +356,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         }
         Effect::VibrationRectification(of) => (
             format!(
-                "The bias follows the strength of the vibration with {}.",
+                "The bias follows the strength of the vibration| with {}|.",
                 per(of.sensitivity, &format!("{}^2", of.per))
             ),
             Advice::new("Isolate the part from vibration, or compensate with the variance of the acceleration", "."),
@@ -385,38 +370,53 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
             Advice::new(FINER, "; short averaging times are dominated by rounding."),
         ),
         Effect::NoiseBelowCount(_) => (
-            "The noise is smaller than a count: the samples repeat one value and hide what is below it.".to_owned(),
+            "The noise is smaller than a count|: the samples repeat one value and hide what is below it|.".to_owned(),
             Advice::new("Take no coefficient from the short averaging times", "; use a smaller range, or add dither."),
         ),
         Effect::MissingCodes(of) => (
-            format!("The converter never gives {} of its codes, which are {} apart.", of.codes, size(of.spacing)),
+            format!("The converter never gives {} of its codes|, which are {} apart|.", of.codes, size(of.spacing)),
             Advice::new(
                 "Compare with another part",
                 "; the codes beside the missing ones hold their samples, an error of half a count.",
             ),
         ),
         Effect::Spikes(of) => (
-            format!("Single samples stand out by {}, {}.", size(of.size), amount(&of.rate_per_hour.parameter("1/h"))),
+            format!(
+                "Single samples stand out by {}, {} an hour.",
+                size(of.size),
+                amount(&of.rate_per_hour.parameter(""))
+            ),
             Advice::new("Check the wiring and the bus for interference", "; a filter should reject such samples."),
         ),
         Effect::NoisyInterval(of) => (
             format!(
-                "The part was knocked at {} for {}: the noise is {} times that beside it.",
-                span(of.from_s.value),
+                "The part was knocked at {} for {}|: the noise is {} times that beside it|.",
+                moment(of.from_s.value),
                 span(of.to_s.value - of.from_s.value),
                 significant(of.level.value, 2)
             ),
             Advice::done("These samples are left out", "; keep hands and machines off the bench while recording."),
         ),
         Effect::MotionInterval(of) => (
-            format!("The platform moved from {} to {}.", span(of.from_s.value), span(of.to_s.value)),
+            match of.stretches {
+                0 | 1 => {
+                    let length_s = of.to_s.value - of.from_s.value;
+                    format!("The platform moved at {} for {}.", moment(of.from_s.value), span(length_s))
+                }
+                times => format!(
+                    "The platform moved {times} times between {} and {}|, for {} together|.",
+                    moment(of.from_s.value),
+                    moment(of.to_s.value),
+                    span(of.moved_s as f64)
+                ),
+            },
             Advice::new(
                 "The models were fitted to these samples too, and noise needs a part at rest: record it again on a firm support",
                 ".",
             ),
         ),
         Effect::Saturation(of) => (
-            format!("The channel reached the end of its range in {} of the samples.", part_in_percent(of.fraction)),
+            format!("{} of the samples are at the end of the channel's range.", part_in_percent(of.fraction)),
             Advice::new("Use a larger range", "; what was cut off makes the noise look too small."),
         ),
         Effect::StuckOutput(of) => (
@@ -436,15 +436,20 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         ),
         Effect::ClockDeviation(of) => match of.change {
             None => (
-                format!("The clock of the samples runs at {}.", hertz(of.rate_hz)),
-                Advice::new("State this rate: every averaging time and N scale with it", "."),
+                format!(
+                    "The sample clock runs at {} instead of| the nominal| {} Hz| ({})|.",
+                    hertz(of.rate_hz),
+                    plain(of.nominal_hz, 5),
+                    relative(of.rate_hz.value / of.nominal_hz - 1.0)
+                ),
+                Advice::new("Use this rate instead of the nominal one", "; every averaging time and N scale with it."),
             ),
             Some(change) => (
                 format!(
-                    "The clock of the samples changes its rate from {} to {} after {}.",
+                    "The sample clock changes its rate| from {} to {}| after {}.",
                     hertz(change.before_hz),
                     hertz(change.after_hz),
-                    span(change.time_s.value)
+                    moment(change.time_s.value)
                 ),
                 Advice::new(
                     "Look for what reset or set the part or the reader at this time",
@@ -453,13 +458,9 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
             ),
         },
         Effect::Unexplained(of) => {
-            let (place, percent) = (unexplained_place(of), of.excess_percent.map(|of| of.value));
-            let told = percent.map_or_else(
-                || format!("What is measured {place}"),
-                |percent| format!("{} {place}", signed_percent(&[percent])),
-            );
+            let percent: Vec<f64> = of.excess_percent.iter().map(|of| of.value).collect();
             (
-                format!("{told} fits no known effect."),
+                format!("{}, which no known effect explains.", capital(&departure(of, &percent))),
                 Advice::new(
                     "Look at the channel's figures at that place",
                     "; a longer record, or temperature and supply beside it, may tell the cause.",
@@ -479,9 +480,9 @@ fn part_in_percent(fraction: BoundedEstimate) -> String {
     format!("{} %", significant(100.0 * fraction.value, 2))
 }
 
-/// Where something is unexplained.
-pub(crate) fn unexplained_place(of: &Unexplained) -> String {
-    match of.place {
+/// By how much and where the data departs from every model; `percent` has the excess of σ in each channel, if it is known.
+pub(crate) fn departure(of: &Unexplained, percent: &[f64]) -> String {
+    let place = match of.place {
         UnexplainedPlace::LineOfCurve { tau_s, frequency_hz } => format!(
             "at averaging times around {}, as by a line at {}",
             span(tau_s.value),
@@ -489,16 +490,29 @@ pub(crate) fn unexplained_place(of: &Unexplained) -> String {
         ),
         UnexplainedPlace::AveragingTime(tau_s) => format!("at averaging times around {}", span(tau_s.value)),
         UnexplainedPlace::Frequency(frequency_hz) => format!("around {}", quantity(frequency_hz.value, "Hz")),
+    };
+    let size = |of: f64| significant(of.abs(), 2);
+    let (low, high) =
+        percent.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), of| (low.min(of.abs()), high.max(of.abs())));
+    let amount = if size(low) == size(high) { size(high) } else { format!("{} to {}", size(low), size(high)) };
+    match (percent, &of.observation) {
+        ([], _) => format!("the data departs from the model {place}"),
+        ([first, ..], Observation::LevelByTemperature { .. }) => {
+            format!("the noise changes with the temperature, by {} %", signed(*first, 2))
+        }
+        ([first, ..], _) => {
+            format!("σ is {amount} % {} the model {place}", if *first < 0.0 { "below" } else { "above" })
+        }
     }
 }
 
-/// Percentages with their signs, as a range where there are several: `−2.1 … −3.6 %`.
-pub(crate) fn signed_percent(values: &[f64]) -> String {
-    let low = values.iter().copied().fold(f64::INFINITY, |low, of| if of.abs() < f64::abs(low) { of } else { low });
-    let high = values.iter().copied().fold(0.0, |high, of| if of.abs() > f64::abs(high) { of } else { high });
-    let text = |value: f64| format!("{}{}", if value < 0.0 { "−" } else { "+" }, significant(value.abs(), 2));
-    let (low, high) = (text(low), text(high));
-    if low == high { format!("{low} %") } else { format!("{low} … {high} %") }
+/// A relative difference in percent, in ppm below 0.01 %.
+fn relative(difference: f64) -> String {
+    if difference.abs() < 1e-4 {
+        format!("{} ppm", signed(1e6 * difference, 2))
+    } else {
+        format!("{} %", signed(100.0 * difference, 2))
+    }
 }
 
 /// The channels of a list in few words: `gyros` for all three, `accel x y` for two.
@@ -527,10 +541,10 @@ pub fn channel_list(names: &[String]) -> String {
 mod tests {
     use super::examples::{examples, line};
     use super::*;
-    use crate::formatting::capital;
+    use crate::evidence::{EvidenceText, NumberStyle};
     use noise_analysis::effects::{
-        LevelStep, LineEvidence, LineSource, Multiples, SharedDrift, SinusoidalLine, SpectrumEvidence, SquareWave,
-        TelegraphEvidence, TelegraphNoise,
+        LevelStep, LineEvidence, LineSource, MotionInterval, MotionScale, Multiples, SharedDrift, SinusoidalLine,
+        SpectrumEvidence, SquareWave, StuckOutput, TelegraphEvidence, TelegraphNoise,
     };
 
     fn names(list: &[&str]) -> Vec<String> {
@@ -607,12 +621,39 @@ mod tests {
                     let is_known = section.contains(&words) || general.contains(&words);
                     assert!(is_known, "{kind}: the page lacks \"{words}\" of {text:?}");
                 }
-                if text.is_weighed {
-                    let words = fixed_words(&capital(&text.weight));
-                    assert!(words.iter().all(|words| general.contains(&capital(words))), "{kind}: {}", text.weight);
-                }
+                let words = fixed_words(&capital(&text.weight));
+                assert!(words.iter().all(|words| general.contains(&capital(words))), "{kind}: {}", text.weight);
             }
         }
+    }
+
+    /// Beside the number and the channels a screen of 80 columns has 63.
+    #[test]
+    fn a_brief_sentence_fits_a_line_of_the_narrowest_screen() {
+        for effect in &examples() {
+            let FindingText { brief, physics, .. } = describe(&finding(effect.clone()));
+            let is_short = brief.chars().count() <= 63 || matches!(effect, Effect::Unexplained(_));
+            assert!(is_short && brief.ends_with('.'), "{} columns: {brief}", brief.chars().count());
+            assert!(![&brief, &physics].iter().any(|text| text.contains(DETAIL)), "{physics}");
+        }
+    }
+
+    #[test]
+    fn a_motion_is_told_by_when_it_began_and_how_long_it_was() {
+        let motion = |from_s: f64, to_s: f64, stretches| {
+            let of = MotionInterval {
+                from_s: BoundedEstimate::exact(from_s),
+                to_s: BoundedEstimate::exact(to_s),
+                size: BoundedEstimate::exact(40.0).in_unit("deg/s"),
+                scale: MotionScale::BiasError(3.0),
+                stretches,
+                moved_s: 12,
+            };
+            describe(&finding(of)).physics
+        };
+        assert_eq!(motion(1000.0, 1020.0, 1), "The platform moved at 16 min 40 s for 20 s.");
+        let several = "The platform moved 2 times between 7.0 s and 16 min 40 s, for 12 s together.";
+        assert_eq!(motion(7.0, 1000.0, 2), several);
     }
 
     #[test]
@@ -654,7 +695,7 @@ mod tests {
     fn the_part_of_the_samples_that_is_cut_off_is_told() {
         let saturation = examples().into_iter().find(|effect| matches!(effect, Effect::Saturation(_))).expect("one");
         let physics = describe(&finding(saturation)).physics;
-        assert_eq!(physics, "The channel reached the end of its range in 0.30 % of the samples.");
+        assert_eq!(physics, "0.30 % of the samples are at the end of the channel's range.");
     }
 
     #[test]
@@ -668,7 +709,7 @@ mod tests {
         let beginning =
             "line at 20.5000 Hz in the spectrum, no wider than the record resolves, 220 sigma, by chance anywhere";
         assert_eq!(plain, format!("{beginning} 0e0"));
-        assert_eq!(prefixed, format!("{beginning} below 0.001"));
+        assert_eq!(prefixed, format!("{} below 0.001", beginning.replace("sigma", "σ")));
         let step = LevelStep {
             time_s: BoundedEstimate::exact(333.0),
             size: BoundedEstimate::exact(-3.1e-5).in_unit("g"),
@@ -683,20 +724,35 @@ mod tests {
         };
         assert_eq!(of_step(NumberStyle::Plain), format!("the level changes by -3.100e-5 g {}", rest("3e-9")));
         assert_eq!(of_step(NumberStyle::Prefixed), format!("the level changes by −31.0 µg {}", rest("below 0.001")));
-        // Where nothing else is known, the weight is what was measured, as far as there is room.
-        let text = describe(&finding(step));
-        assert_eq!(
-            (text.is_weighed, text.weight.as_str()),
-            (false, "the level changes by −31.0 µg at 333.0 s and stays, by chance …")
-        );
+        // Nothing is said of a weight that is not known.
+        assert_eq!(describe(&finding(step)).weight, "");
         let mut in_two = finding(step);
         in_two.channels.insert(0, "accl_x".to_owned());
         in_two.clearest = 1;
-        let sentence = EvidenceText::of_finding(&in_two, NumberStyle::Plain).sentence();
-        assert!(
-            sentence.starts_with("gyro_z: the level") && sentence.ends_with("; one cause in 2 channels"),
-            "{sentence}"
-        );
+        for (style, name) in [(NumberStyle::Plain, "gyro_z: the level"), (NumberStyle::Prefixed, "gyro z: the level")] {
+            let sentence = EvidenceText::of_finding(&in_two, style).sentence();
+            assert!(sentence.starts_with(name) && sentence.ends_with("; one cause in 2 channels"), "{sentence}");
+        }
+    }
+
+    /// The page has no names of the JSON, and one run is no "runs".
+    #[test]
+    fn the_evidence_of_the_page_has_names_symbols_and_numbers_as_its_readers_write_them() {
+        for effect in &examples() {
+            let text = EvidenceText::of_effect(effect, NumberStyle::Prefixed).sentence();
+            let of_json = ["gyro_", "accl_", "tau", "sigma", " -"];
+            assert!(!of_json.iter().any(|name| text.contains(name)), "{text}");
+        }
+        let stuck = StuckOutput {
+            fraction: BoundedEstimate::exact(0.003),
+            from_s: BoundedEstimate::exact(1.0),
+            to_s: BoundedEstimate::exact(2.0),
+            runs: 1,
+            stuck: 5,
+            samples: 12_000,
+        };
+        let text = EvidenceText::of_effect(&stuck.into(), NumberStyle::Prefixed).measured;
+        assert!(text.starts_with("5 of 12000 samples are in 1 run of equal values"), "{text}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Numbers, units, names and tables as the terminal, the figures and the page show them.
 
 use crate::line_breaks::broken;
-use crate::rounding::{NONE, quantity_digits, significant};
+use crate::rounding::{NONE, quantity_digits, significant, span};
 use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
 use noise_analysis::report::assessment::{Innovations, RecordLength};
 use noise_analysis::report::{ChannelReport, MissingSamples, ModelErrorReport, ModelReport};
@@ -72,6 +72,11 @@ pub fn duration(seconds: f64) -> String {
     shown.join(" ")
 }
 
+/// A time of the record, to the second from a minute on: `7.0 s`, `16 min 40 s`.
+pub fn moment(seconds: f64) -> String {
+    if seconds < 59.5 { span(seconds) } else { duration(seconds) }
+}
+
 /// A range of numbers, such as `0.03890 … 0.03910`.
 pub fn interval(low: f64, high: f64) -> String {
     format!("{} … {}", number(low), number(high))
@@ -118,7 +123,7 @@ pub fn filter_consistency(innovations: &Innovations) -> &'static str {
     let white = innovations.whiteness_p >= WHITE;
     if innovations.normalised > innovations.high {
         if white {
-            "white, but larger than the model says: a filter would be too sure"
+            "white, but larger than the model says: a Kalman filter would claim a smaller error than it has"
         } else {
             "larger than the model says, and not white: the model is not enough for a filter"
         }
@@ -129,7 +134,7 @@ pub fn filter_consistency(innovations: &Innovations) -> &'static str {
             "as large as the model says, but not white: something with a memory is missing"
         }
     } else if white {
-        "white, but smaller than the model says: a filter would be too cautious"
+        "white, but smaller than the model says: a Kalman filter would claim a larger error than it has"
     } else {
         "smaller than the model says, and not white"
     }
@@ -172,7 +177,7 @@ pub fn worst_deviations(channel: &ChannelReport) -> Vec<String> {
 pub fn recording_advice(record: &RecordLength) -> String {
     let kind = words(&record.kind);
     match record.more_hours {
-        Some(0.0) => format!("{kind}: known to ±20 % and better"),
+        Some(0.0) => format!("{kind}: the record is long enough for ±20 %"),
         Some(hours) => format!("{kind} to ±20 %: record {} more", duration(3600.0 * hours)),
         None => format!("{kind}: not shown by this record, or a month would not tell it to ±20 %"),
     }
@@ -287,6 +292,7 @@ mod tests {
     #[test]
     fn names_become_readable() {
         assert_eq!(words("angle_random_walk"), "angle random walk");
+        assert_eq!([7.0, 1000.0].map(moment), ["7.0 s", "16 min 40 s"]);
         assert_eq!(parameter_name("value"), "");
         assert_eq!(parameter_name("frequency_hz"), "frequency");
         assert_eq!(parameter_name("correlation_time_s"), "correlation time");

@@ -26,8 +26,7 @@ const WIDTH: u16 = 100;
 /// # Errors
 /// `out` cannot be written.
 pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io::Result<()> {
-    let part = if report.part.name.is_empty() { "Sensor" } else { &report.part.name };
-    let title = format!("{part} noise report");
+    let title = format!("{} noise report", summary::part_name(report));
     match source {
         Some(source) => writeln!(out, "{title}   {source}")?,
         None => writeln!(out, "{title}")?,
@@ -83,7 +82,7 @@ fn verdict(report: &Report, out: &mut impl Write) -> io::Result<()> {
         let weight = if weight.is_empty() { String::new() } else { format!(" {}.", capital(weight)) };
         paragraph(out, &format!("{}. {channels}: {physics}{weight} {advice}", index + 1))?;
     }
-    if let Some(text) = summary::unexplained(report) {
+    for text in summary::unexplained(report) {
         paragraph(out, &format!("Not explained: {text}."))?;
     }
     if found.is_empty() {

@@ -70,7 +70,7 @@ pub struct LiveView {
     /// What was found.
     pub findings: Vec<FindingText>,
     /// What nothing explains.
-    pub unexplained: Option<String>,
+    pub unexplained: Vec<String>,
     /// Where the record departs from the model, and what to do.
     pub advice: Vec<String>,
     /// Counters of the source.
@@ -166,7 +166,7 @@ impl LiveView {
         let warning = if in_colour { Style::new().fg(Color::Yellow) } else { Style::new() };
         let mut lines: Vec<Line<'_>> =
             self.findings.iter().map(|finding| Line::raw(format!("{}: {}", finding.channels, finding.brief))).collect();
-        if lines.is_empty() && self.unexplained.is_none() {
+        if lines.is_empty() && self.unexplained.is_empty() {
             lines.push(Line::raw("Nothing beyond N, B and K yet."));
         }
         lines.extend(self.unexplained.iter().map(|text| Line::styled(format!("Not explained: {text}."), warning)));

@@ -200,7 +200,7 @@ fn finding_section(report: &Report, index: usize, finding: &Finding, text: &Find
             h3 { (index + 1) ". " (words(finding.effect.name())) " " small { (text.channels) } }
             p { (text.physics) " " (text.advice) }
             p.faint {
-                @if text.is_weighed { "In the record: " (text.weight) ". " }
+                @if !text.weight.is_empty() { "In the record: " (text.weight) ". " }
                 (capital(&EvidenceText::of_finding(finding, NumberStyle::Prefixed).sentence())) "."
             }
             (parameters(finding))

@@ -1,9 +1,15 @@
 //! What a record does not tell of the part's clock and filter, in sentences.
 
 use crate::finding_text::channel_list;
-use crate::formatting::capital;
+use crate::formatting::{capital, enumerated};
 use crate::rounding::{estimate, plain, quantity, significant};
 use noise_analysis::report::PartNote;
+
+/// Beginning of the sentence where no filter was found.
+const NOT_CORRELATED: &str =
+    "No low-pass filter shows: neighbouring samples are not correlated, so N holds down to one sample.";
+/// What a wrong sample rate makes.
+const SCALES: &str = "Every τ and N scale with it.";
 
 /// What the record does not tell, and why: for the page, `--full` and the JSON.
 pub(crate) fn sentence(note: &PartNote) -> String {
@@ -14,29 +20,32 @@ pub(crate) fn sentence(note: &PartNote) -> String {
                 .to_owned()
         }
         PartNote::NotCorrelated { period_s } => format!(
-            "No low-pass filter shows: neighbouring samples are not correlated. There is none, or it is shorter than the sample period \
-             of {}.",
+            "{NOT_CORRELATED} There is no filter, or it is shorter than the sample period of {}.",
             quantity(*period_s, "s")
         ),
         PartNote::Minority(channels) if channels.is_empty() => {
             "The channels together look as if behind a low-pass filter, but none of them alone: it is not taken for one of the part."
                 .to_owned()
         }
-        PartNote::Minority(channels) => format!(
-            "{} alone is correlated as behind a low-pass filter. Most channels are not, so that it is none of the part.",
-            capital(&names(channels))
-        ),
+        PartNote::Minority(channels) => {
+            let each: Vec<String> = channels.iter().map(|channel| names(&[channel])).collect();
+            format!(
+                "Only {} {} correlated as behind a low-pass filter; most channels are not, so it is not the part's own filter.",
+                enumerated(&each),
+                if each.len() == 1 { "is" } else { "are" }
+            )
+        }
         PartNote::StatedClock { sample_rate_hz } => format!(
             "The sample rate is the part's clock, as every value of the filter is recorded. Without time stamps it is not measured: \
-             {} Hz is what was stated.",
+             it is the stated {} Hz. {SCALES}",
             plain(*sample_rate_hz, 6)
         ),
         PartNote::NoTimeStamps { nominal_hz, sample_rate_hz, stated_hz } => format!(
-            "Without time stamps the part's clock is not measured. At its nominal {} Hz the sample rate would be {} Hz; {} Hz \
-             was stated.",
+            "Without time stamps the sample rate is the stated {} Hz; by the filter and the part's nominal clock of {} Hz it \
+             would be {} Hz. {SCALES}",
+            plain(*stated_hz, 6),
             plain(*nominal_hz, 4),
-            estimate(sample_rate_hz.value, sample_rate_hz.low, sample_rate_hz.high),
-            plain(*stated_hz, 6)
+            estimate(sample_rate_hz.value, sample_rate_hz.low, sample_rate_hz.high)
         ),
         PartNote::LengthAlone { length, taps, other_taps, nominal_hz } => format!(
             "The curves give the length of the filter, {} samples, and not its taps. {taps} taps are nearest to the nominal clock of {} \
@@ -56,29 +65,27 @@ pub(crate) fn sentence(note: &PartNote) -> String {
     }
 }
 
-/// The notes in short, for the screen, without what that does without.
+/// The notes in short, for the screen, without what that does without: a stated sample rate is told where the nominal clock contradicts
+/// it.
 pub(crate) fn in_short(notes: &[PartNote]) -> Vec<String> {
-    let mut told: Vec<String> = Vec::new();
-    let mut contradicting = Vec::new();
-    for note in notes {
-        match note {
-            PartNote::CountsTooCoarse => {
-                told.push("The noise is smaller than a count, which hides the part's filter.".to_owned());
-            }
-            PartNote::NotCorrelated { .. } => {
-                told.push("No low-pass filter shows: neighbouring samples are not correlated.".to_owned());
-            }
-            PartNote::StatedClock { .. } | PartNote::NoTimeStamps { .. } => {
-                told.push("Without time stamps the part's clock is not measured.".to_owned());
-            }
-            PartNote::Contradicted { channel, .. } => contradicting.push(*channel),
-            PartNote::NotSought | PartNote::Minority(_) | PartNote::LengthAlone { .. } | PartNote::NotInAll { .. } => {}
+    let of = |note: &PartNote| match note {
+        PartNote::CountsTooCoarse => {
+            Some("The noise is smaller than a count, which hides the part's filter.".to_owned())
         }
-    }
-    if !contradicting.is_empty() {
-        told.push(format!("The filter of {} differs from that of the other channels.", names(&contradicting)));
-    }
-    told
+        PartNote::NotCorrelated { .. } => Some(NOT_CORRELATED.to_owned()),
+        PartNote::StatedClock { .. } => {
+            Some(format!("Without time stamps the sample rate is the stated one. {SCALES}"))
+        }
+        PartNote::NoTimeStamps { sample_rate_hz: of, stated_hz, .. } => {
+            (!(of.low..=of.high).contains(stated_hz)).then(|| sentence(note))
+        }
+        PartNote::NotSought
+        | PartNote::Minority(_)
+        | PartNote::LengthAlone { .. }
+        | PartNote::Contradicted { .. }
+        | PartNote::NotInAll { .. } => None,
+    };
+    notes.iter().filter_map(of).collect()
 }
 
 fn names(channels: &[&str]) -> String {

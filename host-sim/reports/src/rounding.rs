@@ -72,7 +72,7 @@ pub fn estimate(value: f64, low: f64, high: f64) -> String {
     if !(low.is_finite() && high.is_finite()) || high <= low {
         return plain(value, 3);
     }
-    if is_upper_bound(value, low, high) {
+    if is_upper_bound(value, low) {
         return format!("< {}", significant(high, 2));
     }
     let (below, above) = (value - low, high - value);
@@ -82,15 +82,16 @@ pub fn estimate(value: f64, low: f64, high: f64) -> String {
         let decimals = decimals(half);
         return format!("{} ± {}", fixed(at_place(value, half), decimals), fixed(at_place(half, half), decimals));
     }
-    if low <= 0.0 {
-        return format!("{} (< {})", significant(value, 2), significant(high, 2));
-    }
-    format!("{} ({} … {})", significant(value, 2), significant(low, 2), significant(high, 2))
+    // As many digits as keep the three numbers apart.
+    let written = |digits| [value, low, high].map(|of| significant(of, digits));
+    let [value, low, high] =
+        (2..6).map(written).find(|[value, low, high]| value != low && value != high).unwrap_or_else(|| written(2));
+    format!("{value} ({low} … {high})")
 }
 
 /// Whether only the upper bound of an estimate is known.
-fn is_upper_bound(value: f64, low: f64, high: f64) -> bool {
-    low <= 0.0 && (0.0..=high / 1e3).contains(&value)
+pub(crate) fn is_upper_bound(value: f64, low: f64) -> bool {
+    low <= 0.0 && value >= 0.0
 }
 
 /// `value` with so many significant digits, without an exponent.
@@ -110,6 +111,12 @@ pub fn significant(value: f64, digits: i32) -> String {
         return scaled;
     };
     fixed(value, usize::try_from(digits - 1 - exponent).unwrap_or(0))
+}
+
+/// The same with its sign: `+2.1`, `−3.6`.
+#[must_use]
+pub fn signed(value: f64, digits: i32) -> String {
+    format!("{}{}", if value < 0.0 { "−" } else { "+" }, significant(value.abs(), digits))
 }
 
 /// The same without zeros at the end: `100`, `8`, `91.4`.
@@ -213,7 +220,7 @@ pub fn bounded_quantity(parameter: &Parameter) -> String {
 #[must_use]
 pub fn parameter_magnitude(parameter: &Parameter) -> f64 {
     let &Parameter { value, low, high, .. } = parameter;
-    if is_upper_bound(value, low, high) { high } else { value }
+    if is_upper_bound(value, low) { high } else { value }
 }
 
 /// One unit, with its prefix, for all the numbers of a row or a column.
@@ -244,7 +251,8 @@ impl Scale {
     pub fn estimate(&self, &Parameter { value, low, high, .. }: &Parameter) -> String {
         let scaled = |of: f64| of / self.factor;
         if value < 0.0 {
-            format!("−{}", estimate(scaled(-value), scaled(-high), scaled(-low)))
+            let sign = if high < 0.0 { "−" } else { "" };
+            format!("{sign}{}", estimate(scaled(-value), scaled(-high), scaled(-low)))
         } else {
             estimate(scaled(value), scaled(low), scaled(high))
         }
@@ -292,7 +300,9 @@ mod tests {
             (240.0, 60.0, 420.0, "240 (60 … 420)"),
             (0.0, 0.0, 187.0, "< 190"),
             (863.2, 820.0, 906.0, "860 ± 40"),
-            (12.0, 0.0, 31.0, "12 (< 31)"),
+            (12.0, 0.0, 31.0, "< 31"),
+            (232.0, 231.0, 238.0, "232 (231 … 238)"),
+            (12.02, 12.01, 12.4, "12.02 (12.01 … 12.40)"),
             (f64::NAN, 0.0, 1.0, NONE),
         ] {
             assert_eq!(estimate(value, low, high), text, "{value} ({low} … {high})");

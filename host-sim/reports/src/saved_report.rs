@@ -28,6 +28,9 @@ pub struct SavedChannel {
     /// The model that was fitted to the whole record.
     #[serde(rename = "final")]
     pub refitted: SavedModel,
+    /// Deviance a point of the model of the first half on the second, 1 for a true model; absent where the record is too short.
+    #[serde(default, rename = "after", deserialize_with = "unseen_error")]
+    pub unseen_error: Option<f64>,
     /// Typical noise by the data sheet of the sensor; absent where that is not known.
     pub data_sheet: Option<DataSheetReport>,
 }
@@ -105,6 +108,19 @@ pub enum SavedReportError {
 /// JSON has no infinity: the report writes `null`.
 fn unbounded<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
+}
+
+/// The deviance of a model of the JSON on unseen data.
+fn unseen_error<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
+    #[derive(Deserialize)]
+    struct Error {
+        deviance_per_point: Option<f64>,
+    }
+    #[derive(Deserialize)]
+    struct Model {
+        unseen: Error,
+    }
+    Ok(Option::<Model>::deserialize(deserializer)?.and_then(|model| model.unseen.deviance_per_point))
 }
 
 impl SavedReport {
@@ -186,6 +202,7 @@ impl From<&ChannelReport> for SavedChannel {
                 terms: channel.refitted.terms.iter().map(term).collect(),
                 adev: channel.refitted.adev.clone(),
             },
+            unseen_error: channel.after.unseen.deviance_per_point,
             data_sheet: channel.figure_data.data_sheet.clone(),
         }
     }

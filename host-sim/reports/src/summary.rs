@@ -2,22 +2,24 @@
 //! the coefficients in the units of their users, what the data contradicts, and what to do next.
 
 use crate::coefficients;
-use crate::finding_text::{FindingText, channel_list, describe, signed_percent, unexplained_place};
+use crate::finding_text::{FindingText, channel_list, departure, describe};
 use crate::formatting::{count, enumerated, words};
 use crate::part_note;
-use crate::rounding::{column_prefix, estimate, plain, quantity, significant, span, unit};
+use crate::rounding::{
+    column_prefix, estimate, is_upper_bound, parameter_magnitude, plain, quantity, significant, span, unit,
+};
 use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::distributions::quantile;
-use noise_analysis::effects::Effect;
+use noise_analysis::effects::{Effect, Unexplained};
 use noise_analysis::nonstationarity::FittedPart;
 use noise_analysis::report::DataSheetReport;
 use noise_analysis::report::assessment::Innovations;
-use noise_analysis::report::{ChannelReport, ModelErrorReport, Parameter, Report};
+use noise_analysis::report::{ChannelReport, Finding, ModelErrorReport, Parameter, PartNote, Report};
 use noise_analysis::units::conversions;
 
 /// Deviance a point on the unseen half above which a model is marked: a true model scores about 1, and what changes from one
 /// half to the other leaves up to 3.
-const HIGH_DEVIANCE: f64 = 3.0;
+pub(crate) const HIGH_DEVIANCE: f64 = 3.0;
 /// Most records with true models of which the same sentence says that the data contradicts the model of some channel.
 const CHANCE: f64 = 0.01;
 /// Variance of what the fit to another half does not know of an octave, over that of the octave in the unseen half: it has as many
@@ -38,6 +40,8 @@ const LETTERS: [(&str, &str); 3] = [("angle_random_walk", "N"), ("bias_instabili
 pub struct CoefficientTable {
     /// `gyro` or `accel`.
     pub title: &'static str,
+    /// What N, B and K are called in this group.
+    pub names: [&'static str; 3],
     /// Units of N, B and K, prefixes included.
     pub units: [String; 3],
     /// One row a channel, then that of the data sheet, if it is known.
@@ -62,10 +66,22 @@ pub struct CoefficientTableRow {
 /// Symbol of a unit, the unit that `conversions` knows, and the factor from that to the symbol's.
 type UnitOfColumn = (&'static str, &'static str, f64);
 
-/// Groups of inertial channels: title, prefix of their names, and the units of N, B and K.
-const GROUPS: [(&str, &str, [UnitOfColumn; 3]); 2] = [
-    ("gyro", "gyro_", [("°/√h", "deg/sqrt(h)", 1.0), ("°/h", "deg/h", 1.0), ("°/h/√h", "deg/h/sqrt(h)", 1.0)]),
-    ("accel", "accl_", [("g/√Hz", "ug/sqrt(Hz)", 1e-6), ("g", "ug", 1e-6), ("g/√h", "ug/sqrt(h)", 1e-6)]),
+/// A group of inertial channels: title, prefix of their names, names and units of N, B and K.
+type Group = (&'static str, &'static str, [&'static str; 3], [UnitOfColumn; 3]);
+
+const GROUPS: [Group; 2] = [
+    (
+        "gyro",
+        "gyro_",
+        ["angle random walk", "bias instability", "rate random walk"],
+        [("°/√h", "deg/sqrt(h)", 1.0), ("°/h", "deg/h", 1.0), ("°/h/√h", "deg/h/sqrt(h)", 1.0)],
+    ),
+    (
+        "accel",
+        "accl_",
+        ["velocity random walk", "bias instability", "accel. random walk"],
+        [("g/√Hz", "ug/sqrt(Hz)", 1e-6), ("g", "ug", 1e-6), ("g/√h", "ug/sqrt(h)", 1e-6)],
+    ),
 ];
 
 /// N, B and K of a channel in its unit and seconds, and what is said of its model.
@@ -115,7 +131,7 @@ fn tables_of(
     sample_rate_hz: f64,
     sheet: impl Fn(&str) -> Option<[Option<f64>; 3]>,
 ) -> Vec<CoefficientTable> {
-    let table = |(title, prefix, units): &(&'static str, &str, [UnitOfColumn; 3])| {
+    let table = |(title, prefix, names, units): &Group| {
         let channels: Vec<&ChannelCoefficients> =
             all.iter().filter(|channel| channel.name.starts_with(prefix)).collect();
         let first = channels.first()?;
@@ -126,7 +142,7 @@ fn tables_of(
         let factors: [f64; 3] = std::array::from_fn(factor);
         let prefixes: [(&str, f64); 3] = std::array::from_fn(|index| {
             let shown = channels.iter().filter_map(|channel| channel.coefficients[index].as_ref());
-            column_prefix(shown.map(|n| factors[index] * if n.value > 0.0 { n.value } else { n.high }))
+            column_prefix(shown.map(|n| factors[index] * parameter_magnitude(n)))
         });
         let scale = |index: usize| factors[index] / prefixes[index].1;
         let mut rows: Vec<CoefficientTableRow> = channels
@@ -148,13 +164,19 @@ fn tables_of(
             label: "sheet".to_owned(),
             channel: String::new(),
             coefficients: std::array::from_fn(|index| {
-                sheet[index].map_or_else(|| "–".to_owned(), |value| significant(value * scale(index), 2))
+                let number = |value: f64| significant(value * scale(index), 2);
+                match sheet[index] {
+                    Some(value) if index == 1 => {
+                        format!("{} = {}/{MINIMUM_OVER_B}", number(value), number(value * MINIMUM_OVER_B))
+                    }
+                    value => value.map_or_else(|| "–".to_owned(), number),
+                }
             }),
             error: String::new(),
             is_high: false,
         }));
         let units = std::array::from_fn(|index| format!("{}{}", prefixes[index].0, units[index].0));
-        Some(CoefficientTable { title, units, rows })
+        Some(CoefficientTable { title, names: *names, units, rows })
     };
     GROUPS.iter().filter_map(table).collect()
 }
@@ -210,25 +232,38 @@ pub(crate) fn inertial(report: &Report) -> impl Iterator<Item = &ChannelReport> 
     report.channels.iter().filter(|channel| ["gyro_", "accl_"].iter().any(|prefix| channel.name.starts_with(prefix)))
 }
 
+/// Name of the part; of one without a profile what it is.
+#[must_use]
+pub fn part_name(report: &Report) -> &str {
+    if ["", "generic"].contains(&report.part.name.as_str()) { "Inertial sensor" } else { &report.part.name }
+}
+
 /// Part, number of samples, length and rate.
 #[must_use]
 pub fn headline(report: &Report, source: Option<&str>) -> Vec<String> {
-    let part = if report.part.name.is_empty() { "Inertial sensor" } else { &report.part.name };
     let length = span(report_length_s(report));
     let rate = plain(report.sample_rate_hz, 4);
     let samples = format!("{} samples", count(report.samples));
     let record = format!("{length} at {rate} Hz");
-    [Some(part), source, Some(samples.as_str()), Some(record.as_str())]
+    [Some(part_name(report)), source, Some(samples.as_str()), Some(record.as_str())]
         .into_iter()
         .flatten()
         .map(str::to_owned)
         .collect()
 }
 
+/// Cause of a sample that was read twice: it has the time of the one before.
+const REPEATED: &str = "repeated";
+
+/// Sample periods of the record with its gaps.
+fn periods(report: &Report) -> u64 {
+    let missing = report.dropped.iter().filter(|(cause, _)| *cause != REPEATED);
+    missing.fold(report.samples, |sum, (_, &of)| sum.saturating_add(of))
+}
+
 /// Length of the record with its gaps, s.
 fn report_length_s(report: &Report) -> f64 {
-    let lost = report.dropped.values().fold(0, |sum: u64, &of| sum.saturating_add(of));
-    let length = report.samples.saturating_add(lost) as f64 / report.sample_rate_hz;
+    let length = periods(report) as f64 / report.sample_rate_hz;
     if length.is_finite() { length } else { 0.0 }
 }
 
@@ -239,49 +274,65 @@ const QUICK: &str = "Quick report, of the curves alone: spectra, spikes, steps, 
 /// What is said where nothing was found.
 #[must_use]
 pub fn nothing_found(report: &Report) -> &'static str {
-    if report.quick {
+    if is_short(report) {
+        "Nothing: a record as short as this one shows strong effects only."
+    } else if report.quick {
         "Nothing in the curves: N, B and K describe those of every channel."
     } else {
         "Nothing: N, B and K describe every channel."
     }
 }
 
-/// The record in sentences: rest, losses, length.
+/// The record in sentences: rest, losses, length, and the errors without spikes and knocks.
 #[must_use]
 pub fn record_sentences(report: &Report) -> Vec<String> {
+    sentences(report, Vec::new()).into_iter().chain(without_events(report)).collect()
+}
+
+/// The record in sentences, with those of the part's `notes`, the most important first.
+fn sentences(report: &Report, notes: Vec<String>) -> Vec<String> {
     let mut sentences = vec![rest(report), losses(report)];
     sentences.extend(report.quick.then(|| QUICK.to_owned()));
     sentences.extend(length_advice(report));
+    sentences.extend(notes);
     sentences.extend(recent_fit(report));
-    sentences.extend(without_events(report));
     sentences.retain(|sentence| !sentence.is_empty());
     sentences
+}
+
+/// Samples from which on neighbours that are correlated by 0.15 or more are so by five standard errors.
+const SAMPLES_FOR_FILTER: u64 = 1000;
+
+/// The part's notes, without that of no filter where none could have shown or where one was found in some channels.
+fn told_notes(report: &Report) -> Vec<PartNote> {
+    let is_filter = |finding: &Finding| matches!(finding.effect, Effect::OutputFilter(_) | Effect::FirstOrderFilter(_));
+    let is_sought = report.samples >= SAMPLES_FOR_FILTER && !report.findings.iter().any(is_filter);
+    let is_told = |note: &&PartNote| is_sought || !matches!(note, PartNote::NotCorrelated { .. });
+    report.part.notes.iter().filter(is_told).cloned().collect()
 }
 
 /// What the record does not tell of the part's clock and filter, and why.
 #[must_use]
 pub fn part_notes(report: &Report) -> Vec<String> {
-    report.part.notes.iter().map(part_note::sentence).collect()
+    told_notes(report).iter().map(part_note::sentence).collect()
 }
 
-/// The record in sentences, with those of the part's notes that a short report has.
+/// The record in sentences for the screen: with the part's notes that it has room for, without the errors without spikes and knocks.
 #[must_use]
 pub fn record_sentences_in_short(report: &Report) -> Vec<String> {
-    let mut sentences = record_sentences(report);
-    sentences.extend(part_note::in_short(&report.part.notes));
-    sentences
+    sentences(report, part_note::in_short(&told_notes(report)))
 }
 
-/// Where and by how much the data departs from every model, in one text; `None` where it does not. Channels that depart at the same
-/// place, to the same side, are told together.
+/// Where and by how much the data departs from every model, one text each. Channels that depart at the same place, to the same side,
+/// are told together.
 #[must_use]
-pub fn unexplained(report: &Report) -> Option<String> {
-    struct Departure {
-        place: String,
+pub fn unexplained(report: &Report) -> Vec<String> {
+    struct Departure<'a> {
+        of: &'a Unexplained,
         channels: Vec<String>,
         excesses: Vec<f64>,
     }
-    let mut departures: Vec<Departure> = Vec::new();
+    let mut departures: Vec<Departure<'_>> = Vec::new();
     // Each channel has its own excess at the place of the finding.
     let in_channels = |number: usize| {
         let effects = report.channels.iter().flat_map(|channel| &channel.effects);
@@ -293,137 +344,184 @@ pub fn unexplained(report: &Report) -> Option<String> {
     };
     for (number, finding) in report.findings.iter().enumerate() {
         let Effect::Unexplained(of) = &finding.effect else { continue };
-        let (place, excess) = (unexplained_place(of), of.excess_percent.map(|of| of.value));
+        let excess = of.excess_percent.map(|of| of.value);
         let excesses = in_channels(number).chain(excess);
-        let is_same_side = |of: &Departure| match (of.excesses.first(), excess) {
+        let is_same_side = |of: &Departure<'_>| match (of.excesses.first(), excess) {
             (Some(first), Some(excess)) => first.signum() == excess.signum(),
             (first, excess) => first.is_none() && excess.is_none(),
         };
-        let of_other_channels = |of: &Departure| finding.channels.iter().all(|name| !of.channels.contains(name));
-        let known = departures.iter_mut().find(|of| of.place == place && is_same_side(of) && of_other_channels(of));
+        let is_same_place = |known: &Departure<'_>| departure(known.of, &[]) == departure(of, &[]);
+        let of_other_channels = |of: &Departure<'_>| finding.channels.iter().all(|name| !of.channels.contains(name));
+        let known = departures.iter_mut().find(|of| is_same_place(of) && is_same_side(of) && of_other_channels(of));
         match known {
             Some(departure) => {
                 departure.channels.extend(finding.channels.iter().cloned());
                 departure.excesses.extend(excesses);
             }
-            None => {
-                departures.push(Departure { place, channels: finding.channels.clone(), excesses: excesses.collect() })
-            }
+            None => departures.push(Departure { of, channels: finding.channels.clone(), excesses: excesses.collect() }),
         }
     }
-    let mut text = String::new();
-    let mut before = None;
-    for Departure { place, channels, excesses } in &departures {
-        let told = match excesses.as_slice() {
-            [] => format!("what is measured {place}"),
-            excesses => format!("{} {place}", signed_percent(excesses)),
-        };
-        if before == Some(channels) {
-            text += &format!(", {told}");
-        } else {
-            let separator = if text.is_empty() { "" } else { "; " };
-            text += &format!("{separator}{}: {told}", channel_list(channels));
-        }
-        before = Some(channels);
-    }
-    (!text.is_empty()).then_some(text)
+    let told = |of: &Departure<'_>| format!("{}: {}", channel_list(&of.channels), departure(of.of, &of.excesses));
+    departures.iter().map(told).collect()
 }
 
+/// Whether the platform was at rest; with a knock or a motion it was not throughout.
 fn rest(report: &Report) -> String {
     let length = report_length_s(report);
     let still = |channel: &ChannelReport| channel.at_rest.iter().map(|of| of.to_s - of.from_s).sum::<f64>();
     let least = inertial(report).filter(|channel| !channel.at_rest.is_empty()).map(still).fold(f64::INFINITY, f64::min);
-    match least {
-        _ if !least.is_finite() => String::new(),
-        least if least >= THROUGHOUT * length => "At rest throughout.".to_owned(),
-        least => {
-            let stretches = inertial(report).flat_map(|channel| &channel.at_rest);
-            let longest = stretches.max_by(|a, b| (a.to_s - a.from_s).total_cmp(&(b.to_s - b.from_s)));
-            let longest = longest.map_or_else(String::new, |of| {
-                // In whole seconds, none of which is moved.
-                let (from, to) = (of.from_s.ceil(), of.to_s.floor());
-                format!(", the longest time from {from} s to {to} s: --from {from} --to {to}")
-            });
-            format!("It moved: at rest for {} of {}{longest}.", span(least), span(length))
-        }
+    if !least.is_finite() {
+        return String::new();
+    }
+    let found = |is_one: fn(&Effect) -> bool| report.findings.iter().filter(|of| is_one(&of.effect)).count();
+    let knocks = found(|effect| matches!(effect, Effect::NoisyInterval(_)));
+    let has_moved = found(|effect| matches!(effect, Effect::MotionInterval(_))) > 0;
+    if has_moved || least < THROUGHOUT * length {
+        let stretches = inertial(report).flat_map(|channel| &channel.at_rest);
+        let longest = stretches.max_by(|a, b| (a.to_s - a.from_s).total_cmp(&(b.to_s - b.from_s)));
+        let longest = longest.map_or_else(String::new, |of| {
+            // In whole seconds, none of which is moved.
+            let (from, to) = (of.from_s.ceil(), of.to_s.floor());
+            format!("; for the longest time at rest, add --from {from} --to {to}")
+        });
+        return format!("It moved for {}{longest}.", span((length - least).max(0.0)));
+    }
+    match knocks {
+        0 => "At rest throughout.".to_owned(),
+        1 => "At rest but for a knock.".to_owned(),
+        knocks => format!("At rest but for {knocks} knocks."),
     }
 }
 
 fn losses(report: &Report) -> String {
     let lost = report.dropped.get("gap").copied().unwrap_or(0);
+    let percent = significant(100.0 * lost as f64 / periods(report).max(1) as f64, 2);
+    if lost > 0 && report.dropped.get(REPEATED) == Some(&lost) {
+        // As many times without a value as values that were read twice.
+        return format!("{} samples ({percent} %) are missing: the one before was read again instead.", count(lost));
+    }
     let refused: Vec<String> = report
         .dropped
         .iter()
         .filter(|(cause, samples)| cause.as_str() != "gap" && **samples > 0)
         .map(|(cause, samples)| format!("{} {}", count(*samples), words(cause)))
         .collect();
-    let all = report.samples.saturating_add(report.dropped.values().sum());
-    let lost = match lost {
-        0 => "No sample lost".to_owned(),
-        lost => {
-            format!("{} samples lost ({} %)", count(lost), significant(100.0 * lost as f64 / all.max(1) as f64, 2))
-        }
-    };
+    let lost =
+        if lost == 0 { "No sample lost".to_owned() } else { format!("{} samples lost ({percent} %)", count(lost)) };
     if refused.is_empty() { format!("{lost}.") } else { format!("{lost}, refused: {}.", refused.join(", ")) }
 }
 
-/// Which coefficients the record gives to ±20 %, how much longer it should be for the others, and which do not show. Nothing without
-/// an inertial channel that says it.
+/// Largest relative half-width of an interval that is told as ±20 %.
+const KNOWN: f64 = 0.205;
+/// Largest time to record on, in lengths of the record, that its model can foretell.
+const FARTHEST: f64 = 10.0;
+
+/// What a record tells of a coefficient of a channel.
+enum Knowledge {
+    /// Its interval is within ±20 %.
+    Known,
+    /// It is wider; the time that the record should be longer by the information in it, s, which may be infinite.
+    Wide(f64),
+    /// There is only an upper limit.
+    Bounded,
+}
+
+/// Farther end of the interval from the value, relative to it.
+fn relative_error(of: &Parameter) -> f64 {
+    (of.high - of.value).max(of.value - of.low) / of.value
+}
+
+/// What the record tells of the coefficient `kind`, with the names of the channels that have it.
+fn knowledge(report: &Report, kind: &str) -> Vec<(String, Knowledge)> {
+    let of = |channel: &ChannelReport| {
+        let value = coefficient(channel, kind)?;
+        let record = channel.assessment.record.iter().find(|record| record.kind == kind);
+        let known = match record {
+            _ if is_upper_bound(value.value, value.low) => Knowledge::Bounded,
+            _ if relative_error(&value) <= KNOWN => Knowledge::Known,
+            Some(record) => Knowledge::Wide(record.more_hours.map_or(f64::INFINITY, |hours| 3600.0 * hours)),
+            None => Knowledge::Wide(0.0),
+        };
+        Some((channel.name.clone(), known))
+    };
+    inertial(report).filter(|channel| !channel.assessment.record.is_empty()).filter_map(of).collect()
+}
+
+/// Length of a record, s, below which one without B and K is called too short for them. From longer ones of a good part they are absent.
+const SHORT_S: f64 = 600.0;
+
+/// Whether a record is too short for a noise model: of B and K no channel shows more than an upper limit.
+fn is_short(report: &Report) -> bool {
+    let shows = |channel: &ChannelReport| {
+        let of =
+            |(kind, _): &(&str, &str)| coefficient(channel, kind).is_some_and(|of| !is_upper_bound(of.value, of.low));
+        LETTERS[1..].iter().any(of)
+    };
+    report_length_s(report) < SHORT_S && inertial(report).next().is_some() && !inertial(report).any(shows)
+}
+
+/// What a record is good for that is too short for a noise model.
+fn use_of_short_record(report: &Report) -> String {
+    let length = span(report_length_s(report));
+    let is_known = |(_, n): &(String, Parameter)| !is_upper_bound(n.value, n.low) && relative_error(n).is_finite();
+    let all = inertial(report).filter_map(|channel| Some((channel.name.clone(), coefficient(channel, LETTERS[0].0)?)));
+    let (known, bounded): (Vec<_>, Vec<_>) = all.partition(is_known);
+    if known.is_empty() {
+        return format!("{length}: too short for N, B, K and a filter.");
+    }
+    let percent = 100.0 * known.iter().map(|(_, n)| relative_error(n)).fold(0.0, f64::max);
+    let names: Vec<String> = bounded.into_iter().map(|(name, _)| name).collect();
+    let except = if names.is_empty() { String::new() } else { format!(" except in {}", channel_list(&names)) };
+    let rough = if percent < 5.0 { "" } else { "a rough " };
+    format!(
+        "{length}: good for {rough}N (±{} %){except} and for strong lines; not for B, K or a filter.",
+        significant(percent, 1)
+    )
+}
+
+/// Which coefficients the record gives to ±20 %, how much longer it should be for the others, and of which it gives a limit only.
+/// Nothing without an inertial channel that says it.
 fn length_advice(report: &Report) -> Vec<String> {
-    let (mut known, mut longer, mut nowhere, mut somewhere) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    if is_short(report) {
+        return vec![use_of_short_record(report)];
+    }
+    let (mut known, mut except, mut longer, mut bounded) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (kind, letter) in LETTERS {
-        let said: Vec<(&str, Option<f64>)> = inertial(report)
-            .filter_map(|channel| {
-                let record = channel.assessment.record.iter().find(|record| record.kind == kind)?;
-                Some((channel.name.as_str(), record.more_hours))
-            })
-            .collect();
-        let hidden: Vec<String> =
-            said.iter().filter(|(_, hours)| hours.is_none()).map(|(name, _)| (*name).to_owned()).collect();
-        let most = said.iter().filter_map(|(_, hours)| *hours).fold(0.0, f64::max);
-        if said.is_empty() {
-            continue;
-        } else if hidden.len() == said.len() {
-            nowhere.push(letter.to_owned());
-            continue;
-        } else if most > 0.0 {
-            longer.push((letter, hours(most)));
-        } else if hidden.is_empty() {
-            known.push(letter.to_owned());
+        let all = knowledge(report, kind);
+        let named = |is_one: &dyn Fn(&Knowledge) -> bool| -> Vec<String> {
+            all.iter().filter(|(_, of)| is_one(of)).map(|(name, _)| name.clone()).collect()
+        };
+        let unknown = named(&|of| !matches!(of, Knowledge::Known));
+        let limited = named(&|of| matches!(of, Knowledge::Bounded));
+        let seconds = |(_, of): &(String, Knowledge)| if let Knowledge::Wide(seconds) = of { *seconds } else { 0.0 };
+        let most = all.iter().map(seconds).fold(0.0, f64::max);
+        match unknown.len() {
+            _ if all.is_empty() => continue,
+            0 => known.push(letter.to_owned()),
+            some if some == limited.len() && some == all.len() => bounded.push(letter.to_owned()),
+            some if 2 * some <= all.len() => {
+                except.push(format!("{letter} is known to ±20 % except in {}.", channel_list(&unknown)));
+            }
+            _ if !limited.is_empty() => bounded.push(format!("{letter} in {}", channel_list(&limited))),
+            _ => {}
         }
-        if !hidden.is_empty() {
-            somewhere.push(format!("{letter} does not show in {}", channel_list(&hidden)));
+        if most > FARTHEST * report_length_s(report) {
+            longer.push(format!("{letter} needs a much longer record"));
+        } else if most > 0.0 {
+            longer.push(format!("{letter} needs {} more", hours(most / 3600.0)));
         }
     }
-    // Of the three, N is known first.
-    let too_short = known.is_empty() && longer.first().is_some_and(|(letter, _)| *letter == LETTERS[0].1);
-    let longer: Vec<String> = match longer.as_slice() {
-        [] => Vec::new(),
-        [(letter, first), rest @ ..] => {
-            let first = format!("{letter} takes {first} more");
-            std::iter::once(first).chain(rest.iter().map(|(letter, hours)| format!("{letter} {hours} more"))).collect()
-        }
-    };
-    let are = |letters: &[String], one: &str, several: &str| {
-        if letters.len() == 1 { one.to_owned() } else { several.to_owned() }
-    };
-    [
-        (!known.is_empty()).then(|| format!("{} {} known to ±20 %.", enumerated(&known), are(&known, "is", "are"))),
-        too_short.then(|| "Too short for ±20 % of any coefficient.".to_owned()),
-        (!longer.is_empty()).then(|| format!("For ±20 %, {}.", enumerated(&longer))),
-        (!nowhere.is_empty()).then(|| {
-            format!(
-                "{} {} not show: the record bounds {} from above.",
-                enumerated(&nowhere),
-                are(&nowhere, "does", "do"),
-                are(&nowhere, "it", "them")
-            )
-        }),
-        (!somewhere.is_empty()).then(|| format!("{}.", enumerated(&somewhere))),
-    ]
-    .into_iter()
-    .flatten()
-    .collect()
+    let are = if known.len() == 1 { "is" } else { "are" };
+    [(!known.is_empty()).then(|| format!("{} {are} known to ±20 %.", enumerated(&known)))]
+        .into_iter()
+        .flatten()
+        .chain(except)
+        .chain((!longer.is_empty()).then(|| format!("For ±20 %, {}.", enumerated(&longer))))
+        .chain(
+            (!bounded.is_empty())
+                .then(|| format!("The record gives only an upper limit for {}.", enumerated(&bounded))),
+        )
+        .collect()
 }
 
 /// Which models of the first half are those of its later quarter; `None` where none is.
@@ -432,13 +530,14 @@ fn recent_fit(report: &Report) -> Option<String> {
         inertial(report).filter(|channel| is_fitted_to_later_quarter(channel)).map(|of| of.name.clone()).collect();
     (!recent.is_empty()).then(|| {
         format!(
-            "The noise changes: the error of {} is that of a fit to the later quarter of the first half.",
-            channel_list(&recent)
+            "The noise changed during the record; {} {} therefore predicted from the quarter before the test half.",
+            channel_list(&recent),
+            if recent.len() == 1 { "is" } else { "are" }
         )
     })
 }
 
-/// What the errors mean where there are spikes or knocks, and what they are without them; `None` where there are none.
+/// What the errors are without spikes and knocks; `None` where there are none.
 fn without_events(report: &Report) -> Option<String> {
     let excluding = inertial(report).filter_map(|channel| {
         let [before, after] = [&channel.before, &channel.after].map(|model| model.unseen_excluding.as_ref());
@@ -446,13 +545,7 @@ fn without_events(report: &Report) -> Option<String> {
         Some(format!("{} {change}", channel_list(std::slice::from_ref(&channel.name))))
     });
     let excluding: Vec<String> = excluding.collect();
-    (!excluding.is_empty()).then(|| {
-        format!(
-            "The errors are on the data as recorded; the models after foretell its spikes and knocks at the rate of the first half. \
-             Without them: {}.",
-            excluding.join(", ")
-        )
-    })
+    (!excluding.is_empty()).then(|| format!("Without spikes and knocks the errors are: {}.", excluding.join(", ")))
 }
 
 /// Whether the model `after` of a channel is fitted to the later quarter of the first half instead of to all of it.
@@ -498,50 +591,51 @@ pub fn conditions(report: &Report) -> Vec<String> {
     .collect()
 }
 
-/// N of the magnetometers, and those whose noise is not that of N, B and K: a bound on N by a model that fails says nothing.
+/// N of the magnetometers, and those without one: a bound on N by a model that fails says nothing.
 fn magnetometers(report: &Report) -> Vec<String> {
     let all = report.channels.iter().filter(|channel| channel.name.starts_with("magn_"));
-    let (failed, described): (Vec<_>, Vec<_>) = all.partition(|channel| is_high(channel));
-    let noise: Vec<(String, Parameter)> =
-        described.iter().filter_map(|of| Some((of.name.clone(), coefficient(of, LETTERS[0].0)?))).collect();
+    let (failed, described): (Vec<&ChannelReport>, Vec<&ChannelReport>) = all.partition(|channel| is_high(channel));
+    let label = |channels: &[&ChannelReport]| match channels.len() {
+        3 => "magnetometers".to_owned(),
+        _ => channel_list(&channels.iter().map(|channel| channel.name.clone()).collect::<Vec<_>>()),
+    };
+    let noise: Vec<Parameter> = described.iter().filter_map(|of| coefficient(of, LETTERS[0].0)).collect();
     let mut told = Vec::new();
-    if let Some((_, first)) = noise.first() {
-        let sizes = noise.iter().map(|(_, n)| if n.value > 0.0 { n.value } else { n.high });
-        let (prefix, factor) = column_prefix(sizes);
+    if let Some(first) = noise.first() {
+        let (prefix, factor) = column_prefix(noise.iter().map(parameter_magnitude));
         let each: Vec<String> =
-            noise.iter().map(|(_, n)| estimate(n.value / factor, n.low / factor, n.high / factor)).collect();
-        let names: Vec<String> = noise.iter().map(|(name, _)| name.clone()).collect();
-        told.push(format!("{} N {} {prefix}{}", channel_list(&names), each.join(", "), unit(&first.unit)));
+            noise.iter().map(|n| estimate(n.value / factor, n.low / factor, n.high / factor)).collect();
+        told.push(format!("{}: N {} {prefix}{}", label(&described), each.join(", "), unit(&first.unit)));
     }
     if !failed.is_empty() {
-        let names: Vec<String> = failed.iter().map(|channel| channel.name.clone()).collect();
-        told.push(format!("the noise of {} is not that of N, B and K", channel_list(&names)));
+        told.push(format!("{}: no noise model holds", label(&failed)));
     }
     told
 }
 
-/// The findings in words, in the order of the report, those that nothing explains apart.
+/// The findings that an effect explains, in the order of the report: a cause in a gyro or an accelerometer comes before one in a channel
+/// that is a condition.
+fn named_findings(report: &Report) -> Vec<&Finding> {
+    let named = report.findings.iter().filter(|finding| !matches!(finding.effect, Effect::Unexplained(_)));
+    let of_inertial =
+        |finding: &&Finding| finding.channels.iter().any(|name| name.starts_with("gyro_") || name.starts_with("accl_"));
+    let (inertial, others): (Vec<_>, Vec<_>) = named.partition(of_inertial);
+    inertial.into_iter().chain(others).collect()
+}
+
+/// The findings in words, in the order in which they are numbered, those that nothing explains apart.
 #[must_use]
 pub fn findings(report: &Report) -> (Vec<FindingText>, Vec<FindingText>) {
-    let (unexplained, named): (Vec<_>, Vec<_>) =
-        report.findings.iter().partition(|finding| matches!(finding.effect, Effect::Unexplained(_)));
-    let of_inertial = |finding: &&&noise_analysis::report::Finding| {
-        finding.channels.iter().any(|name| name.starts_with("gyro_") || name.starts_with("accl_"))
+    let text = |finding: &Finding| {
+        let mut text = describe(finding);
+        if let Some(related) = related_line(report, finding) {
+            text.weight =
+                [text.weight, related].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ");
+        }
+        text
     };
-    // A cause in a gyro or an accelerometer comes before one in a channel that is a condition.
-    let (inertial, others): (Vec<_>, Vec<_>) = named.into_iter().partition(|finding| of_inertial(&finding));
-    let words = |list: Vec<&noise_analysis::report::Finding>| {
-        let text = |finding| {
-            let mut text = describe(finding);
-            if let Some(related) = related_line(report, finding) {
-                text.weight =
-                    [text.weight, related].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ");
-            }
-            text
-        };
-        list.into_iter().map(text).collect::<Vec<_>>()
-    };
-    (words(inertial.into_iter().chain(others).collect()), words(unexplained))
+    let unexplained = report.findings.iter().filter(|finding| matches!(finding.effect, Effect::Unexplained(_)));
+    (named_findings(report).into_iter().map(text).collect(), unexplained.map(text).collect())
 }
 
 /// Largest difference of the frequency of a finding from that of a line that is followed, as a part of it: half of the distance to
@@ -549,7 +643,7 @@ pub fn findings(report: &Report) -> (Vec<FindingText>, Vec<FindingText>) {
 const SAME_LINE: f64 = 0.1;
 
 /// The line of another channel that moves with the line of a finding; `None` where none does.
-fn related_line(report: &Report, finding: &noise_analysis::report::Finding) -> Option<String> {
+fn related_line(report: &Report, finding: &Finding) -> Option<String> {
     let frequency = finding.effect.frequency_hz()?.value;
     let of = finding.channels.iter().find_map(|name| {
         let channel = report.channels.iter().find(|channel| channel.name == *name)?;
@@ -586,13 +680,13 @@ pub fn contradictions(report: &Report) -> Vec<String> {
     for (channel, error, sigma) in &far {
         let (Some(tau), Some(ratio)) = (error.worst_tau_s, error.worst_ratio) else { continue };
         let change = 100.0 * (1.0 / ratio - 1.0);
-        let amount = if change.abs() < 100.0 {
-            format!("{}{} %", if change < 0.0 { "−" } else { "+" }, significant(change.abs(), 2))
+        let size = if change.abs() < 100.0 {
+            format!("{} % {}", significant(change.abs(), 2), if change < 0.0 { "below" } else { "above" })
         } else {
             format!("{} times", significant(1.0 / ratio, 2))
         };
         told.push(format!(
-            "{} at τ = {}: measured {amount} against the model ({} σ)",
+            "{} at τ = {}: σ is {size} the model ({} standard errors)",
             channel_list(std::slice::from_ref(&channel.name)),
             span(tau),
             significant(sigma.abs(), 2)
@@ -606,12 +700,13 @@ pub fn contradictions(report: &Report) -> Vec<String> {
         };
         if spectrum.low > fit.high || spectrum.high < fit.low {
             let percent = 100.0 * (spectrum.value / fit.value - 1.0);
-            told.push(format!(
-                "{}: the spectrum gives N {} % {} than the fit",
-                channel_list(std::slice::from_ref(&channel.name)),
-                significant(percent.abs(), 2),
-                if percent < 0.0 { "lower" } else { "higher" }
-            ));
+            let name = channel_list(std::slice::from_ref(&channel.name));
+            told.push(if is_upper_bound(fit.value, fit.low) {
+                format!("{name}: the spectrum gives N, the fit only an upper limit below it")
+            } else {
+                let side = if percent < 0.0 { "lower" } else { "higher" };
+                format!("{name}: the spectrum gives N {} % {side} than the fit", significant(percent.abs(), 2))
+            });
         }
     }
     let is_unsure = |of: &Innovations| channels * of.chance_of_small_claim() < CHANCE;
@@ -628,57 +723,86 @@ pub fn contradictions(report: &Report) -> Vec<String> {
     told
 }
 
-/// What to do next, the most useful first.
-#[must_use]
-pub fn next_steps(report: &Report) -> Vec<String> {
-    let mut weighed: Vec<(f64, FindingText)> = report
-        .findings
-        .iter()
-        .filter(|finding| !matches!(finding.effect, Effect::Unexplained(_)))
-        .map(|finding| (finding.share_percent.values().copied().fold(0.0, f64::max), describe(finding)))
+/// The advice of the findings with the largest shares of the variance, the most useful first, each with the numbers of its findings.
+fn advice(report: &Report) -> Vec<(String, Vec<usize>)> {
+    let mut weighed: Vec<(f64, usize, &Finding)> = named_findings(report)
+        .into_iter()
+        .enumerate()
+        .map(|(index, finding)| (finding.share_percent.values().copied().fold(0.0, f64::max), index + 1, finding))
         .collect();
     weighed.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut steps: Vec<String> = Vec::new();
-    for step in weighed.into_iter().filter_map(|(_, text)| text.step) {
-        if !steps.contains(&step) {
-            steps.push(step);
+    let mut steps: Vec<(String, Vec<usize>)> = Vec::new();
+    for (number, step) in weighed.into_iter().filter_map(|(_, number, of)| Some((number, describe(of).step?))) {
+        match steps.iter_mut().find(|(known, _)| *known == step) {
+            Some((_, numbers)) => numbers.push(number),
+            None => steps.push((step, vec![number])),
         }
     }
-    steps.truncate(3);
-    if inertial(report).next().is_some() {
-        steps.push("For a filter: add --export kalibr=imu.yaml.".to_owned());
-    }
-    steps.extend(failures(report));
+    steps.truncate(MOST_STEPS);
     steps
 }
 
-/// The models that fail on the unseen half. Where the first half's own curve fails too, no model of the first half can hold: the
-/// noise has changed. Where it does not, the model lacks something.
-fn failures(report: &Report) -> Vec<String> {
+/// Pieces of advice of the findings.
+const MOST_STEPS: usize = 3;
+
+/// What to do next, the most useful first; a warning begins with `!`.
+#[must_use]
+pub fn next_steps(report: &Report) -> Vec<String> {
+    let steps = advice(report).into_iter().map(|(step, _)| step);
+    steps.chain(for_filter(report)).chain(failures(report)).collect()
+}
+
+/// The advice of the findings with the numbers of these: `Look for a fan, a motor or the mains (2, 5).`
+pub(crate) fn numbered_steps(report: &Report) -> Vec<String> {
+    let numbered = |(step, mut numbers): (String, Vec<usize>)| {
+        numbers.sort_unstable();
+        let numbers: Vec<String> = numbers.iter().map(usize::to_string).collect();
+        format!("{} ({}).", step.trim_end_matches('.'), numbers.join(", "))
+    };
+    advice(report).into_iter().map(numbered).collect()
+}
+
+/// How to come to the model of a filter; `None` without a gyro or an accelerometer.
+pub(crate) fn for_filter(report: &Report) -> Option<String> {
+    inertial(report).next()?;
+    let how = if is_short(report) { "record at rest for hours" } else { "add --export kalibr=imu.yaml" };
+    Some(format!("For a filter: {how}."))
+}
+
+/// The models that fail on the unseen half. Where the error without spikes and knocks does not, these make it. Where the first half's own
+/// curve fails too, no model of the first half can hold: the noise has changed. Where it does not, the model lacks something.
+pub(crate) fn failures(report: &Report) -> Vec<String> {
     let own_curve = |channel: &ChannelReport| channel.first_half_curve.deviance_per_point;
-    let failed = || inertial(report).filter(|channel| is_high(channel));
-    let told = |wanted: &dyn Fn(Option<f64>) -> bool, reason: &dyn Fn(&str) -> String| {
-        let channels: Vec<&ChannelReport> = failed().filter(|channel| wanted(own_curve(channel))).collect();
+    let excluding = |channel: &ChannelReport| channel.after.unseen_excluding.as_ref()?.deviance_per_point;
+    let failed: Vec<&ChannelReport> = inertial(report).filter(|channel| is_high(channel)).collect();
+    let told = |value: &dyn Fn(&ChannelReport) -> Option<f64>,
+                is_one: &dyn Fn(&ChannelReport) -> bool,
+                reason: &dyn Fn(&str) -> String| {
+        let channels: Vec<&ChannelReport> = failed.iter().copied().filter(|channel| is_one(channel)).collect();
         let names: Vec<String> = channels.iter().map(|channel| channel.name.clone()).collect();
         let (low, high) = channels
             .iter()
-            .filter_map(|channel| own_curve(channel))
+            .filter_map(|channel| value(channel))
             .fold((f64::INFINITY, 0.0_f64), |(low, high), of| (low.min(of), high.max(of)));
-        let (low, high) = (significant(low, 2), significant(high, 2));
+        let (low, high) = (deviance_per_point(low), deviance_per_point(high));
         let range = if low == high { low } else { format!("{low} … {high}") };
         (!names.is_empty())
-            .then(|| format!("! The model of {} fails on the unseen half{}", channel_list(&names), reason(&range)))
+            .then(|| format!("! {}: the model fails on the unseen half{}", channel_list(&names), reason(&range)))
     };
-    let changed = |own: Option<f64>| own.is_some_and(|own| own > HIGH_DEVIANCE);
-    let lacking = |own: Option<f64>| own.is_some_and(|own| own <= HIGH_DEVIANCE);
+    let is_by_events = |channel: &ChannelReport| excluding(channel).is_some_and(|of| of <= HIGH_DEVIANCE);
+    let changed = |channel: &ChannelReport| own_curve(channel).is_some_and(|of| of > HIGH_DEVIANCE);
+    let lacking = |channel: &ChannelReport| own_curve(channel).is_some_and(|of| of <= HIGH_DEVIANCE);
     [
-        told(&changed, &|range| format!(", and so does the first half's own curve ({range}): the noise has changed.")),
-        told(&lacking, &|range| {
-            format!(
-                ": its error is far above 1. The first half's own curve holds ({range}): the model lacks something."
-            )
+        told(&excluding, &is_by_events, &|range| {
+            format!(" by spikes and knocks alone: without them its error is {range}.")
         }),
-        told(&|own| own.is_none(), &|_| ": its error is far above 1.".to_owned()),
+        told(&own_curve, &|channel| !is_by_events(channel) && changed(channel), &|range| {
+            format!(", and the two halves differ as much ({range}): the noise has changed.")
+        }),
+        told(&own_curve, &|channel| !is_by_events(channel) && lacking(channel), &|range| {
+            format!(", though the two halves agree ({range}): the model lacks something.")
+        }),
+        told(&own_curve, &|channel| !is_by_events(channel) && own_curve(channel).is_none(), &|_| ".".to_owned()),
     ]
     .into_iter()
     .flatten()

@@ -19,8 +19,11 @@ const TEXT: usize = 110;
 /// Columns of the channel's label, and of the error.
 const LABEL: usize = 7;
 const ERROR: usize = 15;
-/// Contradictions that are told where there is room.
-const MOST_CONTRADICTED: usize = 3;
+/// Lines of the sentences about the record, and of the conditions, at most.
+const SENTENCES: usize = 5;
+const CONDITIONS: usize = 2;
+/// Lines at most of each of the blocks below the findings: with room for all of these, and where they need the room.
+const BELOW: [usize; 2] = [4, 2];
 /// Columns of the channels of a finding, with its number.
 const CHANNELS: usize = 17;
 
@@ -59,32 +62,22 @@ impl Screen<'_> {
         self.columns().min(TEXT)
     }
 
-    /// The lines, with styles.
+    /// The lines, with styles. The findings come first: the blocks below them are cut where one of them would have no line.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let mut lines = self.above();
         let (found, _) = summary::findings(self.report);
-        let rest = summary::unexplained(self.report)
-            .map_or_else(Vec::new, |text| self.block("Not explained", &format!("{text}."), WARNING));
         lines.push(String::new());
         lines.push(styled(HEADING, "What was found"));
-        if found.is_empty() && rest.is_empty() {
+        if found.is_empty() && summary::unexplained(self.report).is_empty() {
             lines.push(format!(" {}", summary::nothing_found(self.report)));
         }
-        // Of what is contradicted, fewer lines where the findings need the room.
-        let room = |contradicted: usize| {
-            let below = self.below(contradicted);
-            let room = MOST_LINES.saturating_sub(lines.len() + rest.len() + below.len());
-            (below, room)
-        };
-        let (mut below, mut left) = room(MOST_CONTRADICTED);
-        if left < found.len() {
-            (below, left) = room(1);
-        }
-        lines.extend(self.findings(&found, left));
-        lines.extend(rest);
+        let [roomy, tight] = BELOW.map(|most| self.below(most));
+        let room = |below: &[String]| MOST_LINES.saturating_sub(lines.len() + below.len());
+        let below = if found.len() <= room(&roomy) { roomy } else { tight };
+        let room = room(&below);
+        lines.extend(self.findings(&found, room));
         lines.extend(below);
-        lines.truncate(MOST_LINES);
         lines
     }
 
@@ -111,16 +104,20 @@ impl Screen<'_> {
 
     /// One finding in one line: number, channels, physics without intervals.
     fn brief_finding(&self, number: usize, finding: &FindingText) -> String {
-        let label = shortened(&format!("{number:>2}  {}", finding.channels), CHANNELS - 1);
-        format!("{}{}", padded(&label, CHANNELS), shortened(&finding.brief, self.columns() - CHANNELS))
+        let FindingText { channels, channel_count, brief, .. } = finding;
+        let label = format!("{number:>2}  {channels}");
+        let is_long = label.chars().count() >= CHANNELS;
+        let label = if is_long { format!("{number:>2}  {channel_count} channels") } else { label };
+        let text = broken(brief, self.columns() - CHANNELS - 2, "");
+        let more = if text.len() > 1 { " …" } else { "" };
+        format!("{}{}{more}", padded(&label, CHANNELS), text[0])
     }
 
     /// Verdict, coefficients and conditions.
     fn above(&self) -> Vec<String> {
         let report = self.report;
-        let mut lines =
-            vec![styled(HEADING, &shortened(&summary::headline(report, self.source).join("   "), self.columns()))];
-        lines.extend(broken(&summary::record_sentences_in_short(report).join(" "), self.text_columns(), ""));
+        let mut lines = vec![styled(HEADING, &self.headline())];
+        lines.extend(capped(&summary::record_sentences_in_short(report), " ", "", (self.text_columns(), SENTENCES)));
         let tables = summary::coefficient_tables(report);
         if !tables.is_empty() {
             lines.push(String::new());
@@ -130,7 +127,7 @@ impl Screen<'_> {
         }
         let conditions = summary::conditions(report);
         if !conditions.is_empty() {
-            lines.extend(self.block("Conditions", &format!("{}.", conditions.join("; ")), FAINT));
+            lines.extend(self.block("Conditions", &self.list(&conditions, CONDITIONS), FAINT));
         }
         lines
     }
@@ -159,22 +156,24 @@ impl Screen<'_> {
             .collect()
     }
 
-    /// What the data contradicts, `most` of it, and what to do.
+    /// What no effect explains, what the data contradicts and what to do, each in `most` lines, but for the warnings.
     fn below(&self, most: usize) -> Vec<String> {
         let mut lines = Vec::new();
-        let contradictions = summary::contradictions(self.report);
-        if !contradictions.is_empty() {
-            let mut told = contradictions.iter().take(most).cloned().collect::<Vec<_>>().join("; ");
-            if contradictions.len() > most {
-                told += &format!("; {} more: --full", contradictions.len() - most);
+        for (heading, items) in [
+            ("Not explained", summary::unexplained(self.report)),
+            ("Contradicted", summary::contradictions(self.report)),
+        ] {
+            if !items.is_empty() {
+                lines.extend(self.block(heading, &self.list(&items, most), WARNING));
             }
-            lines.extend(self.block("Contradicted", &format!("{told}."), WARNING));
         }
+        let export = summary::for_filter(self.report).unwrap_or_default();
+        let columns = self.text_columns() - CHANNELS;
+        let steps = capped(&summary::numbered_steps(self.report), " ", &export, (columns, most));
         // A warning has a line of its own.
-        let (warnings, steps): (Vec<String>, Vec<String>) =
-            summary::next_steps(self.report).into_iter().partition(|step| step.starts_with('!'));
-        let paragraphs = [steps.join(" ")].into_iter().filter(|steps| !steps.is_empty()).chain(warnings);
-        for (index, paragraph) in paragraphs.enumerate() {
+        let paragraphs = [steps].into_iter().filter(|steps| !steps.is_empty());
+        let warnings = summary::failures(self.report).into_iter().map(|warning| broken(&warning, columns, ""));
+        for (index, paragraph) in paragraphs.chain(warnings).enumerate() {
             if index == 0 {
                 lines.push(String::new());
             }
@@ -183,46 +182,74 @@ impl Screen<'_> {
         lines
     }
 
-    /// A heading with text beside it.
-    fn block(&self, heading: &str, text: &str, style: Style) -> Vec<String> {
-        let texts = broken(text, self.text_columns() - CHANNELS, "");
-        let labelled = |(index, text): (usize, String)| {
+    /// `items` in lines beside a heading, `most` of them.
+    fn list(&self, items: &[String], most: usize) -> Vec<String> {
+        capped(items, "; ", "", (self.text_columns() - CHANNELS, most))
+    }
+
+    /// Part, recording, samples and length; of a long name its end.
+    fn headline(&self) -> String {
+        let name = self.source.unwrap_or_default();
+        let others = summary::headline(self.report, Some("")).join("   ").chars().count();
+        let room = self.columns().saturating_sub(others);
+        let too_long = name.chars().count().saturating_sub(room);
+        let end: String = name.chars().skip(too_long + 1).collect();
+        let name = if too_long > 0 { format!("…{end}") } else { name.to_owned() };
+        summary::headline(self.report, self.source.map(|_| name.as_str())).join("   ")
+    }
+
+    /// A heading with lines beside it.
+    fn block(&self, heading: &str, texts: &[String], style: Style) -> Vec<String> {
+        let labelled = |(index, text): (usize, &String)| {
             let label = if index == 0 { heading } else { "" };
             let space = " ".repeat(CHANNELS.saturating_sub(label.chars().count()));
             let label = if label.is_empty() { String::new() } else { styled(style, label) };
             format!("{label}{space}{text}")
         };
-        texts.into_iter().enumerate().map(labelled).collect()
+        texts.iter().enumerate().map(labelled).collect()
     }
 }
 
-/// The rows of a table in `columns` columns, each with its style; `is_first` has the names of the coefficients above it.
+/// `items` with `separator` between them and `last` after them, in lines of so many columns: as many items as so many lines have room
+/// for, one at least, and how many more there are.
+fn capped(items: &[String], separator: &str, last: &str, (columns, most): (usize, usize)) -> Vec<String> {
+    let lines = |shown: usize| {
+        let more = items.len() - shown;
+        let more = if more > 0 { format!("{more} more: --full") } else { String::new() };
+        let told = items[..shown].iter().map(String::as_str).chain([more.as_str()]).filter(|part| !part.is_empty());
+        let mut text = told.collect::<Vec<_>>().join(separator);
+        if !text.is_empty() && !text.ends_with('.') {
+            text.push('.');
+        }
+        broken(format!("{text} {last}").trim(), columns, "")
+    };
+    let shown = (1..=items.len()).rev().find(|&shown| lines(shown).len() <= most);
+    let mut lines = lines(shown.unwrap_or(items.len().min(1)));
+    lines.retain(|line| !line.is_empty());
+    lines
+}
+
+/// The rows of a table in `columns` columns, each with its style; `is_first` has the heading of the errors.
 pub(crate) fn table_lines(table: &CoefficientTable, is_first: bool, columns: usize) -> Vec<(Style, String)> {
     let width = ((columns - LABEL - ERROR) / 3).min(26);
-    let row = |cells: [&str; 5]| {
-        let [label, n, b, k, error] = cells;
-        let line = format!(
-            "{}{}{}{}{}",
-            padded(&format!(" {label}"), LABEL),
-            padded(n, width),
-            padded(b, width),
-            padded(k, width),
-            left_padded(error, ERROR)
-        );
-        line.trim_end().to_owned()
+    let widths = [width + 2, width - 2, width];
+    let total = LABEL + 3 * width + ERROR;
+    let row = |label: &str, cells: [&str; 3], error: &str| {
+        let mut line = padded(&format!(" {label}"), LABEL);
+        for (cell, width) in cells.into_iter().zip(widths) {
+            line += &padded(cell, width);
+        }
+        let line = line.trim_end();
+        format!("{line}{}", left_padded(error, total.saturating_sub(line.chars().count()))).trim_end().to_owned()
     };
-    let mut lines = Vec::new();
-    if is_first {
-        let names = ["angle random walk", "bias instability", "rate random walk"];
-        lines.push((HEADING, row([table.title, names[0], names[1], names[2], "error on  "])));
-    }
-    let [n, b, k] = &table.units;
-    let units = if is_first { row(["", n, b, k, "unseen half  "]) } else { row([table.title, n, b, k, ""]) };
-    lines.push(if is_first { (FAINT, units) } else { (HEADING, units) });
+    let errors = if is_first { ["model error  ", "(1 = true)  "] } else { [""; 2] };
+    let mut lines = vec![
+        (HEADING, row(table.title, table.names, errors[0])),
+        (FAINT, row("", table.units.each_ref().map(String::as_str), errors[1])),
+    ];
     for of in &table.rows {
-        let [n, b, k] = &of.coefficients;
         let error = if of.is_high { format!("{} !", of.error) } else { format!("{}  ", of.error) };
-        let line = row([&of.label, n, b, k, &error]);
+        let line = row(&of.label, of.coefficients.each_ref().map(String::as_str), &format!(" {error}"));
         lines.push(match (of.is_high, of.channel.is_empty()) {
             (true, _) => (WARNING, line),
             (_, true) => (FAINT, line),
@@ -244,12 +271,4 @@ fn padded(text: &str, width: usize) -> String {
 
 fn left_padded(text: &str, width: usize) -> String {
     format!("{}{text}", " ".repeat(width.saturating_sub(text.chars().count())))
-}
-
-/// `text` cut off behind `width` columns.
-fn shortened(text: &str, width: usize) -> String {
-    if text.chars().count() <= width {
-        return text.to_owned();
-    }
-    text.chars().take(width.saturating_sub(1)).chain(['…']).collect()
 }

@@ -139,7 +139,7 @@ impl LatestMessages {
             tables: tables_of_channels(&self.coefficients(), rate_hz(hello)),
             curves: self.channels.values().filter_map(|report| curve(report, hello)).collect(),
             findings: findings.iter().map(finding_text::describe).collect(),
-            unexplained: None,
+            unexplained: Vec::new(),
             advice,
             health: self
                 .health

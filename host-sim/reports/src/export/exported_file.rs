@@ -60,9 +60,9 @@ pub(super) fn rate(hz: f64) -> f64 {
     format!("{hz:.8e}").parse().unwrap_or(hz)
 }
 
-/// Seven digits and an exponent with its sign: YAML 1.1, which Python's parser reads, takes `4.7e1` for a text.
+/// Four digits, which is finer than any interval, and an exponent with its sign: YAML 1.1, which Python's parser reads, takes `4.7e1` for a text.
 pub(super) fn scientific(value: f64) -> String {
-    let text = format!("{value:.6e}");
+    let text = format!("{value:.3e}");
     if text.contains("e-") { text } else { text.replace('e', "e+") }
 }
 

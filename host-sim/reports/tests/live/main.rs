@@ -18,14 +18,14 @@ fn view() -> LiveView {
     let mut view = LiveView::from_report(&fixture::report(), Some("run1.csv.gz"), health, status);
     view.findings = vec![FindingText {
         channels: "gyro z".to_owned(),
+        channel_count: 1,
         physics: String::new(),
         brief: "A vibration or hum at 21 Hz: a narrow line of 0.27 °/s.".to_owned(),
         advice: String::new(),
         step: None,
         weight: String::new(),
-        is_weighed: false,
     }];
-    view.unexplained = Some("gyro z: +9.0 % at averaging times around 80 s".to_owned());
+    view.unexplained = vec!["gyro z: σ is 9.0 % above the model at averaging times around 80 s".to_owned()];
     view
 }
 

@@ -177,7 +177,8 @@ fn every_report_tells_how_the_noise_changes() {
         found[0].weight
     );
     assert!(!found[1].weight.contains("accel x"), "{}", found[1].weight);
-    let quarter = "The noise changes: the error of gyro z is that of a fit to the later quarter of the first half.";
+    let quarter =
+        "The noise changed during the record; gyro z is therefore predicted from the quarter before the test half.";
     assert!(summary::record_sentences(&report).contains(&quarter.to_owned()));
 
     let mut out = Vec::new();
