@@ -5,7 +5,9 @@
 mod examples;
 
 use crate::formatting::{capital, moment, words};
-use crate::rounding::{bounded_quantity, plain, quantity, rounded_quantity, signed, significant, span};
+use crate::rounding::{
+    bounded_quantity, plain, quantity, quantity_digits, rounded_quantity, signed, significant, span,
+};
 use noise_analysis::bounds::{BoundedEstimate, ChannelEstimate};
 use noise_analysis::effects::{Effect, Observation, Unexplained, UnexplainedPlace};
 use noise_analysis::report::{Finding, Parameter, Validation};
@@ -437,9 +439,9 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         Effect::ClockDeviation(of) => match of.change {
             None => (
                 format!(
-                    "The sample clock runs at {} instead of| the nominal| {} Hz| ({})|.",
+                    "The sample clock runs at {} instead of| the nominal| {}| ({})|.",
                     hertz(of.rate_hz),
-                    plain(of.nominal_hz, 5),
+                    quantity_digits(of.nominal_hz, "Hz", 4),
                     relative(of.rate_hz.value / of.nominal_hz - 1.0)
                 ),
                 Advice::new("Use this rate instead of the nominal one", "; every averaging time and N scale with it."),

@@ -82,11 +82,11 @@ pub fn interval(low: f64, high: f64) -> String {
     format!("{} … {}", number(low), number(high))
 }
 
-/// `text` with a capital at its beginning.
+/// `text` with a capital at its beginning; `σ` stays a small letter.
 #[must_use]
 pub fn capital(text: &str) -> String {
     let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+    letters.next().map_or_else(String::new, |first| [first.to_ascii_uppercase()].into_iter().chain(letters).collect())
 }
 
 /// `a`, `a and b`, `a, b and c`.

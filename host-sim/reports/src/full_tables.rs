@@ -75,6 +75,10 @@ fn verdict(report: &Report, out: &mut impl Write) -> io::Result<()> {
     for sentence in summary::record_sentences(report).into_iter().chain(notes) {
         paragraph(out, &sentence)?;
     }
+    let conditions = summary::conditions(report);
+    if !conditions.is_empty() {
+        paragraph(out, &format!("Conditions: {}.", conditions.join("; ")))?;
+    }
     let (found, _) = summary::findings(report);
     writeln!(out, "\nWhat was found")?;
     for (index, finding) in found.iter().enumerate() {

@@ -41,7 +41,7 @@ pub(crate) fn sentence(note: &PartNote) -> String {
             plain(*sample_rate_hz, 6)
         ),
         PartNote::NoTimeStamps { nominal_hz, sample_rate_hz, stated_hz } => format!(
-            "Without time stamps the sample rate is the stated {} Hz; by the filter and the part's nominal clock of {} Hz it \
+            "Without time stamps the sample rate is the stated {} Hz; by the part's nominal clock of {} Hz it \
              would be {} Hz. {SCALES}",
             plain(*stated_hz, 6),
             plain(*nominal_hz, 4),

@@ -82,11 +82,11 @@ pub fn estimate(value: f64, low: f64, high: f64) -> String {
         let decimals = decimals(half);
         return format!("{} ± {}", fixed(at_place(value, half), decimals), fixed(at_place(half, half), decimals));
     }
-    // As many digits as keep the three numbers apart.
+    // As many digits as keep the three numbers apart; an interval that six digits do not show is none.
     let written = |digits| [value, low, high].map(|of| significant(of, digits));
-    let [value, low, high] =
-        (2..6).map(written).find(|[value, low, high]| value != low && value != high).unwrap_or_else(|| written(2));
-    format!("{value} ({low} … {high})")
+    let apart = (2..6).map(written).find(|[value, low, high]| value != low && value != high);
+    let [value, low, high] = apart.unwrap_or_else(|| written(2));
+    if low == high { value } else { format!("{value} ({low} … {high})") }
 }
 
 /// Whether only the upper bound of an estimate is known.
@@ -303,6 +303,8 @@ mod tests {
             (12.0, 0.0, 31.0, "< 31"),
             (232.0, 231.0, 238.0, "232 (231 … 238)"),
             (12.02, 12.01, 12.4, "12.02 (12.01 … 12.40)"),
+            (4.4, 3.6, 4.4, "4.4 (3.6 … 4.4)"),
+            (12.0, 12.0, 12.000_1, "12"),
             (f64::NAN, 0.0, 1.0, NONE),
         ] {
             assert_eq!(estimate(value, low, high), text, "{value} ({low} … {high})");

@@ -450,14 +450,17 @@ fn knowledge(report: &Report, kind: &str) -> Vec<(String, Knowledge)> {
 /// Length of a record, s, below which one without B and K is called too short for them. From longer ones of a good part they are absent.
 const SHORT_S: f64 = 600.0;
 
-/// Whether a record is too short for a noise model: of B and K no channel shows more than an upper limit.
+/// Whether a record is too short for a noise model: of B and K most channels show no more than an upper limit.
 fn is_short(report: &Report) -> bool {
     let shows = |channel: &ChannelReport| {
         let of =
             |(kind, _): &(&str, &str)| coefficient(channel, kind).is_some_and(|of| !is_upper_bound(of.value, of.low));
         LETTERS[1..].iter().any(of)
     };
-    report_length_s(report) < SHORT_S && inertial(report).next().is_some() && !inertial(report).any(shows)
+    report_length_s(report) < SHORT_S && {
+        let (showing, all) = (inertial(report).filter(|channel| shows(channel)).count(), inertial(report).count());
+        all > 0 && 2 * showing < all
+    }
 }
 
 /// What a record is good for that is too short for a noise model.
@@ -485,7 +488,8 @@ fn length_advice(report: &Report) -> Vec<String> {
     if is_short(report) {
         return vec![use_of_short_record(report)];
     }
-    let (mut known, mut except, mut longer, mut bounded) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let (mut known, mut except, mut longer, mut much_longer) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let (mut bounded, mut in_some) = (Vec::new(), Vec::new());
     for (kind, letter) in LETTERS {
         let all = knowledge(report, kind);
         let named = |is_one: &dyn Fn(&Knowledge) -> bool| -> Vec<String> {
@@ -502,26 +506,30 @@ fn length_advice(report: &Report) -> Vec<String> {
             some if 2 * some <= all.len() => {
                 except.push(format!("{letter} is known to ±20 % except in {}.", channel_list(&unknown)));
             }
-            _ if !limited.is_empty() => bounded.push(format!("{letter} in {}", channel_list(&limited))),
+            _ if !limited.is_empty() => in_some.push(format!("for {letter} in {}", channel_list(&limited))),
             _ => {}
         }
         if most > FARTHEST * report_length_s(report) {
-            longer.push(format!("{letter} needs a much longer record"));
+            much_longer.push(letter.to_owned());
         } else if most > 0.0 {
             longer.push(format!("{letter} needs {} more", hours(most / 3600.0)));
         }
     }
-    let are = if known.len() == 1 { "is" } else { "are" };
-    [(!known.is_empty()).then(|| format!("{} {are} known to ±20 %.", enumerated(&known)))]
-        .into_iter()
-        .flatten()
-        .chain(except)
-        .chain((!longer.is_empty()).then(|| format!("For ±20 %, {}.", enumerated(&longer))))
-        .chain(
-            (!bounded.is_empty())
-                .then(|| format!("The record gives only an upper limit for {}.", enumerated(&bounded))),
-        )
-        .collect()
+    let verb =
+        |letters: &[String], one: &'static str, several: &'static str| if letters.len() == 1 { one } else { several };
+    if !much_longer.is_empty() {
+        let need = verb(&much_longer, "needs", "need");
+        longer.push(format!("{} {need} a much longer record", enumerated(&much_longer)));
+    }
+    if !bounded.is_empty() {
+        in_some.insert(0, format!("for {}", enumerated(&bounded)));
+    }
+    let known =
+        (!known.is_empty()).then(|| format!("{} {} known to ±20 %.", enumerated(&known), verb(&known, "is", "are")));
+    let longer = (!longer.is_empty()).then(|| format!("For ±20 %, {}.", enumerated(&longer)));
+    let limits =
+        (!in_some.is_empty()).then(|| format!("The record gives only an upper limit {}.", enumerated(&in_some)));
+    known.into_iter().chain(except).chain(longer).chain(limits).collect()
 }
 
 /// Which models of the first half are those of its later quarter; `None` where none is.

@@ -21,7 +21,7 @@ const LABEL: usize = 7;
 const ERROR: usize = 15;
 /// Lines of the sentences about the record, and of the conditions, at most.
 const SENTENCES: usize = 5;
-const CONDITIONS: usize = 2;
+const CONDITIONS: usize = 3;
 /// Lines at most of each of the blocks below the findings: with room for all of these, and where they need the room.
 const BELOW: [usize; 2] = [4, 2];
 /// Columns of the channels of a finding, with its number.
@@ -106,11 +106,17 @@ impl Screen<'_> {
     fn brief_finding(&self, number: usize, finding: &FindingText) -> String {
         let FindingText { channels, channel_count, brief, .. } = finding;
         let label = format!("{number:>2}  {channels}");
-        let is_long = label.chars().count() >= CHANNELS;
+        let length = label.chars().count();
+        // Out of line with the others where both fit.
+        let is_long = length >= CHANNELS && length + 1 + brief.chars().count() > self.columns();
         let label = if is_long { format!("{number:>2}  {channel_count} channels") } else { label };
-        let text = broken(brief, self.columns() - CHANNELS - 2, "");
-        let more = if text.len() > 1 { " …" } else { "" };
-        format!("{}{}{more}", padded(&label, CHANNELS), text[0])
+        let columns = self.columns() - CHANNELS;
+        let text = if brief.chars().count() <= columns {
+            brief.clone()
+        } else {
+            format!("{} …", broken(brief, columns - 2, "")[0])
+        };
+        format!("{}{text}", padded(&label, CHANNELS))
     }
 
     /// Verdict, coefficients and conditions.
@@ -232,8 +238,8 @@ fn capped(items: &[String], separator: &str, last: &str, (columns, most): (usize
 /// The rows of a table in `columns` columns, each with its style; `is_first` has the heading of the errors.
 pub(crate) fn table_lines(table: &CoefficientTable, is_first: bool, columns: usize) -> Vec<(Style, String)> {
     let width = ((columns - LABEL - ERROR) / 3).min(26);
-    let widths = [width + 2, width - 2, width];
-    let total = LABEL + 3 * width + ERROR;
+    let widths = [width + 2, width - 1, width];
+    let total = columns.min(LABEL + 3 * width + 1 + ERROR);
     let row = |label: &str, cells: [&str; 3], error: &str| {
         let mut line = padded(&format!(" {label}"), LABEL);
         for (cell, width) in cells.into_iter().zip(widths) {
@@ -249,7 +255,12 @@ pub(crate) fn table_lines(table: &CoefficientTable, is_first: bool, columns: usi
     ];
     for of in &table.rows {
         let error = if of.is_high { format!("{} !", of.error) } else { format!("{}  ", of.error) };
-        let line = row(&of.label, of.coefficients.each_ref().map(String::as_str), &format!(" {error}"));
+        let error = format!(" {error}");
+        let mut line = row(&of.label, of.coefficients.each_ref().map(String::as_str), &error);
+        if line.chars().count() > total {
+            // Of numbers as large as those of raw counts the values alone.
+            line = row(&of.label, of.coefficients.each_ref().map(|of| of.split(" (").next().unwrap_or(of)), &error);
+        }
         lines.push(match (of.is_high, of.channel.is_empty()) {
             (true, _) => (WARNING, line),
             (_, true) => (FAINT, line),

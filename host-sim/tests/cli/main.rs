@@ -18,6 +18,7 @@ mod outputs;
 mod program;
 mod quick_report;
 mod reading_limits;
+mod recorded_screens;
 mod report_output;
 mod serial_device;
 mod serial_faults;

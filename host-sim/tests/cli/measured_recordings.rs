@@ -4,6 +4,7 @@
 //! files in Python (periodograms, autocorrelations, regressions on averages), and the figures that `docs/recordings.md` quotes.
 //! The last are bounded from above by their scatter ([`largest`]); a better model fails no test.
 
+use crate::recorded_screens;
 use adis16405_driver::GyroRange;
 use noise_analysis::analysis::analyze;
 use noise_analysis::effects::{Effect, OutputFilter};
@@ -39,7 +40,9 @@ fn largest(quoted: f64) -> f64 {
 
 fn analyzed(test: &str, file: &str, rate: Option<f64>) -> Option<Report> {
     let recording = count_table::read(&system_tests::recording(test, file)?, GyroRange::Dps300).expect("a recording");
-    Some(analyze(&measurement(&recording, rate).expect("a time base")))
+    let report = analyze(&measurement(&recording, rate).expect("a time base"));
+    recorded_screens::check_report(file, &report);
+    Some(report)
 }
 
 fn of<'a>(report: &'a Report, channel: &str) -> &'a ChannelReport {
@@ -85,6 +88,7 @@ struct Run {
 
 fn check(test: &str, run: &Run) {
     let Some(report) = analyzed(test, run.file, Some(100.0)) else { return };
+    recorded_screens::check_clock(run.file, &report);
     let time_base = ["dropped_samples", "repeated_samples", "sample_clock"];
     assert!(report.findings.iter().all(|finding| !time_base.contains(&finding.effect.name())), "{:?}", report.findings);
     let inertial = INERTIAL.map(|channel| of(&report, channel));

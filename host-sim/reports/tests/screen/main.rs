@@ -281,7 +281,7 @@ fn what_the_record_does_not_tell_of_the_part_is_told_in_sentences() {
     noted.part.notes = every_note();
     let told = reports::summary::part_notes(&noted);
     let last = [
-        "Without time stamps the sample rate is the stated 100 Hz; by the filter and the part's nominal clock of 819.2 Hz it would be \
+        "Without time stamps the sample rate is the stated 100 Hz; by the part's nominal clock of 819.2 Hz it would be \
          90.80 ± 0.10 Hz. Every τ and N scale with it.",
         "The curves give the length of the filter, 1.77 samples, and not its taps. 8 taps are nearest to the nominal clock of 819.2 Hz; \
          4 or 16 taps at another clock have the same length.",
@@ -333,7 +333,7 @@ fn the_length_of_a_record_is_told_by_what_it_is_good_for() {
         (
             [[narrow, none, none], [narrow, none, wide]],
             [[Some(0.0), None, None], [Some(0.0), None, Some(2.0)]],
-            "N is known to ±20 %. For ±20 %, K needs 2.0 h more. The record gives only an upper limit for B and K in gyro x.",
+            "N is known to ±20 %. For ±20 %, K needs 2.0 h more. The record gives only an upper limit for B and for K in gyro x.",
         ),
         (
             [[narrow, wide, none]; 2],
