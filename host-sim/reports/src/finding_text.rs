@@ -250,10 +250,10 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         ),
         Effect::ShotNoise(of) => (
             format!(
-                "Disturbances of {} begin at once and decay with a time constant of {}, {}.",
+                "Shocks of {}, {} an hour|, each of which begins at once and decays with a time constant of {}|.",
                 size(of.size),
-                seconds(of.time_constant_s),
-                amount(&of.rate_per_hour.parameter("1/h"))
+                amount(&of.rate_per_hour.parameter("")),
+                seconds(of.time_constant_s)
             ),
             Advice::new(
                 "Look for what strikes the part or draws from its supply at random times",
