@@ -42,16 +42,16 @@ pub(super) fn coefficients_of_all(report: &Report) -> Markup {
     let groups = summary::coefficient_tables(report);
     let headings = [
         text("channel"),
-        numbers("angle random walk N"),
-        numbers("bias instability B"),
-        numbers("rate random walk K"),
+        numbers("N"),
+        numbers("B"),
+        numbers("K"),
         numbers("error on the unseen half"),
     ];
     let rows = html! {
         @for group in &groups {
             tr.group {
                 th scope="row" { (group.title) }
-                @for unit in &group.units { td.number { (unit) } }
+                @for (name, unit) in group.names.iter().zip(&group.units) { td.number { (name) ", " (unit) } }
                 td {}
             }
             @for row in &group.rows {
