@@ -2,7 +2,7 @@
 
 use super::exponential::Markov;
 use super::process::Process;
-use crate::math::{abs, cos, floor, ln, sin, sqrt};
+use crate::math::{abs, cos, expm1, floor, ln, sin, sqrt};
 use core::f64::consts::PI;
 
 /// One or two cascaded moving averages whose output is read at the same or at a lower rate. Two equal averages have a
@@ -107,8 +107,11 @@ impl MovingAverageFilter {
         if self.reach_of_differences(n) < WALKS * steps {
             return 2.0 / markov.time_constant * self.avar_of_walk(n, sample_period);
         }
+        // As the variance of the sum of samples of a process with this autocovariance has it.
+        let lost = -expm1(-1.0 / steps);
         let between = (1.0 - 1.0 / (self.decimation * self.decimation)) / (6.0 * steps);
-        self.avar_of_passed(n, steps, &|m| markov.sum_variance(m, sample_period) - between * m)
+        let (line, bend) = ((2.0 - lost) / lost - between, 2.0 * (1.0 - lost) / (lost * lost));
+        self.avar_of_passed(n, steps, &|m| line * m + bend * expm1(-m / steps))
     }
 
     /// The longest lag, in samples, between values on which a second difference of averages over `n` samples depends.

@@ -6,7 +6,7 @@ mod channel;
 mod evidence;
 mod plot;
 
-use crate::finding_text::channel_list;
+use crate::finding_text::channel_name;
 use crate::summary;
 use axis::{Axis, has_logarithm};
 use channel::{allan_deviation_plot, bias_plot, measured, spectrum_plot};
@@ -117,11 +117,6 @@ pub(crate) fn story(report: &Report) -> Option<Plot> {
         .max_by(|(_, a), (_, b)| (a[0] / a[1]).total_cmp(&(b[0] / b[1])))
         .or_else(|| errors.iter().max_by(|(_, a), (_, b)| a[0].total_cmp(&b[0])));
     shown.map(|&(channel, errors)| channel::story_plot(channel, errors))
-}
-
-/// The name of a channel as the sentences and the tables have it, such as `accel x`.
-pub(crate) fn channel_name(channel: &ChannelReport) -> String {
-    channel_list(std::slice::from_ref(&channel.name))
 }
 
 /// The gyros' curves, or the accelerometers' where there is no gyro, beside the data sheet's. `None` without either.

@@ -10,7 +10,7 @@ use crate::rounding::{
 };
 use noise_analysis::bounds::{BoundedEstimate, ChannelEstimate};
 use noise_analysis::effects::{Effect, Observation, Unexplained, UnexplainedPlace};
-use noise_analysis::report::{Finding, Parameter, Validation};
+use noise_analysis::report::{ChannelReport, Finding, Parameter, Validation};
 use std::f64::consts::SQRT_2;
 
 /// Frequency of a line below which nothing that turns or hums makes it, Hz.
@@ -515,6 +515,11 @@ fn relative(difference: f64) -> String {
     } else {
         format!("{} %", signed(100.0 * difference, 2))
     }
+}
+
+/// The name of a channel as the sentences and the tables have it, such as `accel x`.
+pub(crate) fn channel_name(channel: &ChannelReport) -> String {
+    channel_list(std::slice::from_ref(&channel.name))
 }
 
 /// The channels of a list in few words: `gyros` for all three, `accel x y` for two.

@@ -6,8 +6,8 @@ mod tables;
 use crate::coefficient_notes::coefficient_notes;
 use crate::evidence::{EvidenceText, NumberStyle};
 use crate::explanation;
-use crate::figure::{self, Plot, channel_name};
-use crate::finding_text::{FindingText, describe};
+use crate::figure::{self, Plot};
+use crate::finding_text::{FindingText, channel_name, describe};
 use crate::formatting::{
     capital, count, filter_consistency, interval, missing_samples, number, parameter_name, recording_advice, words,
     worst_deviations,

@@ -1,8 +1,8 @@
 //! The figures of one channel: Allan deviation with its terms and its residual, spectrum, bias over time.
 
 use super::axis::{Axis, has_logarithm};
-use super::channel_name;
 use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, frames, heights, places};
+use crate::finding_text::channel_name;
 use crate::formatting::{capital, words};
 use crate::rounding::{quantity, quantity_digits, span, unit};
 use crate::summary::deviance_per_point;

@@ -3,9 +3,8 @@
 
 use super::axis::Axis;
 use super::channel::{allan_deviation_plot, spectrum_plot, time_unit};
-use super::channel_name;
 use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, frames, heights, places};
-use crate::finding_text::channel_list;
+use crate::finding_text::{channel_list, channel_name};
 use crate::formatting::words;
 use crate::rounding::{quantity_digits, span, unit};
 use noise_analysis::effects::{
