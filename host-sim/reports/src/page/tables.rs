@@ -40,12 +40,18 @@ fn table(class: &str, headings: &[Heading], rows: &Markup) -> Markup {
 /// N, B and K of the gyros and accelerometers in the units of their users, the data sheet's, and the error before and after.
 pub(super) fn coefficients_of_all(report: &Report) -> Markup {
     let groups = summary::coefficient_tables(report);
-    let headings = [text("channel"), numbers("N"), numbers("B"), numbers("K"), numbers("error on the unseen half")];
+    let headings = [
+        text("channel"),
+        numbers("angle random walk N"),
+        numbers("bias instability B"),
+        numbers("rate random walk K"),
+        numbers("error on the unseen half"),
+    ];
     let rows = html! {
         @for group in &groups {
             tr.group {
                 th scope="row" { (group.title) }
-                @for (name, unit) in group.names.iter().zip(&group.units) { td.number { (name) br; (unit) } }
+                @for unit in &group.units { td.number { (unit) } }
                 td {}
             }
             @for row in &group.rows {
