@@ -329,7 +329,7 @@ fn a_chirp_is_not_a_resonance() {
 
 #[test]
 fn decaying_disturbances_are_shot_noise() {
-    // One in 20 s on average, of 30 mg, that decays with 1.5 s.
+    // One in 20 s on average, of 8 mg, that decays with 1.5 s: 14 standard deviations behind the matched filter, 8/5·√(150/2).
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let mut times = Vec::new();
     let mut time = 0.0;
@@ -338,7 +338,7 @@ fn decaying_disturbances_are_shot_noise() {
         times.push(time);
     }
     let disturbance = |time: f64| -> f64 {
-        times.iter().filter(|start| **start <= time).map(|start| 0.03 * (-(time - start) / 1.5).exp()).sum()
+        times.iter().filter(|start| **start <= time).map(|start| 0.008 * (-(time - start) / 1.5).exp()).sum()
     };
     let waveform = |name: &str, time: f64| if name == "accl_z" { disturbance(time) } else { 0.0 };
     let report = analyze(&recorded(600.0, 6, &waveform));
@@ -352,9 +352,9 @@ fn decaying_disturbances_are_shot_noise() {
     // The deviation is the root of λA²T/2.
     let truths = [
         (rate, 180.0),
-        (size, 0.03),
+        (size, 0.008),
         (shot_noise.time_constant_s, 1.5),
-        (deviation, 0.03 * (0.5f64 * 1.5 / 20.0).sqrt()),
+        (deviation, 0.008 * (0.5f64 * 1.5 / 20.0).sqrt()),
     ];
     for (of, truth) in truths {
         assert!((of.low..=of.high).contains(&truth), "{truth}: {of:?}");
