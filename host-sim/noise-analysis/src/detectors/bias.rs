@@ -16,7 +16,7 @@ use super::turn_on::Transient;
 use super::vibration_rectification::{Acceleration, Vibration};
 use crate::bounds::BoundedEstimate;
 use crate::distributions::NORMAL_975;
-use crate::effects::findings::{Detection, SIGNIFICANCE};
+use crate::effects::findings::{Detection, REFUTED, SIGNIFICANCE};
 use crate::effects::{LinearDrift, LinearDriftEvidence};
 use crate::samples::series::Series;
 use nalgebra::DVector;
@@ -239,10 +239,11 @@ fn best_candidate(
             let accepted = Accepted { candidate: Candidate::Squared, regressor, p_value };
             rivals.push((deviance + thermal_response::ADVANTAGE, accepted));
         }
-        // Where the bias follows a slow temperature behind a lag, it resembles the temperature itself.
-        let is_followed =
-            |(_, rival): &(f64, Accepted)| matches!(rival.candidate, Candidate::Regressor(of) if of == *index);
-        if rivals.iter().any(is_followed)
+        // Where the bias follows a slow temperature behind a lag, it resembles the temperature itself: not as much as it has to for its name.
+        let resembles = |(of, regressor): &(usize, DVector<f64>)| {
+            of == index && regression.estimate_below(REFUTED, regressor).is_some()
+        };
+        if regressors.iter().any(resembles)
             && let Some(lag) = course.likeliest_lag(blocks, &regression)
             && let smoothed = course.smoothed_regressor(lag.value, blocks)
             && let Some(without_lag) = regression.estimate(&smoothed)
@@ -255,7 +256,9 @@ fn best_candidate(
             } else {
                 (without_lag, Candidate::Regressor(*index), smoothed)
             };
-            rivals.push((deviance + thermal_response::ADVANTAGE, Accepted { candidate, regressor, p_value }));
+            if p_value < SIGNIFICANCE {
+                rivals.push((deviance + thermal_response::ADVANTAGE, Accepted { candidate, regressor, p_value }));
+            }
         }
     }
     let has_transient = accepted.iter().any(|accepted| matches!(accepted.candidate, Candidate::Transient(_)));
