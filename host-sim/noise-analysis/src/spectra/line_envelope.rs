@@ -3,10 +3,12 @@
 //! What a record holds beside the line, multiplied with the line's rotating phasor, is an in-phase part, by which the amplitude
 //! changes, and a quadrature, by which the phase does. In noise the ordinates of both are exponential variables. An
 //! amplitude that swells and fades has one in-phase ordinate that is the coherent sum of two sidebands, each of which may be too weak
-//! for a line of its own.
+//! for a line of its own. An amplitude or a phase that wanders, as that of an oscillator does, has ordinates that fall as 1/f² to those
+//! of the noise (D. B. Leeson, "A simple model of feedback oscillator noise spectrum", Proc. IEEE 54, 1966).
 
 use super::line_models::{Sine, for_each_phase};
 use super::periodogram::taper;
+use super::whittle::{Sign, SpectralBand, fit_mixture};
 use crate::bounds::MeasuredValue;
 use crate::distributions::NORMAL_975;
 use crate::samples::uniform_series::UniformSeries;
@@ -22,6 +24,10 @@ pub(super) const MOST_PERIODS: usize = 64;
 const FEWEST_PERIODS: usize = 3;
 /// The fastest change is slower than this part of the line itself: so near to the line its noise is as good as white.
 const OF_FREQUENCY: usize = 8;
+/// Distance in resolutions from a change, and from a multiple of it, within which an ordinate is no measure of what is beside them.
+const OF_MULTIPLE: f64 = 0.75;
+/// Most peaks of the envelope that are compared with what is beside them: that of the change is among the highest.
+const MOST_PEAKS: usize = 8;
 /// Ordinates to a resolution: between two of them a change loses at most 0.9 dB.
 const PADDING: usize = 2;
 /// Probability that the envelope of one sinusoid in noise has such an ordinate anywhere. It is tried for each of the few lines of a
@@ -73,65 +79,161 @@ impl Modulation {
     ) -> Option<Self> {
         let most = MOST_PERIODS.min((sine.frequency * rest.duration()) as usize / OF_FREQUENCY);
         let length = rest.values().len();
+        let envelope = Envelope::new(sine, rest);
+        // Each part has half the power of the noise on both sides of the line.
+        let unit = density * envelope.squares / (4.0 * rest.sample_period());
+        let periods = |ordinate: usize| ordinate as f64 / PADDING as f64;
+        let ordinates = PADDING * FEWEST_PERIODS..=PADDING * most;
+        let trials = 2.0 * ordinates.clone().count() as f64;
+        let is_seen = |ratio: f64| trials * (-ratio).exp() <= FALSE_ALARM;
+        let mut peaks: Vec<(f64, Part, f64)> = Vec::new();
+        for part in Part::BOTH {
+            let power = |ordinate: usize| envelope.power(part, periods(ordinate));
+            let powers: Vec<f64> = (0..=PADDING * most + 1).map(power).collect();
+            let is_peak = |&at: &usize| powers[at] >= powers[at - 1] && powers[at] >= powers[at + 1];
+            let seen = ordinates.clone().filter(is_peak).map(|at| (powers[at] / unit, part, periods(at)));
+            peaks.extend(seen.filter(|(ratio, ..)| is_seen(*ratio)));
+        }
+        peaks.sort_by(|one, other| other.0.total_cmp(&one.0));
+        peaks.truncate(MOST_PEAKS);
+        let over_level = |(_, part, at): (f64, Part, f64)| {
+            let at = envelope.vertex(part, at);
+            (over_wandering(&envelope, part, at, most, unit), part, at)
+        };
+        let (ratio, part, at) = peaks.into_iter().map(over_level).max_by(|one, other| one.0.total_cmp(&other.0))?;
+        let (power, of_other) = (envelope.power(part, at), envelope.power(part.other(), at));
+        let frequency = at / (length as f64 * rest.sample_period());
+        if !is_seen(ratio) || (has_line(frequency) && of_other > LARGEST_OTHER * power) {
+            return None;
+        }
+        let depth = 4.0 * power.sqrt() / (envelope.weight * sine.amplitude());
+        let relative = 1.0 / (2.0 * ratio).sqrt();
+        Some(Self {
+            frequency: MeasuredValue { value: frequency, error: 3f64.sqrt() / (PI * rest.duration()) * relative },
+            of_line: 1.0,
+            depth: MeasuredValue { value: depth, error: depth * relative },
+            of_phase: matches!(part, Part::Quadrature),
+            statistic: 2.0 * ratio,
+        })
+    }
+}
+
+/// The two parts of what changes a line.
+#[derive(Clone, Copy)]
+enum Part {
+    InPhase,
+    Quadrature,
+}
+
+impl Part {
+    const BOTH: [Self; 2] = [Self::InPhase, Self::Quadrature];
+
+    const fn other(self) -> Self {
+        match self {
+            Self::InPhase => Self::Quadrature,
+            Self::Quadrature => Self::InPhase,
+        }
+    }
+}
+
+/// The sums over blocks of a record, under its taper, times the phasor of a sine.
+#[derive(Clone)]
+struct Envelope {
+    blocks: Vec<Complex<f64>>,
+    /// Weights of the samples of each block, of all, and squares of all.
+    weights: Vec<f64>,
+    weight: f64,
+    squares: f64,
+    /// Turns from one block to the next one of a change of one period a record.
+    turns: f64,
+}
+
+impl Envelope {
+    fn new(sine: &Sine, rest: &UniformSeries) -> Self {
+        let length = rest.values().len();
         let size = (length / BLOCKS).max(1);
         let mut blocks = vec![Complex::<f64>::ZERO; length.div_ceil(size)];
-        let (mut weights, mut squares) = (0.0, 0.0);
+        let (mut weights, mut squares) = (vec![0.0; blocks.len()], 0.0);
         for_each_phase(rest, sine.frequency, |at, value, cosine, sine| {
             if value.is_finite() {
                 let weight = taper(at, length);
                 blocks[at / size] += weight * value * Complex::new(cosine, -sine);
-                (weights, squares) = (weights + weight, squares + weight * weight);
+                weights[at / size] += weight;
+                squares += weight * weight;
             }
         });
         let turned = Complex::cis(sine.phase());
         blocks.iter_mut().for_each(|block| *block *= turned);
-        let turns = |ordinate: f64| ordinate / (PADDING * length) as f64;
-        let sums = |ordinate: f64| {
-            // From the middle of a block to that of the next one. Over a thousand blocks the phasor loses ten bits.
-            let turn = Complex::cis(-TAU * turns(ordinate) * size as f64);
-            let mut phasor = Complex::cis(-TAU * turns(ordinate) * 0.5 * size as f64);
-            let (mut in_phase, mut quadrature) = (Complex::<f64>::ZERO, Complex::<f64>::ZERO);
-            for block in &blocks {
-                in_phase += phasor * block.re;
-                quadrature += phasor * block.im;
-                phasor *= turn;
-            }
-            (in_phase.norm_sqr(), quadrature.norm_sqr())
+        let weight = weights.iter().sum();
+        Self { blocks, weights, weight, squares, turns: size as f64 / length as f64 }
+    }
+
+    /// Phasors of a change of so many periods a record, in the middle of each block. Over a thousand blocks one loses ten bits.
+    fn phasors(&self, periods: f64) -> impl Iterator<Item = Complex<f64>> {
+        let turns = TAU * self.turns * periods;
+        std::iter::successors(Some(Complex::cis(0.5 * turns)), move |phasor| Some(phasor * Complex::cis(turns)))
+    }
+
+    /// The sum of a part, over the phasor of a change.
+    fn sum(&self, part: Part, periods: f64) -> Complex<f64> {
+        let of = |block: &Complex<f64>| match part {
+            Part::InPhase => block.re,
+            Part::Quadrature => block.im,
         };
-        let ordinates = PADDING * FEWEST_PERIODS..=PADDING * most;
-        let trials = 2.0 * ordinates.clone().count() as f64;
-        let candidates = ordinates.flat_map(|ordinate| {
-            let (in_phase, quadrature) = sums(ordinate as f64);
-            [(ordinate, false, in_phase, quadrature), (ordinate, true, quadrature, in_phase)]
-        });
-        let (ordinate, of_phase, power, other) = candidates.max_by(|a, b| a.2.total_cmp(&b.2))?;
-        // Each part has half the power of the noise on both sides of the line.
-        let ratio = 2.0 * power * 2.0 * rest.sample_period() / squares / density;
-        let frequency = turns(ordinate as f64) / rest.sample_period();
-        if trials * (-ratio).exp() > FALSE_ALARM || (has_line(frequency) && other > LARGEST_OTHER * power) {
-            return None;
-        }
-        let power = |ordinate: f64| if of_phase { sums(ordinate).1 } else { sums(ordinate).0 };
-        let to_vertex = |at: f64, step: f64| {
-            let [left, middle, right] = [at - step, at, at + step].map(power);
+        self.blocks.iter().zip(self.phasors(periods)).map(|(block, phasor)| phasor.conj() * of(block)).sum()
+    }
+
+    fn power(&self, part: Part, periods: f64) -> f64 {
+        self.sum(part, periods).norm_sqr()
+    }
+
+    /// The maximum of the power near so many `periods` a record.
+    fn vertex(&self, part: Part, periods: f64) -> f64 {
+        AROUND.into_iter().fold(periods, |at, step| {
+            let [left, middle, right] = [at - step, at, at + step].map(|at| self.power(part, at));
             let curvature = 2.0 * middle - left - right;
             if curvature > 0.0 { at + (0.5 * step * (right - left) / curvature).clamp(-step, step) } else { at }
-        };
-        let ordinate = AROUND.into_iter().fold(ordinate as f64, to_vertex);
-        let depth = 4.0 * power(ordinate).sqrt() / (weights * sine.amplitude());
-        let relative = 1.0 / (2.0 * ratio).sqrt();
-        let frequency = MeasuredValue {
-            value: turns(ordinate) / rest.sample_period(),
-            error: 3f64.sqrt() / (PI * rest.duration()) * relative,
-        };
-        Some(Self {
-            frequency,
-            of_line: 1.0,
-            depth: MeasuredValue { value: depth, error: depth * relative },
-            of_phase,
-            statistic: 2.0 * ratio,
         })
     }
+
+    /// The same without a change of so many periods a record.
+    fn without(&self, part: Part, periods: f64) -> Self {
+        let size = 2.0 * self.sum(part, periods) / self.weight;
+        let turned = match part {
+            Part::InPhase => Complex::ONE,
+            Part::Quadrature => Complex::I,
+        };
+        let of_change = self.phasors(periods).zip(&self.weights).map(|(phasor, weight)| weight * (size * phasor).re);
+        let blocks = self.blocks.iter().zip(of_change).map(|(block, change)| block - turned * change).collect();
+        Self { blocks, ..self.clone() }
+    }
+}
+
+/// Of the power of a change of so many `periods` a record, in units of the noise around the line, `unit`: the exponential variable of mean
+/// 1 that chance exceeds as often, where the part wanders as its other ordinates up to `most` do.
+///
+/// What is beside the change is the noise and a random walk, whose density is known to one part in √m, `m` being the number of ordinates
+/// that show it: over it a power has Fisher's distribution of 2 and 2m degrees of freedom, whose tail is `(1 + r/m)^−m`.
+fn over_wandering(envelope: &Envelope, part: Part, periods: f64, most: usize, unit: f64) -> f64 {
+    let rest = envelope.without(part, periods);
+    let is_multiple = |at: f64| {
+        let multiple = (at / periods).round().clamp(1.0, HIGHEST);
+        (at - multiple * periods).abs() < OF_MULTIPLE
+    };
+    let band =
+        |periods: f64| SpectralBand { frequency: periods, density: rest.power(part, periods) / unit, ordinates: 1.0 };
+    let beside: Vec<SpectralBand> = (1..=most).map(|at| at as f64).filter(|at| !is_multiple(*at)).map(band).collect();
+    let bases: Vec<[f64; 2]> = beside.iter().map(|band| [1.0, band.frequency.powi(-2)]).collect();
+    let mut densities = [0.0; 2];
+    fit_mixture(&beside, &bases, Sign::NonNegative, &mut densities);
+    // Chance makes no noise smaller than it is.
+    let noise = densities[0].max(1.0);
+    let level = |periods: f64| noise + densities[1] / (periods * periods);
+    let part_of_walk = |periods: f64| 1.0 - noise / level(periods);
+    let shown: f64 = beside.iter().map(|band| part_of_walk(band.frequency).powi(2)).sum();
+    let ratio = envelope.power(part, periods) / unit / level(periods);
+    let known_by = shown / part_of_walk(periods).powi(2);
+    if known_by.is_finite() { known_by * (ratio / known_by).ln_1p() } else { ratio }
 }
 
 /// Whether two distances from a line, Hz, are one in a record of `duration` s.
@@ -176,6 +278,31 @@ mod tests {
                 assert_eq!(found.of_phase, phase > 0.0, "{found:?}");
             }
         }
+    }
+
+    /// The phase of a line of 12 times the noise makes a random walk of 0.7 rad in the record: its ordinates are far above the noise, and
+    /// none is above the others. With a change of half a rad beside it, 5.3 times in the record, that one is.
+    #[test]
+    fn a_phase_that_wanders_is_no_change_of_it() {
+        let changed = |seed: u64, depth: f64| {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let mut phase = 0.0;
+            let value = |at: usize| {
+                phase += 0.7 / (SAMPLES as f64).sqrt() * random.sample::<f64, _>(StandardNormal);
+                let change = depth * (TAU * 5.3 * at as f64 / SAMPLES as f64).sin();
+                let noise: f64 = random.sample(StandardNormal);
+                12.0 * (TAU * 7.3 * 0.02 * at as f64 + phase + change).sin() + noise
+            };
+            let series = UniformSeries::new(0.02, (0..SAMPLES).map(value).collect());
+            let sine = Sine::fit_near(&series, 7.3, 0.5 / series.duration());
+            Modulation::find(&sine, &sine.subtracted_from(&series), 2.0 * 0.02, |_| false)
+        };
+        // One of a hundred is expected, and 5 or more of 60 have a probability of 0.04 %.
+        let wrong = (0..60).filter(|&seed| changed(seed, 0.0).is_some()).count();
+        assert!(wrong < 5, "{wrong} of 60");
+        let found = (0..10).filter_map(|seed| changed(seed, 0.5)).filter(|found| found.of_phase);
+        let right = found.filter(|found| (found.frequency.value * 400.0 - 5.3).abs() < 0.5).count();
+        assert_eq!(right, 10);
     }
 
     #[test]
