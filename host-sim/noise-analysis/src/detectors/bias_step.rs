@@ -18,7 +18,7 @@ use nalgebra::DVector;
 pub(super) const SIGNIFICANCE: f64 = 1e-5;
 /// Advantage in −2 ln likelihood that a step must have over any other cause.
 pub(super) const ADVANTAGE: f64 = 12.0;
-/// Largest gain of a second step relative to the first; above it, the bias jumps repeatedly and is no single step.
+/// Largest square of the size of a second step over that of the first; above it, the bias jumps repeatedly and is no single step.
 const SECOND: f64 = 0.2;
 /// In white noise of deviation σ, 95 % of the errors in the position of a step of size s are within this times (σ/s)²
 /// samples (Y.-C. Yao, "Approximating the distribution of the maximum likelihood estimate of the change-point in a sequence
@@ -52,7 +52,7 @@ pub(super) struct StepPosition {
 }
 
 /// The likeliest step given the `known` regressors, to which `regression` was fitted, if its p-value is below [`SIGNIFICANCE`];
-/// `None` if the bias jumps more than once.
+/// `None` if the bias jumps more than once, by as much.
 pub(super) fn find(
     series: &Series,
     blocks: &BlockMeans,
@@ -73,10 +73,11 @@ pub(super) fn find(
     let regressor = blocks.step_at(series.slots[sample]);
     let with_step: Vec<DVector<f64>> = known.iter().cloned().chain([regressor.clone()]).collect();
     let with_step = GlsRegression::new(blocks, grid, &with_step);
-    let gain = regression.deviance() - scan.deviance;
-    let second =
-        StepScan::new(&with_step, &with_step.steps()).map_or(0.0, |second| with_step.deviance() - second.deviance);
-    if second > (SECOND * gain).max(2.0 * ADVANTAGE) {
+    // Not their gains: beside a step that no model has, the noise is larger.
+    let again = StepScan::new(&with_step, &with_step.steps()).filter(|second| {
+        with_step.deviance() - second.deviance > 2.0 * ADVANTAGE && second.size.powi(2) > SECOND * scan.size.powi(2)
+    });
+    if again.is_some() {
         return None;
     }
     let at = series.slots[sample] as f64;
@@ -115,7 +116,8 @@ struct StepScan {
     deviance: f64,
     /// Its block.
     at: usize,
-    /// p-value of the step there, for a known position.
+    /// Size of the step there, and its p-value for a known position.
+    size: f64,
     p_value: f64,
     /// Effective number of independent tests.
     independent: f64,
@@ -135,7 +137,7 @@ impl StepScan {
         let (at, deviance) = of_steps.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
         let best = regression.estimate_step(steps[at].as_ref()?)?;
         let independent = regression.independent_steps();
-        Some(Self { deviances, deviance, at, p_value: best.p_value, independent })
+        Some(Self { deviances, deviance, at, size: best.size, p_value: best.p_value, independent })
     }
 
     /// p-value for an unknown position: adds Rice's expected number of crossings of a level by a smooth process.

@@ -211,6 +211,21 @@ fn where_the_noise_is_below_a_count_neighbouring_counts_are_no_step() {
     assert!(found(&far, 0.0) && found(&far, 1.5));
 }
 
+/// A step of five times the noise, and one of a third of it: alone, either is 40 standard deviations of the mean of a minute or more.
+#[test]
+fn a_small_step_hides_no_large_one() {
+    let step = |time_s: f64, size: f64| InjectedEffect::BiasStep { channel: SENSED_GYRO, time_s, size };
+    let found = |second: f64| {
+        let case = Case::hiding(vec![step(333.0, -3.0), step(480.0, second)], 600.0, 4);
+        bias_changes(&case.series(GYRO)).step
+    };
+    let step = found(0.2).expect("a step");
+    assert!((value_of(&step, "time").value - 333.0).abs() < 0.1, "{step:?}");
+    // What it has of the second one is the part of the record after that.
+    assert!((value_of(&step, "size").value / -3.0 - 1.0).abs() < 0.03, "{step:?}");
+    assert_eq!(found(2.9), None);
+}
+
 #[test]
 fn ramps_telegraph_noise_and_temperature_are_no_steps() {
     let ramp = InjectedEffect::RateRamp { channel: SENSED_GYRO, slope: 1e-3 };
