@@ -10,6 +10,7 @@ mod block;
 mod channel_id;
 mod profile;
 pub mod profile_file;
+mod repetition;
 
 pub use block::{RecordingDescription, SampleBlock};
 pub use channel_id::{ChannelId, PerChannel};
@@ -17,6 +18,8 @@ pub use profile::{
     ChannelProfile, DataSheetDeviation, DataSheetNoise, DataSheetSensitivities, HOST_CLOCK_ERROR, Quantity,
     SensorProfile,
 };
+
+pub use repetition::repeated_fraction;
 
 use std::collections::BTreeMap;
 use std::ops::Range;

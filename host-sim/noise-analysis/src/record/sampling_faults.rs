@@ -4,7 +4,7 @@ use crate::bounds::{BoundedEstimate, MeasuredValue};
 use crate::distributions::{poisson_bounds, poisson_tail, upper_tail};
 use crate::effects::findings::{Correction, Detection, SIGNIFICANCE};
 use crate::effects::{ClockDeviation, DroppedSamples, RateChange, RepeatedSamples};
-use measurement::{Measurement, SensorProfile};
+use measurement::{Measurement, SensorProfile, repeated_fraction};
 use std::collections::BTreeMap;
 
 /// How many times more often than in independent channels equal neighbours may occur by chance.
@@ -97,18 +97,6 @@ pub(crate) fn repeated_samples(measurement: &Measurement) -> Option<Detection> {
         channels: channels.len(),
     };
     Some(Detection { effect: repeated.into(), correction: Some(Correction::Exclude(positions)) })
-}
-
-/// The fraction f of the samples that are repeated, where the fraction `all` of them equals the one before in all channels
-/// and the fractions `shares` in each: the solution of `all = f + (1 − f)·Π (share − f)/(1 − f)`.
-fn repeated_fraction(all: f64, shares: &[f64]) -> f64 {
-    let (mut low, mut high) = (0.0, all);
-    for _ in 0..50 {
-        let repeated = 0.5 * (low + high);
-        let by_chance: f64 = shares.iter().map(|share| ((share - repeated) / (1.0 - repeated)).max(0.0)).product();
-        if repeated + (1.0 - repeated) * by_chance < all { low = repeated } else { high = repeated }
-    }
-    0.5 * (low + high)
 }
 
 /// Compares the sample rate by the time stamps with the stated rate, or without one with the nearest rate that the sensor

@@ -7,11 +7,14 @@ use crate::time_base::EstimatedTimeBase;
 use crate::time_base::sample_slots::{MAX_REPEATED_READ_INTERVAL, SampleSlots, usual_interval};
 use crate::time_base::stamp_quality::StampQuality;
 use crate::time_base::time_base_error::TimeBaseError;
-use measurement::{ChannelProfile, MeasuredChannel, Measurement, SensorProfile};
+use measurement::{ChannelProfile, MeasuredChannel, Measurement, SensorProfile, repeated_fraction};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Fewest channels whose equal rows are one sample that was read twice; fewer are equal by chance.
 pub(crate) const MIN_CHANNELS_OF_REPEAT: usize = 3;
+
+/// Least part of the rows that equal the one before that are more than by chance, for all of them to be left out.
+const LEAST_READ_AGAIN: f64 = 0.5;
 
 /// Largest part of the variance of the noise that rounding adds without a note: ten times what it adds where there is room for it, and
 /// a twentieth of a percent of N.
@@ -77,7 +80,8 @@ pub(crate) fn time_base(
 }
 
 /// Takes rows out that equal the one before in all of three channels or more and come sooner than 0.75 periods after it: one
-/// sample that was read or published twice.
+/// sample that was read or published twice. Where no more rows do so than by chance, as in noise of about a count with stamps that are
+/// coarser than the sample period, all stay.
 fn leave_out_repeated(table: &mut SensorTable, stated_hz: Option<f64>) -> u64 {
     let Some(times) = table.times_s.as_ref().filter(|_| table.columns.len() >= MIN_CHANNELS_OF_REPEAT) else {
         return 0;
@@ -89,11 +93,16 @@ fn leave_out_repeated(table: &mut SensorTable, stated_hz: Option<f64>) -> u64 {
             && table.columns.iter().all(|column| column.values[row] == column.values[row - 1])
     };
     let kept: Vec<bool> = (0..times.len()).map(|row| !is_repeat(row)).collect();
-    let repeated = kept.iter().filter(|kept| !**kept).count() as u64;
-    if repeated > 0 {
-        table.retain(&kept);
+    let repeated = kept.iter().filter(|kept| !**kept).count();
+    let pairs = times.len().saturating_sub(1).max(1) as f64;
+    let equal = |column: &TableColumn| column.values.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    let shares: Vec<f64> = table.columns.iter().map(|column| equal(column) as f64 / pairs).collect();
+    let all = repeated as f64 / pairs;
+    if repeated_fraction(all, &shares) <= LEAST_READ_AGAIN * all {
+        return 0;
     }
-    repeated
+    table.retain(&kept);
+    repeated as u64
 }
 
 /// Why a value of a channel is no measurement, if so: 1 in it is `factor` in the channel's unit, in which it is `limit` at most.
