@@ -1,8 +1,10 @@
 //! Effects outside the vocabulary of the report: the right answer is `unexplained`, or the name that describes the effect, where
-//! the report has one ([`OutsideKind::right_names`]). Every other name is wrong.
+//! the report has one ([`OutsideKind::right_names`]). Every other name is wrong, but for that of a part of the effect, which is neither
+//! right nor wrong ([`OutsideEffect::has_part`]).
 
 use super::environment::{EnvironmentCourse, frequency_factor, gauss_markov, log_uniform};
 use crate::spectral_noise::normal;
+use noise_analysis::report::Effect;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Exp1};
@@ -147,6 +149,15 @@ impl OutsideEffect {
     /// The outputs that it is in; none of an effect that concerns the samples of all channels.
     pub(super) fn channels(&self) -> impl Iterator<Item = OutputRegister> + '_ {
         self.shares.iter().map(|(channel, _)| *channel)
+    }
+
+    /// Whether `found` is a part of it that is there without the rest: the carrier of a line that changes. Each sideband of one that swells
+    /// and fades by half has a sixteenth of its power, and at the detection limit of the carrier they are in the noise.
+    pub(super) fn has_part(&self, found: &Effect) -> bool {
+        let [carrier_hz, change_hz] = self.frequencies_hz;
+        let changes = matches!(self.kind, OutsideKind::ModulatedLine | OutsideKind::SwitchedLine);
+        matches!(found, Effect::SinusoidalLine(line)
+            if changes && (line.frequency_hz.value - carrier_hz).abs() < 0.5 * change_hz)
     }
 
     /// Whether it shows in `channel`.

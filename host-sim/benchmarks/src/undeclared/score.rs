@@ -8,7 +8,7 @@ use super::sample_loss::lose_samples;
 use super::truth::{detects_known_waveform, true_model_errors};
 use adis16405_driver::Channel;
 use noise_analysis::analysis::analyze;
-use noise_analysis::report::{ChannelReport, ModelReport, Report};
+use noise_analysis::report::{ChannelReport, Effect, ModelReport, Report};
 use recordings::time_base::{TimeBaseError, measurement};
 use serde::Serialize;
 use virtual_sensor::InjectedEffect;
@@ -186,12 +186,15 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, loss: f64) -> Rec
         })
         .collect();
     let outside = drawn.simulation.outside.first();
-    let is_true = |channel: Channel, kind: &str| {
+    let is_true = |channel: Channel, found: &Effect| {
+        let kind = found.name();
         let is_lost = loss > 0.0 && kind == EffectKind::DroppedSamples.name();
         // Where something is hidden, a part of it that is said to be unexplained is no wrong name.
         let output = simulation::output_register(channel);
         let is_outside = outside.is_some_and(|effect| {
-            effect.shows_in(output) && (kind == UNEXPLAINED || effect.kind().right_names().contains(&kind))
+            let describes =
+                kind == UNEXPLAINED || effect.kind().right_names().contains(&kind) || effect.has_part(found);
+            effect.shows_in(output) && describes
         });
         let is_unexplained = kind == UNEXPLAINED && effects.iter().any(|effect| shows_in(effect, channel));
         is_lost
@@ -202,9 +205,9 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, loss: f64) -> Rec
     };
     let false_alarms = scored
         .iter()
-        .flat_map(|(channel, report)| report.effects.iter().map(move |shown| (*channel, shown.effect.name())))
-        .filter(|(channel, name)| !is_true(*channel, name))
-        .map(|(channel, name)| format!("{}: {name}", channel.name()))
+        .flat_map(|(channel, report)| report.effects.iter().map(move |shown| (*channel, &shown.effect)))
+        .filter(|(channel, found)| !is_true(*channel, found))
+        .map(|(channel, found)| format!("{}: {}", channel.name(), found.name()))
         .collect();
     let estimates = drawn
         .kinds

@@ -74,8 +74,8 @@ pub(super) fn hidden(stretch: &Stretch<'_>, kind: HiddenKind, effect: &HiddenEff
         channels: own.iter().map(|channel| channel.name()).collect(),
         strength,
         named,
-        found: named_as(&names(&report, &own)),
-        wrong_names: wrong_names(&own, &right, &report, &stretch.report),
+        found: named_as(&names(&report, &own, |_| true)),
+        wrong_names: wrong_names(&own, &right, effect, (&report, &stretch.report)),
         estimates,
         errors,
     }
@@ -133,20 +133,28 @@ fn is_new(effect: &Effect, others: &[ChannelEffect]) -> bool {
     !others.iter().any(is_same)
 }
 
-/// The names of `report` that neither `untouched` has in the same channel nor are `right` in one of the channels `own`.
-fn wrong_names(own: &[Channel], right: &[&str], report: &Report, untouched: &Report) -> Vec<String> {
-    let known = names(untouched, &Channel::INERTIAL);
+/// The names of the first report that neither the second one, of the untouched stretch, has in the same channel nor are `right` in one of
+/// the channels `own` nor are those of a part of the effect.
+fn wrong_names(
+    own: &[Channel],
+    right: &[&str],
+    effect: &HiddenEffect,
+    (report, untouched): (&Report, &Report),
+) -> Vec<String> {
+    let known = names(untouched, &Channel::INERTIAL, |_| true);
     let is_right = |(channel, kind): &(Channel, &str)| own.contains(channel) && right.contains(kind);
-    let mut new = names(report, &Channel::INERTIAL);
+    let is_no_part = |found: &Effect| !matches!(effect, HiddenEffect::Outside(effect) if effect.has_part(found));
+    let mut new = names(report, &Channel::INERTIAL, is_no_part);
     new.retain(|name| !known.contains(name) && !is_right(name));
     named_as(&new)
 }
 
-/// The effects that `report` lists in `channels`.
-fn names(report: &Report, channels: &[Channel]) -> BTreeSet<(Channel, &'static str)> {
+/// The effects that `report` lists in `channels`, of those that count.
+fn names(report: &Report, channels: &[Channel], counts: impl Fn(&Effect) -> bool) -> BTreeSet<(Channel, &'static str)> {
     let of_channel = |channel: &Channel| {
         let effects = channel_report(report, *channel).map(|of| of.effects.as_slice()).unwrap_or_default();
-        effects.iter().map(|shown| (*channel, shown.effect.name())).collect::<Vec<_>>()
+        let counted = effects.iter().filter(|shown| counts(&shown.effect));
+        counted.map(|shown| (*channel, shown.effect.name())).collect::<Vec<_>>()
     };
     channels.iter().flat_map(of_channel).collect()
 }
