@@ -45,7 +45,7 @@ const SLOW_ROUNDS: usize = 6;
 /// Ordinates on either side whose median is the noise of one.
 const NEARBY: usize = 32;
 
-/// The lines of a series with a p-value below 2·10⁻⁴, the strongest first; at most 6 and one at half the sample rate.
+/// The lines of a series with a p-value below 2·10⁻⁵, the strongest first; at most 6 and one at half the sample rate.
 ///
 /// Searches from 8 periods per record up to half the sample rate, or to half the rate at which rounding acts as noise
 /// where that is lower, and at half the sample rate. A record of fewer than some hundred samples has too few ordinates and yields none.

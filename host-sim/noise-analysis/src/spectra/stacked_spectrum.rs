@@ -88,7 +88,7 @@ impl StackedSpectrum {
         }
     }
 
-    /// The lines with a p-value below 2·10⁻⁴, the strongest first; at most 6 and one at half the sample rate.
+    /// The lines with a p-value below 2·10⁻⁵, the strongest first; at most 6 and one at half the sample rate.
     pub(crate) fn lines(&self) -> Vec<SpectralLine> {
         let Some(mut spectrum) = self.mean.clone() else { return Vec::new() };
         // Where the level of the noise changes from stretch to stretch, the loud ones have most of the weight.
@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn noise_has_no_lines() {
-        // Each of 20 has one with a probability of 2·10⁻⁴.
+        // Each of 20 has one with a probability of 2·10⁻⁵.
         for seed in 0..20 {
             assert_eq!(lines(seed, |_| 0.0), []);
         }

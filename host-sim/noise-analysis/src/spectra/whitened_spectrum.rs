@@ -6,12 +6,11 @@ use super::periodogram::{PADDING, Periodogram};
 use super::smooth_shape::{Background, LocalLevel, WINDOW};
 use crate::bounds::MeasuredValue;
 use crate::distributions::mean_ratio_tail;
+use crate::effects::findings::SIGNIFICANCE;
 use crate::samples::rounding::Rounding;
 use crate::samples::uniform_series::UniformSeries;
 use std::f64::consts::PI;
 
-/// Probability that a record without lines yields one sinusoid or more, and the same again for a resonance.
-pub(super) const FALSE_ALARM: f64 = 2e-4;
 /// Lowest frequency that is searched, in periods per record: below, lines cannot be distinguished from drift.
 pub(super) const FEWEST_PERIODS: usize = 8;
 /// Peaks of the periodogram that a sinusoid is fitted to, the highest over the local level.
@@ -173,7 +172,7 @@ impl<'a> WhitenedSpectrum<'a> {
 
     /// The most significant line, if one is significant.
     pub(super) fn most_significant(&self, series: &UniformSeries) -> Option<Candidate> {
-        let sine = self.strongest_sine(series).filter(|(line, _)| line.p_value < FALSE_ALARM);
+        let sine = self.strongest_sine(series).filter(|(line, _)| line.p_value < SIGNIFICANCE);
         if let Some((line, sine)) = sine {
             let bin = line.frequency.value / self.resolution;
             let widths =
@@ -209,7 +208,7 @@ impl<'a> WhitenedSpectrum<'a> {
         }
         peaks.retain(|(ratio, at)| {
             let level = self.background.level(&self.whitened, at / PADDING);
-            self.sine_p_value(LARGEST_RISE * ratio, level) < FALSE_ALARM
+            self.sine_p_value(LARGEST_RISE * ratio, level) < SIGNIFICANCE
         });
         peaks.sort_by(highest_first);
         let candidates = peaks.into_iter().map(|(_, at)| {
@@ -285,7 +284,7 @@ impl<'a> WhitenedSpectrum<'a> {
             }
             peaks
         });
-        peaks.min_by(|a, b| a.2.total_cmp(&b.2)).filter(|peak| peak.2 < FALSE_ALARM)
+        peaks.min_by(|a, b| a.2.total_cmp(&b.2)).filter(|peak| peak.2 < SIGNIFICANCE)
     }
 
     /// The likeliest resonance near `bin`, by fits that begin with each of `widths`; all in resolutions.
