@@ -530,7 +530,7 @@ impl Wording {
                 ),
                 "; no effect that is known here explains it",
             ),
-            Observation::RefutedTerm { curve, by } => text(format!("{} {}", excess(curve), refutation(by)), ""),
+            Observation::RefutedTerm { curve, by } => text(format!("{} {}", excess(curve), self.refutation(by)), ""),
             Observation::Band { width_hz, sigmas, mismatch } => {
                 let why = match mismatch {
                     BandMismatch::Shape { p_value } => format!(
@@ -556,33 +556,37 @@ impl Wording {
             ),
         }
     }
-}
 
-/// What contradicts a term that fits an octave of the curve.
-fn refutation(by: &Refutation) -> String {
-    let forgets = |time_constant_s: f64| {
-        format!("with the spectrum of a process that forgets within {} s", seconds(time_constant_s))
-    };
-    match *by {
-        Refutation::FewPeriods => {
-            "as by a line of a few periods in the record, which its curve does not tell from a drift".to_owned()
+    /// What contradicts a term that fits an octave of the curve.
+    fn refutation(&self, by: &Refutation) -> String {
+        let forgets = |time_constant_s: f64| {
+            format!("with the spectrum of a process that forgets within {} s", seconds(time_constant_s))
+        };
+        match *by {
+            Refutation::FewPeriods => {
+                "as by a line of a few periods in the record, which its curve does not tell from a drift".to_owned()
+            }
+            Refutation::NotInSpectrum { frequency_hz } => {
+                format!("as by a line at {frequency_hz:.4} Hz, where the spectrum has none")
+            }
+            Refutation::ShapeOfSpectrum { p_value } => format!(
+                "as by quantization, whose density rises with the square of the frequency; the spectrum has another shape, by chance {}",
+                self.chance(p_value)
+            ),
+            Refutation::Irreversible { time_constant_s } => format!(
+                "{}, but its changes up and down differ: disturbances that begin at once and decay",
+                forgets(time_constant_s)
+            ),
+            Refutation::RareDisturbances { time_constant_s, kurtosis: [ratio, error] } => format!(
+                "{}, but an excess kurtosis {ratio:.1} ± {error:.1} times that of a telegraph signal: rare disturbances",
+                forgets(time_constant_s)
+            ),
+            Refutation::UndecidedLevels { time_constant_s, kurtosis: [ratio, error] } => format!(
+                "{}: its excess kurtosis, {ratio:.1} ± {error:.1} times that of a telegraph signal, does not tell whether that has two \
+                 levels",
+                forgets(time_constant_s)
+            ),
         }
-        Refutation::NotInSpectrum { frequency_hz } => {
-            format!("as by a line at {frequency_hz:.4} Hz, where the spectrum has none")
-        }
-        Refutation::Irreversible { time_constant_s } => format!(
-            "{}, but its changes up and down differ: disturbances that begin at once and decay",
-            forgets(time_constant_s)
-        ),
-        Refutation::RareDisturbances { time_constant_s, kurtosis: [ratio, error] } => format!(
-            "{}, but an excess kurtosis {ratio:.1} ± {error:.1} times that of a telegraph signal: rare disturbances",
-            forgets(time_constant_s)
-        ),
-        Refutation::UndecidedLevels { time_constant_s, kurtosis: [ratio, error] } => format!(
-            "{}: its excess kurtosis, {ratio:.1} ± {error:.1} times that of a telegraph signal, does not tell whether that has two \
-             levels",
-            forgets(time_constant_s)
-        ),
     }
 }
 

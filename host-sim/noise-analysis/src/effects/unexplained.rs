@@ -74,6 +74,11 @@ pub enum Refutation {
         /// Hz
         frequency_hz: f64,
     },
+    /// The spectrum has another shape where the term is.
+    ShapeOfSpectrum {
+        /// Probability by chance.
+        p_value: f64,
+    },
     /// The changes up and down differ.
     Irreversible {
         /// Of the term, s.

@@ -6,7 +6,7 @@ use crate::distributions::DESCRIBED;
 use crate::fit::covariates::CovariateFit;
 use crate::fit::noise_terms::{filter_length_s, is_filter, is_line, is_same_time, is_white, line_frequency};
 use crate::fit::part_filter::PartFilter;
-use crate::fit::sample_coefficients::{CoefficientsFrom, SamplesOfCurve, by_samples};
+use crate::fit::sample_coefficients::{CoefficientsFrom, SamplesOfCurve, by_samples, quantization_p_value};
 use crate::fit::traced_model::{Addition, PlannedTerm, Shapes, TracedModel, residual, within_measured};
 use crate::record::estimators::RecordEstimators;
 use crate::samples::rounding::is_dithered;
@@ -51,12 +51,16 @@ pub(crate) struct ChannelFit {
     refuted: Vec<NoiseTerm>,
     /// What the coefficients of the model with added terms are fitted to.
     pub coefficients_from: CoefficientsFrom,
+    /// Probability that chance makes the spectrum depart as far from that of the model where that has quantization; `None` where it has
+    /// none, or the spectrum does not show its shape.
+    pub quantization_p_value: Option<f64>,
 }
 
 /// The models of a channel with the coefficients by all samples, or what else they are from.
 pub(crate) struct ModelsBySamples {
     before: Result<Model, CoefficientsFrom>,
     after: Result<Model, CoefficientsFrom>,
+    quantization_p_value: Option<f64>,
 }
 
 impl ChannelFit {
@@ -72,6 +76,7 @@ impl ChannelFit {
             lines: None,
             refuted: Vec::new(),
             coefficients_from: CoefficientsFrom::Octaves,
+            quantization_p_value: None,
         }
     }
 
@@ -364,11 +369,13 @@ impl ChannelFit {
     pub(crate) fn by_samples(&self, samples: SamplesOfCurve) -> ModelsBySamples {
         let of = |model: &Model| by_samples(&self.covariates.curve, model, samples);
         let after = if self.recent.is_some() { Err(CoefficientsFrom::Octaves) } else { of(self.after()) };
-        ModelsBySamples { before: of(&self.before), after }
+        let quantization_p_value = quantization_p_value(&self.covariates.curve, self.after(), samples);
+        ModelsBySamples { before: of(&self.before), after, quantization_p_value }
     }
 
     /// Takes these, where the samples have given them.
     pub(crate) fn take(&mut self, models: ModelsBySamples) {
+        self.quantization_p_value = models.quantization_p_value;
         if let Ok(before) = models.before {
             self.before = before;
         }

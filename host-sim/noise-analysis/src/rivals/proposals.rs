@@ -107,7 +107,10 @@ fn term_effects(
     let mut effects = match term.kind {
         NoiseTerm::Filtered(filter) => vec![filter_effect(term, &filter, curve, unit, profile.internal_rate_hz)],
         NoiseTerm::Quantization => {
-            vec![AngleQuantization { coefficient: coefficient(term, unit), evidence: curve }.into()]
+            let refuted = fit.quantization_p_value.filter(|p_value| *p_value < REFUTED);
+            let refuted = refuted.map(|p_value| unexplained(Refutation::ShapeOfSpectrum { p_value }));
+            let quantization = AngleQuantization { coefficient: coefficient(term, unit), evidence: curve };
+            refuted.into_iter().chain([quantization.into()]).collect()
         }
         NoiseTerm::RateRamp => {
             let evidence = LinearDriftEvidence::Curve(curve);

@@ -111,7 +111,7 @@ const fn row(
 
 /// The rows, in their order.
 #[rustfmt::skip]
-pub static RIVALRIES: [Rivalry; 45] = [
+pub static RIVALRIES: [Rivalry; 46] = [
     // Lines and signals of the spectrum.
     row("line above half the rate of the means", "line of the means", "at its alias, and as wide", "means sample it too slowly",
         Rule::Line(|of| of.faster.iter().any(|faster| is_alias(of.line, faster, of.period_s)))),
@@ -183,6 +183,10 @@ pub static RIVALRIES: [Rivalry; 45] = [
     row("unexplained octave without a line", "line of the curve", "no line of the spectrum there and no width that the record bounds",
         "a line would stand out of the spectrum",
         Rule::Channel(|of| of.loses_to(is_absent_in_spectrum))),
+    row("unexplained octave of another spectrum", "quantization",
+        "where quantization has a tenth of the density or more, the spectrum has another shape: 2·10⁻⁴",
+        "the density of quantization rises with the square of the frequency",
+        Rule::Channel(|of| of.loses_to(|effect| matches!(refutation(effect), Some(Refutation::ShapeOfSpectrum { .. }))))),
     row("telegraph noise of the samples", "Markov process or ramp of the curve", "always",
         "the samples show the levels; the curve is that of a Markov process",
         Rule::Channel(|of| of.is_slow_term() && of.levels().is_some())),

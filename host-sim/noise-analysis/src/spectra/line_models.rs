@@ -1,6 +1,7 @@
 //! The two models of a line: a sinusoid, fitted to the samples, and a resonance, fitted to the spectrum.
 
 use super::periodogram::taper;
+use super::whittle::departure_by_chance;
 use crate::samples::uniform_series::UniformSeries;
 use nalgebra::{Matrix4, Vector4};
 use realfft::num_complex::Complex;
@@ -392,24 +393,11 @@ fn log_likelihood(groups: &[Group], parameters: &Vector4<f64>) -> f64 {
     groups.iter().map(of_group).sum()
 }
 
-/// Probability that ordinates of the modelled density deviate from it as far: Bartlett's test of the cumulative periodogram.
-///
-/// Ordinates over their density are exponential variables, whose cumulative sums over the total are distributed as the
-/// ordered values of uniform ones, so that the largest distance from a straight line has Kolmogorov's distribution (M.
-/// Bartlett, "An introduction to stochastic processes", 1955). That the parameters were fitted lowers the distance.
+/// Probability that ordinates of the modelled density deviate from it as far.
 fn shape_p_value(groups: &[Group], parameters: &Vector4<f64>) -> f64 {
     let curve = LorentzCurve::new(parameters);
-    let ratio = |group: &Group| group.ordinates * group.density / curve.density(group);
-    let (total, count) =
-        groups.iter().fold((0.0, 0.0), |(total, count), group| (total + ratio(group), count + group.ordinates));
-    let (mut sum, mut position, mut largest) = (0.0, 0.0, 0.0_f64);
-    for group in groups {
-        sum += ratio(group) / total;
-        position += group.ordinates / count;
-        largest = largest.max((sum - position).abs());
-    }
-    // The first term of Kolmogorov's series, which is exact where it matters.
-    (2.0 * (-2.0 * count * largest * largest).exp()).min(1.0)
+    let over_density = |group: &Group| (group.density / curve.density(group), group.ordinates);
+    departure_by_chance(&groups.iter().map(over_density).collect::<Vec<_>>())
 }
 
 /// Fisher's information and the score.

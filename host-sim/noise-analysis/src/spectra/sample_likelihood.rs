@@ -13,8 +13,9 @@
 use super::cosine_spectrum::flicker_leakage;
 use super::filtered_noise::FilteredNoise;
 use super::sample_spectrum::{Place, SampleSpectrum};
-use super::whittle::{Sign, SpectralBand, fit_mixture, fit_mixture_with};
+use super::whittle::{Sign, SpectralBand, departure_by_chance, fit_mixture, fit_mixture_with, least_departure};
 use crate::distributions::NORMAL_975;
+use crate::effects::findings::REFUTED;
 use crate::samples::rounding::Rounding;
 use allan_core::model::FittedTerm;
 use allan_core::term::MovingAverageFilter;
@@ -30,6 +31,8 @@ const POINTS_IN_BAND_OF_MEANS: usize = 2;
 const HANN: [(f64, f64); 3] = [(-1.0, 1.0 / 6.0), (0.0, 2.0 / 3.0), (1.0, 1.0 / 6.0)];
 /// Largest part of the density of filtered white noise that the ends of the record may leak.
 const MOST_LEAKAGE: f64 = 0.1;
+/// Least part of a density that a term has where the spectrum shows its shape.
+const SHOWS_SHAPE: f64 = 0.1;
 /// Factor by which a bound is bracketed, and width at which its search ends, as a part of its distance from the value.
 const BRACKET: f64 = 2.0;
 const PRECISION: f64 = 1e-3;
@@ -45,11 +48,12 @@ impl SampleSpectrum {
     ///
     /// A bound is where the likelihood, with all other coefficients at their likeliest, is `exp(−1.96²/2)` of its maximum, and farther
     /// where the decimation of the filter is known between bounds. Flicker noise and random walks pass the filter; where white noise
-    /// beside it is not one of the terms, that of rounding is, of known size. `None` if the model has a ramp, whose size is no density.
+    /// beside it is not one of the terms, that of rounding is, of known size. `None` if the model has a ramp, whose size is no density, or if more
+    /// than a thousandth of the samples is interpolated.
     #[must_use]
     pub fn fitted(self, model: &Model) -> Option<Model> {
         let kinds: Vec<NoiseTerm> = model.terms().iter().map(|term| term.kind).collect();
-        if kinds.contains(&NoiseTerm::RateRamp) {
+        if kinds.contains(&NoiseTerm::RateRamp) || !self.has_all_noise() {
             return None;
         }
         let spectrum = if let Some(filter) = model.filter() { self.without_leakage(filter) } else { self };
@@ -76,6 +80,25 @@ impl SampleSpectrum {
             Some(FittedTerm { value, low, high, ..*term })
         });
         Some(Model::new(model.sample_period(), terms.collect::<Option<Vec<FittedTerm>>>()?))
+    }
+
+    /// Probability that the spectrum departs as far from that of the terms `kinds`, at their likeliest, where the term at the position `at`
+    /// has a tenth of the density or more: Bartlett's test ([`departure_by_chance`]). `None` where so many samples are interpolated that
+    /// this may be what departs.
+    pub(crate) fn shape_p_value(&self, kinds: &[NoiseTerm], at: usize) -> Option<f64> {
+        let likelihood = Likelihood::new(self, kinds);
+        let shown = kinds[..at].iter().filter(|kind| !is_sinusoid(kind)).count();
+        let with_shape = |(band, basis): (&SpectralBand, &Vec<f64>)| {
+            let density: f64 = basis.iter().zip(&likelihood.densities).map(|(shape, size)| shape * size).sum();
+            let is_shown = likelihood.densities[shown] * basis[shown] >= SHOWS_SHAPE * density;
+            is_shown.then_some((band.density / density, band.ordinates))
+        };
+        let bands: Vec<(f64, f64)> = likelihood.bands.iter().zip(&likelihood.bases).filter_map(with_shape).collect();
+        let ordinates: f64 = bands.iter().map(|(_, ordinates)| ordinates).sum();
+        // An interpolated sample has no noise at some frequencies and all of it at others, which moves the cumulative sum by a quarter of
+        // their share at most.
+        let moved = self.interpolated / 4.0;
+        (moved < 0.5 * least_departure(ordinates, REFUTED)).then(|| departure_by_chance(&bands))
     }
 
     /// Its likelihood with the terms `kinds`, of which the first is noise behind a filter.

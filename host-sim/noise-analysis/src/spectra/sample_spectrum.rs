@@ -20,7 +20,7 @@ use std::ops::Range;
 
 /// Fewest samples.
 const LEAST_SAMPLES: usize = 1024;
-/// Largest share of samples that may be interpolated: they have less noise than the others.
+/// Largest share of samples that may be interpolated where coefficients are fitted: they have less noise than the others.
 const MOST_INTERPOLATED: f64 = 1e-3;
 /// Relative width of a band, and the number of equal bands at which its growth ends: narrow enough for the nulls of a filter.
 const BANDS_PER_E_FOLD: usize = 16;
@@ -46,6 +46,8 @@ pub struct SampleSpectrum {
     pub(super) point_resolution: f64,
     /// Of the samples.
     pub(super) rounding: Rounding,
+    /// Share of the samples that are interpolated.
+    pub(super) interpolated: f64,
 }
 
 /// An average over neighbouring frequencies.
@@ -63,8 +65,7 @@ pub(super) enum Place {
 }
 
 impl SampleSpectrum {
-    /// Of a series with `lines` at these frequencies in Hz. `None` if more than a thousandth of the samples is missing, or a long gap,
-    /// or if there are fewer than 1,024.
+    /// Of a series with `lines` at these frequencies in Hz. `None` if a long gap is missing, or if there are fewer than 1,024 samples.
     #[must_use]
     pub fn of_samples(series: &UniformSeries, lines: &[f64]) -> Option<Self> {
         Self::of_values(series, 1, lines, f64::INFINITY)
@@ -80,6 +81,11 @@ impl SampleSpectrum {
         Some(spectrum)
     }
 
+    /// Whether at most a thousandth of the samples is interpolated.
+    pub(crate) fn has_all_noise(&self) -> bool {
+        self.interpolated <= MOST_INTERPOLATED
+    }
+
     /// Number of its bands.
     pub(crate) fn bands(&self) -> usize {
         self.bands.len()
@@ -87,7 +93,7 @@ impl SampleSpectrum {
 
     /// The bands of the coefficients of `series` below a frequency.
     fn of_values(series: &UniformSeries, samples_per_mean: u64, lines: &[f64], below: f64) -> Option<Self> {
-        let (filled, replaced) = series.interpolated();
+        let (filled, interpolated) = series.interpolated();
         let mut filled = filled.into_owned();
         let (period, resolution) = (series.sample_period(), 0.5 / series.duration());
         // Means show a line at its alias.
@@ -97,7 +103,7 @@ impl SampleSpectrum {
         }
         let values = filled.values();
         let is_whole = values.len() >= LEAST_SAMPLES && values.iter().all(|value| value.is_finite());
-        if !is_whole || replaced > MOST_INTERPOLATED {
+        if !is_whole {
             return None;
         }
         let squares = squared_coefficients(values, series.mean());
@@ -119,6 +125,7 @@ impl SampleSpectrum {
             resolution,
             point_resolution: resolution,
             rounding: series.rounding().clone(),
+            interpolated,
         })
     }
 }

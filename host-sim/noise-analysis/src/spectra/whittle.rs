@@ -34,6 +34,31 @@ const LEAST_GAIN: f64 = 1e-4;
 /// Shortest part of a step of the scoring that is tried.
 const SHORTEST_STEP: f64 = 1e-3;
 
+/// Probability that ordinates of a true density depart from it as far, in the order of their frequencies: `bands` are means over that
+/// density, with the number of ordinates. Bartlett's test of the cumulative periodogram.
+///
+/// Ordinates over their density are exponential variables, whose cumulative sums over the total are distributed as the
+/// ordered values of uniform ones, so that the largest distance from a straight line has Kolmogorov's distribution (M.
+/// Bartlett, "An introduction to stochastic processes", 1955). That the parameters were fitted lowers the distance.
+pub(super) fn departure_by_chance(bands: &[(f64, f64)]) -> f64 {
+    let sums =
+        |(total, count): (f64, f64), (ratio, ordinates): &(f64, f64)| (total + ratio * ordinates, count + ordinates);
+    let (total, count) = bands.iter().fold((0.0, 0.0), sums);
+    let (mut sum, mut position, mut largest) = (0.0, 0.0, 0.0_f64);
+    for (ratio, ordinates) in bands {
+        sum += ratio * ordinates / total;
+        position += ordinates / count;
+        largest = largest.max((sum - position).abs());
+    }
+    // The first term of Kolmogorov's series, which is exact where it matters.
+    (2.0 * (-2.0 * count * largest * largest).exp()).min(1.0)
+}
+
+/// The distance that has this probability.
+pub(super) fn least_departure(ordinates: f64, p_value: f64) -> f64 {
+    ((2.0 / p_value).ln() / (2.0 * ordinates)).sqrt()
+}
+
 /// Fits the densities of shapes whose values in each band are a row of `bases`; returns `Σ g·(ln S + P/S)` with them.
 ///
 /// Begins with each shape that is nowhere negative alone explaining an equal part of the bands. A few rounds multiply the densities

@@ -37,7 +37,7 @@ impl ChannelSpectrum {
             return None;
         }
         let lines = [lines.as_slice(), &sinusoids(others.iter())].concat();
-        let spectrum = samples.spectrum(channel.curve, &lines)?;
+        let spectrum = samples.spectrum(channel.curve, &lines).filter(SampleSpectrum::has_all_noise)?;
         let spectrum = allowed.iter().fold(spectrum, |spectrum, (filter, _)| spectrum.without_leakage(*filter));
         Some(Self { spectrum, others })
     }

@@ -69,6 +69,10 @@ fn size(value: f64) -> crate::bounds::ChannelEstimate {
     known(value).in_unit("g")
 }
 
+fn quantization() -> Effect {
+    AngleQuantization { coefficient: size(1.0), evidence: CURVE }.into()
+}
+
 fn markov(time_constant_s: f64) -> Effect {
     let evidence = MarkovEvidence::Curve(CURVE);
     MarkovProcess { deviation: size(1.0), time_constant_s: known(time_constant_s), evidence }.into()
@@ -133,6 +137,7 @@ fn refuted_line(frequency_hz: f64, by: Refutation) -> Effect {
     Unexplained { place, excess_percent: Some(known(50.0)), observation }.into()
 }
 
+const OTHER_SPECTRUM: Refutation = Refutation::ShapeOfSpectrum { p_value: 1e-6 };
 const IRREVERSIBLE: Refutation = Refutation::Irreversible { time_constant_s: 1.0 };
 const RARE: Refutation = Refutation::RareDisturbances { time_constant_s: 1.0, kurtosis: [3.0, 0.1] };
 const UNDECIDED: Refutation = Refutation::UndecidedLevels { time_constant_s: 1.0, kurtosis: [0.4, 0.3] };
@@ -314,6 +319,8 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
         (["harmonic of a line of the spectrum", "line of the curve"],
             channel(absent().into_iter().chain([of(line(3.0), OF_LINE)])), vec!["sinusoid"]),
         (["unexplained octave without a line", "line of the curve"], channel(absent()), vec!["unexplained"]),
+        (["unexplained octave of another spectrum", "quantization"],
+            channel([of_term(0, refuted(OTHER_SPECTRUM)), of_term(0, quantization())]), vec!["unexplained"]),
         (["telegraph noise of the samples", "Markov process or ramp of the curve"],
             channel([of_term(0, markov(1.0)), of(levels(1.0, 1.0), OF_LEVELS)]), vec!["telegraph"]),
         (["drift in common", "Markov process or ramp of the curve"],
