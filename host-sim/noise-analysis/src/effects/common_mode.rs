@@ -2,8 +2,6 @@
 
 use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
-use allan_core::NoiseTerm;
-use allan_core::term::Markov;
 
 /// A drift in common.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,8 +36,7 @@ impl Kind for CommonMode {
     }
 
     fn avar(&self, at: &AveragingTime) -> AddedVariance {
-        let term = NoiseTerm::Markov(Markov { time_constant: self.time_constant_s.value });
-        at.of_term(&term, self.deviation.value)
+        at.of_markov(self.time_constant_s.value, self.deviation.value)
     }
 
     no_course!();

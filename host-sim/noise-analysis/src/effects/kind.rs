@@ -2,6 +2,7 @@
 
 use crate::bounds::{BoundedEstimate, Parameter};
 use allan_core::NoiseTerm;
+use allan_core::term::Markov;
 use measurement::Quantity;
 
 /// A kind of effect.
@@ -159,6 +160,11 @@ impl AveragingTime<'_> {
     /// Of a term of the noise model with this coefficient.
     pub(crate) fn of_term(&self, term: &NoiseTerm, coefficient: f64) -> AddedVariance {
         AddedVariance::modelled(coefficient * coefficient * term.avar(self.n, self.period_s))
+    }
+
+    /// Of exponentially correlated noise with this time constant, in s, and this standard deviation.
+    pub(crate) fn of_markov(&self, time_constant: f64, deviation: f64) -> AddedVariance {
+        self.of_term(&NoiseTerm::Markov(Markov { time_constant }), deviation)
     }
 
     /// Of `sensitivity` times a channel; none where there is no such channel.

@@ -3,8 +3,6 @@
 use super::evidence::CurveEvidence;
 use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
-use allan_core::NoiseTerm;
-use allan_core::term::Markov;
 
 /// A Markov process.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,8 +54,7 @@ impl Kind for MarkovProcess {
     }
 
     fn avar(&self, at: &AveragingTime) -> AddedVariance {
-        let term = NoiseTerm::Markov(Markov { time_constant: self.time_constant_s.value });
-        at.of_term(&term, self.deviation.value)
+        at.of_markov(self.time_constant_s.value, self.deviation.value)
     }
 
     no_course!();

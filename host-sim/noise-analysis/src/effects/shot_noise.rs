@@ -6,8 +6,6 @@
 
 use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
-use allan_core::NoiseTerm;
-use allan_core::term::Markov;
 
 /// Disturbances of one direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,8 +52,7 @@ impl Kind for ShotNoise {
     }
 
     fn avar(&self, at: &AveragingTime) -> AddedVariance {
-        let term = NoiseTerm::Markov(Markov { time_constant: self.time_constant_s.value });
-        at.of_term(&term, self.deviation.value)
+        at.of_markov(self.time_constant_s.value, self.deviation.value)
     }
 
     no_course!();

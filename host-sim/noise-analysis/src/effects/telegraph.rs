@@ -3,8 +3,6 @@
 use super::evidence::CurveEvidence;
 use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
-use allan_core::NoiseTerm;
-use allan_core::term::Markov;
 
 /// Two levels.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,9 +56,8 @@ impl Kind for TelegraphNoise {
     }
 
     fn avar(&self, at: &AveragingTime) -> AddedVariance {
-        let term = NoiseTerm::Markov(Markov { time_constant: self.time_constant_s.value });
         // Two levels that are equally frequent are two standard deviations apart.
-        at.of_term(&term, 0.5 * self.amplitude.value)
+        at.of_markov(self.time_constant_s.value, 0.5 * self.amplitude.value)
     }
 
     no_course!();
