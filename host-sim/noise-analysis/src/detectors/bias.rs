@@ -223,8 +223,14 @@ fn best_candidate(
     let mut rivals: Vec<(f64, Accepted)> = Vec::new();
     let single = std::iter::once((Candidate::Ramp, &ramp))
         .chain(regressors.iter().map(|(index, regressor)| (Candidate::Regressor(*index), regressor)));
+    // Where the bias follows a slow temperature behind a lag, it resembles the temperature itself: not as much as it has to for its name.
+    let mut resembles_temperature = false;
     for (candidate, regressor) in single {
-        if let Some(RegressionEstimate { p_value, deviance, .. }) = regression.estimate_below(SIGNIFICANCE, regressor) {
+        let estimate = regression.estimate_below(REFUTED, regressor);
+        let Some(RegressionEstimate { p_value, deviance, .. }) = estimate else { continue };
+        let is_temperature = |(index, _): &(usize, _)| matches!(candidate, Candidate::Regressor(of) if of == *index);
+        resembles_temperature |= temperature.as_ref().is_some_and(is_temperature);
+        if p_value < SIGNIFICANCE {
             rivals.push((deviance, Accepted { candidate, regressor: regressor.clone(), p_value }));
         }
     }
@@ -239,11 +245,7 @@ fn best_candidate(
             let accepted = Accepted { candidate: Candidate::Squared, regressor, p_value };
             rivals.push((deviance + thermal_response::ADVANTAGE, accepted));
         }
-        // Where the bias follows a slow temperature behind a lag, it resembles the temperature itself: not as much as it has to for its name.
-        let resembles = |(of, regressor): &(usize, DVector<f64>)| {
-            of == index && regression.estimate_below(REFUTED, regressor).is_some()
-        };
-        if regressors.iter().any(resembles)
+        if resembles_temperature
             && let Some(lag) = course.likeliest_lag(blocks, &regression)
             && let smoothed = course.smoothed_regressor(lag.value, blocks)
             && let Some(without_lag) = regression.estimate(&smoothed)
