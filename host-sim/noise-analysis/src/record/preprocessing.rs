@@ -9,6 +9,7 @@ use crate::detectors::bias::{self, BiasChanges, BiasSensitivity};
 use crate::detectors::bias_response::BiasResponse;
 use crate::detectors::knocks::{self, Knock, KnockRule};
 use crate::detectors::noise_grid::NoiseGrids;
+use crate::detectors::output_range::find_noise_below_count;
 use crate::detectors::spikes::{self, Disturbance, FoundSpikes, SpikeRule};
 use crate::detectors::vibration_rectification::{Acceleration, largest_sensitivity};
 use crate::effects::Effect;
@@ -16,12 +17,12 @@ use crate::effects::findings::{Correction, Detection};
 use crate::parallel::{in_parallel, per_channel};
 use crate::record::condensed_record::CondensedRecord;
 use crate::samples::exclusion::Exclusion;
-use crate::samples::gapped_cascade::GappedCascade;
-use crate::samples::rounding::{DITHERED_OCTAVES, NEIGHBOURING_COUNTS, is_dithered};
+use crate::samples::rounding::NEIGHBOURING_COUNTS;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra;
 use measurement::{ChannelId, Measurement, PerChannel, Quantity};
+use std::cell::LazyCell;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -199,7 +200,12 @@ impl ChannelPreprocessing {
         let regressors: Vec<ChannelId> =
             measurement.ids().filter(|&regressor| may_depend(measurement, channel, regressor)).collect();
         let others: Vec<&Series> = regressors.iter().map(|&regressor| &quiet[regressor]).collect();
-        let least_step = || smallest_step(&series[channel], measurement.profile.dithered_avar_counts2);
+        // That rounding cannot make of a slow change: any step, where the noise reaches from one count to the next.
+        let smallest_step = LazyCell::new(|| {
+            find_noise_below_count(&series[channel], measurement.profile.dithered_avar_counts2)
+                .map_or(0.0, |_| NEIGHBOURING_COUNTS * series[channel].resolution)
+        });
+        let least_step = || *smallest_step;
         let own = without_lines(quiet[channel].clone().without(&exclusion.spikes));
         let whole = bias::find(&own, &others, &accelerations(measurement, series, channel), noise_grids, &least_step);
         let half = {
@@ -238,16 +244,6 @@ impl ChannelPreprocessing {
         let [first_half, whole] = &self.bias;
         if exclusion == Exclusion::ByWhole { whole } else { first_half }
     }
-}
-
-/// The smallest step that rounding cannot make of a slow change, in the unit of `series`: any, where its noise reaches from one count to
-/// the next.
-fn smallest_step(series: &Series, dithered_avar_counts2: f64) -> f64 {
-    let curve = GappedCascade::of_series(series, 0..series.values.len()).curve(series.period_s);
-    if is_dithered(&curve, 1.0, dithered_avar_counts2, DITHERED_OCTAVES) {
-        return 0.0;
-    }
-    NEIGHBOURING_COUNTS * series.resolution
 }
 
 /// The first sample period behind a step, and its size.
