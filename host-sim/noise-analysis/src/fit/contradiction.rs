@@ -31,8 +31,7 @@ impl Contradiction {
     /// Compares `model` with all points of `curve`; `None` where chance explains their differences.
     ///
     /// The tail of a point is that of `v·edf/m` for a measured variance `v` and a modelled `m`, on its own side. The
-    /// probability is twice the smallest tail, for the two sides, times the number of independent points
-    /// ([`independent_points`]), as Bonferroni's bound has it.
+    /// probability is twice the smallest tail, for the two sides, times the number of independent points, as Bonferroni's bound has it.
     #[must_use]
     pub fn find<const POINTS: usize>(model: &Model, curve: &Curve<POINTS>) -> Option<Self> {
         Self::find_by(model, curve, |point| (model.avar(point.n), model.edf(point)))
