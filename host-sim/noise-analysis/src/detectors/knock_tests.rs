@@ -2,6 +2,7 @@
 
 use super::knocks::{KnockRule, find, find_by};
 use crate::effects::findings::SIGNIFICANCE;
+use crate::parallel::in_parallel;
 use crate::samples::series::Series;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -122,14 +123,7 @@ fn assert_quiet(name: &str, record: impl Fn(u64) -> Series + Sync) {
 /// How many of 200.
 fn records_with_a_knock(record: impl Fn(u64) -> Series + Sync) -> usize {
     let is_found = |seed: &u64| !find(&[record(*seed).before(QUIET)], DITHERED)[0].is_empty();
-    let seeds: Vec<u64> = (0..200).collect();
-    std::thread::scope(|scope| {
-        let tasks: Vec<_> = seeds
-            .chunks(50)
-            .map(|chunk| scope.spawn(move || chunk.iter().filter(|seed| is_found(seed)).count()))
-            .collect();
-        tasks.into_iter().map(|task| task.join().expect("a test")).sum()
-    })
+    in_parallel(&(0..200).collect::<Vec<u64>>(), is_found).into_iter().filter(|found| *found).count()
 }
 
 #[test]
