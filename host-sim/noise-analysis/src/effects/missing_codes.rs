@@ -10,8 +10,6 @@ pub struct MissingCodes {
     pub codes: u32,
     /// The largest distance of which all distances between missing codes are multiples; it is exact.
     pub spacing: ChannelEstimate,
-    /// The same in counts.
-    pub spacing_counts: u32,
     /// Samples that the missing codes would have if each had as many as the rarer of its neighbours.
     pub expected: f64,
 }

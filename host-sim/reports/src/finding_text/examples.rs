@@ -192,7 +192,7 @@ pub(super) fn examples() -> Vec<Effect> {
             moved_s: 12,
         }
         .into(),
-        MissingCodes { codes: 9, spacing: size(), spacing_counts: 8, expected: 25_000.0 }.into(),
+        MissingCodes { codes: 9, spacing: size(), expected: 25_000.0 }.into(),
         Saturation {
             fraction: BoundedEstimate::exact(0.003),
             level: size(),
