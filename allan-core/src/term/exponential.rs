@@ -6,9 +6,9 @@
 //! the formulas are written in `1 − z`; where this cancels too, a power series in `λ` is used.
 
 use super::process::Process;
-use crate::math::{cos, exp, expm1, sin, sqrt};
+use crate::math::{cos, exp, expm1, sin};
 use core::f64::consts::PI;
-use core::ops::{Add, Div, Mul, Sub};
+use core::ops::{Add, Mul, Sub};
 
 /// Exponentially correlated (first-order Gauss–Markov) noise of variance 1: `r(t) = exp(−|t|/T)` (IEEE 952).
 ///
@@ -42,6 +42,14 @@ const SLOW: f64 = 0.03;
 trait ExponentialAutocovariance {
     /// λ: decay and angle (radians) per sample.
     fn rate(&self, sample_period: f64) -> Complex;
+}
+
+impl Markov {
+    /// The factors a and b of the variance of the sum of `m` samples, `a·m − b·(1 − exp(−m·dt/T))`.
+    pub(super) fn line_and_bend(&self, sample_period: f64) -> (f64, f64) {
+        let (line, bend) = line_and_bend(self.rate(sample_period));
+        (line, bend.re)
+    }
 }
 
 impl ExponentialAutocovariance for Markov {
@@ -80,41 +88,43 @@ impl<T: ExponentialAutocovariance> Process for T {
     }
 }
 
+/// `Re (1+z)/(1−z)` and `2z/(1−z)²`: the variance of the sum of `m` samples is the first times `m` less the real part of the second times
+/// `1 − z^m`.
+#[inline(never)] // linked once
+fn line_and_bend(rate: Complex) -> (f64, Complex) {
+    let inverse = rate.one_minus_exp().inverse();
+    (2.0 * inverse.re - 1.0, (inverse * inverse - inverse) * 2.0)
+}
+
 fn sum_variance(rate: Complex, m: f64) -> f64 {
-    let one_minus_z = rate.one_minus_exp();
-    let one_minus_power = (rate * m).one_minus_exp();
-    let z = Complex::ONE - one_minus_z;
-    let line = (Complex::ONE + z) / one_minus_z * m;
-    (line - z * one_minus_power / (one_minus_z * one_minus_z) * 2.0).re
+    let (line, bend) = line_and_bend(rate);
+    line * m - (bend * (rate * m).one_minus_exp()).re
 }
 
 fn avar(rate: Complex, n: f64) -> f64 {
-    if (rate * n).magnitude() < SLOW {
+    if (rate * n).square() < SLOW * SLOW {
         return slow_avar(rate, n);
     }
-    let one_minus_z = rate.one_minus_exp();
+    let (line, bend) = line_and_bend(rate);
     let one_minus_power = (rate * n).one_minus_exp();
-    let z = Complex::ONE - one_minus_z;
-    let line = (Complex::ONE + z) / one_minus_z * n;
-    // 3 − 4zⁿ + z²ⁿ without its cancellation.
-    let bend = one_minus_power * 2.0 + one_minus_power * one_minus_power;
-    (line - z * bend / (one_minus_z * one_minus_z)).re / (n * n)
+    // Half of 3 − 4zⁿ + z²ⁿ, without its cancellation.
+    let powers = one_minus_power + one_minus_power * one_minus_power * 0.5;
+    (line * n - (bend * powers).re) / (n * n)
 }
 
 /// Power series of the Allan variance in `λ` up to `λ⁴`; the next term is below 10⁻⁷ of the result.
 fn slow_avar(rate: Complex, n: f64) -> f64 {
     let square = rate * rate;
     let (n2, n3) = (n * n, n * n * n);
-    let sum = rate * ((2.0 * n2 + 1.0) / (3.0 * n)) - square * (n2 / 2.0)
-        + square * rate * ((1.4 * n3 - n / 3.0 - 1.0 / (15.0 * n)) / 6.0)
-        - square * square * ((2.0 * n2 * n2 - n2) / 24.0);
-    sum.re
+    rate.re * ((2.0 * n2 + 1.0) / (3.0 * n)) - square.re * (n2 / 2.0)
+        + (square * rate).re * ((1.4 * n3 - n / 3.0 - 1.0 / (15.0 * n)) / 6.0)
+        - (square * square).re * ((2.0 * n2 * n2 - n2) / 24.0)
 }
 
 /// Sum variances at 0, 1, 2 … strides. `1 − z^m` advances from stride to stride by `1 − zᵃ⁺ᵇ = u + v − uv` with
 /// `u = 1 − zᵃ`, `v = 1 − zᵇ`.
 fn sum_variances(rate: Complex, stride: f64, table: &mut [f64]) {
-    if (rate * stride).magnitude() * (table.len() as f64) < 1e-3 {
+    if (rate * (stride * table.len() as f64)).square() < 1e-6 {
         // At these strides the process is a random walk, and the differences below would cancel.
         for (k, sum_variance) in table.iter_mut().enumerate() {
             let m = k as f64 * stride;
@@ -122,14 +132,11 @@ fn sum_variances(rate: Complex, stride: f64, table: &mut [f64]) {
         }
         return;
     }
-    let one_minus_z = rate.one_minus_exp();
-    let z = Complex::ONE - one_minus_z;
-    let line = (Complex::ONE + z) / one_minus_z;
-    let bend = z / (one_minus_z * one_minus_z) * 2.0;
+    let (line, bend) = line_and_bend(rate);
     let step = (rate * stride).one_minus_exp();
     let mut one_minus_power = Complex { re: 0.0, im: 0.0 };
     for (k, sum_variance) in table.iter_mut().enumerate() {
-        *sum_variance = (line * (k as f64 * stride) - bend * one_minus_power).re;
+        *sum_variance = line * (k as f64 * stride) - (bend * one_minus_power).re;
         one_minus_power = one_minus_power + step - one_minus_power * step;
     }
 }
@@ -137,19 +144,19 @@ fn sum_variances(rate: Complex, stride: f64, table: &mut [f64]) {
 /// A complex number whose real part is the covariance of second differences at a lag of `2n`; at longer lags it is
 /// multiplied by `z` per sample.
 fn covariance_at_2n(rate: Complex, n: f64) -> Complex {
-    let one_minus_z = rate.one_minus_exp();
-    let square = (rate * n).one_minus_exp() * (rate * n).one_minus_exp();
-    let z = Complex::ONE - one_minus_z;
-    z * square * square / (one_minus_z * one_minus_z) * (-1.0 / (2.0 * n * n))
+    let (_, bend) = line_and_bend(rate);
+    let one_minus_power = (rate * n).one_minus_exp();
+    let square = one_minus_power * one_minus_power;
+    bend * square * square * (-1.0 / (4.0 * n * n))
 }
 
 /// Sum of the squares of the covariances at the lags `2n + stride, 2n + 2·stride …`
 fn squared_covariance_tail(rate: Complex, n: f64, stride: f64) -> f64 {
     let step = rate * stride;
-    let first = covariance_at_2n(rate, n) * step.decay();
-    let square = first * first;
-    let steady = (first.re * first.re + first.im * first.im) / -expm1(-2.0 * step.re);
-    (steady + (square / (step * 2.0).one_minus_exp()).re) / 2.0
+    let at_2n = covariance_at_2n(rate, n);
+    let first = at_2n - at_2n * step.one_minus_exp();
+    let steady = first.square() / -expm1(-2.0 * step.re);
+    (steady + (first * first * (step * 2.0).one_minus_exp().inverse()).re) / 2.0
 }
 
 /// Discrete spectrum of `exp(−decay·|j|)` at `angle` radians per sample.
@@ -166,8 +173,6 @@ struct Complex {
 }
 
 impl Complex {
-    const ONE: Self = Self { re: 1.0, im: 0.0 };
-
     /// `1 − exp(−self)`, without cancellation near 0.
     fn one_minus_exp(self) -> Self {
         let shrink = expm1(-self.re);
@@ -175,14 +180,15 @@ impl Complex {
         Self { re: 2.0 * half * half * (1.0 + shrink) - shrink, im: (1.0 + shrink) * sin(self.im) }
     }
 
-    /// `exp(−self)`.
-    fn decay(self) -> Self {
-        let modulus = exp(-self.re);
-        Self { re: modulus * cos(self.im), im: -modulus * sin(self.im) }
+    /// `1/self`.
+    fn inverse(self) -> Self {
+        let square = self.square();
+        Self { re: self.re / square, im: -self.im / square }
     }
 
-    fn magnitude(self) -> f64 {
-        sqrt(self.re * self.re + self.im * self.im)
+    /// The square of its magnitude.
+    fn square(self) -> f64 {
+        self.re * self.re + self.im * self.im
     }
 }
 
@@ -211,13 +217,5 @@ impl Mul<f64> for Complex {
     type Output = Self;
     fn mul(self, factor: f64) -> Self {
         Self { re: self.re * factor, im: self.im * factor }
-    }
-}
-
-impl Div for Complex {
-    type Output = Self;
-    fn div(self, by: Self) -> Self {
-        let square = by.re * by.re + by.im * by.im;
-        Self { re: (self.re * by.re + self.im * by.im) / square, im: (self.im * by.re - self.re * by.im) / square }
     }
 }

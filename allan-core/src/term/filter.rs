@@ -107,11 +107,9 @@ impl MovingAverageFilter {
         if self.reach_of_differences(n) < WALKS * steps {
             return 2.0 / markov.time_constant * self.avar_of_walk(n, sample_period);
         }
-        // As the variance of the sum of samples of a process with this autocovariance has it.
-        let lost = -expm1(-1.0 / steps);
         let between = (1.0 - 1.0 / (self.decimation * self.decimation)) / (6.0 * steps);
-        let (line, bend) = ((2.0 - lost) / lost - between, 2.0 * (1.0 - lost) / (lost * lost));
-        self.avar_of_passed(n, steps, &|m| line * m + bend * expm1(-m / steps))
+        let (line, bend) = markov.line_and_bend(sample_period);
+        self.avar_of_passed(n, steps, &|m| (line - between) * m + bend * expm1(-m / steps))
     }
 
     /// The longest lag, in samples, between values on which a second difference of averages over `n` samples depends.
