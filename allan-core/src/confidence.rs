@@ -61,7 +61,7 @@ pub(crate) enum Difference {
 impl Difference {
     /// Autocorrelation of the differences at lag `x`, in averaging times. `law` is the generalised autocovariance of the
     /// phase noise.
-    fn correlation(self, law: impl Fn(f64) -> f64, x: f64) -> f64 {
+    fn correlation(self, law: &dyn Fn(f64) -> f64, x: f64) -> f64 {
         // Binomial coefficients of twice the order, with alternating signs, from the middle on.
         let coefficients: &[f64] = match self {
             Self::Second => &[6.0, -4.0, 1.0],
@@ -154,21 +154,21 @@ impl ChiSquareApproximation {
 fn difference_correlation(difference: Difference, fractions: VarianceFractions, distance: f64, n: u64) -> f64 {
     let mut sum = 0.0;
     if fractions.white > 0.0 {
-        sum += fractions.white * difference.correlation(abs, distance);
+        sum += fractions.white * difference.correlation(&abs, distance);
     }
     if fractions.flicker > 0.0 {
         let law = |x: f64| if x == 0.0 { 0.0 } else { x * x * ln(abs(x)) };
-        sum += fractions.flicker * difference.correlation(law, distance);
+        sum += fractions.flicker * difference.correlation(&law, distance);
     }
     if fractions.random_walk > 0.0 {
         // Generalised autocovariance of the double sum of white noise: |k|³ − |k| at a lag of k samples.
         let per_sample = 1.0 / (n as f64 * n as f64);
         let law = |x: f64| abs(x) * (x * x - per_sample);
-        sum += fractions.random_walk * difference.correlation(law, distance);
+        sum += fractions.random_walk * difference.correlation(&law, distance);
     }
     if fractions.quantization > 0.0 {
         let law = |x: f64| if x == 0.0 { 1.0 } else { 0.0 };
-        sum += fractions.quantization * difference.correlation(law, distance);
+        sum += fractions.quantization * difference.correlation(&law, distance);
     }
     sum
 }
