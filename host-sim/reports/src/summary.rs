@@ -14,7 +14,7 @@ use noise_analysis::effects::{Effect, Unexplained};
 use noise_analysis::nonstationarity::FittedPart;
 use noise_analysis::report::DataSheetReport;
 use noise_analysis::report::assessment::Innovations;
-use noise_analysis::report::{ChannelReport, Finding, ModelErrorReport, Parameter, PartNote, Report};
+use noise_analysis::report::{BiasOverTime, ChannelReport, Finding, ModelErrorReport, Parameter, PartNote, Report};
 use noise_analysis::units::conversions;
 
 /// Deviance a point on the unseen half above which a model is marked: a true model scores about 1, and what changes from one
@@ -582,9 +582,13 @@ pub fn conditions(report: &Report) -> Vec<String> {
             .mean
             .iter()
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| (value.min(low), value.max(high)));
-        Some(match high - low {
-            0.0 => format!("{label} did not change"),
-            range => format!("{label} moved by {}", quantity(range, &channel.unit)),
+        let range = high - low;
+        Some(if is_constant(channel) || range == 0.0 {
+            format!("{label} did not change")
+        } else if range < range_of_white_noise(channel, bias) {
+            format!("{label} constant within its noise")
+        } else {
+            format!("{label} moved by {}", quantity(range, &channel.unit))
         })
     };
     let unknown = report.channels.iter().all(|channel| channel.name != "temp");
@@ -597,6 +601,19 @@ pub fn conditions(report: &Report) -> Vec<String> {
     .flatten()
     .chain(magnetometers(report))
     .collect()
+}
+
+/// Whether all samples of a channel are the same, by a curve that is 0. The means of blocks of one value may differ by the rounding of
+/// their sums.
+fn is_constant(channel: &ChannelReport) -> bool {
+    !channel.curve.is_empty() && channel.curve.iter().all(|point| point.adev == 0.0)
+}
+
+/// Range of the means of blocks that white noise of the channel's N exceeds in fewer than [`CHANCE`] of all records; 0 without N.
+fn range_of_white_noise(channel: &ChannelReport, bias: &BiasOverTime) -> f64 {
+    let deviation = coefficient(channel, LETTERS[0].0).map_or(0.0, |n| n.high / bias.block_s.sqrt());
+    // The highest and the lowest mean, each beyond its bound in half as many.
+    2.0 * quantile(CHANCE / 2.0 / bias.mean.len().max(1) as f64) * deviation
 }
 
 /// N of the magnetometers, and those without one: a bound on N by a model that fails says nothing.

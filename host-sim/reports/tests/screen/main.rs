@@ -13,7 +13,7 @@ use noise_analysis::effects::{
     OutputFilter, SinusoidalLine, Unexplained, UnexplainedPlace,
 };
 use noise_analysis::report::assessment::RecordLength;
-use noise_analysis::report::{ChannelReport, Finding, PartNote, Report, Stretch, Validation};
+use noise_analysis::report::{BiasOverTime, ChannelReport, Finding, PartNote, Report, Stretch, Validation};
 use phrases::{documentation, phrases};
 use reports::terminal::{MOST_LINES, Screen};
 use std::collections::BTreeMap;
@@ -162,6 +162,31 @@ fn what_is_not_known_is_not_claimed() {
     let moved = "It moved for 2 h 37 min; for the longest time at rest, add --from 9419 --to 10018.";
     let sentences = reports::summary::record_sentences(&report);
     assert!(sentences.iter().any(|sentence| sentence == moved), "{sentences:#?}");
+}
+
+/// The means of blocks of a constant temperature differ by rounding; those of a supply with white noise by that noise.
+#[test]
+fn a_condition_has_moved_where_rounding_and_noise_do_not_explain_it() {
+    let told = |adev: f64, mean: [f64; 4], n: f64| {
+        let mut channel = fixture::channel("temp", "degC");
+        channel.curve.iter_mut().for_each(|point| point.adev = adev);
+        channel.refitted.terms.retain(|term| term.kind() == "angle_random_walk");
+        let term = &mut channel.refitted.terms[0].term;
+        (term.value, term.low, term.high) = (n, n, n);
+        let time_s = vec![8.0, 24.0, 40.0, 56.0];
+        let bias = BiasOverTime { block_s: 16.0, followed: Vec::new(), time_s, mean: mean.to_vec() };
+        channel.figure_data.bias_over_time = Some(bias);
+        let mut report = report();
+        report.channels.push(channel);
+        reports::summary::conditions(&report).remove(0)
+    };
+    let residue = [1.243e-14, 1.243e-14, 0.0, 1.243e-14];
+    assert_eq!(told(0.0, residue, 0.0), "temperature did not change");
+    assert_eq!(told(0.01, [0.0; 4], 0.01), "temperature did not change");
+    // Means of 16 s with N = 0.04 °C/√Hz scatter by 0.01 °C. Of four, the highest is above 3.02 of these in half a per cent.
+    let half = 0.0302;
+    assert_eq!(told(0.01, [0.0, 0.99 * half, -0.99 * half, 0.0], 0.04), "temperature constant within its noise");
+    assert_eq!(told(0.01, [0.0, 1.01 * half, -1.01 * half, 0.0], 0.04), "temperature moved by 0.061 °C");
 }
 
 /// A magnetometer with this N, in gauss/√Hz, and deviance on the unseen half.
