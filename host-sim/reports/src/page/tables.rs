@@ -3,7 +3,7 @@
 use crate::curve_numbers::curve_numbers;
 use crate::formatting::{duration, number, optional, parameter_name, percent, words};
 use crate::rounding::{NONE, Scale, parameter_magnitude};
-use crate::summary;
+use crate::summary::{self, CoefficientTable};
 use maud::{Markup, html};
 use noise_analysis::report::assessment::{Coefficient, NavigationDrift};
 use noise_analysis::report::{ChannelReport, ModelErrorReport, ModelReport, Report};
@@ -19,18 +19,19 @@ fn numbers(heading: &str) -> Heading {
     (html! { (heading) }, true)
 }
 
+/// The cells of headings.
+fn cells(headings: &[Heading]) -> Markup {
+    html! {
+        @for (heading, numeric) in headings { th class=[numeric.then_some("number")] scope="col" { (heading) } }
+    }
+}
+
 /// A table of the given class, empty for none, with `rows` (`tr` elements).
 fn table(class: &str, headings: &[Heading], rows: &Markup) -> Markup {
     html! {
         div.scroll {
             table class=[(!class.is_empty()).then_some(class)] {
-                thead {
-                    tr {
-                        @for (heading, numeric) in headings {
-                            th class=[numeric.then_some("number")] scope="col" { (heading) }
-                        }
-                    }
-                }
+                thead { tr { (cells(headings)) } }
                 tbody { (rows) }
             }
         }
@@ -40,20 +41,18 @@ fn table(class: &str, headings: &[Heading], rows: &Markup) -> Markup {
 /// N, B and K of the gyros and accelerometers in the units of their users, the data sheet's, and the error before and after.
 pub(super) fn coefficients_of_all(report: &Report) -> Markup {
     let groups = summary::coefficient_tables(report);
-    let headings = [
-        text("channel"),
-        numbers("angle random walk N"),
-        numbers("bias instability B"),
-        numbers("rate random walk K"),
-        numbers("error on the unseen half"),
-    ];
+    // An accelerometer's random walks have other names than a gyro's.
+    let headings = |group: &CoefficientTable| {
+        let columns = group.names.iter().zip(["N", "B", "K"]).zip(&group.units);
+        let columns = columns.map(|((name, letter), unit)| {
+            (html! { (name) " " span.letter { (letter) } span.under { (unit) } }, true)
+        });
+        let error = (html! { "error on the unseen half" span.under { "1 = true" } }, true);
+        [text(group.title)].into_iter().chain(columns).chain([error]).collect::<Vec<Heading>>()
+    };
     let rows = html! {
-        @for group in &groups {
-            tr.group {
-                th scope="row" { (group.title) }
-                @for unit in &group.units { td.number { (unit) } }
-                td {}
-            }
+        @for (number, group) in groups.iter().enumerate() {
+            @if number > 0 { tr.group { (cells(&headings(group))) } }
             @for row in &group.rows {
                 tr class=[row.channel.is_empty().then_some("sheet")] {
                     th scope="row" {
@@ -65,7 +64,7 @@ pub(super) fn coefficients_of_all(report: &Report) -> Markup {
             }
         }
     };
-    html! { @if !groups.is_empty() { (table("", &headings, &rows)) } }
+    html! { @if let Some(first) = groups.first() { (table("", &headings(first), &rows)) } }
 }
 
 /// The terms of a model with all their parameters.

@@ -292,7 +292,8 @@ fn values_are_read_by_keyboard_and_pointer_and_tables_are_copied() {
         }
     }
     let csv = facts[0]["csv"].as_str().expect("the table");
-    assert!(csv.starts_with("channel,angle random walk N,"), "{csv}");
+    assert!(csv.starts_with("gyro,angle random walk N °/√h,bias instability B °/h,"), "{csv}");
+    assert!(csv.contains("\naccel,velocity random walk N µg/√Hz,"), "{csv}");
     assert!(csv.contains("\nx,2.21 ± 0.14,"), "{csv}");
     // The first figure as it is on light ground, with twice the pixels: ground, measured curve and models.
     let png = &facts[0]["png"];
