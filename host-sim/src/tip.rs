@@ -1,6 +1,7 @@
 //! What the user probably meant: names that are similar to one that does not exist.
 
 use clap::error::{ContextKind, ContextValue};
+use recordings::sample_stream::StreamError;
 use recordings::{InputError, Reason, serial};
 use simulation::ScenarioTextError;
 use std::fs;
@@ -62,7 +63,11 @@ pub(crate) fn tip(error: &anyhow::Error) -> Option<String> {
     if let Some(error) = error.downcast_ref::<ScenarioTextError>() {
         return similar_part(error);
     }
-    let InputError { file, reason, .. } = error.downcast_ref()?;
+    let of_stream = || match error.downcast_ref()? {
+        StreamError::Input(error) => Some(error),
+        StreamError::TimeBase(_) => None,
+    };
+    let InputError { file, reason, .. } = error.downcast_ref().or_else(of_stream)?;
     match reason {
         Reason::Io(reason) if reason.kind() == ErrorKind::NotFound => {
             Some(format!("a similar file exists: {}", similar_file(file)?.display()))

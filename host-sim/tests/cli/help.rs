@@ -63,7 +63,13 @@ fn a_misspelt_command_option_or_file_gets_a_suggestion() {
     std::fs::create_dir(dir.path().join("flights")).expect("a folder");
     let in_folder = dir.path().join("flights/hover.csv").display().to_string();
     std::fs::write(&in_folder, "gyro_x_counts\n1\n").expect("written");
+    let topics = dir.path().join("topics.csv").display().to_string();
+    let rows = |row: u32| format!("gyro,{row},0.1,0.2,0.3\naccel,{row},0.1,0.2,9.8\n");
+    std::fs::write(&topics, (0..50).map(rows).collect::<String>()).expect("written");
     for (arguments, status, suggestion) in [
+        (vec!["analyze", &topics, "--topic", "gyros"], 1, "tip: did you mean gyro?\n".to_owned()),
+        (vec!["analyze", &topics, "--topic", "gyros", "--to", "9"], 1, "tip: did you mean gyro?\n".to_owned()),
+        (vec!["inspect", &topics, "--topic", "acel"], 1, "tip: did you mean accel?\n".to_owned()),
         (vec!["analize", "x.csv"], 2, "'analyze'".to_owned()),
         (vec!["analyze", "--pagge", "d", "x.csv"], 2, "'--page'".to_owned()),
         // Other names of what the program has.
