@@ -12,14 +12,16 @@ use anyhow::{Context, Result, bail};
 use measurement::{Measurement, SensorProfile, adis16405, profile_file};
 use noise_analysis::analysis::{analyze_and_release, analyze_condensed};
 use noise_analysis::record::long_record::{MOST_LOST, MOST_SAMPLES, MOST_SAMPLES_WITH_LOSSES};
-use noise_analysis::report::Report;
+use noise_analysis::effects::Effect;
+use noise_analysis::report::{Report, Stretch};
 use noise_analysis::report::several::{self, NoiseAgreement, NoiseInflation};
 use recordings::any_sensor::{ReadOptions, SensorRecording};
 use recordings::file_format::{FileFormat, InputFile};
 use recordings::recording::Recording;
 use recordings::sample_stream::{KeptInMemory, SampleStream, StreamError};
-use recordings::time_base::{StampQuality, time_base};
+use recordings::time_base::{StampQuality, TimeRange, time_base};
 use recordings::{ColumnSelection, Printable, ReadMonitor, count_table};
+use reports::summary::longest_at_rest;
 use serde::Serialize;
 use simulation::Replay;
 use std::fs::File;
@@ -131,8 +133,29 @@ fn watched_report(recording: &RecordingArguments, is_quick: bool) -> Result<Repo
     report(recording, is_quick, &monitor, &mut end_reading)
 }
 
-/// The report of a recording; `end_reading` is called when it was read, before it is analysed.
+/// The report of a recording, with the longest part at rest of its file where the platform moved; `end_reading` is called when it was
+/// read, before it is analysed.
 fn report(
+    recording: &RecordingArguments,
+    is_quick: bool,
+    monitor: &ReadMonitor,
+    end_reading: &mut dyn FnMut(&SampleStream),
+) -> Result<Report> {
+    let mut report = report_of_samples(recording, is_quick, monitor, end_reading)?;
+    if report.findings.iter().any(|finding| matches!(finding.effect, Effect::MotionInterval(_))) {
+        let by_motions = || {
+            // From the first sample of the part that was read.
+            let from_s = recording.from.unwrap_or(0.0);
+            let longest = longest_at_rest(&report)?;
+            Some(Stretch { from_s: from_s + longest.from_s, to_s: from_s + longest.to_s })
+        };
+        let by_file = inspect::part_at_rest(recording).map(|TimeRange { from_s, to_s }| Stretch { from_s, to_s });
+        report.longest_at_rest = by_file.or_else(by_motions);
+    }
+    Ok(report)
+}
+
+fn report_of_samples(
     recording: &RecordingArguments,
     is_quick: bool,
     monitor: &ReadMonitor,

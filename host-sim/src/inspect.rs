@@ -8,9 +8,10 @@ use measurement::Measurement;
 use recordings::file_format::{FileFormat, InputFile, TopicDescription};
 use recordings::inspection::{ColumnGuess, InspectedColumn, InspectedTable, Proposal};
 use recordings::sample_stream::StreamError;
-use recordings::time_base::TimeBaseError;
+use recordings::time_base::{TimeBaseError, TimeRange};
 use recordings::{ColumnSelection, InputError, Printable, Reason};
 use reports::rounding::plain;
+use reports::summary::time_options;
 use std::fmt::{self, Display, Write as _};
 use std::io::Write;
 use std::path::Path;
@@ -83,6 +84,16 @@ pub(crate) fn each_sensor(recording: &RecordingArguments) -> Result<Vec<Recordin
         return Err(Question { error, text: contents.to_string() }.into());
     }
     Ok(proposals.into_iter().map(|proposal| contents.arguments(proposal)).collect())
+}
+
+/// The longest part at rest of the file of `recording`, as `inspect` shows it; `None` where that shows none, or more than one table.
+pub(crate) fn part_at_rest(recording: &RecordingArguments) -> Option<TimeRange> {
+    let file = &recording.input.file;
+    let input = InputFile::open(file).ok().filter(|_| !is_standard_stream(file))?;
+    match Contents::read(&input, recording.clone()).ok()?.tables.as_slice() {
+        [table] => table.part_at_rest(),
+        _ => None,
+    }
 }
 
 /// What is in a file.
@@ -262,13 +273,11 @@ fn write_table(table: &InspectedTable, f: &mut fmt::Formatter<'_>) -> fmt::Resul
 fn write_steady(table: &InspectedTable, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     let Some(steady) = &table.steady else { return Ok(()) };
     let what = if steady.is_rest { "at rest" } else { "steady (without units, that is all that is known)" };
-    let rate_hz = table.rate.map(|rate| rate.hz).or(table.stated_rate_hz);
-    match (steady.rows.len(), rate_hz) {
+    match (steady.rows.len(), table.steady_s) {
         (0, _) => writeln!(f, "never {what}"),
         (length, _) if length == table.rows => writeln!(f, "{what} all the time"),
-        (_, Some(rate)) => {
-            let [from, to] = [steady.rows.start, steady.rows.end].map(|row| row as f64 / rate);
-            writeln!(f, "longest part {what}: --from {from:.1} --to {to:.1}, in s")
+        (_, Some(TimeRange { from_s, to_s })) => {
+            writeln!(f, "longest part {what}: {}, in s", time_options(from_s, to_s))
         }
         (_, None) => writeln!(f, "longest part {what}: rows {} to {}", steady.rows.start + 1, steady.rows.end),
     }

@@ -129,6 +129,7 @@ pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Rep
         part,
         findings,
         common_mode: common_mode_regression(measurement, &channels),
+        longest_at_rest: None,
         channels,
     };
     figure_data::set(&mut report, measurement, record.first.as_ref());

@@ -100,6 +100,7 @@ impl CurveEstimators {
             },
             findings,
             common_mode: None,
+            longest_at_rest: None,
             channels: reports,
         }
     }

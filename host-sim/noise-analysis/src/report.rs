@@ -50,6 +50,9 @@ pub struct Report {
     pub findings: Vec<Finding>,
     /// Regression of the gyros and accelerometers on each other; absent where there are fewer than two, or too few samples.
     pub common_mode: Option<CommonModeRegression>,
+    /// The longest part at rest by the rows of its file, s from the first of them, where the platform moved and the file was looked at.
+    /// Not in the JSON, which says nothing of the file; `None` leaves it to [`ChannelReport::at_rest`].
+    pub longest_at_rest: Option<Stretch>,
     /// In the order of the burst.
     pub channels: Vec<ChannelReport>,
 }

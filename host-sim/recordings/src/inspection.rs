@@ -11,8 +11,9 @@ use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::sensor_guess::SensorGuess;
 use crate::tables::whole_table::WholeTable;
 use crate::time_base::sample_slots::SampleSlots;
-use crate::time_base::{RateEstimate, StampQuality};
+use crate::time_base::{RateEstimate, StampQuality, TimeRange};
 use measurement::SensorProfile;
+use std::ops::Range;
 
 pub use crate::inspection::sensor_guess::{ColumnGuess, Proposal};
 pub use crate::inspection::steady_part::SteadyPart;
@@ -78,6 +79,8 @@ pub struct InspectedTable {
     pub gaps: usize,
     /// The longest part in which the sensor was steady; `None` where no column is taken for one of an inertial sensor.
     pub steady: Option<SteadyPart>,
+    /// Its time from the first row, where times, an index or a rate tell it.
+    pub steady_s: Option<TimeRange>,
     /// How each sensor in it is analysed.
     pub proposals: Vec<Proposal>,
     /// What the user should know, one sentence each.
@@ -104,6 +107,7 @@ impl InspectedTable {
             missing: 0,
             gaps: 0,
             steady: SteadyPart::find(&facts, &sensors),
+            steady_s: None,
             proposals: Vec::new(),
             notes: table.notes.clone(),
         };
@@ -122,6 +126,10 @@ impl InspectedTable {
             inspected.gaps = slots.slots.windows(2).filter(|pair| pair[1] - pair[0] > 1).count();
             inspected.notes.extend(slots.stamps.iter().flat_map(StampQuality::notes));
         }
+        if let Some(SteadyPart { rows, .. }) = &inspected.steady {
+            let rate_hz = inspected.rate.map(|rate| rate.hz).or(table.rate_hz);
+            inspected.steady_s = time_of(rows, inspected.rows, times_s, indices.as_deref(), rate_hz);
+        }
         let has_rate = inspected.rate.is_some() || table.rate_hz.is_some();
         inspected.proposals = sensors.iter().map(|sensor| sensor.proposal(&table, &facts, has_rate)).collect();
         let guess = |at: usize| sensors.iter().find_map(|sensor| sensor.guess(at));
@@ -130,9 +138,40 @@ impl InspectedTable {
         inspected
     }
 
+    /// The longest part in which the sensor was at rest, where it is one of a table that was looked at as a whole.
+    #[must_use]
+    pub fn part_at_rest(&self) -> Option<TimeRange> {
+        let SteadyPart { rows, is_rest } = self.steady.as_ref()?;
+        let is_part = *is_rest && !self.is_cut && !rows.is_empty() && rows.len() < self.rows;
+        self.steady_s.filter(|_| is_part)
+    }
+
     /// Whether a column is taken for `channel`, which is a channel's name, `time` or `sample`.
     #[must_use]
     pub fn has(&self, channel: &str) -> bool {
         self.columns.iter().any(|column| column.guess.as_ref().is_some_and(|guess| guess.channel == channel))
     }
+}
+
+/// The time of `rows` among `all` from the first of these, as [`TimeRange`] takes it: by the times of the rows, else by their index or
+/// number and the rate. `None` where it is not known.
+fn time_of(
+    rows: &Range<usize>,
+    all: usize,
+    times_s: Option<&[f64]>,
+    indices: Option<&[u64]>,
+    rate_hz: Option<f64>,
+) -> Option<TimeRange> {
+    let period_s = rate_hz.map(f64::recip);
+    // Rows whose time goes back have no place among the times.
+    let times_s = times_s.filter(|times| times.len() == all);
+    let indices = indices.filter(|indices| indices.len() == all);
+    let at = |row: usize| match (times_s, indices) {
+        (Some(times), _) => Some(times.get(row)? - times.first()?),
+        (None, Some(indices)) => Some((indices.get(row)? - indices.first()?) as f64 * period_s?),
+        (None, None) => Some(row as f64 * period_s?),
+    };
+    // The last row lasts for a period.
+    let to_s = if rows.end < all { at(rows.end)? } else { at(all.checked_sub(1)?)? + period_s? };
+    Some(TimeRange { from_s: at(rows.start)?, to_s })
 }

@@ -83,8 +83,19 @@ struct EffectJson {
 
 impl<'a> From<&'a Report> for ReportJson<'a> {
     fn from(report: &'a Report) -> Self {
-        let Report { schema, quick, sample_rate_hz, samples, dropped, flagged, part, findings, common_mode, channels } =
-            report;
+        let Report {
+            schema,
+            quick,
+            sample_rate_hz,
+            samples,
+            dropped,
+            flagged,
+            part,
+            findings,
+            common_mode,
+            longest_at_rest: _,
+            channels,
+        } = report;
         Self {
             schema: *schema,
             quick: *quick,

@@ -14,7 +14,7 @@ use noise_analysis::effects::{Effect, Unexplained};
 use noise_analysis::nonstationarity::FittedPart;
 use noise_analysis::report::DataSheetReport;
 use noise_analysis::report::assessment::Innovations;
-use noise_analysis::report::{BiasOverTime, ChannelReport, Finding, ModelErrorReport, Parameter, PartNote, Report};
+use noise_analysis::report::{BiasOverTime, ChannelReport, Finding, ModelErrorReport, Parameter, PartNote, Report, Stretch};
 use noise_analysis::units::conversions;
 
 /// Deviance a point on the unseen half above which a model is marked: a true model scores about 1, and what changes from one
@@ -365,6 +365,23 @@ pub fn unexplained(report: &Report) -> Vec<String> {
     departures.iter().map(told).collect()
 }
 
+/// The longest part at rest: by the file, where it was looked at, and else the longest without a motion.
+#[must_use]
+pub fn longest_at_rest(report: &Report) -> Option<Stretch> {
+    let stretches = || inertial(report).flat_map(|channel| &channel.at_rest);
+    let longest = || stretches().max_by(|a, b| (a.to_s - a.from_s).total_cmp(&(b.to_s - b.from_s))).copied();
+    report.longest_at_rest.or_else(longest)
+}
+
+/// The options for a part of a recording, in tenths of a second within it.
+#[must_use]
+pub fn time_options(from_s: f64, to_s: f64) -> String {
+    // A tenth is none in binary.
+    const ROUNDING: f64 = 1e-6;
+    let (from, to) = ((10.0 * from_s - ROUNDING).ceil() / 10.0, (10.0 * to_s + ROUNDING).floor() / 10.0);
+    format!("--from {from} --to {to}")
+}
+
 /// Whether the platform was at rest; with a knock or a motion it was not throughout.
 fn rest(report: &Report) -> String {
     let length = report_length_s(report);
@@ -377,12 +394,8 @@ fn rest(report: &Report) -> String {
     let knocks = found(|effect| matches!(effect, Effect::NoisyInterval(_)));
     let has_moved = found(|effect| matches!(effect, Effect::MotionInterval(_))) > 0;
     if has_moved || least < THROUGHOUT * length {
-        let stretches = inertial(report).flat_map(|channel| &channel.at_rest);
-        let longest = stretches.max_by(|a, b| (a.to_s - a.from_s).total_cmp(&(b.to_s - b.from_s)));
-        let longest = longest.map_or_else(String::new, |of| {
-            // In whole seconds, none of which is moved.
-            let (from, to) = (of.from_s.ceil(), of.to_s.floor());
-            format!("; for the longest time at rest, add --from {from} --to {to}")
+        let longest = longest_at_rest(report).map_or_else(String::new, |of| {
+            format!("; for the longest part at rest, add {}", time_options(of.from_s, of.to_s))
         });
         return format!("It moved for {}{longest}.", span((length - least).max(0.0)));
     }

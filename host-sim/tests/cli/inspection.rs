@@ -152,9 +152,46 @@ fn the_part_at_rest_is_found_and_can_be_analysed() {
     let file = write(&dir, "moved.csv", format!("time_s,gx [dps],gy [dps],gz [dps]\n{rows}").as_bytes());
     let shown = inspected(&file);
     let line = shown.lines().find(|line| line.contains("at rest")).expect(&shown);
-    assert!(line.contains("--from 39.7 --to 100.0"), "{line}");
-    let output = host_sim(&["analyze", name(&file), "--from", "39.7", "--to", "100.0", "--quiet"]);
+    assert!(line.contains("--from 39.7 --to 100,"), "{line}");
+    let output = host_sim(&["analyze", name(&file), "--from", "39.7", "--to", "100", "--quiet"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// A sensor that is turned for 8 s at the beginning, of which the 5 s from 20 to 25 s are missing: `inspect` and `analyze` offer one part,
+/// in the time of the stamps.
+#[test]
+fn the_part_at_rest_is_the_same_in_inspect_and_analyze() {
+    let dir = tempdir().expect("a folder");
+    let mut rng = ChaCha8Rng::seed_from_u64(16);
+    let mut row = |row: u32| {
+        let moved = if row < 800 { 20.0 } else { 0.0 };
+        let rate = [0, 1, 2].map(|_| format!("{:.5}", moved + 0.05 * normal(&mut rng)));
+        format!("{:.3},{}\n", f64::from(row) * 0.01, rate.join(","))
+    };
+    let rows: String = (0..10_000).filter(|row| !(2000..2500).contains(row)).map(&mut row).collect();
+    let file = write(&dir, "turned.csv", format!("time_s,gx [dps],gy [dps],gz [dps]\n{rows}").as_bytes());
+    // The seventh block of 128 rows is moved in part, and the one after it is left out: 1024 rows.
+    let offered = "--from 10.3 --to 100";
+    let shown = inspected(&file);
+    assert!(shown.contains(&format!("longest part at rest: {offered}, in s")), "{shown}");
+    for part in [&[][..], &["--from", "1"]] {
+        let output = host_sim(&[&["analyze", name(&file)], part].concat());
+        let text = String::from_utf8(output.stdout).expect("UTF-8");
+        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(text.contains(&format!("for the longest part at rest, add {offered}.")), "{part:?}: {text}");
+    }
+}
+
+/// Both programs' parts of a recorded file.
+#[test]
+fn the_part_at_rest_of_a_log_is_the_same_in_inspect_and_analyze() {
+    let test = "the_part_at_rest_of_a_log_is_the_same_in_inspect_and_analyze";
+    let Some(path) = recording(test, "others/px4_sample.ulg") else { return };
+    let shown = inspected(&path);
+    let part = shown.split("longest part at rest: ").nth(1).and_then(|rest| rest.split(',').next()).expect(&shown);
+    let text = String::from_utf8(host_sim(&["analyze", name(&path)]).stdout).expect("UTF-8");
+    let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(text.contains(&format!("for the longest part at rest, add {part}.")), "{part}: {text}");
 }
 
 /// Names of several sensors in one table.

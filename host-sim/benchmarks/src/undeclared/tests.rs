@@ -327,6 +327,7 @@ fn report(found: &[Found]) -> Report {
         part: PartReport::default(),
         findings: Vec::new(),
         common_mode: None,
+        longest_at_rest: None,
         channels: Channel::ALL.into_iter().map(channel).collect(),
     }
 }

@@ -49,6 +49,7 @@ pub(crate) fn report() -> Report {
         part: PartReport::default(),
         findings: Vec::new(),
         common_mode: None,
+        longest_at_rest: None,
         channels,
     }
 }

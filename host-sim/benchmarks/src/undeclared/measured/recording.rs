@@ -80,10 +80,13 @@ fn only_sensor(tables: &[InspectedTable], rate_hz: Option<f64>) -> (ReadOptions,
     if let (Some((table, proposal)), None) = (proposals.next(), proposals.next()) {
         selection = ColumnSelection::parse(&proposal.columns, &proposal.units).unwrap_or_default();
         topic.clone_from(&proposal.topic);
-        let rate_hz = table.rate.map(|rate| rate.hz).or(table.stated_rate_hz).or(rate_hz);
-        rest = table.steady.as_ref().zip(rate_hz).and_then(|(SteadyPart { rows, .. }, rate_hz)| {
-            let [from_s, to_s] = [rows.start, rows.end].map(|row| row as f64 / rate_hz);
-            (rows.len() < table.rows).then_some(TimeRange { from_s, to_s })
+        rest = table.steady.as_ref().and_then(|SteadyPart { rows, .. }| {
+            // A rate of the user's counts where the file has none.
+            let by_rate = || {
+                let [from_s, to_s] = [rows.start, rows.end].map(|row| row as f64 / rate_hz.unwrap_or(f64::NAN));
+                rate_hz.map(|_| TimeRange { from_s, to_s })
+            };
+            (rows.len() < table.rows).then(|| table.steady_s.or_else(by_rate))?
         });
     }
     (ReadOptions { sensor: SensorProfile::generic(), selection, topic }, rest)
