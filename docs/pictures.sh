@@ -4,7 +4,9 @@
 #     docs/pictures.sh
 #
 #   docs/report.svg       gyro x of the simulated hour that the program makes without a command
-#   docs/run1-gyro_z.svg  gyro z of the first measured recording, if ADIS_RECORDINGS names the folder (docs/recordings.md)
+#                         (seed 1); no recording
+#   docs/run1-gyro_z.svg  gyro z of adis16405-static/run1.csv.gz in the folder that ADIS_RECORDINGS names (docs/recordings.md); left
+#                         as it is without
 set -eu
 cd "$(dirname "$0")/.."
 drawn=$(mktemp -d)
