@@ -5,9 +5,10 @@
 //! no more than the scatter of the levels from block to block allows, so that filtered noise, lines and a level that moves
 //! by itself have the false-alarm rate that is asked for.
 
-use crate::distributions::{quantile, upper_tail};
+use crate::distributions::quantile;
 use crate::effects::findings::REFUTED;
 use crate::samples::series::Series;
+use statrs::distribution::{ContinuousCDF, StudentsT};
 use statrs::function::beta::checked_beta_reg;
 use std::ops::Range;
 
@@ -311,7 +312,9 @@ impl LevelScatter {
         let excess = |part: f64| (quantile_of(&self.ratios, part) - lowest).ln();
         let deviation = (excess(0.9) - excess(0.5)) / NORMAL_90;
         // Counts that seldom change have half of the levels at their lowest.
-        (deviation > 0.0 && deviation.is_finite()).then(|| Wandering { lowest, median: excess(0.5), deviation })
+        let freedom = 0.5 * self.ratios.len() as f64 / SCATTER_ERROR.powi(2);
+        let median = excess(0.5);
+        (deviation > 0.0 && deviation.is_finite()).then_some(Wandering { lowest, median, deviation, freedom })
     }
 }
 
@@ -335,13 +338,16 @@ pub(super) struct Wandering {
     /// Median and deviation of the logarithm of what there is above.
     median: f64,
     deviation: f64,
+    /// Degrees of freedom of the deviation.
+    freedom: f64,
 }
 
 impl Wandering {
-    /// Probability of a level of at least `ratio` times those around it.
+    /// Probability of a level of at least `ratio` times those around it, by Student's distribution.
     pub(super) fn exceedance(&self, ratio: f64) -> f64 {
         let excess = (ratio - self.lowest).max(0.0).ln();
-        upper_tail((excess - self.median) / self.deviation)
+        let deviations = (excess - self.median) / self.deviation;
+        StudentsT::new(0.0, 1.0, self.freedom).map_or(1.0, |of| of.sf(deviations))
     }
 }
 
