@@ -55,9 +55,7 @@ impl SamplesOfCurve<'_> {
 pub(crate) fn quantization_p_value(curve: &Curve<OCTAVES>, model: &Model, samples: SamplesOfCurve) -> Option<f64> {
     let kinds: Vec<NoiseTerm> = model.terms().iter().map(|term| term.kind).collect();
     let at = kinds.iter().position(|kind| *kind == NoiseTerm::Quantization)?;
-    let spectrum = samples.spectrum(curve, &sinusoids(kinds.iter()))?;
-    let spectrum = model.filter().into_iter().fold(spectrum, SampleSpectrum::without_leakage);
-    spectrum.shape_p_value(&kinds, at)
+    samples.spectrum(curve, &sinusoids(kinds.iter()))?.shape_p_value(&kinds, at)
 }
 
 /// `model`, fitted to `curve`, with the coefficients and the bounds by its samples; otherwise what those of `model` are from.

@@ -12,7 +12,7 @@
 
 use super::cosine_spectrum::flicker_leakage;
 use super::filtered_noise::FilteredNoise;
-use super::sample_spectrum::{Place, SampleSpectrum};
+use super::sample_spectrum::{Place, SampleBand, SampleSpectrum};
 use super::whittle::{Sign, SpectralBand, departure_by_chance, fit_mixture, fit_mixture_with, least_departure};
 use crate::distributions::NORMAL_975;
 use crate::effects::findings::REFUTED;
@@ -87,13 +87,20 @@ impl SampleSpectrum {
     /// this may be what departs.
     pub(crate) fn shape_p_value(&self, kinds: &[NoiseTerm], at: usize) -> Option<f64> {
         let likelihood = Likelihood::new(self, kinds);
-        let shown = kinds[..at].iter().filter(|kind| !is_sinusoid(kind)).count();
-        let with_shape = |(band, basis): (&SpectralBand, &Vec<f64>)| {
-            let density: f64 = basis.iter().zip(&likelihood.densities).map(|(shape, size)| shape * size).sum();
-            let is_shown = likelihood.densities[shown] * basis[shown] >= SHOWS_SHAPE * density;
-            is_shown.then_some((band.density / density, band.ordinates))
+        let filtered = match kinds {
+            [NoiseTerm::Filtered(filter), ..] => Some(FilteredNoise::new(filter, self.period, 1)),
+            _ => None,
         };
-        let bands: Vec<(f64, f64)> = likelihood.bands.iter().zip(&likelihood.bases).filter_map(with_shape).collect();
+        let shown = kinds[..at].iter().filter(|kind| !is_sinusoid(kind)).count();
+        let with_shape = |(band, basis): (&SampleBand, &Vec<f64>)| {
+            let of_term = |at: usize| likelihood.densities[at] * basis[at];
+            let density: f64 = (0..basis.len()).map(of_term).sum();
+            let others = (density - of_term(0)) / likelihood.densities[0];
+            let is_leakage = filtered.as_ref().is_some_and(|of| self.leaks_into(of, &band.place, others));
+            let is_shown = !is_leakage && of_term(shown) >= SHOWS_SHAPE * density;
+            is_shown.then_some((band.measured.density / density, band.measured.ordinates))
+        };
+        let bands: Vec<(f64, f64)> = self.bands.iter().zip(&likelihood.bases).filter_map(with_shape).collect();
         let ordinates: f64 = bands.iter().map(|(_, ordinates)| ordinates).sum();
         // An interpolated sample has no noise at some frequencies and all of it at others, which moves the cumulative sum by a quarter of
         // their share at most.
@@ -111,22 +118,25 @@ impl SampleSpectrum {
     /// Without the bands into whose first, middle or last coefficient behind `filter` the ends of the record leak: few
     /// numbers make what is seen there, so that it scatters more than an average of independent coefficients.
     pub(crate) fn without_leakage(mut self, filter: MovingAverageFilter) -> Self {
-        if self.samples_per_mean > 1 {
-            return self;
-        }
         let filtered = FilteredNoise::new(&filter, self.period, 1);
-        let is_leakage = |order: usize| {
-            let density = filtered.density(order as f64 * self.resolution);
-            (filtered.expected(order as f64, self.count) - density).abs() > MOST_LEAKAGE * density
-        };
-        let is_kept = |place: &Place| match place {
-            Place::Coefficients(at) => {
-                ![at.start + 1, at.start.midpoint(at.end) + 1, at.end].into_iter().any(is_leakage)
-            }
-            Place::Points(_) => true,
-        };
-        self.bands.retain(|band| is_kept(&band.place));
+        let bands = std::mem::take(&mut self.bands);
+        self.bands = bands.into_iter().filter(|band| !self.leaks_into(&filtered, &band.place, 0.0)).collect();
         self
+    }
+
+    /// Whether the ends of the record leak so much into the first, middle or last coefficient of a band where there is a density of `other`
+    /// noise too, over that of the white noise before the filter.
+    fn leaks_into(&self, filtered: &FilteredNoise, place: &Place, other: f64) -> bool {
+        let leaks = |order: usize| {
+            let density = filtered.density(order as f64 * self.resolution);
+            (filtered.expected(order as f64, self.count) - density).abs() > MOST_LEAKAGE * (density + other)
+        };
+        match place {
+            Place::Coefficients(at) if self.samples_per_mean == 1 => {
+                [at.start + 1, at.start.midpoint(at.end) + 1, at.end].into_iter().any(leaks)
+            }
+            Place::Coefficients(_) | Place::Points(_) => false,
+        }
     }
 }
 
