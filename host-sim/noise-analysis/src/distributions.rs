@@ -1,6 +1,6 @@
-//! Tail probabilities, quantiles and bounds of the normal, the Poisson and the exponential distribution.
+//! Tail probabilities, quantiles and bounds of the normal, Student's, the Poisson and the exponential distribution.
 
-use statrs::distribution::{Continuous, ContinuousCDF, DiscreteCDF, Normal, Poisson};
+use statrs::distribution::{Continuous, ContinuousCDF, DiscreteCDF, Normal, Poisson, StudentsT};
 use statrs::function::beta::checked_beta_reg;
 use statrs::function::gamma::checked_gamma_ur;
 
@@ -15,6 +15,17 @@ pub(crate) const DESCRIBED: f64 = 1e-3;
 /// Probability that a standard normal number exceeds `z`.
 pub fn upper_tail(z: f64) -> f64 {
     Normal::standard().sf(z)
+}
+
+/// Probability that a variable of Student's distribution with so many degrees of freedom exceeds `value`; 1 where that is no number, or
+/// where there is no freedom.
+#[must_use]
+pub fn student_tail(value: f64, freedom: f64) -> f64 {
+    match StudentsT::new(0.0, 1.0, freedom) {
+        Ok(_) if value == f64::INFINITY => 0.0,
+        Ok(of) if value.is_finite() => of.sf(value),
+        _ => 1.0,
+    }
 }
 
 /// Density of the standard normal distribution.
@@ -59,7 +70,7 @@ pub(crate) fn poisson_bounds(count: f64) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::{exponential_sum_tail, mean_ratio_tail};
+    use super::{exponential_sum_tail, mean_ratio_tail, student_tail};
 
     #[test]
     fn tails_of_exponential_variables() {
@@ -73,5 +84,14 @@ mod tests {
         for (ratio, above, below) in [(f64::NAN, 1.0, 1.0), (2.0, 0.0, 1.0), (2.0, 1.0, 0.0)] {
             assert_eq!(mean_ratio_tail(ratio, above, below), 1.0);
         }
+    }
+
+    /// 2.228 is the 97.5 % quantile of ten degrees of freedom in the tables.
+    #[test]
+    fn tails_of_student_s_distribution() {
+        assert!((student_tail(2.228, 10.0) - 0.025).abs() < 1e-5);
+        let odd = [(f64::NAN, 10.0), (f64::NEG_INFINITY, 10.0), (1.0, 0.0), (1.0, f64::NAN)];
+        assert!(odd.into_iter().all(|(value, freedom)| student_tail(value, freedom) == 1.0));
+        assert_eq!(student_tail(f64::INFINITY, 10.0), 0.0);
     }
 }

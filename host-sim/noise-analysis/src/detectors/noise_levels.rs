@@ -5,10 +5,9 @@
 //! no more than the scatter of the levels from block to block allows, so that filtered noise, lines and a level that moves
 //! by itself have the false-alarm rate that is asked for.
 
-use crate::distributions::quantile;
+use crate::distributions::{quantile, student_tail};
 use crate::effects::findings::REFUTED;
 use crate::samples::series::Series;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 use statrs::function::beta::checked_beta_reg;
 use std::ops::Range;
 
@@ -346,8 +345,7 @@ impl Wandering {
     /// Probability of a level of at least `ratio` times those around it, by Student's distribution.
     pub(super) fn exceedance(&self, ratio: f64) -> f64 {
         let excess = (ratio - self.lowest).max(0.0).ln();
-        let deviations = (excess - self.median) / self.deviation;
-        StudentsT::new(0.0, 1.0, self.freedom).map_or(1.0, |of| of.sf(deviations))
+        student_tail((excess - self.median) / self.deviation, self.freedom)
     }
 }
 

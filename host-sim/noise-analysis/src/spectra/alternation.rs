@@ -6,10 +6,10 @@
 
 use super::whitened_spectrum::SpectralLine;
 use crate::bounds::MeasuredValue;
+use crate::distributions::student_tail;
 use crate::effects::findings::SIGNIFICANCE;
 use crate::samples::rounding::Rounding;
 use crate::samples::uniform_series::UniformSeries;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Differences of a block.
 const BLOCK: u32 = 64;
@@ -66,7 +66,7 @@ impl Alternation {
         let of_rounding = rounding.density(0.5 / sample_period) / (2.0 * duration);
         let error = (self.squares / (blocks * (blocks - 1.0))).max(of_rounding).sqrt();
         let sigmas = self.mean.abs() / error;
-        let p_value = StudentsT::new(0.0, 1.0, blocks - 1.0).map_or(1.0, |of| 2.0 * of.sf(sigmas));
+        let p_value = 2.0 * student_tail(sigmas, blocks - 1.0);
         (self.blocks >= FEWEST_BLOCKS && error > 0.0 && p_value < SIGNIFICANCE).then(|| SpectralLine {
             // Within half a resolution on either side.
             frequency: MeasuredValue { value: 0.5 / sample_period, error: 1.0 / (12.0_f64.sqrt() * duration) },
