@@ -44,8 +44,9 @@ pub(super) fn coefficients_of_all(report: &Report) -> Markup {
     // An accelerometer's random walks have other names than a gyro's.
     let headings = |group: &CoefficientTable| {
         let columns = group.names.iter().zip(["N", "B", "K"]).zip(&group.units);
-        let columns = columns
-            .map(|((name, letter), unit)| (html! { (name) " " span.letter { (letter) } span.under { (unit) } }, true));
+        let columns = columns.map(|((name, letter), unit)| {
+            (html! { (name) "\u{a0}" span.letter { (letter) } span.under { (unit) } }, true)
+        });
         let error = (html! { "error on the unseen half" span.under { "1 = true" } }, true);
         [text(group.title)].into_iter().chain(columns).chain([error]).collect::<Vec<Heading>>()
     };
