@@ -159,6 +159,9 @@ pub struct ChannelReport {
     pub missing: MissingSamples,
     /// Allan deviation over the whole record as recorded, without preprocessing, octave by octave.
     pub curve: Vec<CurvePoint>,
+    /// Allan deviation of the second half as recorded, which the models of the first half have not seen, at the first averaging times of
+    /// `curve`: as many as the half has.
+    pub unseen_adev: Vec<f64>,
     /// The coefficients by the slope method.
     pub read_off: SlopeMethodReport,
     /// The baseline model: angle random walk, bias instability, rate random walk.

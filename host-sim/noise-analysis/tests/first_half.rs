@@ -111,3 +111,19 @@ fn spikes_and_bursts_are_foretold_at_the_rate_of_the_first_half() {
         }
     }
 }
+
+/// Allan deviation by definition: σ²(nτ₀) is half the mean square of the differences of neighbouring means of n samples.
+#[test]
+fn the_curve_of_the_unseen_half_is_that_of_its_samples() {
+    let mut random = ChaCha8Rng::seed_from_u64(4);
+    let first = white(&mut random, NOISE);
+    let mut second = white(&mut random, 3.0 * NOISE);
+    add_spikes(&mut random, &mut second, 3000);
+    let report = report(&first, &second);
+    let counts: Vec<f64> = second.iter().map(|value| value.round()).collect();
+    let squares: f64 = counts.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
+    let expected = 0.05 * (0.5 * squares / (HALF - 1) as f64).sqrt();
+    assert!((report.unseen_adev[0] / expected - 1.0).abs() < 1e-9, "{} and {expected}", report.unseen_adev[0]);
+    // The whole record has twice as many samples, and one octave more.
+    assert_eq!(report.unseen_adev.len() + 1, report.curve.len());
+}

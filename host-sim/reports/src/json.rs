@@ -57,6 +57,7 @@ struct ChannelJson<'a> {
     #[serde(flatten)]
     missing: &'a MissingSamples,
     curve: &'a [CurvePoint],
+    unseen_adev: &'a [f64],
     read_off: &'a SlopeMethodReport,
     before: &'a ModelReport,
     effects: Vec<EffectJson>,
@@ -140,6 +141,7 @@ impl<'a> From<&'a ChannelReport> for ChannelJson<'a> {
             samples,
             missing,
             curve,
+            unseen_adev,
             read_off,
             before,
             effects,
@@ -157,6 +159,7 @@ impl<'a> From<&'a ChannelReport> for ChannelJson<'a> {
             samples: *samples,
             missing,
             curve,
+            unseen_adev,
             read_off,
             before,
             effects: effects.iter().map(EffectJson::from).collect(),

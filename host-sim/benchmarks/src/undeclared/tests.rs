@@ -305,6 +305,7 @@ fn report(found: &[Found]) -> Report {
         unit: channel.unit().to_owned(),
         samples: 0,
         missing: Default::default(),
+        unseen_adev: Vec::new(),
         curve: Vec::new(),
         read_off: SlopeMethodReport { angle_random_walk: None, bias_instability: None, rate_random_walk: None },
         before: model(),

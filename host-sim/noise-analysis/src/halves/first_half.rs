@@ -145,6 +145,7 @@ impl FirstHalf {
             samples: curve.samples(),
             missing: MissingSamples::default(),
             curve: curve.points().iter().map(point).collect(),
+            unseen_adev: unseen_adev(&curve, &estimators.raw[1].curve(channel)),
             read_off: SlopeMethodReport::from_curve(&curve, unit),
             before: self.before(estimators, channel, (&curve, &rounding), has_rules),
             effects: Vec::new(),
@@ -247,4 +248,10 @@ impl Epochs {
             nonstationarity::describe(&channels, traced.iter().position(|of| *of == channel)?)
         })
     }
+}
+
+/// Allan deviations of the `second` half at the first averaging times of the `whole` record.
+fn unseen_adev(whole: &Curve<OCTAVES>, second: &Curve<OCTAVES>) -> Vec<f64> {
+    let pairs = whole.points().iter().zip(second.points());
+    pairs.take_while(|(whole, second)| whole.n == second.n).map(|(_, second)| second.avar.sqrt()).collect()
 }

@@ -1,7 +1,7 @@
 //! The figures of one channel: Allan deviation with its terms and its residual, spectrum, bias over time.
 
 use super::axis::{Axis, has_logarithm};
-use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, frames, heights, places};
+use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, below_legend, frames, heights, places};
 use crate::finding_text::channel_name;
 use crate::formatting::{capital, words};
 use crate::rounding::{quantity, quantity_digits, span, unit};
@@ -58,15 +58,26 @@ pub(super) fn story_plot(channel: &ChannelReport, [before, after]: [f64; 2]) -> 
     if is_lowered {
         lines.insert(1, model_line(channel, &channel.after, "after: with effects", Look::Model));
     }
-    let [frame] = frames([330.0]);
+    let unseen: Vec<(f64, f64)> = channel
+        .curve
+        .iter()
+        .zip(&channel.unseen_adev)
+        .map(|(point, &adev)| (point.tau_s, adev))
+        .filter(|&(tau, adev)| has_logarithm(tau) && has_logarithm(adev))
+        .collect();
+    if !unseen.is_empty() {
+        let name = "second half, not seen by the fit";
+        lines.push(Line::new(name, Look::Reference, unseen).with_dots().unjoined());
+    }
+    let [frame] = frames([330.0]).map(|frame| below_legend(frame, &lines));
     let across = Axis::logarithmic("averaging time τ, s", lines.iter().flat_map(places), [LEFT, RIGHT]);
     let label = format!("Allan deviation σ(τ), {}", unit(&channel.unit));
     let up = Axis::logarithmic(&label, lines.iter().flat_map(heights), frame);
     lines.extend(slopes(channel).into_iter().flatten());
     let name = capital(&channel_name(channel));
     let [before, after] = [before, after].map(deviance_per_point);
-    const MEASURED: &str =
-        "A true model has about 1. The measured curve is that of the whole record with its 95 % bounds.";
+    const MEASURED: &str = "A true model has about 1. The curve is that of the whole record with its 95 % bounds, the points are \
+                            those of the second half.";
     let (title, description) = if is_lowered {
         (
             format!("{name}: what was measured, and the model before and after"),

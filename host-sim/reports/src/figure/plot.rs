@@ -136,7 +136,40 @@ pub(super) fn frames<const PANELS: usize>(heights: [f64; PANELS]) -> [[f64; 2]; 
     })
 }
 
+/// Distance of two rows of the legend.
+const LEGEND_ROW: f64 = 20.0;
+
+/// The row and the left edge of the entry of each of `lines` in a legend, in rows up to `last`.
+fn legend_places<'l>(lines: impl Iterator<Item = &'l Line>, last: f64) -> Vec<(f64, f64, &'l Line)> {
+    let (mut left, mut row) = (LEFT, 0.0);
+    let mut entries: Vec<(f64, f64, &Line)> = Vec::new();
+    for line in lines.filter(|line| line.in_legend) {
+        if entries.iter().any(|(.., known)| known.name == line.name) {
+            continue;
+        }
+        // Letters of 16 px, as the first figures of the page have them, are up to 9.1 px wide.
+        let width = 40.0 + 9.1 * line.name.chars().count() as f64;
+        if row < last && left > LEFT && left + width > WIDTH {
+            (left, row) = (LEFT, row + 1.0);
+        }
+        entries.push((row, left, line));
+        left += width;
+    }
+    entries
+}
+
+/// The edges of a first panel below the legend of its `lines`, which may have several rows.
+pub(super) fn below_legend(frame: [f64; 2], lines: &[Line]) -> [f64; 2] {
+    let rows = legend_places(lines.iter(), f64::INFINITY).last().map_or(0.0, |(row, ..)| *row);
+    frame.map(|edge| edge + LEGEND_ROW * rows)
+}
+
 impl Plot {
+    /// Top of the first panel.
+    fn top(&self) -> f64 {
+        self.panels.first().map_or(TOP, |panel| panel.up.end)
+    }
+
     pub(super) fn height(&self) -> f64 {
         self.panels.last().map_or(TOP, |panel| panel.up.start) + BELOW
     }
@@ -155,33 +188,23 @@ impl Plot {
                 @for (index, panel) in self.panels.iter().enumerate() {
                     (panel.svg(&format!("{}-{index}", self.id), index + 1 == self.panels.len()))
                 }
-                line class="cursor" x1="0" x2="0" y1=(TOP) y2=(self.height() - BELOW) visibility="hidden" {}
+                line class="cursor" x1="0" x2="0" y1=(self.top()) y2=(self.height() - BELOW) visibility="hidden" {}
             }
         }
     }
 
-    /// Swatches and names above the first panel.
+    /// Swatches and names above the first panel: in rows, where it has room for them.
     fn legend(&self) -> Markup {
-        let mut left = LEFT;
-        let mut names: Vec<&str> = Vec::new();
-        let mut entries = Vec::new();
-        for line in self.panels.iter().flat_map(|panel| &panel.lines).filter(|line| line.in_legend) {
-            if names.contains(&line.name.as_str()) {
-                continue;
-            }
-            names.push(&line.name);
-            entries.push((left, line));
-            // Letters of 16 px, as the first figures of the page have them, are up to 9.1 px wide.
-            left += 40.0 + 9.1 * line.name.chars().count() as f64;
-        }
+        let entries = legend_places(self.panels.iter().flat_map(|panel| &panel.lines), (self.top() - TOP) / LEGEND_ROW);
         html! {
             g class="legend" {
-                @for (left, line) in entries {
+                @for (row, left, line) in entries {
+                    @let middle = 16.0 + LEGEND_ROW * row;
                     g class=(line.look.class()) {
-                        @if line.is_joined { line x1=(pixel(left)) x2=(pixel(left + 20.0)) y1="16" y2="16" {} }
-                        @if line.has_dots { circle cx=(pixel(left + 10.0)) cy="16" r="3.2" {} }
+                        @if line.is_joined { line x1=(pixel(left)) x2=(pixel(left + 20.0)) y1=(pixel(middle)) y2=(pixel(middle)) {} }
+                        @if line.has_dots { circle cx=(pixel(left + 10.0)) cy=(pixel(middle)) r="3.2" {} }
                     }
-                    text x=(pixel(left + 25.0)) y="20" { (line.name) }
+                    text x=(pixel(left + 25.0)) y=(pixel(middle + 4.0)) { (line.name) }
                 }
             }
         }

@@ -181,6 +181,14 @@ fn what_is_drawn_is_what_was_measured() {
     for (name, model) in [("before: N, B, K", &told.before), ("after: with effects", &told.after)] {
         check("story", name, &taus.clone().zip(model.adev.iter().copied()).collect::<Vec<_>>());
     }
+    let (panel, _, drawn) = line("story", "second half, not seen by the fit");
+    assert_eq!(list(&drawn, "dots").len(), told.unseen_adev.len());
+    for ((tau, adev), dot) in taus.zip(&told.unseen_adev).zip(list(&drawn, "dots")) {
+        for (axis, value, at) in [("x", tau, 0), ("y", *adev, 1)] {
+            let distance = (dot[at].as_f64().expect("a pixel") - pixel(&panel[axis], value)).abs();
+            assert!(distance < PIXEL, "{distance} pixels off");
+        }
+    }
     for channel in &report.channels {
         let name = &channel.name;
         let measured: Vec<(f64, f64)> = channel.curve.iter().map(|point| (point.tau_s, point.adev)).collect();

@@ -64,6 +64,7 @@ pub(crate) fn empty() -> Report {
     let channel = &mut report.channels[0];
     channel.samples = 1;
     channel.curve.clear();
+    channel.unseen_adev.clear();
     channel.read_off = SlopeMethodReport { angle_random_walk: None, bias_instability: None, rate_random_walk: None };
     let error = ModelErrorReport::default();
     channel.before = ModelReport {
@@ -96,7 +97,10 @@ pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
     let value = |value: f64, per: &str, from_s: f64, to_s: f64| {
         Some(SlopeMethodValue { value: value * scale, unit: rate_unit(unit, per), from_s, to_s })
     };
+    // Half of the record lacks the longest averaging time.
+    let unseen_adev = curve[..17].iter().map(|point| 1.05 * point.adev).collect();
     ChannelReport {
+        unseen_adev,
         name: name.to_owned(),
         unit: unit.to_owned(),
         samples: SAMPLES,

@@ -321,6 +321,30 @@ fn picture(report: &Report, name: &str) -> String {
     figure::pictures(report).into_iter().find(|picture| picture.name == name).expect(name).svg
 }
 
+/// The errors beneath the first picture are those on the second half: its points are in it, below a second row of the legend.
+#[test]
+fn the_first_picture_has_the_half_that_the_fit_has_not_seen() {
+    let mut report = report();
+    let name = "second half, not seen by the fit";
+    let top = |picture: &str| {
+        let document = Document::parse(picture).expect("XML");
+        let frame = document.descendants().find(|node| node.attribute("class") == Some("frame")).expect("a frame");
+        let names = document.descendants().filter(|node| node.has_tag_name("text") && node.text() == Some(name));
+        let row: Vec<f64> = names.map(|node| node.attribute("y").expect("y").parse().expect("a number")).collect();
+        (frame.attribute("y").expect("y").parse::<f64>().expect("a number"), row)
+    };
+    let story = picture(&report, "story");
+    let document = Document::parse(&story).expect("XML");
+    let group = document.descendants().find(|node| node.attribute("data-line") == Some(name)).expect("the points");
+    let dots = group.children().filter(|node| node.has_tag_name("circle")).count();
+    assert_eq!(dots, report.channels[0].unseen_adev.len());
+    assert_eq!(top(&story), (54.0, vec![40.0]));
+    for channel in &mut report.channels {
+        channel.unseen_adev.clear();
+    }
+    assert_eq!(top(&picture(&report, "story")), (34.0, Vec::new()));
+}
+
 #[test]
 fn the_first_picture_is_there_without_a_gain() {
     let mut report = report();
