@@ -209,8 +209,8 @@ impl Envelope {
     }
 }
 
-/// Of the power of a change of so many `periods` a record, in units of the noise around the line, `unit`: the exponential variable of mean
-/// 1 that chance exceeds as often, where the part wanders as its other ordinates up to `most` do.
+/// The exponential variable of mean 1 that chance exceeds as often as the power of a change of so many `periods` a record, where the part
+/// wanders as its ordinates up to `most` do. `unit` is the power of the noise around the line.
 ///
 /// What is beside the change is the noise and a random walk, whose density is known to one part in √m, `m` being the number of ordinates
 /// that show it: over it a power has Fisher's distribution of 2 and 2m degrees of freedom, whose tail is `(1 + r/m)^−m`.
