@@ -98,7 +98,7 @@ mod tests {
         spectrum.shape_p_value(&KINDS, 3).expect("few are interpolated")
     }
 
-    /// Of true quantization, with half of the power, one in 5,000 is refuted by chance: of 60 more than one in 70,000 cases. A band
+    /// Of true quantization, with half of the power, one in 5,000 is refuted by chance: of 60 more than one in 14,000 cases. A band
     /// at 0.45 of the sample rate, a tenth of it wide and of a third of the power, raises the curve at one sample as well.
     #[test]
     fn the_spectrum_tells_quantization_from_a_band() {
