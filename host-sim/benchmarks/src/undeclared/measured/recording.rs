@@ -80,14 +80,14 @@ fn only_sensor(tables: &[InspectedTable], rate_hz: Option<f64>) -> (ReadOptions,
     if let (Some((table, proposal)), None) = (proposals.next(), proposals.next()) {
         selection = ColumnSelection::parse(&proposal.columns, &proposal.units).unwrap_or_default();
         topic.clone_from(&proposal.topic);
-        rest = table.steady.as_ref().and_then(|SteadyPart { rows, .. }| {
-            // A rate of the user's counts where the file has none.
-            let by_rate = || {
-                let [from_s, to_s] = [rows.start, rows.end].map(|row| row as f64 / rate_hz.unwrap_or(f64::NAN));
-                rate_hz.map(|_| TimeRange { from_s, to_s })
-            };
-            (rows.len() < table.rows).then(|| table.steady_s.or_else(by_rate))?
-        });
+        rest = table.steady.as_ref().filter(|steady| steady.rows.len() < table.rows).and_then(
+            |SteadyPart { rows, .. }| {
+                // By a rate of the user's where the file has none.
+                let [from, to] = [rows.start, rows.end].map(|row| row as f64);
+                let by_rate = |rate_hz: f64| TimeRange { from_s: from / rate_hz, to_s: to / rate_hz };
+                table.steady_s.or_else(|| rate_hz.map(by_rate))
+            },
+        );
     }
     (ReadOptions { sensor: SensorProfile::generic(), selection, topic }, rest)
 }
