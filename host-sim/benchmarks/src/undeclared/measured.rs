@@ -8,8 +8,7 @@
 //! ```
 //!
 //! What is in the noise itself is not known. So an effect is named if a finding of its kind is there that the untouched stretch does
-//! not have, and a wrong name is one that the untouched stretch does not have, unless the whole recording has it with the same parameters:
-//! what is weak in the noise itself is found in one stretch and not in the next. An effect that needs a quantity beside the noise
+//! not have, and a wrong name is one that the untouched stretch does not have. An effect that needs a quantity beside the noise
 //! (temperature, supply, acceleration, a clock) or that would change the noise itself (another filter) is not hidden.
 
 mod hidden_kind;
@@ -27,7 +26,6 @@ pub use table::MeasuredNoiseTable;
 
 use crate::parallel;
 use noise_analysis::analysis::analyze;
-use noise_analysis::report::Report;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::convert::Infallible;
@@ -70,19 +68,12 @@ impl MeasuredNoisePlan {
             return MeasuredNoiseTable::default();
         }
         let numbers: Vec<u64> = (0..self.stretches).collect();
-        let used = &self.recordings[..self.recordings.len().min(numbers.len())];
-        let all = used.len() + numbers.len() * (1 + HiddenKind::ALL.len());
-        let Ok(wholes) = parallel::map(
-            used,
-            self.jobs,
-            |recording| Ok::<_, Infallible>(analyze(&recording.samples)),
-            |done, _| progress(done, all),
-        );
+        let all = numbers.len() * (1 + HiddenKind::ALL.len());
         let Ok(stretches) = parallel::map(
             &numbers,
             self.jobs,
-            |&number| Ok::<_, Infallible>(self.stretch(number, &wholes)),
-            |done, _| progress(used.len() + done, all),
+            |&number| Ok::<_, Infallible>(self.stretch(number)),
+            |done, _| progress(done, all),
         );
         let cases: Vec<(&Stretch<'_>, HiddenKind)> =
             stretches.iter().flat_map(|stretch| HiddenKind::ALL.map(|kind| (stretch, kind))).collect();
@@ -90,30 +81,28 @@ impl MeasuredNoisePlan {
             let drawn = stretch.draw(kind, self.strength);
             Ok::<_, Infallible>(drawn.map(|(effect, strength)| score::hidden(stretch, kind, &effect, strength)))
         };
-        let Ok(scores) =
-            parallel::map(&cases, self.jobs, work, |done, _| progress(used.len() + numbers.len() + done, all));
+        let Ok(scores) = parallel::map(&cases, self.jobs, work, |done, _| progress(numbers.len() + done, all));
         let not_hidden = cases.iter().zip(&scores).filter(|(_, score)| score.is_none()).map(|((_, kind), _)| *kind);
         MeasuredNoiseTable { not_hidden: not_hidden.collect(), scores: scores.into_iter().flatten().collect() }
     }
 
-    fn stretch<'a>(&'a self, number: u64, wholes: &'a [Report]) -> Stretch<'a> {
+    fn stretch(&self, number: u64) -> Stretch<'_> {
         let seed = self.seed + number;
-        let at = (number % self.recordings.len() as u64) as usize;
-        let (recording, whole) = (&self.recordings[at], &wholes[at]);
+        let recording = &self.recordings[(number % self.recordings.len() as u64) as usize];
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(STRETCHES);
-        let samples = &recording.samples;
+        let whole = &recording.samples;
         let length = match self.length {
-            StretchLength::Seconds(seconds) => (seconds * samples.sample_rate_hz).round() as u64,
+            StretchLength::Seconds(seconds) => (seconds * whole.sample_rate_hz).round() as u64,
             StretchLength::Samples(samples) => samples,
         };
-        let length = length.clamp(1, samples.periods());
-        let from = random.random_range(0..=samples.periods() - length);
-        let from_s = from as f64 / samples.sample_rate_hz;
-        let samples = recording::part(samples, from..from + length);
+        let length = length.clamp(1, whole.periods());
+        let from = random.random_range(0..=whole.periods() - length);
+        let samples = recording::part(whole, from..from + length);
         let noise = noise_estimate::noise_estimate(&samples);
         let report = analyze(&samples);
-        Stretch { recording: &recording.name, seed, from_s, samples, noise, report, whole }
+        let from_s = from as f64 / whole.sample_rate_hz;
+        Stretch { recording: &recording.name, seed, from_s, samples, noise, report }
     }
 }
 

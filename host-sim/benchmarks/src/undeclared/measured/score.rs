@@ -74,8 +74,8 @@ pub(super) fn hidden(stretch: &Stretch<'_>, kind: HiddenKind, effect: &HiddenEff
         channels: own.iter().map(|channel| channel.name()).collect(),
         strength,
         named,
-        found: named_as(&names(&report, &own, |_, _| true)),
-        wrong_names: wrong_names(stretch, &report, effect, (&own, &right)),
+        found: named_as(&names(&report, &own, |_| true)),
+        wrong_names: wrong_names(&own, &right, effect, (&report, &stretch.report)),
         estimates,
         errors,
     }
@@ -133,35 +133,27 @@ fn is_new(effect: &Effect, others: &[ChannelEffect]) -> bool {
     !others.iter().any(is_same)
 }
 
-/// The names of `report` that neither the report of the untouched stretch has in the same channel, nor that of the whole recording with the
-/// same parameters, nor are those of a part of the effect, nor right, which is by channel and name.
+/// The names of the first report that neither the second one, of the untouched stretch, has in the same channel nor are `right` in one of
+/// the channels `own` nor are those of a part of the effect.
 fn wrong_names(
-    stretch: &Stretch<'_>,
-    report: &Report,
+    own: &[Channel],
+    right: &[&str],
     effect: &HiddenEffect,
-    (own, right): (&[Channel], &[&str]),
+    (report, untouched): (&Report, &Report),
 ) -> Vec<String> {
-    let known = names(&stretch.report, &Channel::INERTIAL, |_, _| true);
+    let known = names(untouched, &Channel::INERTIAL, |_| true);
     let is_right = |(channel, kind): &(Channel, &str)| own.contains(channel) && right.contains(kind);
-    let is_part = |found: &Effect| matches!(effect, HiddenEffect::Outside(effect) if effect.has_part(found));
-    let is_of_noise = |channel: Channel, found: &Effect| {
-        channel_report(stretch.whole, channel).is_some_and(|whole| !is_new(found, &whole.effects))
-    };
-    let counts = |channel: Channel, found: &Effect| !is_part(found) && !is_of_noise(channel, found);
-    let mut new = names(report, &Channel::INERTIAL, counts);
+    let is_no_part = |found: &Effect| !matches!(effect, HiddenEffect::Outside(effect) if effect.has_part(found));
+    let mut new = names(report, &Channel::INERTIAL, is_no_part);
     new.retain(|name| !known.contains(name) && !is_right(name));
     named_as(&new)
 }
 
 /// The effects that `report` lists in `channels`, of those that count.
-fn names(
-    report: &Report,
-    channels: &[Channel],
-    counts: impl Fn(Channel, &Effect) -> bool,
-) -> BTreeSet<(Channel, &'static str)> {
+fn names(report: &Report, channels: &[Channel], counts: impl Fn(&Effect) -> bool) -> BTreeSet<(Channel, &'static str)> {
     let of_channel = |channel: &Channel| {
         let effects = channel_report(report, *channel).map(|of| of.effects.as_slice()).unwrap_or_default();
-        let counted = effects.iter().filter(|shown| counts(*channel, &shown.effect));
+        let counted = effects.iter().filter(|shown| counts(&shown.effect));
         counted.map(|shown| (*channel, shown.effect.name())).collect::<Vec<_>>()
     };
     channels.iter().flat_map(of_channel).collect()

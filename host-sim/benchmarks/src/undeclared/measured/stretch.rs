@@ -41,8 +41,6 @@ pub(super) struct Stretch<'a> {
     /// Of its gyros and accelerometers.
     pub(super) noise: NoiseEstimate,
     pub(super) report: Report,
-    /// The report of the whole recording.
-    pub(super) whole: &'a Report,
 }
 
 impl Stretch<'_> {
