@@ -90,6 +90,32 @@ fn a_phone_with_whole_seconds_at_5_hz_is_read() {
     assert!((rate / 5.0 - 1.0).abs() < 0.01, "{rate}");
 }
 
+/// Three channels at 5 Hz of noise whose deviation is one count, 0.001: two neighbouring rows are equal in 0.28³ of the cases, 2 %. Where
+/// the stamps are whole seconds, all of a second are at one time. With finer stamps a fifth of the rows is written again 50 ms later.
+#[test]
+fn rows_that_are_equal_by_chance_are_samples() {
+    let dir = tempdir().expect("a folder");
+    let columns = ["--columns", "time=0,gyro_x=1,gyro_y=2,gyro_z=3", "--units", "rad/s"];
+    for (decimals, repeats) in [(0, false), (2, false), (2, true)] {
+        let mut rng = ChaCha8Rng::seed_from_u64(11);
+        let (mut text, mut again) = (String::new(), 0_u64);
+        for row in 0..ROWS {
+            let (whole, cents) = (row / 5, 20 * (row % 5));
+            let stamp = |cents: u32| if decimals == 0 { format!("{whole}") } else { format!("{whole}.{cents:02}") };
+            let values = [(); 3].map(|()| format!("{:.3}", (50.0 * noise(&mut rng)).round() / 1000.0)).join(" ");
+            text.push_str(&format!("{} {values}\n", stamp(cents)));
+            if repeats && rng.random_bool(0.2) {
+                text.push_str(&format!("{} {values}\n", stamp(cents + 5)));
+                again += 1;
+            }
+        }
+        let report = analysed(&dir, &text, &columns);
+        let (samples, repeated) =
+            (report["samples"].as_u64(), report["dropped"].get("repeated").and_then(Value::as_u64));
+        assert_eq!((samples, repeated.unwrap_or(0)), (Some(u64::from(ROWS)), again), "{decimals} {repeats}");
+    }
+}
+
 fn sentence(content: &str) -> String {
     format!("${content}*{:02X}\r\n", content.bytes().fold(0u8, |sum, byte| sum ^ byte))
 }
