@@ -403,10 +403,10 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
             match of.stretches {
                 0 | 1 => {
                     let length_s = of.to_s.value - of.from_s.value;
-                    format!("The platform moved at {} for {}.", moment(of.from_s.value), span(length_s))
+                    format!("The platform moved at {} for up to {}.", moment(of.from_s.value), span(length_s))
                 }
                 times => format!(
-                    "The platform moved {times} times between {} and {}|, for {} together|.",
+                    "The platform moved {times} times between {} and {}|, for up to {} together|.",
                     moment(of.from_s.value),
                     moment(of.to_s.value),
                     span(of.moved_s as f64)
@@ -658,8 +658,8 @@ mod tests {
             };
             describe(&finding(of)).physics
         };
-        assert_eq!(motion(1000.0, 1020.0, 1), "The platform moved at 16 min 40 s for 20 s.");
-        let several = "The platform moved 2 times between 7.0 s and 16 min 40 s, for 12 s together.";
+        assert_eq!(motion(1000.0, 1020.0, 1), "The platform moved at 16 min 40 s for up to 20 s.");
+        let several = "The platform moved 2 times between 7.0 s and 16 min 40 s, for up to 12 s together.";
         assert_eq!(motion(7.0, 1000.0, 2), several);
     }
 

@@ -399,7 +399,7 @@ fn rest(report: &Report) -> String {
         let longest = longest_at_rest(report).map_or_else(String::new, |of| {
             format!("; for the longest part at rest, add {}", time_options(of.from_s, of.to_s))
         });
-        return format!("It moved for {}{longest}.", span((length - least).max(0.0)));
+        return format!("It moved for up to {}{longest}.", span((length - least).max(0.0)));
     }
     match knocks {
         0 => "At rest throughout.".to_owned(),

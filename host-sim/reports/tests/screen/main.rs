@@ -159,7 +159,7 @@ fn what_is_not_known_is_not_claimed() {
     let screen = plain(&report, 80).join("\n");
     assert!(!screen.contains("rest throughout") && !screen.contains("For ±20 %"), "{screen}");
     report.channels[0].at_rest = vec![Stretch { from_s: 9418.5, to_s: 10018.9 }];
-    let moved = "It moved for 2 h 37 min; for the longest part at rest, add --from 9418.5 --to 10018.9.";
+    let moved = "It moved for up to 2 h 37 min; for the longest part at rest, add --from 9418.5 --to 10018.9.";
     let sentences = reports::summary::record_sentences(&report);
     assert!(sentences.iter().any(|sentence| sentence == moved), "{sentences:#?}");
 }
@@ -429,7 +429,7 @@ fn rest_and_losses_are_told_as_they_are() {
     moved.dropped = [("gap", 212), ("repeated", 212)].map(|(cause, samples)| (cause.to_owned(), samples)).into();
     assert_eq!(
         sentences(&moved),
-        "It moved for 3.0 s; for the longest part at rest, add --from 903 --to 10002.1. 212 samples (0.021 %) are missing: the one \
+        "It moved for up to 3.0 s; for the longest part at rest, add --from 903 --to 10002.1. 212 samples (0.021 %) are missing: the one \
          before was read again instead."
     );
 }
