@@ -86,12 +86,12 @@ impl Modulation {
         let ordinates = PADDING * FEWEST_PERIODS..=PADDING * most;
         let trials = 2.0 * ordinates.clone().count() as f64;
         let is_seen = |ratio: f64| trials * (-ratio).exp() <= FALSE_ALARM;
+        let powers: Vec<[f64; 2]> = (0..=PADDING * most + 1).map(|at| envelope.powers(periods(at))).collect();
         let mut peaks: Vec<(f64, Part, f64)> = Vec::new();
         for part in Part::BOTH {
-            let power = |ordinate: usize| envelope.power(part, periods(ordinate));
-            let powers: Vec<f64> = (0..=PADDING * most + 1).map(power).collect();
-            let is_peak = |&at: &usize| powers[at] >= powers[at - 1] && powers[at] >= powers[at + 1];
-            let seen = ordinates.clone().filter(is_peak).map(|at| (powers[at] / unit, part, periods(at)));
+            let power = |at: usize| powers[at][part as usize];
+            let is_peak = |&at: &usize| power(at) >= power(at - 1) && power(at) >= power(at + 1);
+            let seen = ordinates.clone().filter(is_peak).map(|at| (power(at) / unit, part, periods(at)));
             peaks.extend(seen.filter(|(ratio, ..)| is_seen(*ratio)));
         }
         peaks.sort_by(|one, other| other.0.total_cmp(&one.0));
@@ -101,7 +101,8 @@ impl Modulation {
             (over_wandering(&envelope, part, at, most, unit), part, at)
         };
         let (ratio, part, at) = peaks.into_iter().map(over_level).max_by(|one, other| one.0.total_cmp(&other.0))?;
-        let (power, of_other) = (envelope.power(part, at), envelope.power(part.other(), at));
+        let powers = envelope.powers(at);
+        let (power, of_other) = (powers[part as usize], powers[1 - part as usize]);
         let frequency = at / (length as f64 * rest.sample_period());
         if !is_seen(ratio) || (has_line(frequency) && of_other > LARGEST_OTHER * power) {
             return None;
@@ -118,7 +119,7 @@ impl Modulation {
     }
 }
 
-/// The two parts of what changes a line.
+/// The two parts of what changes a line; as a number, its position in what both have.
 #[derive(Clone, Copy)]
 enum Part {
     InPhase,
@@ -127,13 +128,6 @@ enum Part {
 
 impl Part {
     const BOTH: [Self; 2] = [Self::InPhase, Self::Quadrature];
-
-    const fn other(self) -> Self {
-        match self {
-            Self::InPhase => Self::Quadrature,
-            Self::Quadrature => Self::InPhase,
-        }
-    }
 }
 
 /// The sums over blocks of a record, under its taper, times the phasor of a sine.
@@ -171,20 +165,26 @@ impl Envelope {
     /// Phasors of a change of so many periods a record, in the middle of each block. Over a thousand blocks one loses ten bits.
     fn phasors(&self, periods: f64) -> impl Iterator<Item = Complex<f64>> {
         let turns = TAU * self.turns * periods;
-        std::iter::successors(Some(Complex::cis(0.5 * turns)), move |phasor| Some(phasor * Complex::cis(turns)))
+        let turn = Complex::cis(turns);
+        std::iter::successors(Some(Complex::cis(0.5 * turns)), move |phasor| Some(phasor * turn))
     }
 
-    /// The sum of a part, over the phasor of a change.
-    fn sum(&self, part: Part, periods: f64) -> Complex<f64> {
-        let of = |block: &Complex<f64>| match part {
-            Part::InPhase => block.re,
-            Part::Quadrature => block.im,
-        };
-        self.blocks.iter().zip(self.phasors(periods)).map(|(block, phasor)| phasor.conj() * of(block)).sum()
+    /// The sums of both parts, over the phasor of a change.
+    fn sums(&self, periods: f64) -> [Complex<f64>; 2] {
+        let mut sums = [Complex::ZERO; 2];
+        for (block, phasor) in self.blocks.iter().zip(self.phasors(periods)) {
+            sums[Part::InPhase as usize] += phasor.conj() * block.re;
+            sums[Part::Quadrature as usize] += phasor.conj() * block.im;
+        }
+        sums
+    }
+
+    fn powers(&self, periods: f64) -> [f64; 2] {
+        self.sums(periods).map(|sum| sum.norm_sqr())
     }
 
     fn power(&self, part: Part, periods: f64) -> f64 {
-        self.sum(part, periods).norm_sqr()
+        self.powers(periods)[part as usize]
     }
 
     /// The maximum of the power near so many `periods` a record.
@@ -198,7 +198,7 @@ impl Envelope {
 
     /// The same without a change of so many periods a record.
     fn without(&self, part: Part, periods: f64) -> Self {
-        let size = 2.0 * self.sum(part, periods) / self.weight;
+        let size = 2.0 * self.sums(periods)[part as usize] / self.weight;
         let turned = match part {
             Part::InPhase => Complex::ONE,
             Part::Quadrature => Complex::I,
