@@ -1,7 +1,7 @@
 //! Curves of the halves, quarters and epochs of a channel's record, and whether the noise differs between the quarters.
 
 use crate::OCTAVES;
-use crate::distributions::quantile;
+use crate::distributions::{quantile, student_tail};
 use crate::record::sample_curves::SampleCurves;
 use crate::samples::epoch_ranges::epochs;
 use crate::samples::exclusion::Exclusion;
@@ -10,7 +10,7 @@ use crate::samples::rounding::Rounding;
 use crate::samples::series::Series;
 use allan_core::{AllanPoint, Curve, Model};
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use std::ops::Range;
 
 /// Highest probability, over all that is compared in a channel, at which stationary noise is taken to be non-stationary.
@@ -173,7 +173,7 @@ fn t_test(earlier: &[f64], later: &[f64]) -> Option<f64> {
         return Some(if difference == 0.0 { 1.0 } else { 0.0 });
     }
     let t = difference / error;
-    StudentsT::new(0.0, 1.0, freedom).ok().map(|distribution| 2.0 * distribution.sf(t.abs()))
+    (freedom > 0.0).then(|| 2.0 * student_tail(t.abs(), freedom))
 }
 
 fn median_avar<const POINTS: usize>(epochs: &[Curve<POINTS>], n: u64) -> Option<f64> {

@@ -6,13 +6,13 @@
 use super::epochs::{ComparedCurve, EpochCurves, SIGNIFICANCE};
 use super::prediction::mean_avar;
 use super::tracked_parameters::{TrackedModel, minimum};
+use crate::distributions::student_tail;
 use crate::record::sample_curves::SampleCurves;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::Welch;
 use allan_core::Model;
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::ops::Range;
 
 /// Frequencies of the related line over the line's that are tried.
@@ -165,8 +165,8 @@ fn correlation(a: &[f64], b: &[f64]) -> Option<(f64, f64)> {
     let products: f64 = a.iter().zip(b).map(|(a, b)| (a - mean_a) * (b - mean_b)).sum();
     let correlation = products / (deviation_a * deviation_b * (degrees_of_freedom + 1.0));
     let t = correlation * (degrees_of_freedom / (1.0 - correlation * correlation)).sqrt();
-    let students_t = StudentsT::new(0.0, 1.0, degrees_of_freedom).ok()?;
-    t.is_finite().then(|| (correlation, 2.0 * students_t.sf(t.abs())))
+    let is_known = t.is_finite() && degrees_of_freedom > 0.0;
+    is_known.then(|| (correlation, 2.0 * student_tail(t.abs(), degrees_of_freedom)))
 }
 
 /// Deviance per point on the second half of the model whose line moves with the related line.
