@@ -191,6 +191,11 @@ pub(crate) fn positive<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64
     checked(deserializer, |x: f64| x > 0.0 && is_finite(x), "a shape parameter that is not positive and finite")
 }
 
+/// The damping of a filter that oscillates.
+pub(crate) fn damping<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    checked(deserializer, |x: f64| x > 0.0 && x < 1.0, "a damping that is not between 0 and 1")
+}
+
 /// The sample period of a model, 0 in a model without a curve.
 pub(crate) fn not_negative<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     checked(deserializer, |x: f64| x >= 0.0 && is_finite(x), "a sample period that is negative or not finite")

@@ -6,12 +6,14 @@
 
 mod exponential;
 mod filter;
+mod low_pass;
 mod process;
 mod set;
 mod shape;
 
 pub use exponential::{Markov, Resonance};
 pub use filter::MovingAverageFilter;
+pub use low_pass::LowPass;
 pub use process::{AngleRandomWalk, BiasInstability, Process, Quantization, RateRamp, RateRandomWalk, Sinusoid};
 pub(crate) use set::{AllTerms, PowerLawTerms, TermSet};
 pub(crate) use shape::MAX_SHAPE;
@@ -19,6 +21,7 @@ pub use shape::Shape;
 
 use crate::math::clamp;
 use crate::noise_type::VarianceFractions;
+use core::f64::consts::PI;
 
 /// A term of a noise model: a [`Process`] with an unknown coefficient.
 ///
@@ -45,6 +48,9 @@ pub enum NoiseTerm {
     Resonance(Resonance),
     /// A sinusoid; its amplitude, in the unit itself.
     Sinusoid(Sinusoid),
+    /// N after an analog low-pass filter of the second order, in unit·√s. B, K and Markov processes in a model with it are as they were
+    /// sampled.
+    LowPass(LowPass),
 }
 
 /// Frequency over bandwidth above which an Allan variance curve cannot distinguish a resonance from a sinusoid.
@@ -89,6 +95,7 @@ macro_rules! with_process {
             NoiseTerm::RateRandomWalk => with_process!(@one RateRandomWalk, $process => $expression),
             NoiseTerm::RateRamp => with_process!(@one RateRamp, $process => $expression),
             NoiseTerm::Filtered($process) => $expression,
+            NoiseTerm::LowPass($process) => $expression,
             NoiseTerm::Markov($process) => $expression,
             NoiseTerm::Resonance($process) => $expression,
             NoiseTerm::Sinusoid($process) => $expression,
@@ -110,6 +117,7 @@ impl NoiseTerm {
             Self::RateRandomWalk => "rate_random_walk",
             Self::RateRamp => "rate_ramp",
             Self::Filtered(_) => "filter_bandwidth",
+            Self::LowPass(_) => "low_pass",
             Self::Markov(_) => "markov",
             Self::Resonance(_) => "resonance",
             Self::Sinusoid(_) => "sinusoid",
@@ -132,7 +140,7 @@ impl NoiseTerm {
     pub const fn unit(&self) -> CoefficientUnit {
         match self {
             Self::Quantization => CoefficientUnit::TimesSecond,
-            Self::AngleRandomWalk | Self::Filtered(_) => CoefficientUnit::TimesRootSecond,
+            Self::AngleRandomWalk | Self::Filtered(_) | Self::LowPass(_) => CoefficientUnit::TimesRootSecond,
             Self::RateRandomWalk => CoefficientUnit::PerRootSecond,
             Self::RateRamp => CoefficientUnit::PerSecond,
             Self::BiasInstability | Self::Markov(_) | Self::Resonance(_) | Self::Sinusoid(_) => CoefficientUnit::Itself,
@@ -149,6 +157,7 @@ impl NoiseTerm {
             }
             Self::Sinusoid(sinusoid) => Shape::Sinusoid { frequency: sinusoid.frequency },
             Self::Filtered(filter) => Shape::Filtered { taps: filter.taps as f64, decimation: filter.decimation },
+            Self::LowPass(filter) => Shape::LowPass { frequency: filter.frequency, damping: filter.damping },
             _ => Shape::PowerLaw,
         }
     }
@@ -167,14 +176,15 @@ impl NoiseTerm {
             }
             Self::Sinusoid(_) => Self::Sinusoid(Sinusoid { frequency: shape[0] }),
             Self::Filtered(filter) => Self::Filtered(MovingAverageFilter { decimation: shape[1].max(1.0), ..filter }),
+            Self::LowPass(filter) => Self::LowPass(LowPass { frequency: shape[0], ..filter }),
             other => other,
         }
     }
 
-    /// Indices of the shape parameters that a fit can adjust: real numbers, except a decimation of exactly 1.
+    /// Indices of the shape parameters that a fit can adjust: real numbers, except a decimation of exactly 1 and the damping of a filter.
     pub(crate) const fn free_parameters(&self) -> core::ops::Range<usize> {
         match self {
-            Self::Markov(_) | Self::Sinusoid(_) => 0..1,
+            Self::Markov(_) | Self::Sinusoid(_) | Self::LowPass(_) => 0..1,
             Self::Resonance(_) => 0..2,
             Self::Filtered(filter) if filter.decimation != 1.0 => 1..2,
             _ => 0..0,
@@ -222,7 +232,7 @@ impl NoiseTerm {
     /// [`Process::squared_covariance_tail`] in units of the square of the Allan variance.
     pub(crate) fn squared_covariance_tail(&self, n: u64, stride: f64, sample_period: f64) -> f64 {
         match self {
-            Self::Markov(_) | Self::Resonance(_) => {
+            Self::Markov(_) | Self::Resonance(_) | Self::LowPass(_) => {
                 let avar = self.avar(n, sample_period);
                 with_process!(self, process => process.squared_covariance_tail(n, stride, sample_period))
                     / (avar * avar)
@@ -249,7 +259,11 @@ impl NoiseTerm {
             Self::Filtered(filter) if (n as f64) * filter.decimation < f64::from(filter.taps) => {
                 VarianceFractions { random_walk: fraction, ..none }
             }
-            Self::Filtered(_) => VarianceFractions { white: fraction, ..none },
+            Self::LowPass(filter) if PI * filter.frequency * n as f64 * sample_period < filter.damping => {
+                // Shorter than the mean of its impulse response, 2ζ/ω₀, as that of a moving average is half of its length.
+                VarianceFractions { random_walk: fraction, ..none }
+            }
+            Self::Filtered(_) | Self::LowPass(_) => VarianceFractions { white: fraction, ..none },
             Self::Markov(markov) => {
                 let averaged = n as f64 * sample_period / markov.time_constant;
                 match averaged {

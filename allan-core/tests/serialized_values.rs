@@ -1,7 +1,7 @@
 //! Serialised curves and models: the same after a round trip, refused where a value is impossible.
 
 use allan_core::fit::fit_shapes;
-use allan_core::term::{Markov, MovingAverageFilter};
+use allan_core::term::{LowPass, Markov, MovingAverageFilter};
 use allan_core::{Cascade, Curve, Model, NoiseTerm};
 
 fn curve() -> Curve<12> {
@@ -21,6 +21,7 @@ fn curves_and_models_survive_a_round_trip() {
         NoiseTerm::Filtered(MovingAverageFilter::bartlett(4)),
         NoiseTerm::Markov(Markov { time_constant: 0.3 }),
         NoiseTerm::RateRandomWalk,
+        NoiseTerm::LowPass(LowPass::butterworth(3.0)),
     ];
     let model = fit_shapes(&curve, &kinds);
     let bytes = postcard::to_stdvec(&(&curve, &model)).unwrap();
@@ -61,4 +62,7 @@ fn a_term_with_an_impossible_shape_is_refused() {
     let text = serde_json::to_string(&NoiseTerm::Markov(Markov { time_constant: 1.5 })).unwrap();
     assert!(serde_json::from_str::<NoiseTerm>(&text).is_ok());
     assert!(serde_json::from_str::<NoiseTerm>(&text.replace("1.5", "-1.5")).is_err());
+    let text = serde_json::to_string(&NoiseTerm::LowPass(LowPass { frequency: 3.0, damping: 0.75 })).unwrap();
+    assert!(serde_json::from_str::<NoiseTerm>(&text).is_ok());
+    assert!(serde_json::from_str::<NoiseTerm>(&text.replace("0.75", "1.0")).is_err(), "no oscillation");
 }

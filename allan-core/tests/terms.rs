@@ -5,7 +5,9 @@ mod simulation;
 
 use allan_core::term::{MovingAverageFilter, NoiseTerm, Resonance, Sinusoid};
 use allan_core::{Model, model::FittedTerm};
-use simulation::{MARKOV, Noise, PERIOD, RESONANCE, autocovariance, curve, impulse_response, noises, stationary};
+use simulation::{
+    LOW_PASS, MARKOV, Noise, PERIOD, RESONANCE, autocovariance, curve, impulse_response, noises, stationary,
+};
 use std::f64::consts::PI;
 
 const FACTORS: [u64; 8] = [1, 2, 3, 4, 8, 33, 128, 1024];
@@ -123,7 +125,8 @@ fn what_passes_a_filter_that_is_read_slowly_has_the_allan_variance_of_its_sample
 
 #[test]
 fn squared_covariances_beyond_two_averaging_times_are_summed_completely() {
-    for kind in MARKOV.map(NoiseTerm::Markov).into_iter().chain(RESONANCE.map(NoiseTerm::Resonance)) {
+    let filtered = LOW_PASS.map(NoiseTerm::LowPass);
+    for kind in MARKOV.map(NoiseTerm::Markov).into_iter().chain(RESONANCE.map(NoiseTerm::Resonance)).chain(filtered) {
         let (n, stride) = (16, 2.0);
         let width = n as f64;
         let v = |m: f64| kind.process().sum_variance(m.abs(), PERIOD);

@@ -67,7 +67,8 @@ pub(crate) fn reported_term(kind: NoiseTerm) -> ReportedTerm {
         NoiseTerm::BiasInstability => ReportedTerm::BiasInstability,
         NoiseTerm::RateRandomWalk => ReportedTerm::RateRandomWalk,
         NoiseTerm::RateRamp => ReportedTerm::RateRamp,
-        NoiseTerm::Filtered(_) => ReportedTerm::Filtered,
+        // No candidate of the device is a low-pass filter of the second order.
+        NoiseTerm::Filtered(_) | NoiseTerm::LowPass(_) => ReportedTerm::Filtered,
         NoiseTerm::Markov(_) => ReportedTerm::Markov,
         NoiseTerm::Resonance(_) => ReportedTerm::Resonance,
         NoiseTerm::Sinusoid(_) => ReportedTerm::Sinusoid,

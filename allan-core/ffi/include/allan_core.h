@@ -171,6 +171,10 @@ typedef enum allan_kind {
    * Amplitude of a sinusoid; shape: frequency in Hz. 
    */
   ALLAN_SINUSOID = 8,
+  /**
+   * N after a low-pass filter of the second order; shape: natural frequency in Hz, damping below 1. 
+   */
+  ALLAN_LOW_PASS = 9,
 } allan_kind;
 
 /**

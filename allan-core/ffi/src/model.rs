@@ -6,7 +6,7 @@ use crate::status::{contained, status};
 use crate::storage::{elements, object_ref, store};
 use allan_core::fit::{fit, fit_power_laws, fit_shapes, goodness};
 use allan_core::model::{FittedTerm, MAX_TERMS};
-use allan_core::term::{Markov, MovingAverageFilter, Resonance, Sinusoid};
+use allan_core::term::{LowPass, Markov, MovingAverageFilter, Resonance, Sinusoid};
 use allan_core::{Model, NoiseTerm};
 
 /// Largest number of terms of a model.
@@ -34,6 +34,8 @@ pub enum allan_kind {
     ALLAN_RESONANCE = 7,
     /** Amplitude of a sinusoid; shape: frequency in Hz. */
     ALLAN_SINUSOID = 8,
+    /** N after a low-pass filter of the second order; shape: natural frequency in Hz, damping below 1. */
+    ALLAN_LOW_PASS = 9,
 }
 
 /// A term: `kind`, `stages` and `shape` are set before a fit, the rest is its result.
@@ -93,6 +95,7 @@ impl allan_term {
             NoiseTerm::RateRandomWalk => (ALLAN_RATE_RANDOM_WALK, 0),
             NoiseTerm::RateRamp => (ALLAN_RATE_RAMP, 0),
             NoiseTerm::Filtered(filter) => (ALLAN_FILTERED, u32::from(filter.stages)),
+            NoiseTerm::LowPass(_) => (ALLAN_LOW_PASS, 0),
             NoiseTerm::Markov(_) => (ALLAN_MARKOV, 0),
             NoiseTerm::Resonance(_) => (ALLAN_RESONANCE, 0),
             NoiseTerm::Sinusoid(_) => (ALLAN_SINUSOID, 0),
@@ -124,6 +127,10 @@ impl allan_term {
             kind if kind == allan_kind::ALLAN_RATE_RANDOM_WALK as i32 => NoiseTerm::RateRandomWalk,
             kind if kind == allan_kind::ALLAN_RATE_RAMP as i32 => NoiseTerm::RateRamp,
             kind if kind == allan_kind::ALLAN_FILTERED as i32 => NoiseTerm::Filtered(self.filter()?),
+            kind if kind == allan_kind::ALLAN_LOW_PASS as i32 => {
+                let damping = positive(second).ok().filter(|damping| *damping < 1.0).ok_or(ALLAN_ERROR_RANGE)?;
+                NoiseTerm::LowPass(LowPass { frequency: positive(first)?, damping })
+            }
             kind if kind == allan_kind::ALLAN_MARKOV as i32 => {
                 NoiseTerm::Markov(Markov { time_constant: positive(first)? })
             }

@@ -3,7 +3,7 @@
 use crate::curve::NativeCurve;
 use allan_core::fit::{fit as fit_coefficients, fit_shapes, goodness};
 use allan_core::model::{Discrepancy, FittedTerm, MAX_TERMS};
-use allan_core::term::{CoefficientUnit, Markov, MovingAverageFilter, Resonance, Sinusoid};
+use allan_core::term::{CoefficientUnit, LowPass, Markov, MovingAverageFilter, Resonance, Sinusoid};
 use allan_core::{Model, NoiseTerm};
 use postcard::{from_bytes, to_allocvec};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
@@ -63,6 +63,10 @@ fn term(name: &str, shape: &[f64]) -> PyResult<NoiseTerm> {
         ("sinusoid", &[frequency]) => {
             NoiseTerm::Sinusoid(Sinusoid { frequency: positive(name, "frequency", frequency)? })
         }
+        ("low_pass", &[frequency, damping]) if damping < 1.0 => NoiseTerm::LowPass(LowPass {
+            frequency: positive(name, "frequency", frequency)?,
+            damping: positive(name, "damping", damping)?,
+        }),
         ("filter_bandwidth", &[stages, taps, decimation]) => NoiseTerm::Filtered(filter(stages, taps, decimation)?),
         _ => {
             return Err(PyValueError::new_err(format!(

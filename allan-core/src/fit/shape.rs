@@ -28,15 +28,14 @@ const SHORTEST: f64 = 1.5;
 pub(crate) enum FreeShapes<'a> {
     /// None.
     None,
-    /// All except the frequencies of the sinusoids in this list, which are known from a spectrum, and the decimations of the
-    /// filters in it.
+    /// All except the frequencies of the sinusoids in this list, which are known from a spectrum, and the shapes of the filters in it.
     AllExcept(&'a [NoiseTerm]),
 }
 
 impl FreeShapes<'_> {
     /// Whether the shape of this term is adjusted.
     pub(super) fn has<T: TermSet>(self, kind: &NoiseTerm) -> bool {
-        let can_be_known = matches!(kind, NoiseTerm::Sinusoid(_) | NoiseTerm::Filtered(_));
+        let can_be_known = matches!(kind, NoiseTerm::Sinusoid(_) | NoiseTerm::Filtered(_) | NoiseTerm::LowPass(_));
         let is_fixed = |known: &[NoiseTerm]| can_be_known && known.contains(kind);
         !T::free_parameters(kind).is_empty() && matches!(self, Self::AllExcept(known) if !is_fixed(known))
     }

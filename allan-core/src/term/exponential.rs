@@ -152,8 +152,11 @@ fn covariance_at_2n(rate: Complex, n: f64) -> Complex {
 
 /// Sum of the squares of the covariances at the lags `2n + stride, 2n + 2·stride …`
 fn squared_covariance_tail(rate: Complex, n: f64, stride: f64) -> f64 {
-    let step = rate * stride;
-    let at_2n = covariance_at_2n(rate, n);
+    squared_tail(covariance_at_2n(rate, n), rate * stride)
+}
+
+/// The same, of covariances whose values are those of `at_2n` at a lag of `2n` and whose rate for a stride is `step`.
+pub(super) fn squared_tail(at_2n: Complex, step: Complex) -> f64 {
     let first = at_2n - at_2n * step.one_minus_exp();
     let steady = first.square() / -expm1(-2.0 * step.re);
     (steady + (first * first * (step * 2.0).one_minus_exp().inverse()).re) / 2.0
@@ -167,21 +170,21 @@ fn lorentzian(decay: f64, angle: f64) -> f64 {
 
 /// A complex number with the operations that the formulas above need.
 #[derive(Debug, Clone, Copy)]
-struct Complex {
-    re: f64,
-    im: f64,
+pub(super) struct Complex {
+    pub(super) re: f64,
+    pub(super) im: f64,
 }
 
 impl Complex {
     /// `1 − exp(−self)`, without cancellation near 0.
-    fn one_minus_exp(self) -> Self {
+    pub(super) fn one_minus_exp(self) -> Self {
         let shrink = expm1(-self.re);
         let half = sin(self.im / 2.0);
         Self { re: 2.0 * half * half * (1.0 + shrink) - shrink, im: (1.0 + shrink) * sin(self.im) }
     }
 
     /// `1/self`.
-    fn inverse(self) -> Self {
+    pub(super) fn inverse(self) -> Self {
         let square = self.square();
         Self { re: self.re / square, im: -self.im / square }
     }

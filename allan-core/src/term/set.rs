@@ -96,7 +96,11 @@ impl TermSet for PowerLawTerms {
     fn contains(kind: &NoiseTerm) -> bool {
         !matches!(
             kind,
-            NoiseTerm::Filtered(_) | NoiseTerm::Markov(_) | NoiseTerm::Resonance(_) | NoiseTerm::Sinusoid(_)
+            NoiseTerm::Filtered(_)
+                | NoiseTerm::LowPass(_)
+                | NoiseTerm::Markov(_)
+                | NoiseTerm::Resonance(_)
+                | NoiseTerm::Sinusoid(_)
         )
     }
 

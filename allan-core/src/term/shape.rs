@@ -34,6 +34,13 @@ pub enum Shape<T = f64> {
         /// Hz
         frequency: T,
     },
+    /// Of [`NoiseTerm::LowPass`](crate::NoiseTerm::LowPass).
+    LowPass {
+        /// Hz
+        frequency: T,
+        /// 1
+        damping: T,
+    },
 }
 
 impl<T: Copy> Shape<T> {
@@ -42,6 +49,7 @@ impl<T: Copy> Shape<T> {
         let (first, second) = match *self {
             Self::PowerLaw => (None, None),
             Self::Filtered { taps, decimation } => (Some(("taps", taps)), Some(("decimation", decimation))),
+            Self::LowPass { frequency, damping } => (Some(("frequency", frequency)), Some(("damping", damping))),
             Self::Markov { time_constant } => (Some(("time_constant", time_constant)), None),
             Self::Resonance { frequency, bandwidth } => {
                 (Some(("frequency", frequency)), Some(("bandwidth", bandwidth)))
@@ -58,6 +66,9 @@ impl<T: Copy> Shape<T> {
             Self::Filtered { taps, decimation } => {
                 Shape::Filtered { taps: change(taps), decimation: change(decimation) }
             }
+            Self::LowPass { frequency, damping } => {
+                Shape::LowPass { frequency: change(frequency), damping: change(damping) }
+            }
             Self::Markov { time_constant } => Shape::Markov { time_constant: change(time_constant) },
             Self::Resonance { frequency, bandwidth } => {
                 Shape::Resonance { frequency: change(frequency), bandwidth: change(bandwidth) }
@@ -71,6 +82,7 @@ impl<T: Copy> Shape<T> {
         let (first, second) = match self {
             Self::PowerLaw => (None, None),
             Self::Filtered { taps, decimation } => (Some(taps), Some(decimation)),
+            Self::LowPass { frequency, damping } => (Some(frequency), Some(damping)),
             Self::Markov { time_constant } => (Some(time_constant), None),
             Self::Resonance { frequency, bandwidth } => (Some(frequency), Some(bandwidth)),
             Self::Sinusoid { frequency } => (Some(frequency), None),

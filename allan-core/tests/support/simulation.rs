@@ -2,7 +2,7 @@
 //! closed forms.
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
-use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm, Resonance, Sinusoid};
+use allan_core::term::{LowPass, Markov, MovingAverageFilter, NoiseTerm, Resonance, Sinusoid};
 use allan_core::{Cascade, Curve};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -66,6 +66,7 @@ impl Noise {
                 self.rotating(keep, 2.0 * PI * line.frequency * PERIOD, samples)
             }
             NoiseTerm::Filtered(filter) => self.filtered(filter, samples),
+            NoiseTerm::LowPass(filter) => self.behind_low_pass(filter, samples),
             NoiseTerm::BiasInstability => self.half_integrated(samples),
         }
     }
@@ -91,6 +92,24 @@ impl Noise {
         let white: Vec<f64> = (0..samples * step + response.len()).map(|_| gain * self.normal()).collect();
         let output = white.windows(response.len()).step_by(step);
         output.map(|window| window.iter().zip(&response).map(|(a, b)| a * b).sum()).take(samples).collect()
+    }
+
+    /// The state of the filter's differential equation `y″ = −2ζω₀y′ − ω₀²y + ω₀²·noise`, in steps of a hundredth of a sample by the
+    /// leapfrog method, from rest.
+    fn behind_low_pass(&mut self, filter: &LowPass, samples: usize) -> Vec<f64> {
+        const STEPS: usize = 100;
+        let (step, turn) = (PERIOD / STEPS as f64, 2.0 * PI * filter.frequency);
+        let settled = (20.0 / (filter.damping * turn * PERIOD)) as usize;
+        let (mut value, mut slope) = (0.0, 0.0);
+        let mut next = || {
+            for _ in 0..STEPS {
+                let noise = self.normal() / step.sqrt();
+                slope += step * (turn * turn * (noise - value) - 2.0 * filter.damping * turn * slope);
+                value += step * slope;
+            }
+            value
+        };
+        (0..samples + settled).map(|_| next()).skip(settled).collect()
     }
 
     /// White noise integrated of order ½, which is flicker noise: J. Hosking, Biometrika 68 (1981).
@@ -133,6 +152,12 @@ pub(crate) fn autocovariance(kind: &NoiseTerm, j: usize) -> f64 {
         NoiseTerm::Markov(markov) => (-t / markov.time_constant).exp(),
         NoiseTerm::Resonance(line) => (-PI * line.bandwidth * t).exp() * (2.0 * PI * line.frequency * t).cos(),
         NoiseTerm::Sinusoid(line) => 0.5 * (2.0 * PI * line.frequency * t).cos(),
+        NoiseTerm::LowPass(filter) => {
+            let turn = 2.0 * PI * filter.frequency;
+            let (decay, damped) = (filter.damping * turn, turn * (1.0 - filter.damping.powi(2)).sqrt());
+            let oscillation = (damped * t).cos() + decay / damped * (damped * t).sin();
+            turn / (4.0 * filter.damping) * (-decay * t).exp() * oscillation
+        }
         NoiseTerm::Filtered(filter) => {
             let response = impulse_response(filter);
             let at = |values: usize| response.iter().zip(response.iter().skip(values)).map(|(a, b)| a * b).sum::<f64>();
@@ -164,6 +189,9 @@ pub(crate) const RESONANCE: [Resonance; 3] = [
     Resonance { frequency: 1.1, bandwidth: 0.2 },
     Resonance { frequency: 37.0, bandwidth: 6.0 },
 ];
+/// A slow one, one about as fast as the samples, and two equal stages.
+pub(crate) const LOW_PASS: [LowPass; 3] =
+    [LowPass::butterworth(2.0), LowPass { frequency: 60.0, damping: 0.4 }, LowPass::two_stages(23.0)];
 const FILTER: [MovingAverageFilter; 7] = [
     MovingAverageFilter { stages: 1, taps: 1, decimation: 1.0 },
     MovingAverageFilter { stages: 1, taps: 5, decimation: 1.0 },
@@ -180,7 +208,12 @@ pub(crate) fn noises() -> Vec<NoiseTerm> {
     let power_laws =
         [NoiseTerm::Quantization, NoiseTerm::AngleRandomWalk, NoiseTerm::BiasInstability, NoiseTerm::RateRandomWalk];
     let shaped = MARKOV.map(NoiseTerm::Markov).into_iter().chain(RESONANCE.map(NoiseTerm::Resonance));
-    power_laws.into_iter().chain(shaped).chain(FILTER.map(NoiseTerm::Filtered)).collect()
+    power_laws
+        .into_iter()
+        .chain(shaped)
+        .chain(LOW_PASS.map(NoiseTerm::LowPass))
+        .chain(FILTER.map(NoiseTerm::Filtered))
+        .collect()
 }
 
 /// Every stationary term, with several shapes.
