@@ -276,7 +276,11 @@ fn physics(channel: Channel, cause: Cause) -> TextLine {
                 }
                 NoiseTerm::Quantization => text_line(format_args!("Rounding shows: a quantization noise of {size}*s.")),
                 NoiseTerm::RateRamp => text_line(format_args!("The bias drifts in a straight line by {size}/s.")),
-                NoiseTerm::AngleRandomWalk | NoiseTerm::BiasInstability | NoiseTerm::RateRandomWalk => TextLine::new(),
+                // Terms of the baseline, and one that the device does not trace.
+                NoiseTerm::AngleRandomWalk
+                | NoiseTerm::BiasInstability
+                | NoiseTerm::RateRandomWalk
+                | NoiseTerm::LowPass(_) => TextLine::new(),
             }
         }
     }

@@ -147,6 +147,7 @@ pub fn profile(gyro_lsb: f64) -> SensorProfile {
         internal_rate_hz: INTERNAL_RATE_HZ,
         native_rates_hz: native_rates_hz(),
         filters: filters(),
+        may_be_low_pass: false,
         dithered_avar_counts2: DITHERED_AVAR_COUNTS2,
         largest_sensitivity_multiple: LARGEST_SENSITIVITY_MULTIPLE,
         host_clock_error: HOST_CLOCK_ERROR,

@@ -192,6 +192,8 @@ pub struct SensorProfile {
     pub native_rates_hz: Vec<f64>,
     /// Low-pass filters that the sensor may have put before its samples, every value of which is read, the shortest first.
     pub filters: Vec<MovingAverageFilter>,
+    /// Whether a low-pass filter of the second order may be in their place, in the part or in what reads it.
+    pub may_be_low_pass: bool,
     /// Allan variance of a channel at the shortest octaves, in counts², above which rounding to counts adds white noise and
     /// nothing else.
     pub dithered_avar_counts2: f64,
@@ -233,6 +235,7 @@ impl SensorProfile {
             internal_rate_hz: 0.0,
             native_rates_hz: Vec::new(),
             filters: taps().map(moving_average).chain(taps().map(MovingAverageFilter::bartlett)).collect(),
+            may_be_low_pass: true,
             // Rounding is white where the noise reaches from one count to the next, whatever the part.
             dithered_avar_counts2: DITHERED_AVAR_COUNTS2,
             largest_sensitivity_multiple: LARGEST_SENSITIVITY_MULTIPLE,

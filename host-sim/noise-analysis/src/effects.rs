@@ -14,10 +14,10 @@ mod effective_lsb;
 mod environment;
 mod evidence;
 pub mod findings;
-mod first_order_filter;
 mod kind;
 mod knock;
 mod level_change;
+mod low_pass_filter;
 mod markov_process;
 mod missing_codes;
 mod modulated_line;
@@ -53,10 +53,10 @@ pub use dropped_samples::DroppedSamples;
 pub use effective_lsb::EffectiveLsb;
 pub use environment::{SupplySensitivity, TemperatureSensitivity};
 pub use evidence::{CurveEvidence, LineEvidence, LineSource, Multiples, SpectrumEvidence};
-pub use first_order_filter::FirstOrderFilter;
 pub(crate) use kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 pub use knock::NoisyInterval;
 pub use level_change::LevelChange;
+pub use low_pass_filter::{LowPassDesign, LowPassFilter};
 pub use markov_process::{MarkovEvidence, MarkovProcess};
 pub use missing_codes::MissingCodes;
 pub use modulated_line::{ModulatedLine, ModulationEvidence};
@@ -92,7 +92,7 @@ pub enum Effect {
     /// The low-pass filter of the part.
     OutputFilter(OutputFilter),
     /// A low-pass filter of the first order in one channel.
-    FirstOrderFilter(FirstOrderFilter),
+    LowPassFilter(LowPassFilter),
     /// A line no wider than the record resolves.
     SinusoidalLine(SinusoidalLine),
     /// A line with a width.
@@ -220,7 +220,7 @@ macro_rules! kinds {
 
 kinds!(
     OutputFilter,
-    FirstOrderFilter,
+    LowPassFilter,
     SinusoidalLine,
     ResonantLine,
     ModulatedLine,

@@ -3,8 +3,8 @@
 use crate::formatting::enumerated;
 use crate::rounding::{probability, quantity_digits, significant};
 use noise_analysis::effects::{
-    BandMismatch, ClockDeviation, CurveEvidence, Effect, LineEvidence, LineSource, LinearDriftEvidence, MarkovEvidence,
-    ModulatedLine, ModulationEvidence, MotionScale, Multiples, Observation, OutputFilter, Refutation,
+    BandMismatch, ClockDeviation, CurveEvidence, Effect, LineEvidence, LineSource, LinearDriftEvidence, LowPassDesign,
+    MarkovEvidence, ModulatedLine, ModulationEvidence, MotionScale, Multiples, Observation, OutputFilter, Refutation,
     TelegraphEvidence, Unexplained,
 };
 use noise_analysis::report::Finding;
@@ -128,13 +128,21 @@ impl Wording {
     fn effect(&self, effect: &Effect) -> EvidenceText {
         match effect {
             Effect::OutputFilter(of) => added(&of.evidence, &filter_meaning(of)),
-            Effect::FirstOrderFilter(of) => text(
-                excess(&of.evidence),
-                format!(
-                    "; all the white noise is correlated over {} s and none is left: a low-pass filter of the first order",
-                    seconds(of.time_constant_s)
+            Effect::LowPassFilter(of) => match of.design {
+                LowPassDesign::OneStage { time_constant_s } => text(
+                    excess(&of.evidence),
+                    format!(
+                        "; all the white noise is correlated over {} s and none is left: a low-pass filter of the first order",
+                        seconds(time_constant_s)
+                    ),
                 ),
-            ),
+                LowPassDesign::TwoStages => {
+                    added(&of.evidence, "neighbours correlate as behind two equal low-pass stages of the first order")
+                }
+                LowPassDesign::Butterworth => {
+                    added(&of.evidence, "neighbours correlate as behind a Butterworth filter of the second order")
+                }
+            },
             Effect::SinusoidalLine(of) => self.harmonic(of.multiples.as_ref(), &of.evidence),
             Effect::ResonantLine(of) => self.harmonic(of.multiples.as_ref(), &of.evidence),
             Effect::ModulatedLine(of) => self.modulated(of),

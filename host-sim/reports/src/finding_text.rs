@@ -133,7 +133,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
                 "; take N from averaging times longer than the filter, or use fewer taps for more bandwidth.",
             ),
         ),
-        Effect::FirstOrderFilter(of) => (
+        Effect::LowPassFilter(of) => (
             format!("A low-pass filter with a bandwidth of {}.", hertz(of.bandwidth_hz)),
             Advice::done(
                 "Nothing to repair",

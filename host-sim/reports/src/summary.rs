@@ -307,7 +307,7 @@ const SAMPLES_FOR_FILTER: u64 = 1000;
 
 /// The part's notes, without that of no filter where none could have shown or where one was found in some channels.
 fn told_notes(report: &Report) -> Vec<PartNote> {
-    let is_filter = |finding: &Finding| matches!(finding.effect, Effect::OutputFilter(_) | Effect::FirstOrderFilter(_));
+    let is_filter = |finding: &Finding| matches!(finding.effect, Effect::OutputFilter(_) | Effect::LowPassFilter(_));
     let is_sought = report.samples >= SAMPLES_FOR_FILTER && !report.findings.iter().any(is_filter);
     let is_told = |note: &&PartNote| is_sought || !matches!(note, PartNote::NotCorrelated { .. });
     report.part.notes.iter().filter(is_told).cloned().collect()

@@ -147,8 +147,10 @@ impl ChannelFit {
         let own: Vec<PlannedTerm> = self.traced.terms().collect();
         let is_basic = |kind: &NoiseTerm| is_filter(kind) || NoiseTerm::BASELINE.contains(kind);
         let basic: Vec<PlannedTerm> = own.iter().filter(|(kind, _)| is_basic(kind)).copied().collect();
-        let filters: Vec<MovingAverageFilter> = own.iter().filter_map(|(kind, _)| filter_of(kind)).collect();
-        let by_curve = trace(curve, LineCandidates::Curve, &filters);
+        let by_curve = match own.iter().find(|(kind, _)| is_filter(kind)) {
+            Some((filtered, _)) => traced_with(curve, *filtered, LineCandidates::Curve),
+            None => trace(curve, LineCandidates::Curve, &[]),
+        };
         let is_possible = self.lines.as_ref().is_none_or(|lines| are_in_spectrum(&by_curve, lines));
         let by_curve = is_possible.then(|| TracedModel::new(&by_curve, curve).terms().collect::<Vec<PlannedTerm>>());
         let of_own = left(&own);
@@ -226,14 +228,14 @@ impl ChannelFit {
             }
             None => {}
         }
-        self.resolve(common.map(|common| common.decimation));
+        self.resolve(common.map(|common| common.adjusted));
     }
 
     /// Sets the bounds that the record resolves, and removes each added term that may be absent and of whose shape it resolves
     /// nothing, if the deviance does not rise by more than [`MAX_DEVIANCE_RISE`] without it.
-    fn resolve(&mut self, decimation: Option<BoundedEstimate>) {
+    fn resolve(&mut self, of_filter: Option<BoundedEstimate>) {
         let curve = &self.covariates.curve;
-        self.traced = self.traced.clone().bounded(curve, decimation);
+        self.traced = self.traced.clone().bounded(curve, of_filter);
         while let Some(unresolved) = self.traced.unresolved(curve) {
             let without = self.traced.removed(curve, unresolved);
             if without.goodness.deviance - self.traced.goodness.deviance > MAX_DEVIANCE_RISE {
@@ -251,13 +253,13 @@ impl ChannelFit {
         let mut best = with_filter(curve, &self.traced, common);
         // The channel's own terms may have stood in for the filter.
         if !had || best.cost() > self.traced.cost() + MAX_DEVIANCE_RISE {
-            let again = TracedModel::new(&trace(curve, LineCandidates::Curve, &[common.filter]), curve);
+            let again = TracedModel::new(&traced_with(curve, common.term, self.line_candidates(common)), curve);
             let other = with_filter(curve, &again, common);
             best = if other.cost() < best.cost() { other } else { best };
         }
         // So may those without which the noise behind the filter and that of rounding describe the curve; and, as white noise is never
         // absent, those that leave it unknown to a half.
-        let plain = with_rounding(curve, &behind(common.filter).map(|kind| (kind, None)));
+        let plain = with_rounding(curve, &behind(common.term).map(|kind| (kind, None)));
         let is_unknown = |model: &TracedModel| {
             let bounded = model.clone().bounded(curve, None);
             bounded.model().terms().first().is_none_or(|filter| filter.low <= KNOWN_WHITE * filter.value)
@@ -265,7 +267,9 @@ impl ChannelFit {
         let other = if plain.goodness.p_value >= DESCRIBED {
             Some(plain)
         } else {
-            is_unknown(&best).then(|| with_filter(curve, &traced_behind(curve, common.filter), common))
+            is_unknown(&best)
+                .then(|| traced_behind(curve, common.term, LineCandidates::Curve))
+                .map(|trace| with_filter(curve, &TracedModel::new(&trace, curve), common))
         };
         best = other.filter(|other| other.cost() < best.cost() + MAX_DEVIANCE_RISE).unwrap_or(best);
         if !had && best.cost() > self.traced.cost() + MAX_DEVIANCE_RISE {
@@ -393,6 +397,14 @@ impl ChannelFit {
         self.refuted.contains(line)
     }
 
+    /// What lines to look for behind a filter: behind a low-pass filter, which no trace had before, those of the spectrum where it has any.
+    fn line_candidates(&self, common: &PartFilter) -> LineCandidates<'_> {
+        match (&self.lines, common.term) {
+            (Some(lines), NoiseTerm::LowPass(_)) if !lines.is_empty() => LineCandidates::Spectrum(lines),
+            _ => LineCandidates::Curve,
+        }
+    }
+
     /// The residual of the model at the shortest averaging time.
     fn first_residual(&self) -> Residual {
         let nothing = Residual { n: 1, excess: 0.0, sigmas: 0.0 };
@@ -411,7 +423,7 @@ impl ChannelFit {
             return;
         }
         let terms = held.terms().map(|(kind, addition)| match common {
-            Some(common) if is_filter(&kind) => (NoiseTerm::Filtered(common.filter), addition),
+            Some(common) if is_filter(&kind) => (common.term, addition),
             _ => (kind, addition),
         });
         let taken =
@@ -423,11 +435,11 @@ impl ChannelFit {
     }
 }
 
-/// The filter that a term is.
-fn filter_of(kind: &NoiseTerm) -> Option<MovingAverageFilter> {
-    match kind {
-        NoiseTerm::Filtered(filter) => Some(*filter),
-        _ => None,
+/// What the baseline lacks of a curve, with a filter that white noise may be behind as in `filtered`.
+fn traced_with(curve: &Curve<OCTAVES>, filtered: NoiseTerm, lines: LineCandidates) -> Trace {
+    match filtered {
+        NoiseTerm::Filtered(averages) => trace(curve, lines, &[averages]),
+        _ => traced_behind(curve, filtered, lines),
     }
 }
 
@@ -436,7 +448,7 @@ fn filter_of(kind: &NoiseTerm) -> Option<MovingAverageFilter> {
 fn with_filter(curve: &Curve<OCTAVES>, traced: &TracedModel, common: &PartFilter) -> TracedModel {
     let (white, mut others): (Vec<PlannedTerm>, Vec<PlannedTerm>) =
         traced.terms().partition(|(kind, _)| is_white(kind));
-    let filter = (NoiseTerm::Filtered(common.filter), white.into_iter().find_map(|(_, addition)| addition));
+    let filter = (common.term, white.into_iter().find_map(|(_, addition)| addition));
     let is_baseline = |kind: &NoiseTerm| NoiseTerm::BASELINE.contains(kind);
     loop {
         let fitted = with_rounding(curve, &[&[filter], others.as_slice()].concat());
@@ -461,18 +473,18 @@ fn with_rounding(curve: &Curve<OCTAVES>, terms: &[PlannedTerm]) -> TracedModel {
     if is_shown && more.goodness.deviance < plain.goodness.deviance { more } else { plain }
 }
 
-/// White noise behind `filter`, bias instability and random walk.
-fn behind(filter: MovingAverageFilter) -> [NoiseTerm; 3] {
-    [NoiseTerm::Filtered(filter), NoiseTerm::BiasInstability, NoiseTerm::RateRandomWalk]
+/// White noise behind a filter, `filtered`, bias instability and random walk.
+fn behind(filtered: NoiseTerm) -> [NoiseTerm; 3] {
+    [filtered, NoiseTerm::BiasInstability, NoiseTerm::RateRandomWalk]
 }
 
 /// What the noise [`behind`] a filter lacks of a curve.
-fn traced_behind(curve: &Curve<OCTAVES>, filter: MovingAverageFilter) -> TracedModel {
+fn traced_behind(curve: &Curve<OCTAVES>, filtered: NoiseTerm, lines: LineCandidates) -> Trace {
     let mut traced = Trace::baseline(curve);
-    traced.after = fit(curve, &behind(filter));
+    traced.after = fit(curve, &behind(filtered));
     traced.after_goodness = allan_core::fit::goodness(curve, &traced.after);
-    let _ = trace_while(&mut traced, curve, LineCandidates::Curve, &[], &mut || true);
-    TracedModel::new(&traced, curve)
+    let _ = trace_while(&mut traced, curve, lines, &[], &mut || true);
+    traced
 }
 
 /// Whether the spectrum has one of its `lines` beside each line of the model of a curve.

@@ -1,6 +1,7 @@
 //! What the terms of a noise model are: white noise, filters, lines.
 
 use allan_core::{Model, NoiseTerm};
+use std::f64::consts::PI;
 
 /// Farthest that a time constant and another one, or the octave of the curve that it may belong to, are apart to be one, in octaves:
 /// either is known to a factor of 2.
@@ -11,9 +12,9 @@ pub(crate) fn is_same_time(one_s: f64, other_s: f64) -> bool {
     (one_s / other_s).log2().abs() <= SAME_TIME_OCTAVES
 }
 
-/// Whether a term is a digital filter.
+/// Whether a term is white noise behind a filter.
 pub(crate) fn is_filter(kind: &NoiseTerm) -> bool {
-    matches!(kind, NoiseTerm::Filtered(_))
+    matches!(kind, NoiseTerm::Filtered(_) | NoiseTerm::LowPass(_))
 }
 
 /// Whether a term is white noise, filtered or not.
@@ -50,6 +51,8 @@ pub(crate) fn filter_length_s(model: &Model) -> f64 {
         NoiseTerm::Filtered(filter) => {
             f64::from(filter.stages) * f64::from(filter.taps) * model.sample_period() / filter.decimation
         }
+        // As long as the moving average whose impulse response has the same mean, 2ζ/ω₀.
+        NoiseTerm::LowPass(filter) => 2.0 * filter.damping / (PI * filter.frequency),
         _ => 0.0,
     };
     model.terms().iter().map(|term| length(&term.kind)).fold(0.0, f64::max)

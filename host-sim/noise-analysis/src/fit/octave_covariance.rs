@@ -12,7 +12,7 @@ use crate::bounds::BoundedEstimate;
 use crate::fit::noise_terms::{is_filter, is_white};
 use allan_core::confidence::{NORMAL_975, octave_correlation};
 use allan_core::model::FittedTerm;
-use allan_core::term::MovingAverageFilter;
+use allan_core::term::{LowPass, MovingAverageFilter};
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 use nalgebra::{DMatrix, DVector};
 use std::borrow::Cow;
@@ -78,12 +78,12 @@ fn transfer_function(n: u64) -> Cow<'static, [f64]> {
 /// `model` with wider bounds of its white noise where it has a filter: the model was fitted to `curve` with the degrees of
 /// freedom of the model, which count differences that are closer than the filter's length as independent.
 ///
-/// Shapes other than the decimation count as known. That of the filter has the bounds `decimation` where the channels have it in common,
-/// else those of its term; its error changes the variance of the filtered noise, which the white noise follows.
+/// Shapes count as known but for that of the filter which is adjusted, its decimation or its frequency. It has the bounds `of_filter` where
+/// the channels have it in common, else those of its term; its error changes the variance of the filtered noise, which the white noise follows.
 pub(crate) fn with_bounds_behind_a_filter(
     curve: &Curve<OCTAVES>,
     model: &Model,
-    decimation: Option<BoundedEstimate>,
+    of_filter: Option<BoundedEstimate>,
 ) -> Model {
     let Some(filter) = model.terms().iter().find(|term| is_filter(&term.kind) && term.value > 0.0) else {
         return model.clone();
@@ -97,10 +97,10 @@ pub(crate) fn with_bounds_behind_a_filter(
     let weighted = DMatrix::from_diagonal(&weights) * &shares;
     let Some(information) = (shares.transpose() * &weighted).cholesky() else { return model.clone() };
     let estimator = weighted * information.inverse();
-    let by_decimation = decimation_error(filter, decimation) * by_decimation(model, filter, &points);
-    let by_decimation = estimator.transpose() * by_decimation;
-    let covariance = estimator.transpose() * relative_covariance(model, &points) * &estimator
-        + &by_decimation * by_decimation.transpose();
+    let by_shape = shape_error(filter, of_filter) * by_shape(model, filter, &points);
+    let by_shape = estimator.transpose() * by_shape;
+    let covariance =
+        estimator.transpose() * relative_covariance(model, &points) * &estimator + &by_shape * by_shape.transpose();
     let widened = |term: &FittedTerm| {
         let position = present.iter().position(|known| std::ptr::eq(*known, term));
         let Some(position) = position.filter(|_| is_white(&term.kind)) else { return *term };
@@ -112,9 +112,14 @@ pub(crate) fn with_bounds_behind_a_filter(
     Model::new(model.sample_period(), model.terms().iter().map(widened))
 }
 
-/// Relative standard deviation of the decimation of `filter`.
-fn decimation_error(filter: &FittedTerm, common: Option<BoundedEstimate>) -> f64 {
-    let own = || filter.shape_parameters().find(|(name, ..)| *name == "decimation");
+/// Whether a parameter of the shape of a filter is the one that a fit adjusts.
+pub(crate) fn is_adjusted_of_filter(kind: &NoiseTerm, name: &str) -> bool {
+    matches!((kind, name), (NoiseTerm::Filtered(_), "decimation") | (NoiseTerm::LowPass(_), "frequency"))
+}
+
+/// Relative standard deviation of the adjusted shape of `filter`.
+fn shape_error(filter: &FittedTerm, common: Option<BoundedEstimate>) -> f64 {
+    let own = || filter.shape_parameters().find(|(name, ..)| is_adjusted_of_filter(&filter.kind, name));
     let (value, low, high) = match common {
         Some(common) => (common.value, common.low, common.high),
         None => own().map_or((1.0, 1.0, 1.0), |(_, value, (low, high))| (value, low, high)),
@@ -122,16 +127,19 @@ fn decimation_error(filter: &FittedTerm, common: Option<BoundedEstimate>) -> f64
     (high - low) / (2.0 * NORMAL_975 * value)
 }
 
-/// Relative change of the model's variance at each point for a relative change of the decimation of `filter`.
-fn by_decimation(model: &Model, filter: &FittedTerm, points: &[&AllanPoint]) -> DVector<f64> {
+/// Relative change of the model's variance at each point for a relative change of the adjusted shape of `filter`.
+fn by_shape(model: &Model, filter: &FittedTerm, points: &[&AllanPoint]) -> DVector<f64> {
     let period = model.sample_period();
     let changed = |point: &&AllanPoint| {
-        let variance = |factor: f64| match filter.kind {
-            NoiseTerm::Filtered(of) => {
-                let of = MovingAverageFilter { decimation: (of.decimation * factor).max(1.0), ..of };
-                NoiseTerm::Filtered(of).avar(point.n, period)
-            }
-            known => known.avar(point.n, period),
+        let variance = |factor: f64| {
+            let changed = match filter.kind {
+                NoiseTerm::Filtered(of) => {
+                    NoiseTerm::Filtered(MovingAverageFilter { decimation: (of.decimation * factor).max(1.0), ..of })
+                }
+                NoiseTerm::LowPass(of) => NoiseTerm::LowPass(LowPass { frequency: of.frequency * factor, ..of }),
+                known => known,
+            };
+            changed.avar(point.n, period)
         };
         let slope = (variance(1.0 + RELATIVE_STEP) - variance(1.0 - RELATIVE_STEP)) / (2.0 * RELATIVE_STEP);
         filter.value * filter.value * slope / model.avar(point.n)

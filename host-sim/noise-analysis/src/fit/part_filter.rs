@@ -16,6 +16,7 @@ mod channel_deviance;
 mod decimation;
 mod hypothesis;
 mod joint_samples;
+mod low_pass;
 mod screen;
 
 pub(crate) use channel_deviance::FilteredChannel;
@@ -24,8 +25,8 @@ use crate::OCTAVES;
 use crate::bounds::BoundedEstimate;
 use crate::effects::findings::{REFUTED, SIGNIFICANCE};
 use crate::parallel;
-use allan_core::Curve;
 use allan_core::term::MovingAverageFilter;
+use allan_core::{Curve, NoiseTerm};
 use channel_deviance::{ChannelDeviance, without_rounding};
 use decimation::{decimations, slowest};
 use hypothesis::{BOUNDED, Hypothesis, Identified, birge_ratio, chi_squared_quantile, simplest};
@@ -37,10 +38,11 @@ const CHANNELS_FOR_MAJORITY: usize = 3;
 /// The filter of a sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PartFilter {
-    /// With the common decimation.
-    pub filter: MovingAverageFilter,
-    /// Values of the sensor's clock from one sample to the next, with 95 % bounds; exactly 1 where every value is recorded.
-    pub decimation: BoundedEstimate,
+    /// White noise behind it.
+    pub term: NoiseTerm,
+    /// What is adjusted of it, with 95 % bounds. Of moving averages the values of the sensor's clock from one sample to the next, exactly 1
+    /// where every value is recorded; of a low-pass filter its frequency, Hz.
+    pub adjusted: BoundedEstimate,
     /// Number of dithered channels that show it, of all dithered ones.
     pub shown: (usize, usize),
     /// Channels that contradict it, with the decimation that each has alone.
@@ -62,11 +64,11 @@ pub(crate) enum Unidentified {
     NotSought,
 }
 
-/// The common filter of `channels`, of which the sensor may have `filters`; its clock runs at about `nominal_decimation` values
-/// per sample.
+/// The common filter of `channels`, of which the sensor may have `filters`, and `may_be_low_pass`; its clock runs at about
+/// `nominal_decimation` values per sample.
 pub(crate) fn estimate(
     channels: &[FilteredChannel],
-    filters: &[MovingAverageFilter],
+    (filters, may_be_low_pass): (&[MovingAverageFilter], bool),
     nominal_decimation: f64,
 ) -> Result<PartFilter, Unidentified> {
     // Where more than half of the samples of an octave were replaced from their neighbours, these correlate by that.
@@ -128,7 +130,24 @@ pub(crate) fn estimate(
     };
     let common = hypothesis(&mut joint, filter);
     let contradicting = contradictions(&mut joint, &common, &scatters, &shown).channels;
-    Ok(PartFilter { filter, decimation, shown: (showing, joint.len()), contradicting, other_taps })
+    let averages = PartFilter {
+        term: NoiseTerm::Filtered(filter),
+        adjusted: decimation,
+        shown: (showing, joint.len()),
+        contradicting,
+        other_taps,
+    };
+    let low_pass = may_be_low_pass.then(|| low_pass::in_place_of(filter, &mut joint, required)).flatten();
+    Ok(match low_pass {
+        Some((low_pass, frequency)) => PartFilter {
+            term: NoiseTerm::LowPass(low_pass),
+            adjusted: frequency,
+            contradicting: Vec::new(),
+            other_taps: Vec::new(),
+            ..averages
+        },
+        None => averages,
+    })
 }
 
 /// Those of `tried` whose deviance is above `least`, in units of its `scatter`, by no more than chance, with the decimations of which that
@@ -252,7 +271,12 @@ mod tests {
             },
         });
         let channels: Vec<FilteredChannel> = channels.collect();
-        estimate(&channels, &profile.filters, decimation)
+        estimate(&channels, (&profile.filters, profile.may_be_low_pass), decimation)
+    }
+
+    fn averages(found: &PartFilter) -> MovingAverageFilter {
+        let NoiseTerm::Filtered(filter) = found.term else { panic!("{found:?}") };
+        filter
     }
 
     /// Estimates the decimation of each of `parts` (taps, rate in Hz) for four seeds. Of 20 intervals of 95 %, 19 ± 1 hold; at three
@@ -263,9 +287,9 @@ mod tests {
             for seed in 1..=4 {
                 let found = estimated(taps, rate_hz, seed, evidence).expect("a filter");
                 let truth = CLOCK_HZ / rate_hz;
-                assert_eq!(usize::from(found.filter.taps), taps, "read at {rate_hz} Hz: {found:?}");
+                assert_eq!(usize::from(averages(&found).taps), taps, "read at {rate_hz} Hz: {found:?}");
                 assert!(found.contradicting.is_empty(), "read at {rate_hz} Hz: {found:?}");
-                let BoundedEstimate { value, low, high } = found.decimation;
+                let BoundedEstimate { value, low, high } = found.adjusted;
                 println!("{taps} taps, {truth:.4}: {value:.4} [{low:.4}, {high:.4}]");
                 widths.push((high - low) / value);
                 held += usize::from((low..=high).contains(&truth));
@@ -299,7 +323,8 @@ mod tests {
         for taps in [2, 4, 16] {
             for evidence in [Evidence::Curves, Evidence::Samples] {
                 let found = estimated(taps, CLOCK_HZ, 7, evidence).expect("a filter");
-                assert_eq!((usize::from(found.filter.taps), found.filter.decimation), (taps, 1.0), "{found:?}");
+                let filter = averages(&found);
+                assert_eq!((usize::from(filter.taps), filter.decimation), (taps, 1.0), "{found:?}");
             }
         }
     }
@@ -311,6 +336,6 @@ mod tests {
             assert_eq!(estimated(1, CLOCK_HZ, seed, Evidence::Samples), Err(Unidentified::NotCorrelated));
             assert_eq!(estimated(4, 91.8, seed, Evidence::Samples), Err(Unidentified::NotCorrelated));
         }
-        assert_eq!(estimate(&[], &[], 1.0), Err(Unidentified::NotDithered));
+        assert_eq!(estimate(&[], (&[], true), 1.0), Err(Unidentified::NotDithered));
     }
 }

@@ -4,7 +4,7 @@
 use crate::OCTAVES;
 use crate::bounds::BoundedEstimate;
 use crate::fit::noise_terms::{filter_length_s, is_filter, is_white};
-use crate::fit::octave_covariance::with_bounds_behind_a_filter;
+use crate::fit::octave_covariance::{is_adjusted_of_filter, with_bounds_behind_a_filter};
 use allan_core::fit::{Goodness, fit, goodness};
 use allan_core::host::fit_shapes_except;
 use allan_core::model::{FittedTerm, MAX_TERMS};
@@ -18,7 +18,7 @@ const VISIBLE_SIGMAS: f64 = 0.5;
 /// Least part of the variance of a point that is left to the other terms beside a line: a line that takes more is traced in the curve.
 const LEAST_LEFT: f64 = 0.1;
 /// Least decrease of the deviance by a term of two parameters that a trace adds.
-const COST_OF_A_TERM: f64 = 18.0;
+pub(crate) const COST_OF_A_TERM: f64 = 18.0;
 
 /// Averaging time, in lengths of the filter, from which on the Allan variance of white noise behind it is that of white noise within a
 /// percent or two.
@@ -60,8 +60,8 @@ pub(crate) struct TracedModel {
     /// Of each term of the model.
     additions: Vec<Option<Addition>>,
     pub goodness: Goodness,
-    /// What is known of the filter that all channels have.
-    decimation: Option<BoundedEstimate>,
+    /// What is known of the adjusted shape of the filter that all channels have: its decimation, or its frequency.
+    of_filter: Option<BoundedEstimate>,
 }
 
 impl TracedModel {
@@ -72,7 +72,7 @@ impl TracedModel {
             additions[found.term] = Some(Addition { score: found.score, residual: found.residual, rank });
         }
         let model = within_measured(&trace.after, curve);
-        Self { model, additions, goodness: trace.after_goodness, decimation: None }
+        Self { model, additions, goodness: trace.after_goodness, of_filter: None }
     }
 
     /// The model of at most the first [`MAX_TERMS`] of these `terms` that fits `curve` best, with the bounds of that fit.
@@ -85,7 +85,7 @@ impl TracedModel {
             Shapes::AllButFilters => fit_shapes_except(curve, &kinds, &filters()),
         };
         let additions = terms.iter().map(|(_, addition)| *addition).take(MAX_TERMS).collect();
-        Self { goodness: goodness(curve, &model), model: within_measured(&model, curve), additions, decimation: None }
+        Self { goodness: goodness(curve, &model), model: within_measured(&model, curve), additions, of_filter: None }
     }
 
     /// The model itself.
@@ -144,7 +144,7 @@ impl TracedModel {
 
     /// Other `terms` in place of all, fitted to `curve`.
     pub(crate) fn replaced(&self, curve: &Curve<OCTAVES>, terms: &[PlannedTerm], shapes: Shapes) -> Self {
-        Self::fit(curve, terms, shapes).bounded(curve, self.decimation)
+        Self::fit(curve, terms, shapes).bounded(curve, self.of_filter)
     }
 
     /// Without the term at a position, fitted to `curve`.
@@ -192,13 +192,13 @@ impl TracedModel {
         let kept = fitted.terms().iter().zip(model.terms()).map(kept);
         let model = within_measured(&Model::new(period_s, kept.chain(lines.iter().copied())), curve);
         let additions = self.additions.iter().copied().chain(lines.iter().map(|_| None)).collect();
-        Some(Self { goodness: goodness(curve, &model), model, additions, decimation: self.decimation })
+        Some(Self { goodness: goodness(curve, &model), model, additions, of_filter: self.of_filter })
     }
 
     /// Fitted, with the shapes of its processes, to what `lines` leave of `curve`.
     pub(crate) fn shaped_beside(&self, curve: &Curve<OCTAVES>, lines: &[FittedTerm]) -> Self {
         let terms: Vec<PlannedTerm> = self.terms().collect();
-        Self { decimation: self.decimation, ..Self::fit(&left_by(lines, curve), &terms, Shapes::OfProcesses) }
+        Self { of_filter: self.of_filter, ..Self::fit(&left_by(lines, curve), &terms, Shapes::OfProcesses) }
     }
 
     /// With the coefficients and the bounds of `model`, which has the same terms.
@@ -214,13 +214,13 @@ impl TracedModel {
         Self { model, additions: kept.map(|at| self.additions[at]).collect(), ..*self }
     }
 
-    /// The same with the bounds that `curve`, which it was fitted to, gives to white noise behind a filter, those of the `decimation` of
-    /// the sensor, and bounds of shapes that the record can [resolve](resolvable).
-    pub(crate) fn bounded(mut self, curve: &Curve<OCTAVES>, decimation: Option<BoundedEstimate>) -> Self {
+    /// The same with the bounds that `curve`, which it was fitted to, gives to white noise behind a filter, those `of_filter`,
+    /// of the sensor, and bounds of shapes that the record can [resolve](resolvable).
+    pub(crate) fn bounded(mut self, curve: &Curve<OCTAVES>, of_filter: Option<BoundedEstimate>) -> Self {
         let resolved = |term: &FittedTerm| {
             let mut term = *term;
             for ((name, value), bounds) in term.kind.shape().named().zip(term.shape.iter_mut()) {
-                if let Some(common) = decimation.filter(|_| name == "decimation") {
+                if let Some(common) = of_filter.filter(|_| is_adjusted_of_filter(&term.kind, name)) {
                     *bounds = (common.low, common.high);
                 } else if let Some((least, most)) = resolvable(name, curve) {
                     // `max` and `min` take the limit in place of a bound that is not a number.
@@ -229,10 +229,10 @@ impl TracedModel {
             }
             term
         };
-        let bounded = with_bounds_behind_a_filter(curve, &self.model, decimation);
+        let bounded = with_bounds_behind_a_filter(curve, &self.model, of_filter);
         let model = Model::new(bounded.sample_period(), bounded.terms().iter().map(resolved));
         self.model = within_measured(&model, curve);
-        self.decimation = decimation;
+        self.of_filter = of_filter;
         self
     }
 

@@ -242,7 +242,7 @@ fn agree_on_filter(part: &PartData, channels: &mut PerChannel<ChannelTrace>) -> 
             }
         })
         .collect();
-    let filter = part_filter::estimate(&filtered, &profile.filters, decimation);
+    let filter = part_filter::estimate(&filtered, (&profile.filters, profile.may_be_low_pass), decimation);
     let dithered: Vec<bool> = filtered.iter().map(|channel| channel.is_dithered).collect();
     for (channel, is_dithered) in inertial.into_iter().zip(dithered) {
         channels[channel].fit.agree(filter.as_ref().ok(), is_dithered);

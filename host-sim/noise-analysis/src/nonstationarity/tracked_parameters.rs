@@ -2,6 +2,7 @@
 
 use super::epochs::SIGNIFICANCE;
 use crate::fit::minimum::downhill;
+use crate::fit::noise_terms::is_white;
 use allan_core::confidence::octave_correlation;
 use allan_core::model::FittedTerm;
 use allan_core::term::{Resonance, Shape, Sinusoid};
@@ -133,7 +134,7 @@ impl TrackedModel {
     pub(crate) fn at(&self, [level, line]: ParameterVector) -> Model {
         let moved = |(at, term): (usize, &FittedTerm)| {
             let mut term = *term;
-            if matches!(term.kind, NoiseTerm::AngleRandomWalk | NoiseTerm::Filtered(_)) {
+            if is_white(&term.kind) {
                 term.value *= (level / 2.0).exp();
             }
             if self.line == Some(at) {

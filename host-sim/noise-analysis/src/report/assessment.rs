@@ -10,7 +10,7 @@ mod spectral_white_noise;
 pub use innovations::Innovations;
 
 use crate::bounds::{BoundedEstimate, Parameter};
-use crate::fit::noise_terms::is_white;
+use crate::fit::noise_terms::{is_filter, is_white};
 pub use crate::fit::sample_coefficients::CoefficientsFrom;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
@@ -185,6 +185,8 @@ fn sampled_every(model: &Model, period: f64) -> Model {
             NoiseTerm::Filtered(filter) => {
                 (NoiseTerm::Filtered(MovingAverageFilter { decimation: filter.decimation * ratio, ..filter }), 1.0)
             }
+            // Means over more than its length are white.
+            NoiseTerm::LowPass(_) => (NoiseTerm::AngleRandomWalk, 1.0),
             NoiseTerm::Sinusoid(sinusoid) => {
                 let (frequency, gain) = line(sinusoid.frequency);
                 (NoiseTerm::Sinusoid(Sinusoid { frequency }), gain)
@@ -241,7 +243,7 @@ pub fn sum_of_white_noise(parts: &[BoundedEstimate]) -> BoundedEstimate {
 /// Name of a term's coefficient; that of white noise behind a filter is N.
 fn name(kind: &NoiseTerm) -> &'static str {
     match kind {
-        NoiseTerm::Filtered(_) => NoiseTerm::AngleRandomWalk.name(),
+        kind if is_filter(kind) => NoiseTerm::AngleRandomWalk.name(),
         kind => kind.name(),
     }
 }

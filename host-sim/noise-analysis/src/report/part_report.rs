@@ -5,6 +5,8 @@ use crate::distributions::NORMAL_975;
 use crate::fit::part_filter::{PartFilter, Unidentified};
 use crate::record::sampling_faults::rate_by_time_stamps;
 use crate::report::{PartNote, PartReport};
+use allan_core::NoiseTerm;
+use allan_core::term::MovingAverageFilter;
 use measurement::Measurement;
 
 /// The report on the filter that the inertial channels of a recording have in common; `measurement` has its first samples, or all of
@@ -12,15 +14,23 @@ use measurement::Measurement;
 pub(crate) fn report(measurement: &Measurement, common: &Result<PartFilter, Unidentified>) -> PartReport {
     let name = measurement.profile.name.to_owned();
     match common {
-        Ok(common) => identified(measurement, common, name),
+        Ok(common) => match common.term {
+            NoiseTerm::Filtered(filter) => averages(measurement, (common, filter), name),
+            // It says nothing of the sensor's clock.
+            _ => PartReport { name, filter: Some(common.term.name().to_owned()), ..PartReport::default() },
+        },
         Err(unidentified) => {
             PartReport { name, notes: vec![reason(measurement, unidentified)], ..PartReport::default() }
         }
     }
 }
 
-fn identified(measurement: &Measurement, common: &PartFilter, name: String) -> PartReport {
-    let PartFilter { filter, decimation, .. } = common;
+fn averages(
+    measurement: &Measurement,
+    (common, filter): (&PartFilter, MovingAverageFilter),
+    name: String,
+) -> PartReport {
+    let decimation = &common.adjusted;
     let taps = f64::from(filter.taps);
     let BoundedEstimate { value, low, high } = *decimation;
     let window = if filter.stages == 2 { "bartlett" } else { "moving_average" };
@@ -32,7 +42,7 @@ fn identified(measurement: &Measurement, common: &PartFilter, name: String) -> P
         Parameter::new(clock, clock * (1.0 - half(low)), clock * (1.0 + half(high)), "Hz")
     });
     let without_stamps = clock.is_none().then(|| without_stamps(measurement, *decimation));
-    let length = taps_by_clock(measurement, common);
+    let length = taps_by_clock(measurement, (common, filter));
     PartReport {
         name,
         clock,
@@ -56,8 +66,8 @@ fn without_stamps(measurement: &Measurement, decimation: BoundedEstimate) -> Par
 }
 
 /// That the taps follow from the nominal clock, where the curves allow others.
-fn taps_by_clock(measurement: &Measurement, common: &PartFilter) -> Option<PartNote> {
-    let PartFilter { filter, other_taps, .. } = common;
+fn taps_by_clock(measurement: &Measurement, (common, filter): (&PartFilter, MovingAverageFilter)) -> Option<PartNote> {
+    let PartFilter { other_taps, .. } = common;
     (!other_taps.is_empty() && filter.decimation != 1.0).then(|| PartNote::LengthAlone {
         length: f64::from(filter.stages) * f64::from(filter.taps) / filter.decimation,
         taps: filter.taps,

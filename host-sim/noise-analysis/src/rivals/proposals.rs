@@ -6,11 +6,11 @@ use crate::bounds::{BoundedEstimate, ChannelEstimate};
 use crate::detectors::random_telegraph::{self, TOLD_APART, is_reversible};
 use crate::effects::findings::REFUTED;
 use crate::effects::{
-    AccelerationSensitivity, AngleQuantization, BandMismatch, CommonMode, CurveEvidence, Effect, FirstOrderFilter,
-    LineEvidence, LineSource, LinearDrift, LinearDriftEvidence, MarkovEvidence, MarkovProcess, ModulatedLine,
-    ModulationEvidence, Observation, OutputFilter, Refutation, ResonantLine, SharedDrift, SinusoidalLine,
-    SpectrumEvidence, SupplySensitivity, TelegraphEvidence, TelegraphNoise, TemperatureSensitivity, Unexplained,
-    UnexplainedPlace,
+    AccelerationSensitivity, AngleQuantization, BandMismatch, CommonMode, CurveEvidence, Effect, LineEvidence,
+    LineSource, LinearDrift, LinearDriftEvidence, LowPassDesign, LowPassFilter, MarkovEvidence, MarkovProcess,
+    ModulatedLine, ModulationEvidence, Observation, OutputFilter, Refutation, ResonantLine, SharedDrift,
+    SinusoidalLine, SpectrumEvidence, SupplySensitivity, TelegraphEvidence, TelegraphNoise, TemperatureSensitivity,
+    Unexplained, UnexplainedPlace,
 };
 use crate::fit::channel_fit::ChannelFit;
 use crate::fit::noise_terms::{is_white, line_frequency};
@@ -27,7 +27,7 @@ use allan_core::confidence::NORMAL_975;
 use allan_core::model::FittedTerm;
 use allan_core::regression::Sensitivity;
 use allan_core::telegraph::{self, KurtosisRatio};
-use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm, Shape};
+use allan_core::term::{LowPass, Markov, MovingAverageFilter, NoiseTerm, Shape};
 use allan_core::{AllanPoint, Curve, Model};
 use measurement::{ChannelProfile, Quantity, SensorProfile};
 use std::f64::consts::{PI, SQRT_2};
@@ -105,6 +105,7 @@ fn term_effects(
     let line = |has_width: bool| LineEvidence { has_width, source: LineSource::Curve(curve) };
     let unexplained = |by: Refutation| unexplained_octave(found, &fit.covariates.curve, term, by);
     let mut effects = match term.kind {
+        NoiseTerm::LowPass(filter) => vec![second_order_effect(term, &filter, curve)],
         NoiseTerm::Filtered(filter) => vec![filter_effect(term, &filter, curve, unit, profile.internal_rate_hz)],
         NoiseTerm::Quantization => {
             let refuted = fit.quantization_p_value.filter(|p_value| *p_value < REFUTED);
@@ -307,9 +308,23 @@ fn unexplained_octave(found: &Addition, curve: &Curve<OCTAVES>, term: &FittedTer
 fn low_pass_effect(term: &FittedTerm, markov: Markov, curve: CurveEvidence) -> Effect {
     let corner = |time_constant: f64| 0.5 / (PI * time_constant);
     let BoundedEstimate { low, high, .. } = shape(term, 0);
-    FirstOrderFilter {
+    LowPassFilter {
         bandwidth_hz: BoundedEstimate::new(corner(markov.time_constant), corner(high), corner(low)),
-        time_constant_s: markov.time_constant,
+        design: LowPassDesign::OneStage { time_constant_s: markov.time_constant },
+        evidence: curve,
+    }
+    .into()
+}
+
+/// White noise behind a low-pass filter of the second order.
+fn second_order_effect(term: &FittedTerm, filter: &LowPass, curve: CurveEvidence) -> Effect {
+    LowPassFilter {
+        bandwidth_hz: shape(term, 0).scaled(filter.bandwidth() / filter.frequency),
+        design: if *filter == LowPass::butterworth(filter.frequency) {
+            LowPassDesign::Butterworth
+        } else {
+            LowPassDesign::TwoStages
+        },
         evidence: curve,
     }
     .into()

@@ -194,7 +194,7 @@ pub static RIVALRIES: [Rivalry; 46] = [
         Rule::Channel(|of| of.is_slow_term() && of.others().any(|other| matches!(other.effect, Effect::CommonMode(_))))),
     row("first-order filter", "Markov process of the curve", "below 64 samples, with no white noise left but rounding",
         "white noise is never absent, filtered it is such a process",
-        Rule::Channel(|of| of.loses_to(|effect| matches!(effect, Effect::FirstOrderFilter(_))))),
+        Rule::Channel(|of| of.loses_to(|effect| matches!(effect, Effect::LowPassFilter(_))))),
     row("unexplained octave of irreversible changes", "Markov process of the curve", "the changes up and down differ by 2·10⁻⁴",
         "a Gaussian process is the same when time runs backwards",
         Rule::Channel(|of| of.loses_to(|effect| matches!(refutation(effect), Some(Refutation::Irreversible { .. }))))),

@@ -17,6 +17,7 @@ use super::smooth_shape::{filter_gain, walk_amplitude};
 use super::welch::Welch;
 use super::whittle::{Sign, SpectralBand, fit_mixture, information, mixture_density};
 use crate::bounds::BoundedEstimate;
+use allan_core::term::{LowPass, Process};
 use allan_core::{Model, NoiseTerm};
 use nalgebra::DVector;
 use std::f64::consts::PI;
@@ -44,8 +45,11 @@ const SIGNIFICANT_MISFIT: f64 = 3.0;
 /// 97.5 % quantile of the normal distribution.
 const TWO_SIDED_95: f64 = 1.96;
 
+/// Frequencies over which the gain of a low-pass filter is averaged.
+const SAMPLED: u32 = 512;
+
 /// What the sensor's filter makes of white noise.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FilterSpectrum {
     /// It stays white.
     Unfiltered,
@@ -54,6 +58,8 @@ pub enum FilterSpectrum {
         /// Samples of each average.
         taps: u32,
     },
+    /// A low-pass filter of the second order, with white noise added behind it.
+    LowPass(LowPass),
     /// Each sample is correlated with so many on either side.
     Correlated {
         /// The longest lag with a correlation, samples.
@@ -77,7 +83,8 @@ pub struct WhiteNoiseFit {
 
 /// Shapes that are known of a channel besides N, B and K.
 pub struct KnownShapes<'a> {
-    /// Its fitted model: lines and resonances are left out of the spectrum, Markov processes are fitted.
+    /// Its fitted model: lines and resonances are left out of the spectrum, Markov processes are fitted, and its low-pass filter of the
+    /// second order, if it has one, is a candidate.
     pub model: &'a Model,
     /// Of a filter that is known to have been read at a rate below its own, the number of samples over which it reaches: these may be
     /// correlated even where that is too little to be seen.
@@ -94,7 +101,11 @@ pub fn fit_white_noise(welch: &Welch, known: &KnownShapes) -> Option<WhiteNoiseF
     let correlated = (1..=reach).map(|lags| FilterSpectrum::Correlated { lags });
     let unfiltered = known.reach_of_slow_reading.is_none().then_some(FilterSpectrum::Unfiltered);
     let bartlett = TAPS_LOG2.map(|log2| FilterSpectrum::Bartlett { taps: 1 << log2 });
-    let candidates = unfiltered.into_iter().chain(correlated).chain(bartlett);
+    let low_pass = known.model.terms().iter().find_map(|term| match term.kind {
+        NoiseTerm::LowPass(filter) => Some(FilterSpectrum::LowPass(filter)),
+        _ => None,
+    });
+    let candidates = unfiltered.into_iter().chain(correlated).chain(bartlett).chain(low_pass);
     let fits = candidates.filter_map(|filter| MixtureFit::new(&bands, filter, known.model));
     let likeliest = fits.min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
     let FilterSpectrum::Bartlett { taps } = likeliest.filter else { return likeliest.white_noise(&bands) };
@@ -172,6 +183,7 @@ impl MixtureFit {
         let period = bands.sample_period;
         let gain = |f: f64| match filter {
             FilterSpectrum::Bartlett { taps } => bartlett_gain(f, period, taps),
+            FilterSpectrum::LowPass(filter) => filter.density(f, period) / filter.density(0.0, period),
             _ => 1.0,
         };
         // Each white shape with its contributions at 0 Hz and to the variance of a sample.
@@ -182,6 +194,13 @@ impl MixtureFit {
                 // The variance of the triangular weights: (2L² + 1)/(3L³).
                 let l = f64::from(taps);
                 white.push((bands.averaged(gain), 1.0, (2.0 * l * l + 1.0) / (3.0 * l.powi(3))));
+                white.push((bands.averaged(|_| 1.0), 1.0, 1.0));
+            }
+            FilterSpectrum::LowPass(_) => {
+                // The mean of the gain up to the Nyquist frequency.
+                let in_sample =
+                    (0..SAMPLED).map(|at| gain((f64::from(at) + 0.5) / f64::from(SAMPLED) * 0.5 / period)).sum::<f64>();
+                white.push((bands.averaged(gain), 1.0, in_sample / f64::from(SAMPLED)));
                 white.push((bands.averaged(|_| 1.0), 1.0, 1.0));
             }
             FilterSpectrum::Correlated { lags } => {
@@ -210,7 +229,8 @@ impl MixtureFit {
         let bases: Vec<Vec<f64>> = (0..bands.points.len()).map(row).collect();
         let mut coefficients = DVector::zeros(columns.len());
         let objective = fit_mixture(&bands.bands, &bases, Sign::Any, coefficients.as_mut_slice());
-        let parameters = columns.len() + usize::from(count == 2 && matches!(filter, FilterSpectrum::Bartlett { .. }));
+        let parameters = columns.len()
+            + usize::from(count == 2 && matches!(filter, FilterSpectrum::Bartlett { .. } | FilterSpectrum::LowPass(_)));
         let ordinates: f64 = bands.bands.iter().map(|band| band.ordinates).sum();
         let criterion = 2.0 * objective + parameters as f64 * ordinates.ln();
         Some(Self { filter, bases, coefficients, at_zero, in_sample, criterion })

@@ -176,7 +176,7 @@ fn terms(channel: &ChannelReport, model: &ModelReport, rate_hz: f64) -> Vec<Line
         let deviation = |n: u64| (n as f64 / rate_hz, whole.part(term, n).sqrt());
         let points = factors.iter().map(|&n| deviation(n)).filter(|&(_, of)| has_logarithm(of)).collect();
         let mark = match kind {
-            NoiseTerm::AngleRandomWalk | NoiseTerm::Filtered(_) => "N",
+            NoiseTerm::AngleRandomWalk | NoiseTerm::Filtered(_) | NoiseTerm::LowPass(_) => "N",
             NoiseTerm::BiasInstability => "B",
             NoiseTerm::RateRandomWalk => "K",
             NoiseTerm::Quantization => "Q",

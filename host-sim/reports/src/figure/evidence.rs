@@ -29,7 +29,7 @@ pub(crate) fn evidence(report: &Report, index: usize) -> Option<Plot> {
         | Effect::ModulatedLine(ModulatedLine { frequency_hz, .. })
         | Effect::Periodic(Periodic { frequency_hz, .. })
         | Effect::SquareWave(SquareWave { frequency_hz, .. }) => line_in_spectrum(report, channel, frequency_hz.value),
-        Effect::Chirp(_) | Effect::OutputFilter(_) | Effect::FirstOrderFilter(_) | Effect::ClockDeviation(_) => {
+        Effect::Chirp(_) | Effect::OutputFilter(_) | Effect::LowPassFilter(_) | Effect::ClockDeviation(_) => {
             spectrum_plot(report, channel)
         }
         Effect::LevelStep(LevelStep { time_s, .. }) | Effect::LevelChange(LevelChange { time_s, .. }) => {

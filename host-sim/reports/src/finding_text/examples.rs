@@ -72,7 +72,7 @@ pub(super) fn examples() -> Vec<Effect> {
     vec![
         filter(1.0).into(),
         filter(8.95).into(),
-        FirstOrderFilter { bandwidth_hz: estimate(), time_constant_s: 0.1, evidence: CURVE }.into(),
+        LowPassFilter { bandwidth_hz: estimate(), design: LowPassDesign::Butterworth, evidence: CURVE }.into(),
         line(20.5).into(),
         line(0.12).into(),
         alternating().into(),

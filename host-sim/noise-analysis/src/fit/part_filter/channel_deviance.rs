@@ -5,6 +5,7 @@ use crate::OCTAVES;
 use crate::fit::noise_terms::is_white;
 use crate::fit::octave_covariance::relative_covariance;
 use crate::fit::sample_coefficients::SamplesOfCurve;
+use crate::fit::traced_model::COST_OF_A_TERM;
 use crate::samples::rounding::Rounding;
 use allan_core::host::DevianceComparison;
 use allan_core::model::{FittedTerm, MAX_TERMS};
@@ -41,6 +42,18 @@ pub(super) fn without_rounding(channel: &FilteredChannel) -> Curve<OCTAVES> {
         curve.replace_avar(|point| point.avar - (variance / point.n as f64).min(MOST_ROUNDING * point.avar));
     }
     curve
+}
+
+/// The deviance of a channel, and what it must exceed to be worth the terms that were added.
+pub(super) struct Cost {
+    pub(super) deviance: f64,
+    of_terms: f64,
+}
+
+impl Cost {
+    pub(super) fn total(&self) -> f64 {
+        self.deviance + self.of_terms
+    }
 }
 
 /// The deviance of one channel as a function of the filter.
@@ -93,19 +106,36 @@ impl<'a> ChannelDeviance<'a> {
         if least.is_finite() { (least / freedom as f64).max(1.0) } else { 1.0 }
     }
 
+    pub(super) fn sample_period(&self) -> f64 {
+        self.curve.sample_period()
+    }
+
     pub(super) fn unfiltered(&mut self) -> f64 {
         self.comparison.deviance(&[&[NoiseTerm::AngleRandomWalk], self.others.as_slice()].concat()) / self.dispersion
     }
 
     pub(super) fn deviance(&mut self, filter: MovingAverageFilter) -> f64 {
-        let kinds = kinds(filter, &self.others);
-        self.comparison.deviance(&kinds) / self.dispersion
+        self.comparison.deviance(&kinds(NoiseTerm::Filtered(filter), &self.others)) / self.dispersion
+    }
+
+    /// With `filtered` in place of the white noise, and with the other terms of the channel or without those of them that may stand in for
+    /// another filter, whichever costs less. It is not divided by the dispersion.
+    pub(super) fn cost_behind(&mut self, filtered: NoiseTerm) -> Cost {
+        let stands_in = |kind: &&NoiseTerm| matches!(kind, NoiseTerm::Markov(_) | NoiseTerm::Quantization);
+        let fewer: Vec<NoiseTerm> = self.others.iter().filter(|kind| !stands_in(kind)).copied().collect();
+        let mut cost = |others: &[NoiseTerm]| {
+            let added = others.iter().filter(|kind| !NoiseTerm::BASELINE.contains(kind)).count();
+            let deviance = self.comparison.deviance(&kinds(filtered, others));
+            Cost { deviance, of_terms: COST_OF_A_TERM * added as f64 }
+        };
+        let (all, fewer) = (cost(&self.others), cost(&fewer));
+        if fewer.total() < all.total() { fewer } else { all }
     }
 
     /// Variance of the decimation's score over its information, at least 1: by how much the deviance falls and rises more
     /// than for independent points.
     pub(super) fn scatter(&self, filter: MovingAverageFilter) -> f64 {
-        let model = allan_core::fit::fit(self.curve, &kinds(filter, &self.others));
+        let model = allan_core::fit::fit(self.curve, &kinds(NoiseTerm::Filtered(filter), &self.others));
         let points: Vec<&AllanPoint> =
             self.curve.points().iter().filter(|point| point.avar > 0.0 && model.avar(point.n) > 0.0).collect();
         let present: Vec<&FittedTerm> = model.terms().iter().filter(|term| term.value > 0.0).collect();
@@ -136,10 +166,10 @@ impl<'a> ChannelDeviance<'a> {
     }
 }
 
-/// Noise behind `filter` with the terms `others`. At the filter's own rate white noise after the filter is told from what passed it; read
-/// slowly it is not.
-pub(super) fn kinds(filter: MovingAverageFilter, others: &[NoiseTerm]) -> Vec<NoiseTerm> {
-    let after = (filter.decimation == 1.0).then_some(NoiseTerm::AngleRandomWalk);
-    let first = NoiseTerm::Filtered(filter);
-    std::iter::once(first).chain(others.iter().copied()).chain(after).collect()
+/// White noise behind a filter, `filtered`, with the terms `others`. At the filter's own rate white noise after the filter is told from what
+/// passed it; read slowly it is not.
+pub(super) fn kinds(filtered: NoiseTerm, others: &[NoiseTerm]) -> Vec<NoiseTerm> {
+    let is_read_slowly = matches!(filtered, NoiseTerm::Filtered(filter) if filter.decimation != 1.0);
+    let after = (!is_read_slowly).then_some(NoiseTerm::AngleRandomWalk);
+    std::iter::once(filtered).chain(others.iter().copied()).chain(after).collect()
 }

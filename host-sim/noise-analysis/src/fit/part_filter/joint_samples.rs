@@ -51,7 +51,7 @@ struct ChannelBehindFilter<'a> {
 
 impl<'a> ChannelBehindFilter<'a> {
     fn new(ChannelSpectrum { spectrum, others }: &'a ChannelSpectrum, (filter, range): AllowedFilter) -> Self {
-        let spectrum = spectrum.behind(&kinds(filter, others));
+        let spectrum = spectrum.behind(&kinds(NoiseTerm::Filtered(filter), others));
         let (least, _) = likeliest((filter, range), |read| spectrum.deviance(read));
         Self { least, spectrum }
     }

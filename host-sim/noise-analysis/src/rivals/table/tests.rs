@@ -269,7 +269,11 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
     let level_change = |explained| -> Effect {
         LevelChange { time_s: known(500.0), ratio: known(2.0), explained, p_value: 1e-9 }.into()
     };
-    let low_pass = FirstOrderFilter { bandwidth_hz: known(1.0), time_constant_s: 0.16, evidence: CURVE };
+    let low_pass = LowPassFilter {
+        bandwidth_hz: known(1.0),
+        design: LowPassDesign::OneStage { time_constant_s: 0.16 },
+        evidence: CURVE,
+    };
     let step = LevelStep { time_s: known(500.0), size: size(0.2), p_value: 1e-9 };
     let shown = |channel: usize| Shown { channel, effect: line(0.01), parts: Vec::new() };
     let by_kurtosis = TelegraphEvidence::Kurtosis { ratio: 1.0, error: 0.1, curve: CURVE };
@@ -326,7 +330,7 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
         (["drift in common", "Markov process or ramp of the curve"],
             channel([of_term(0, markov(1.0)), of(common_mode(1.0), Origin::CrossSpectra)]), vec!["common_mode"]),
         (["first-order filter", "Markov process of the curve"],
-            channel([of_term(0, low_pass.into()), of_term(0, markov(1.0))]), vec![FirstOrderFilter::NAME]),
+            channel([of_term(0, low_pass.into()), of_term(0, markov(1.0))]), vec![LowPassFilter::NAME]),
         (["unexplained octave of irreversible changes", "Markov process of the curve"],
             channel([of_term(0, refuted(IRREVERSIBLE)), of_term(0, markov(1.0))]), vec!["unexplained"]),
         (["telegraph noise by the kurtosis of a stronger term", "telegraph noise or an unexplained octave by the kurtosis of a Markov process"],

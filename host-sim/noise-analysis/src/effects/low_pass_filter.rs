@@ -1,21 +1,35 @@
-//! A low-pass filter of the first order in one channel: a Markov process in the place of the white noise.
+//! A low-pass filter of the first or the second order: an analog one, or a digital one that is fast against the samples.
 
 use super::evidence::CurveEvidence;
 use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, Parameter};
 
-/// A filter of the first order.
+/// A low-pass filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FirstOrderFilter {
+pub struct LowPassFilter {
     /// Frequency at which half of the power is left.
     pub bandwidth_hz: BoundedEstimate,
-    /// Correlation time of the noise, s.
-    pub time_constant_s: f64,
+    /// Its design.
+    pub design: LowPassDesign,
     /// What the curve shows of it.
     pub evidence: CurveEvidence,
 }
 
-impl Kind for FirstOrderFilter {
+/// What a low-pass filter is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LowPassDesign {
+    /// One stage of the first order, of one channel: a Markov process in the place of its white noise.
+    OneStage {
+        /// Correlation time of the noise, s.
+        time_constant_s: f64,
+    },
+    /// Two equal stages of the first order, of all channels.
+    TwoStages,
+    /// A Butterworth filter of the second order, of all channels.
+    Butterworth,
+}
+
+impl Kind for LowPassFilter {
     const NAME: &'static str = "filter_bandwidth";
 
     fn parameters(&self) -> Vec<(&'static str, Parameter)> {
