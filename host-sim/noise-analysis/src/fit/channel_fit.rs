@@ -251,8 +251,9 @@ impl ChannelFit {
             return;
         }
         let mut best = with_filter(curve, &self.traced, common);
-        // The channel's own terms may have stood in for the filter.
-        if !had || best.cost() > self.traced.cost() + MAX_DEVIANCE_RISE {
+        // The channel's own terms may have stood in for the filter; none of them were traced with a low-pass filter.
+        let is_new = !had || matches!(common.term, NoiseTerm::LowPass(_));
+        if is_new || best.cost() > self.traced.cost() + MAX_DEVIANCE_RISE {
             let again = TracedModel::new(&traced_with(curve, common.term, self.line_candidates(common)), curve);
             let other = with_filter(curve, &again, common);
             best = if other.cost() < best.cost() { other } else { best };

@@ -48,14 +48,22 @@ impl SamplesOfCurve<'_> {
             Some(spectrum) => SampleSpectrum::of_means(rest, samples_per_mean as u64, spectrum, lines),
         }
     }
+
+    /// The spectrum of their longest part without a gap; `None` where the means alone are kept.
+    fn spectrum_without_gaps(&self, curve: &Curve<OCTAVES>, lines: &[f64]) -> Option<SampleSpectrum> {
+        let are_samples = self.rest.sample_period() < 1.5 * curve.sample_period();
+        are_samples.then(|| SampleSpectrum::of_samples(&self.rest.longest_without_gaps(), lines))?
+    }
 }
 
-/// Probability that the spectrum of the `samples` departs as far from that of `model` where that has quantization; `None` where it has
-/// none, or the spectrum does not show its shape.
+/// Probability that the spectrum of the `samples`, or where too many of them are missing that of their longest part without a gap, departs as
+/// far from that of `model` where that has quantization; `None` where it has none, or the spectrum does not show its shape.
 pub(crate) fn quantization_p_value(curve: &Curve<OCTAVES>, model: &Model, samples: SamplesOfCurve) -> Option<f64> {
     let kinds: Vec<NoiseTerm> = model.terms().iter().map(|term| term.kind).collect();
     let at = kinds.iter().position(|kind| *kind == NoiseTerm::Quantization)?;
-    samples.spectrum(curve, &sinusoids(kinds.iter()))?.shape_p_value(&kinds, at)
+    let lines = sinusoids(kinds.iter());
+    let of_all = samples.spectrum(curve, &lines).and_then(|spectrum| spectrum.shape_p_value(&kinds, at));
+    of_all.or_else(|| samples.spectrum_without_gaps(curve, &lines)?.shape_p_value(&kinds, at))
 }
 
 /// `model`, fitted to `curve`, with the coefficients and the bounds by its samples; otherwise what those of `model` are from.

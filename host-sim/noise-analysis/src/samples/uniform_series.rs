@@ -100,6 +100,12 @@ impl UniformSeries {
         self.values.iter().filter(|value| value.is_finite()).count()
     }
 
+    /// The longest part of which no sample is missing.
+    pub(crate) fn longest_without_gaps(&self) -> Self {
+        let parts = self.values.split(|value| !value.is_finite());
+        self.with_values(parts.max_by_key(|part| part.len()).unwrap_or_default().to_vec())
+    }
+
     /// Number of values, missing ones included, times the sample period, s.
     #[must_use]
     pub fn duration(&self) -> f64 {

@@ -9,7 +9,7 @@ use crate::fit::traced_model::COST_OF_A_TERM;
 use crate::samples::rounding::Rounding;
 use allan_core::host::DevianceComparison;
 use allan_core::model::{FittedTerm, MAX_TERMS};
-use allan_core::term::MovingAverageFilter;
+use allan_core::term::{MovingAverageFilter, Sinusoid};
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 use nalgebra::{DMatrix, DVector};
 
@@ -63,6 +63,8 @@ pub(super) struct ChannelDeviance<'a> {
     curve: &'a Curve<OCTAVES>,
     /// The terms of the channel beside its white noise.
     others: Vec<NoiseTerm>,
+    /// Lines of its spectrum.
+    lines: Vec<NoiseTerm>,
     /// By how much the deviance exceeds that of a curve which a filter describes, at least 1; what it is divided by.
     pub(super) dispersion: f64,
     /// Each filter that may be read slowly, at the decimation that fits this channel best.
@@ -80,6 +82,7 @@ impl<'a> ChannelDeviance<'a> {
             comparison: DevianceComparison::new(curve, model),
             curve,
             others,
+            lines: channel.samples.iter().flat_map(|(_, lines)| lines).map(|&frequency| sinusoid(frequency)).collect(),
             dispersion: 1.0,
             slowest: Vec::new(),
         }
@@ -118,18 +121,20 @@ impl<'a> ChannelDeviance<'a> {
         self.comparison.deviance(&kinds(NoiseTerm::Filtered(filter), &self.others)) / self.dispersion
     }
 
-    /// With `filtered` in place of the white noise, and with the other terms of the channel or without those of them that may stand in for
-    /// another filter, whichever costs less. It is not divided by the dispersion.
+    /// With `filtered` in place of the white noise, and with the other terms of the channel, or without those of them that may stand in for
+    /// another filter, or with the lines of its spectrum in their place, whichever costs least. It is not divided by the dispersion.
     pub(super) fn cost_behind(&mut self, filtered: NoiseTerm) -> Cost {
         let stands_in = |kind: &&NoiseTerm| matches!(kind, NoiseTerm::Markov(_) | NoiseTerm::Quantization);
         let fewer: Vec<NoiseTerm> = self.others.iter().filter(|kind| !stands_in(kind)).copied().collect();
+        let lines = self.lines.iter().filter(|line| !self.others.contains(line));
+        let with_lines: Vec<NoiseTerm> = fewer.iter().chain(lines).take(MAX_TERMS - 2).copied().collect();
         let mut cost = |others: &[NoiseTerm]| {
             let added = others.iter().filter(|kind| !NoiseTerm::BASELINE.contains(kind)).count();
             let deviance = self.comparison.deviance(&kinds(filtered, others));
             Cost { deviance, of_terms: COST_OF_A_TERM * added as f64 }
         };
-        let (all, fewer) = (cost(&self.others), cost(&fewer));
-        if fewer.total() < all.total() { fewer } else { all }
+        let others = [cost(&fewer), cost(&with_lines)];
+        others.into_iter().fold(cost(&self.others), |least, of| if of.total() < least.total() { of } else { least })
     }
 
     /// Variance of the decimation's score over its information, at least 1: by how much the deviance falls and rises more
@@ -164,6 +169,10 @@ impl<'a> ChannelDeviance<'a> {
         let variance = (score.transpose() * relative_covariance(&model, &points) * &score)[(0, 0)];
         (variance / score.dot(&own)).max(1.0)
     }
+}
+
+fn sinusoid(frequency: f64) -> NoiseTerm {
+    NoiseTerm::Sinusoid(Sinusoid { frequency })
 }
 
 /// White noise behind a filter, `filtered`, with the terms `others`. At the filter's own rate white noise after the filter is told from what
