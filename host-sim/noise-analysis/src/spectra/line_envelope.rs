@@ -42,8 +42,6 @@ const AROUND: [f64; 3] = [0.5, 0.15, 0.05];
 
 /// Distance in resolutions within which two frequencies are one, and a line is a sideband of a change.
 const SAME: f64 = 1.5;
-/// Highest multiple of a change that has sidebands: that of a line that is switched on and off has a ninth of the first.
-const HIGHEST: f64 = 9.0;
 
 /// A change of the amplitude or of the phase of a line, to and fro.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,7 +62,8 @@ impl Modulation {
     /// Whether a line at a distance from the modulated one, in Hz, is one of the sidebands in a record of `duration` s: at a multiple of
     /// the change, which a change has that is no sinusoid.
     pub(super) fn is_sideband(&self, distance: f64, duration: f64) -> bool {
-        let multiple = (distance.abs() / self.frequency.value).round().clamp(1.0, HIGHEST);
+        let highest = highest_multiple(0.5 * self.statistic);
+        let multiple = (distance.abs() / self.frequency.value).round().clamp(1.0, highest);
         let error = (multiple - 1.0) * self.frequency.error;
         (distance.abs() - multiple * self.frequency.value).abs() < (SAME / duration).hypot(NORMAL_975 * error)
     }
@@ -216,8 +215,9 @@ impl Envelope {
 /// that show it: over it a power has Fisher's distribution of 2 and 2m degrees of freedom, whose tail is `(1 + r/m)^−m`.
 fn over_wandering(envelope: &Envelope, part: Part, periods: f64, most: usize, unit: f64) -> f64 {
     let rest = envelope.without(part, periods);
+    let power = envelope.power(part, periods) / unit;
     let is_multiple = |at: f64| {
-        let multiple = (at / periods).round().clamp(1.0, HIGHEST);
+        let multiple = (at / periods).round().clamp(1.0, highest_multiple(power));
         (at - multiple * periods).abs() < OF_MULTIPLE
     };
     let band =
@@ -231,9 +231,15 @@ fn over_wandering(envelope: &Envelope, part: Part, periods: f64, most: usize, un
     let level = |periods: f64| noise + densities[1] / (periods * periods);
     let part_of_walk = |periods: f64| 1.0 - noise / level(periods);
     let shown: f64 = beside.iter().map(|band| part_of_walk(band.frequency).powi(2)).sum();
-    let ratio = envelope.power(part, periods) / unit / level(periods);
+    let ratio = power / level(periods);
     let known_by = shown / part_of_walk(periods).powi(2);
     if known_by.is_finite() { known_by * (ratio / known_by).ln_1p() } else { ratio }
+}
+
+/// Highest multiple of a change, whose power is `ratio` times the noise, with sidebands that are above the noise: those of a line that is
+/// switched on and off fall as one over the multiple, and each of the two has half the power.
+fn highest_multiple(ratio: f64) -> f64 {
+    (0.5 * ratio).sqrt().floor().max(1.0)
 }
 
 /// Whether two distances from a line, Hz, are one in a record of `duration` s.
@@ -331,7 +337,10 @@ mod tests {
             Modulation { frequency: change(8.0), of_line: 1.0, depth: change(1.0), of_phase: false, statistic: 100.0 };
         let is_sideband = |turns: f64| found.is_sideband(turns / 400.0, 400.0);
         assert!([8.0, -24.0, 40.5].into_iter().all(is_sideband));
+        // The fifth has one part in 25 of 25 times the noise; that of eleven is above it where the first has 250 times the noise.
         assert!(![4.0, 20.0, 88.0].into_iter().any(is_sideband));
+        let clearer = Modulation { statistic: 1000.0, ..found };
+        assert!(clearer.is_sideband(88.0 / 400.0, 400.0));
     }
 
     #[test]

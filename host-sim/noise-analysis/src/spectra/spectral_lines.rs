@@ -127,8 +127,14 @@ pub(crate) fn merged(
             distance < reach || (wanders && distance < MERGE_DISTANCE * strongest.frequency.value)
         };
         let (same, others): (Vec<_>, Vec<_>) = rest.into_iter().partition(is_same);
-        lines.push(MergedLine { duration_s, ..MergedLine::merge(&same, resolved_s, rate_error) });
+        let line = MergedLine { duration_s, ..MergedLine::merge(&same, resolved_s, rate_error) };
         rest = others;
+        if let Some(change) = line.modulation {
+            let is_weaker = |peak: &spectra::SpectralLine| peak.deviation.value < strongest.deviation.value;
+            let distance = |peak: &spectra::SpectralLine| peak.frequency.value - strongest.frequency.value;
+            rest.retain(|peak| !(is_weaker(peak) && change.is_sideband(distance(peak), duration_s)));
+        }
+        lines.push(line);
     }
     lines
 }
@@ -293,14 +299,13 @@ mod tests {
     use rand_distr::StandardNormal;
     use std::f64::consts::TAU;
 
-    /// 400 s at 50 Hz: white noise of deviation 1 with a sinusoid of amplitude 1 at 7.3 Hz, which swells and fades by `depth` five times.
-    fn series(depth: f64) -> Series {
+    /// 400 s at 50 Hz: white noise of deviation 1 with a sinusoid at 7.3 Hz that has this amplitude at each part of the record.
+    fn series(amplitude: impl Fn(f64) -> f64) -> Series {
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let slots = 0..20_000_u64;
         let value = |slot: u64| {
             let time_s = 0.02 * slot as f64;
-            let amplitude = 1.0 + depth * (TAU * 5.0 * time_s / 400.0).sin();
-            amplitude * (TAU * 7.3 * time_s).sin() + random.sample::<f64, _>(StandardNormal)
+            amplitude(time_s / 400.0) * (TAU * 7.3 * time_s).sin() + random.sample::<f64, _>(StandardNormal)
         };
         let values = slots.clone().map(value).collect();
         Series { slots: slots.clone().collect(), values, span: slots, period_s: 0.02, resolution: 1e-6, unit: "g" }
@@ -309,7 +314,8 @@ mod tests {
     #[test]
     fn a_line_that_swells_and_fades_has_sidebands() {
         let of = |depth: f64| {
-            find(&series(depth), &Rounding::default(), None, 0.0, 1)
+            let swelling = series(|part| 1.0 + depth * (TAU * 5.0 * part).sin());
+            find(&swelling, &Rounding::default(), None, 0.0, 1)
                 .first()
                 .map(|line| (line.frequency.value, line.modulation))
         };
@@ -321,6 +327,17 @@ mod tests {
         // The amplitude of each sideband is known to a fiftieth of that of the line.
         assert!((modulation.depth.value - 0.5).abs() < 0.1, "{modulation:?}");
         assert_eq!(of(0.0).map(|(_, modulation)| modulation), Some(None));
+    }
+
+    /// Five times on and off: the sidebands at the third, the fifth and the seventh multiple have 20,000/4·(2/kπ)² times the power of the noise,
+    /// 225, 81 and 41, and are far enough from the line to be lines of their own.
+    #[test]
+    fn a_line_that_is_switched_on_and_off_is_one() {
+        let switched = series(|part| if (5.0 * part).fract() < 0.5 { 2.0 } else { 0.0 });
+        let found = find(&switched, &Rounding::default(), None, 0.0, 1);
+        let [line] = &found[..] else { panic!("{found:?}") };
+        let change = line.modulation.expect("switched");
+        assert!((change.frequency.value - 5.0 / 400.0).abs() < 0.0005, "{change:?}");
     }
 
     /// Means of samples, not of the time between them: the largest frequency in the means is that of two fifths of their rate.
