@@ -225,7 +225,13 @@ mod tests {
     use crate::samples::uniform_series::UniformSeries;
     use crate::simulated_part::{RecordedChannel, read};
     use allan_core::Cascade;
+    use allan_core::term::LowPass;
     use allan_core::trace::{LineCandidates, trace};
+    use measurement::SensorProfile;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use std::f64::consts::PI;
 
     const CLOCK_HZ: f64 = 819.2;
 
@@ -240,13 +246,23 @@ mod tests {
     /// rounding is 1.3 % of the variance of the first and nothing in the last. 2¹⁷ samples.
     fn estimated(taps: usize, rate_hz: f64, seed: u64, evidence: Evidence) -> Result<PartFilter, Unidentified> {
         let profile = measurement::adis16405::profile(0.05);
-        let (period, decimation) = (1.0 / rate_hz, CLOCK_HZ / rate_hz);
+        let decimation = CLOCK_HZ / rate_hz;
         let recorded = [2.5, 5.0, 20.0].map(|deviation| {
             // The filter takes the variance of a sample down by about its length in samples.
             let deviation = deviation * (1.0_f64).max(1.5 * taps as f64 / decimation).sqrt();
             let seed = 1_000 * seed + deviation.to_bits() % 997;
             read(&RecordedChannel { taps, decimation, deviation, samples: 1 << 17, seed })
         });
+        estimated_from(&recorded, (&profile, rate_hz), evidence)
+    }
+
+    /// Of three channels that were recorded at `rate_hz`.
+    fn estimated_from(
+        recorded: &[Vec<i32>; 3],
+        (profile, rate_hz): (&SensorProfile, f64),
+        evidence: Evidence,
+    ) -> Result<PartFilter, Unidentified> {
+        let (period, decimation) = (1.0 / rate_hz, profile.internal_rate_hz / rate_hz);
         let curves = recorded.each_ref().map(|counts| {
             let mut cascade = Cascade::<OCTAVES, OVERLAP>::new();
             counts.iter().for_each(|count| cascade.push(*count));
@@ -272,6 +288,53 @@ mod tests {
         });
         let channels: Vec<FilteredChannel> = channels.collect();
         estimate(&channels, (&profile.filters, profile.may_be_low_pass), decimation)
+    }
+
+    /// Three channels with 2.5, 5 and 20 counts of white noise behind two equal stages of the first order with a corner of `frequency_hz`, in steps
+    /// of a fortieth of a sample, read at 250 Hz.
+    fn behind_two_stages(frequency_hz: f64, seed: u64) -> [Vec<i32>; 3] {
+        const STEPS: usize = 40;
+        let kept = (-2.0 * PI * frequency_hz / (250.0 * STEPS as f64)).exp();
+        [2.5, 5.0, 20.0_f64].map(|deviation| {
+            let mut random = ChaCha8Rng::seed_from_u64(seed ^ deviation.to_bits());
+            // A stage has (1 − kept)/(1 + kept) of the variance of white noise, and the second one half of that.
+            let size = deviation * (4.0 / (1.0 - kept)).sqrt();
+            let (mut first, mut second) = (0.0, 0.0);
+            let mut next = || {
+                for _ in 0..STEPS {
+                    first = kept * first + (1.0 - kept) * size * random.sample::<f64, _>(StandardNormal);
+                    second = kept * second + (1.0 - kept) * first;
+                }
+                second.round() as i32
+            };
+            (0..1 << 15).map(|_| next()).collect()
+        })
+    }
+
+    /// Of eight intervals of 95 % six or more hold in 99.4 % of cases. Bartlett windows and white noise of a sensor that may have a low-pass
+    /// filter have none.
+    #[test]
+    fn two_stages_are_told_from_moving_averages() {
+        let profile = SensorProfile::generic();
+        let mut held = 0;
+        for (frequency_hz, seed) in
+            [(25.0, 1), (25.0, 2), (60.0, 3), (60.0, 4), (60.0, 5), (90.0, 6), (90.0, 7), (90.0, 8)]
+        {
+            let recorded = behind_two_stages(frequency_hz, seed);
+            let found = estimated_from(&recorded, (&profile, 250.0), Evidence::Samples).expect("a filter");
+            let BoundedEstimate { value, low, high } = found.adjusted;
+            println!("{frequency_hz}: {value:.2} [{low:.2}, {high:.2}]");
+            assert_eq!(found.term, NoiseTerm::LowPass(LowPass::two_stages(value)), "{found:?}");
+            held += usize::from((low..=high).contains(&frequency_hz));
+        }
+        assert!(held >= 6, "{held}");
+        for taps in [2, 4, 16] {
+            let deviation = 5.0 * (1.5 * f64::from(taps as u32)).sqrt();
+            let averaged = [1, 2, 3]
+                .map(|seed| read(&RecordedChannel { taps, decimation: 1.0, deviation, samples: 1 << 15, seed }));
+            let found = estimated_from(&averaged, (&profile, 250.0), Evidence::Samples).expect("a filter");
+            assert_eq!(usize::from(averages(&found).taps), taps, "{found:?}");
+        }
     }
 
     fn averages(found: &PartFilter) -> MovingAverageFilter {
