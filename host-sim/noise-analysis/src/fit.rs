@@ -10,4 +10,5 @@ pub(crate) mod noise_terms;
 pub(crate) mod octave_covariance;
 pub(crate) mod part_filter;
 pub mod sample_coefficients;
+pub(crate) mod signal_share;
 pub(crate) mod traced_model;

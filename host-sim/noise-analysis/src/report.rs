@@ -15,6 +15,7 @@ pub use crate::effects::findings::{ChannelEffect, Finding, Validation};
 pub use crate::fit::contradiction::Contradiction;
 use crate::fit::event_share::EventShare;
 pub use crate::fit::event_share::EventsReport;
+use crate::fit::signal_share::SignalShare;
 pub use crate::nonstationarity::{CommonModeRegression, Nonstationarity};
 use crate::report::assessment::Assessment;
 use crate::units::coefficient_unit;
@@ -465,12 +466,16 @@ impl ModelErrorReport {
         }
     }
 
-    /// The error against `curve` of `model` with the spikes and knocks that are foretold.
-    pub(crate) fn with_events<const POINTS: usize>(model: &Model, events: &EventShare, curve: &Curve<POINTS>) -> Self {
-        if events.is_empty() {
+    /// The error against `curve` of `model` with the signals, and the spikes and knocks, that are foretold.
+    pub(crate) fn with_shares<const POINTS: usize>(
+        model: &Model,
+        (signals, events): (&SignalShare, &EventShare),
+        curve: &Curve<POINTS>,
+    ) -> Self {
+        if signals.is_empty() && events.is_empty() {
             return Self::new(model, curve);
         }
-        let predicted = |point: &AllanPoint| events.predicted(model, point);
+        let predicted = |point: &AllanPoint| events.added_to(signals.predicted(model, point), point.n);
         let error = Self::by_points(curve, |point| Some(predicted(point)));
         Self { contradiction: Contradiction::find_by(model, curve, predicted), ..error }
     }

@@ -2,11 +2,7 @@
 
 use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
-use allan_core::NoiseTerm;
-use allan_core::term::Sinusoid;
-
-/// Frequencies of a chirp whose Allan variances are averaged.
-const FREQUENCIES: u32 = 32;
+use crate::fit::signal_share::avar_of_run;
 
 /// A line whose frequency runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,12 +52,8 @@ impl Kind for Chirp {
     }
 
     fn avar(&self, at: &AveragingTime) -> AddedVariance {
-        // Of a sinusoid at each of the frequencies, for as long as it is there. The models have no term for it.
-        let run = self.end_hz.value - self.start_hz.value;
-        let frequency = |number: u32| self.start_hz.value + run * (f64::from(number) + 0.5) / f64::from(FREQUENCIES);
-        let of = |frequency: f64| NoiseTerm::Sinusoid(Sinusoid { frequency }).avar(at.n, at.period_s);
-        let mean = (0..FREQUENCIES).map(|number| of(frequency(number))).sum::<f64>() / f64::from(FREQUENCIES);
-        AddedVariance::corrected(self.amplitude.value.powi(2) * mean)
+        let frequencies = [self.start_hz.value, self.end_hz.value];
+        AddedVariance::modelled(avar_of_run(self.amplitude.value, frequencies, at.n, at.period_s))
     }
 
     no_course!();
@@ -105,7 +97,7 @@ mod tests {
                 model_avar: 0.0,
                 adev_of: &|_, _| None,
             };
-            let found = chirp.avar(&at).corrected;
+            let found = chirp.avar(&at).modelled;
             assert!((found / expected - 1.0).abs() < 0.01, "{n}: {found} {expected}");
         }
         assert_eq!(chirp.parameters().len(), 4);

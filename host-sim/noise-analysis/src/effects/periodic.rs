@@ -2,8 +2,7 @@
 
 use super::kind::{AddedVariance, AveragingTime, Kind, amplitude_at_frequency, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
-use allan_core::NoiseTerm;
-use allan_core::term::Sinusoid;
+use crate::fit::signal_share::avar_of_harmonics;
 
 /// A signal that repeats.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,13 +35,8 @@ impl Kind for Periodic {
     amplitude_at_frequency!();
 
     fn avar(&self, at: &AveragingTime) -> AddedVariance {
-        // Of its harmonics. The models have no term for them.
         let amplitudes = std::iter::once(self.amplitude.value).chain(self.harmonics.iter().copied());
-        let share = |(number, amplitude): (f64, f64)| {
-            let frequency = number * self.frequency_hz.value;
-            amplitude * amplitude * NoiseTerm::Sinusoid(Sinusoid { frequency }).avar(at.n, at.period_s)
-        };
-        AddedVariance::corrected((1..).map(f64::from).zip(amplitudes).map(share).sum())
+        AddedVariance::modelled(avar_of_harmonics(self.frequency_hz.value, amplitudes, at.n, at.period_s))
     }
 
     no_course!();
@@ -82,7 +76,7 @@ mod tests {
             let expected = 0.5 * differences.map(|of| of * of).sum::<f64>() / count;
             let (n, samples) = (n as u64, SAMPLES as u64);
             let at = AveragingTime { n, period_s: PERIOD_S, samples, model_avar: 0.0, adev_of: &|_, _| None };
-            let found = periodic.avar(&at).corrected;
+            let found = periodic.avar(&at).modelled;
             // The ends of the record do not hold whole periods of the differences.
             assert!((found / expected - 1.0).abs() < 0.01, "{n}: {found} {expected}");
         }

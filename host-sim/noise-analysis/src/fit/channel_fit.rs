@@ -7,6 +7,7 @@ use crate::fit::covariates::CovariateFit;
 use crate::fit::noise_terms::{filter_length_s, is_filter, is_line, is_same_time, is_white, line_frequency};
 use crate::fit::part_filter::PartFilter;
 use crate::fit::sample_coefficients::{CoefficientsFrom, SamplesOfCurve, by_samples, quantization_p_value};
+use crate::fit::signal_share::SignalShare;
 use crate::fit::traced_model::{Addition, PlannedTerm, Shapes, TracedModel, residual, within_measured};
 use crate::record::estimators::RecordEstimators;
 use crate::samples::rounding::is_dithered;
@@ -37,13 +38,17 @@ const SAME_FREQUENCY: f64 = 1e-3;
 /// The fit of one channel in one part of a recording: its covariates, the baseline model, and the model with what that lacks.
 pub(crate) struct ChannelFit {
     pub covariates: CovariateFit,
-    /// The baseline model.
+    /// Signals in the part, whose share is no part of the model with the added terms.
+    pub signals: SignalShare,
+    /// What these leave of the curve of `covariates`.
+    pub curve: Curve<OCTAVES>,
+    /// The baseline model, with the signals.
     pub before: Model,
     /// The model with the added terms.
     pub traced: TracedModel,
     /// The Markov process of the model that the spectrum shows and the curve does not, if there is one.
     pub markov_by_spectrum: Option<MarkovEstimate>,
-    /// The curve that the model with added terms is fitted to, where that is not the curve of the whole part.
+    /// The curve that the model with added terms is fitted to, without the signals, where that is not the curve of the whole part.
     recent: Option<Curve<OCTAVES>>,
     /// Lines of the spectrum; `None` where it was not searched for any.
     lines: Option<Vec<NoiseTerm>>,
@@ -68,6 +73,8 @@ impl ChannelFit {
         let traced = TracedModel::new(&trace, &covariates.curve);
         let before = within_measured(&trace.before, &covariates.curve);
         Self {
+            signals: SignalShare::default(),
+            curve: covariates.curve.clone(),
             covariates,
             before,
             traced,
@@ -91,14 +98,15 @@ impl ChannelFit {
     /// If the model with `lines` fits badly and the lines that the curve itself shows fit better, those are used: a line
     /// whose frequency wanders is many lines in the spectrum of a long record and one in the curve.
     pub(crate) fn fit_traced(covariates: CovariateFit, lines: &[NoiseTerm], filters: &[MovingAverageFilter]) -> Self {
-        let mut traced = trace(&covariates.curve, LineCandidates::Spectrum(lines), filters);
-        if !lines.is_empty() && traced.after_goodness.p_value < DESCRIBED {
-            let by_curve = trace(&covariates.curve, LineCandidates::Curve, filters);
-            if by_curve.after_goodness.deviance < traced.after_goodness.deviance {
-                traced = by_curve;
-            }
-        }
+        let traced = traced_with(&covariates.curve, lines, filters);
         Self { lines: Some(lines.to_vec()), ..Self::new(covariates, traced) }
+    }
+
+    /// The same with what the baseline model lacks beside `signals`, traced with `lines` and `filters` in the curve that they leave.
+    pub(crate) fn beside(self, signals: SignalShare, lines: &[NoiseTerm], filters: &[MovingAverageFilter]) -> Self {
+        let curve = signals.left_of(&self.curve);
+        let traced = TracedModel::new(&traced_with(&curve, lines, filters), &curve);
+        Self { signals, traced, lines: Some(lines.to_vec()), curve, ..self }
     }
 
     /// The baseline model and what it lacks by the curve alone; `filters` are those that the sensor may have.
@@ -131,7 +139,7 @@ impl ChannelFit {
         if self.traced.added_at().is_empty() {
             return;
         }
-        let curve = &self.covariates.curve;
+        let curve = &self.curve;
         let own_model = self.after();
         let is_compared = |point: &&AllanPoint| point.n <= later.samples() / 8 && point.avar > 0.0;
         let compared: Vec<(&AllanPoint, f64)> =
@@ -148,7 +156,7 @@ impl ChannelFit {
         let is_basic = |kind: &NoiseTerm| is_filter(kind) || NoiseTerm::BASELINE.contains(kind);
         let basic: Vec<PlannedTerm> = own.iter().filter(|(kind, _)| is_basic(kind)).copied().collect();
         let by_curve = match own.iter().find(|(kind, _)| is_filter(kind)) {
-            Some((filtered, _)) => traced_with(curve, *filtered, LineCandidates::Curve),
+            Some((filtered, _)) => traced_with_filter(curve, *filtered, LineCandidates::Curve),
             None => trace(curve, LineCandidates::Curve, &[]),
         };
         let is_possible = self.lines.as_ref().is_none_or(|lines| are_in_spectrum(&by_curve, lines));
@@ -163,9 +171,12 @@ impl ChannelFit {
         }
     }
 
-    /// The curve that the model with added terms is fitted to.
-    pub(crate) fn fitted_curve(&self) -> &Curve<OCTAVES> {
-        self.recent.as_ref().unwrap_or(&self.covariates.curve)
+    /// The curve that the model with added terms is fitted to, with the signals in it.
+    pub(crate) fn fitted_curve(&self) -> (&Curve<OCTAVES>, SignalShare) {
+        match &self.recent {
+            Some(recent) => (recent, SignalShare::default()),
+            None => (&self.covariates.curve, self.signals.clone()),
+        }
     }
 
     /// Correlation times of the model's Markov processes, s.
@@ -223,8 +234,8 @@ impl ChannelFit {
             Some(common) => self.take_filter(common, is_dithered),
             None if self.traced.has_filter() => {
                 let lines: Vec<NoiseTerm> = self.traced.terms().map(|(kind, _)| kind).filter(is_line).collect();
-                let trace = trace(&self.covariates.curve, LineCandidates::Spectrum(&lines), &[]);
-                self.traced = TracedModel::new(&trace, &self.covariates.curve);
+                let trace = trace(&self.curve, LineCandidates::Spectrum(&lines), &[]);
+                self.traced = TracedModel::new(&trace, &self.curve);
             }
             None => {}
         }
@@ -234,7 +245,7 @@ impl ChannelFit {
     /// Sets the bounds that the record resolves, and removes each added term that may be absent and of whose shape it resolves
     /// nothing, if the deviance does not rise by more than [`MAX_DEVIANCE_RISE`] without it.
     fn resolve(&mut self, of_filter: Option<BoundedEstimate>) {
-        let curve = &self.covariates.curve;
+        let curve = &self.curve;
         self.traced = self.traced.clone().bounded(curve, of_filter);
         while let Some(unresolved) = self.traced.unresolved(curve) {
             let without = self.traced.removed(curve, unresolved);
@@ -246,7 +257,7 @@ impl ChannelFit {
     }
 
     fn take_filter(&mut self, common: &PartFilter, is_dithered: bool) {
-        let (curve, had) = (&self.covariates.curve, self.traced.has_filter());
+        let (curve, had) = (&self.curve, self.traced.has_filter());
         if !had && !is_dithered {
             return;
         }
@@ -254,7 +265,7 @@ impl ChannelFit {
         // The channel's own terms may have stood in for the filter; none of them were traced with a low-pass filter.
         let is_new = !had || matches!(common.term, NoiseTerm::LowPass(_));
         if is_new || best.cost() > self.traced.cost() + MAX_DEVIANCE_RISE {
-            let again = TracedModel::new(&traced_with(curve, common.term, self.line_candidates(common)), curve);
+            let again = TracedModel::new(&traced_with_filter(curve, common.term, self.line_candidates(common)), curve);
             let other = with_filter(curve, &again, common);
             best = if other.cost() < best.cost() { other } else { best };
         }
@@ -308,7 +319,7 @@ impl ChannelFit {
     /// Adds a Markov process of this deviation and time constant: the coefficients of all terms are fitted again with their shapes as they
     /// are. Says whether the curve gives it variance.
     fn add_markov(&mut self, [deviation, time_constant]: [BoundedEstimate; 2], score: f64) -> bool {
-        let curve = &self.covariates.curve;
+        let curve = &self.curve;
         let octave = curve.points().iter().min_by(|a, b| {
             let distance = |point: &AllanPoint| (point.tau / time_constant.value).ln().abs();
             distance(a).total_cmp(&distance(b))
@@ -331,7 +342,7 @@ impl ChannelFit {
     /// Adds those of `lines`, the lines of the spectrum, that the model has not: too weak to be traced in the curve, their power
     /// would be that of the other terms.
     pub(crate) fn add_lines_of_spectrum(&mut self, lines: &[FittedTerm]) {
-        let curve = &self.covariates.curve;
+        let curve = &self.curve;
         let mut traced = self.traced.clone();
         let mut added: Vec<FittedTerm> = Vec::new();
         for line in lines {
@@ -370,12 +381,14 @@ impl ChannelFit {
         self.traced = with_lines;
     }
 
-    /// Both models with the coefficients by the samples. A model of the latest stretch of the part has none.
-    pub(crate) fn by_samples(&self, samples: SamplesOfCurve) -> ModelsBySamples {
-        let of = |model: &Model| by_samples(&self.covariates.curve, model, samples);
-        let after = if self.recent.is_some() { Err(CoefficientsFrom::Octaves) } else { of(self.after()) };
-        let quantization_p_value = quantization_p_value(&self.covariates.curve, self.after(), samples);
-        ModelsBySamples { before: of(&self.before), after, quantization_p_value }
+    /// Both models with the coefficients by the samples. The one with added terms has those by the samples without the signals, `noise`; a
+    /// model of the latest stretch of the part has none.
+    pub(crate) fn by_samples(&self, samples: SamplesOfCurve, noise: Option<SamplesOfCurve>) -> ModelsBySamples {
+        let of_noise = |noise: SamplesOfCurve| by_samples(&self.curve, self.after(), noise);
+        let after = noise.filter(|_| self.recent.is_none()).map_or(Err(CoefficientsFrom::Octaves), of_noise);
+        let quantization_p_value = noise.and_then(|noise| quantization_p_value(&self.curve, self.after(), noise));
+        let before = by_samples(&self.covariates.curve, &self.before, samples);
+        ModelsBySamples { before, after, quantization_p_value }
     }
 
     /// Takes these, where the samples have given them.
@@ -386,7 +399,7 @@ impl ChannelFit {
         }
         match models.after {
             Ok(after) => {
-                self.traced = self.traced.clone().with_coefficients(&self.covariates.curve, after);
+                self.traced = self.traced.clone().with_coefficients(&self.curve, after);
                 self.coefficients_from = CoefficientsFrom::Samples;
             }
             Err(other) => self.coefficients_from = other,
@@ -409,7 +422,7 @@ impl ChannelFit {
     /// The residual of the model at the shortest averaging time.
     fn first_residual(&self) -> Residual {
         let nothing = Residual { n: 1, excess: 0.0, sigmas: 0.0 };
-        self.covariates.curve.points().first().map_or(nothing, |point| residual(self.after(), point))
+        self.curve.points().first().map_or(nothing, |point| residual(self.after(), point))
     }
 
     /// Takes the terms of `held`, a model of the first half that held on the second, in place of those that were traced in the
@@ -427,8 +440,7 @@ impl ChannelFit {
             Some(common) if is_filter(&kind) => (common.term, addition),
             _ => (kind, addition),
         });
-        let taken =
-            self.traced.replaced(&self.covariates.curve, &terms.collect::<Vec<PlannedTerm>>(), Shapes::OfProcesses);
+        let taken = self.traced.replaced(&self.curve, &terms.collect::<Vec<PlannedTerm>>(), Shapes::OfProcesses);
         if taken.goodness.deviance <= self.traced.goodness.deviance + MAX_DEVIANCE_RISE {
             self.traced = taken;
             self.markov_by_spectrum = None;
@@ -436,8 +448,18 @@ impl ChannelFit {
     }
 }
 
-/// What the baseline lacks of a curve, with a filter that white noise may be behind as in `filtered`.
-fn traced_with(curve: &Curve<OCTAVES>, filtered: NoiseTerm, lines: LineCandidates) -> Trace {
+/// What the baseline model lacks of `curve`, with these lines of the spectrum or those that the curve itself shows.
+fn traced_with(curve: &Curve<OCTAVES>, lines: &[NoiseTerm], filters: &[MovingAverageFilter]) -> Trace {
+    let traced = trace(curve, LineCandidates::Spectrum(lines), filters);
+    if lines.is_empty() || traced.after_goodness.p_value >= DESCRIBED {
+        return traced;
+    }
+    let by_curve = trace(curve, LineCandidates::Curve, filters);
+    if by_curve.after_goodness.deviance < traced.after_goodness.deviance { by_curve } else { traced }
+}
+
+/// The same with a filter that white noise may be behind as in `filtered`.
+fn traced_with_filter(curve: &Curve<OCTAVES>, filtered: NoiseTerm, lines: LineCandidates) -> Trace {
     match filtered {
         NoiseTerm::Filtered(averages) => trace(curve, lines, &[averages]),
         _ => traced_behind(curve, filtered, lines),

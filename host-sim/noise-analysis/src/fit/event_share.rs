@@ -10,7 +10,7 @@ use crate::bounds::Parameter;
 use crate::distributions::poisson_bounds;
 use crate::samples::interpolation::REACH;
 use crate::samples::series::Series;
-use allan_core::{AllanPoint, Curve, Model};
+use allan_core::{AllanPoint, Curve};
 use serde::Serialize;
 
 /// Blocks of a part over which the energy of its events is compared first: fewer events than these are hardly ever two in a block.
@@ -76,11 +76,11 @@ impl EventShare {
         known.map_or(0.0, |&(known, avar)| avar * known as f64 / n as f64)
     }
 
-    /// The Allan variance of `model` with these events, and the degrees of freedom of a `point` that measures it: the scatter of the
-    /// noise and that of the events, in this part and in the one that is foretold, add.
-    pub(crate) fn predicted(&self, model: &Model, point: &AllanPoint) -> (f64, f64) {
-        let (noise, share) = (model.avar(point.n), self.avar(point.n));
-        (noise + share, self.degrees_of_freedom(model.edf(point), share / (noise + share)))
+    /// The Allan variance at an averaging factor, and the degrees of freedom of a point that measures it, of the same `without` events
+    /// and these: the scatter of the noise and that of the events, in this part and in the one that is foretold, add.
+    pub(crate) fn added_to(&self, without: (f64, f64), n: u64) -> (f64, f64) {
+        let ((without, edf), share) = (without, self.avar(n));
+        (without + share, self.degrees_of_freedom(edf, share / (without + share)))
     }
 
     /// Degrees of freedom of a variance with those of its noise, `edf`, of which the events have the `fraction`.

@@ -5,6 +5,7 @@ use crate::fit::channel_fit::ChannelFit;
 use crate::fit::covariates::CovariateFit;
 use crate::fit::event_share::EventShare;
 use crate::fit::sample_coefficients::{SamplesOfCurve, by_samples};
+use crate::fit::signal_share::SignalShare;
 use crate::halves::traced_part::{BiasByBlocks, PartData, PartSamples, TracedPart};
 use crate::halves::traced_record::TracedRecord;
 use crate::nonstationarity::{self, ChannelEpochs, EpochCurves, Nonstationarity, TracedChannel};
@@ -53,7 +54,7 @@ impl FirstHalf {
             sensitivities: preprocessing.sensitivities(channel, Exclusion::ByFirstHalf).to_vec(),
         });
         let samples =
-            PartSamples { record: record.record, series: &halves, biases: biases.clone(), seeks_signals: false };
+            PartSamples { record: record.record, series: &halves, biases: biases.clone(), seeks_levels: false };
         let profile = &record.measurement().profile;
         let data = PartData { profile, curves: &estimators.ruled[0], samples: Some(samples) };
         // The filter of the whole record is the one that is reported.
@@ -62,19 +63,19 @@ impl FirstHalf {
             if !record.has_rules(channel) {
                 return EventShare::default();
             }
-            let covariates = &part.channels[channel].fit.covariates;
-            let with = covariates.compensated(&estimators.raw[0], channel);
+            let fit = &part.channels[channel].fit;
+            let with = fit.signals.left_of(&fit.covariates.compensated(&estimators.raw[0], channel));
             let recorded = preprocessing.series(record.measurement(), channel, Exclusion::None).before(middle);
             let excluded = preprocessing.excluded_events(channel, middle);
             let screened = &record.record.channels[channel].screened;
-            EventShare::of_first_half((&recorded, &excluded), screened, (&with, &covariates.curve))
+            EventShare::of_first_half((&recorded, &excluded), screened, (&with, &fit.curve))
         });
         let channels = per_channel(series.ids(), |channel| {
             let (fit, own) = (&part.channels[channel].fit, &series[channel]);
             let followed = fit.covariates.compensated_series(own, &series);
             let curves = || EpochCurves::from_series(followed.as_ref().unwrap_or(own), middle);
             let curves = record.record.is_traced(channel).then(curves).flatten()?;
-            let curves = curves.in_samples(&record.record.channels[channel].samples);
+            let curves = curves.in_samples(&record.record.channels[channel].samples).without(&fit.signals);
             Some(ChannelEpochs::compare(curves, fit.after()))
         });
         for (trace, epochs) in part.channels.iter_mut().zip(&channels) {
@@ -132,7 +133,7 @@ impl FirstHalf {
         // The model with the added terms, fitted to the whole record, with the errors of `after`.
         let refitted = ModelReport {
             terms: term_reports(fit.after(), unit),
-            adev: self.as_recorded(fit, estimators, channel, (&curve, &rounding)),
+            adev: self.as_recorded((fit, &fit.signals), estimators, channel, (&curve, &rounding)),
             ..after.clone()
         };
         let point = |point: &AllanPoint| CurvePoint {
@@ -198,27 +199,34 @@ impl FirstHalf {
         let fit = &self.part.channels[channel].fit;
         let model = fit.after();
         let events = &self.events[channel];
-        let unseen = |part: &RecordPart| fit.covariates.compensated(part, channel);
+        // The second half has the frequencies that follow those of the first.
+        let [signals, of_both] = [[1.0, 2.0], [0.0, 2.0]].map(|times| fit.signals.within(times));
+        let error = |events: &EventShare, part: &RecordPart| {
+            ModelErrorReport::with_shares(model, (&signals, events), &fit.covariates.compensated(part, channel))
+        };
+        let (fitted, of_fitted) = fit.fitted_curve();
+        let none = EventShare::default();
         ModelReport {
             terms: term_reports(model, estimators.both.channels[channel].unit),
-            adev: self.as_recorded(fit, estimators, channel, (whole, rounding)),
-            fitted: ModelErrorReport::new(model, fit.fitted_curve()),
-            unseen: ModelErrorReport::with_events(model, events, &unseen(&estimators.raw[1])),
-            unseen_excluding: has_rules.then(|| ModelErrorReport::new(model, &unseen(&estimators.ruled[1]))),
+            adev: self.as_recorded((fit, &of_both), estimators, channel, (whole, rounding)),
+            fitted: ModelErrorReport::with_shares(model, (&of_fitted, &none), fitted),
+            unseen: error(events, &estimators.raw[1]),
+            unseen_excluding: has_rules.then(|| error(&none, &estimators.ruled[1])),
             events: events.report(whole.points().iter().map(|point| point.n)),
         }
     }
 
     /// The Allan deviations that the model of `fit` foretells at the points of the curve of the `whole` record: with the shares of the
-    /// covariates, of the events and of correlated rounding errors.
+    /// covariates, of the `signals`, of the events and of correlated rounding errors.
     fn as_recorded(
         &self,
-        fit: &ChannelFit,
+        (fit, signals): (&ChannelFit, &SignalShare),
         estimators: &RecordEstimators,
         channel: ChannelId,
         (whole, rounding): (&Curve<OCTAVES>, &Rounding),
     ) -> Vec<f64> {
-        let added = |n: u64| self.events[channel].avar(n) + rounding.correlated_avar(n);
+        let events = &self.events[channel];
+        let added = |n: u64| events.avar(n) + rounding.correlated_avar(n) + signals.avar(n, whole.sample_period());
         let with = |(point, deviation): (&AllanPoint, f64)| (deviation * deviation + added(point.n)).sqrt();
         whole.points().iter().zip(fit.deviations(estimators, channel, whole)).map(with).collect()
     }

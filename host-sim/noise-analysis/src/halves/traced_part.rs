@@ -9,6 +9,7 @@ use crate::fit::contradiction::Contradiction;
 use crate::fit::covariates::CovariateFit;
 use crate::fit::part_filter::{self, FilteredChannel, PartFilter, Unidentified};
 use crate::fit::sample_coefficients::SamplesOfCurve;
+use crate::fit::signal_share::SignalShare;
 use crate::parallel::per_channel;
 use crate::record::condensed_record::CondensedRecord;
 use crate::record::estimators::RecordPart;
@@ -23,9 +24,9 @@ use crate::samples::rounding::DITHERED_OCTAVES;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::cosine_spectrum::CosineSpectrum;
-use crate::spectra::decaying_disturbances::DecayingDisturbances;
 use crate::spectra::spectral_lines::MergedLine;
 use crate::spectra::{Welch, without_sines};
+use allan_core::NoiseTerm;
 use allan_core::model::FittedTerm;
 use allan_core::regression::Sensitivity;
 use measurement::{ChannelId, PerChannel, SensorProfile};
@@ -44,8 +45,8 @@ pub(crate) struct PartSamples<'a> {
     pub series: &'a PerChannel<Series>,
     /// What block means show of each channel.
     pub biases: PerChannel<BiasByBlocks>,
-    /// Whether signals are looked for that the model has no term for, beside shot noise.
-    pub seeks_signals: bool,
+    /// Whether two levels are looked for, which the model has as a Markov process.
+    pub seeks_levels: bool,
 }
 
 /// What the block means of a channel show.
@@ -70,6 +71,8 @@ pub(crate) struct ChannelTrace {
     pub lines: Vec<MergedLine>,
     /// The samples less the share of the covariates; `None` where they were not used.
     pub rest: Option<UniformSeries>,
+    /// The same less the periodic signal, where there is one.
+    noise: Option<UniformSeries>,
     /// Random telegraph noise.
     pub telegraph: Option<TelegraphNoise>,
     /// Signals in the samples.
@@ -107,7 +110,11 @@ impl TracedPart {
     pub(crate) fn take_terms_that_held(&mut self, first_half: &Self, unseen: &RecordPart) {
         let filter = self.filter.as_ref().ok();
         for (channel, ChannelTrace { fit, .. }) in first_half.channels.with_ids() {
-            let held = || Contradiction::find(fit.after(), &fit.covariates.compensated(unseen, channel)).is_none();
+            let held = || {
+                let (model, signals) = (fit.after(), fit.signals.within([1.0, 2.0]));
+                let curve = fit.covariates.compensated(unseen, channel);
+                Contradiction::find_by(model, &curve, |point| signals.predicted(model, point)).is_none()
+            };
             if unseen.channels[channel].quantity.is_inertial() && held() {
                 self.channels[channel].fit.take_terms_that_held(&fit.traced, filter);
             }
@@ -126,7 +133,7 @@ impl TracedPart {
     pub(crate) fn take_coefficients_of_samples(&mut self) {
         let of = |channel: ChannelId| {
             let trace = &self.channels[channel];
-            trace.samples().map(|samples| trace.fit.by_samples(samples))
+            trace.samples().map(|samples| trace.fit.by_samples(samples, trace.samples_of_noise()))
         };
         let models = per_channel(self.channels.ids(), of);
         for (trace, models) in self.channels.iter_mut().zip(models) {
@@ -182,8 +189,23 @@ impl ChannelTrace {
         self.rest.as_ref().map(|rest| SamplesOfCurve { rest, spectrum: self.spectrum.as_ref() })
     }
 
+    /// The same without signals; `None` where a line's frequency runs, which is in many of their frequencies.
+    fn samples_of_noise(&self) -> Option<SamplesOfCurve<'_>> {
+        let samples = self.samples().filter(|_| !self.fit.signals.has_run())?;
+        Some(SamplesOfCurve { rest: self.noise.as_ref().unwrap_or(samples.rest), ..samples })
+    }
+
     fn without_samples(fit: ChannelFit) -> Self {
-        Self { fit, lines: Vec::new(), rest: None, telegraph: None, signals: Vec::new(), slowest: None, spectrum: None }
+        Self {
+            fit,
+            lines: Vec::new(),
+            rest: None,
+            noise: None,
+            telegraph: None,
+            signals: Vec::new(),
+            slowest: None,
+            spectrum: None,
+        }
     }
 
     fn fit_with_samples(
@@ -196,21 +218,25 @@ impl ChannelTrace {
         let covariates = CovariateFit::estimate(curves, channel, bias.has_ramp, |to| bias.sensitivity(to));
         let rest = covariates.compensated_series(own, samples.series);
         let faster = &samples.record.channels[channel].faster_lines;
-        let (fit, mut lines) =
+        let (mut fit, lines) =
             fit_with_lines(covariates, own, rest.as_ref(), profile, (samples.record.samples_per_mean, faster));
         let rest = UniformSeries::from_series(rest.as_ref().unwrap_or(own));
         let rest = rest.with_rounding(fit.covariates.rounding().clone());
-        let (mut telegraph, mut signals) = (None, Vec::new());
-        if samples.seeks_signals {
-            let correlation_times: Vec<f64> = fit.correlation_times().collect();
-            telegraph = telegraph_noise(&rest, own.unit, &correlation_times);
-            let found = standing_in_spectrum(SpectrumProposals::find(&rest, lines, fit.bands()));
-            (lines, signals) = found.into_lines_and_signals();
-        } else {
-            signals.extend(DecayingDisturbances::find(&rest).map(Signal::Decays));
+        let correlation_times = || fit.correlation_times().collect::<Vec<f64>>();
+        let levels = || telegraph_noise(&rest, own.unit, &correlation_times());
+        let telegraph = if samples.seeks_levels { levels() } else { None };
+        let found = standing_in_spectrum(SpectrumProposals::find(&rest, lines, fit.bands()));
+        let share = SignalShare::new(found.periodic.as_ref(), found.track.as_ref());
+        let noise = found.periodic.as_ref().map(|periodic| periodic.subtracted_from(&rest));
+        let (lines, signals) = found.into_lines_and_signals();
+        if !share.is_empty() {
+            let kinds: Vec<NoiseTerm> = lines.iter().map(MergedLine::kind).collect();
+            let filters = profile.filters_read_at(1.0 / fit.curve.sample_period());
+            fit = fit.beside(share, &kinds, &filters);
         }
+        let slowest = CosineSpectrum::new(noise.as_ref().unwrap_or(&rest));
         let spectrum = samples.record.spectrum_within(channel, own.span.clone());
-        Self { fit, lines, telegraph, slowest: CosineSpectrum::new(&rest), rest: Some(rest), signals, spectrum }
+        Self { fit, lines, rest: Some(rest), noise, telegraph, signals, slowest, spectrum }
     }
 }
 
@@ -234,11 +260,11 @@ fn agree_on_filter(part: &PartData, channels: &mut PerChannel<ChannelTrace>) -> 
             let lines = || trace.lines.iter().map(|line| line.frequency.value).collect();
             FilteredChannel {
                 name: curves.channels[channel].name,
-                curve: &fit.covariates.curve,
+                curve: &fit.curve,
                 model: fit.after(),
                 rounding: fit.covariates.rounding(),
                 is_dithered: fit.is_dithered(profile, resolution, DITHERED_OCTAVES),
-                samples: trace.samples().map(|samples| (samples, lines())),
+                samples: trace.samples_of_noise().map(|samples| (samples, lines())),
             }
         })
         .collect();

@@ -49,7 +49,7 @@ impl<'a> TracedRecord<'a> {
             sensitivities: preprocessing.sensitivities(channel, Exclusion::ByWhole).to_vec(),
         };
         let biases = measurement.ids().map(bias).collect();
-        let samples = PartSamples { record, series: &series, biases, seeks_signals: true };
+        let samples = PartSamples { record, series: &series, biases, seeks_levels: true };
         let data = PartData { profile: &measurement.profile, curves: &estimators.both, samples: Some(samples) };
         let part = TracedPart::fit(&data);
         Self { record, preprocessing, estimators, series, part, motions }

@@ -2,6 +2,7 @@
 
 use crate::OCTAVES;
 use crate::distributions::{quantile, student_tail};
+use crate::fit::signal_share::SignalShare;
 use crate::record::sample_curves::SampleCurves;
 use crate::samples::epoch_ranges::epochs;
 use crate::samples::exclusion::Exclusion;
@@ -88,6 +89,25 @@ impl EpochCurves {
             epoch: self.epoch * shorter.samples_per_mean,
             ..self
         }
+    }
+
+    /// The same curves without the `signals` of the first half, which go on in the second.
+    #[must_use]
+    pub(crate) fn without(mut self, signals: &SignalShare) -> Self {
+        if signals.is_empty() {
+            return self;
+        }
+        let left = |curve: &mut Curve<OCTAVES>, times: [f64; 2]| *curve = signals.within(times).left_of(curve);
+        let [first, second] = &mut self.quarters;
+        left(first, [0.0, 0.5]);
+        left(second, [0.5, 1.0]);
+        left(&mut self.unseen, [1.0, 2.0]);
+        let middle = self.ranges[1].first().map_or(1, |range| range.start) as f64;
+        let ranges = self.ranges.iter().flatten();
+        for (range, curve) in ranges.zip(self.fitted_epochs.iter_mut().chain(&mut self.unseen_epochs)) {
+            left(curve, [range.start, range.end].map(|of| of as f64 / middle));
+        }
+        self
     }
 
     /// Epochs of the later quarter of the first half.

@@ -103,7 +103,7 @@ fn term_effects(
     let &ChannelFindings { channel: ChannelProfile { unit, .. }, fit, lines, .. } = findings;
     let curve = curve_evidence(found, facts.period_s);
     let line = |has_width: bool| LineEvidence { has_width, source: LineSource::Curve(curve) };
-    let unexplained = |by: Refutation| unexplained_octave(found, &fit.covariates.curve, term, by);
+    let unexplained = |by: Refutation| unexplained_octave(found, &fit.curve, term, by);
     let mut effects = match term.kind {
         NoiseTerm::LowPass(filter) => vec![second_order_effect(term, &filter, curve)],
         NoiseTerm::Filtered(filter) => vec![filter_effect(term, &filter, curve, unit, profile.internal_rate_hz)],
@@ -205,7 +205,7 @@ fn kurtosis_ratio(
 ) -> Option<KurtosisRatio> {
     let model = fit.after();
     if fit.covariates.is_empty() {
-        return telegraph::kurtosis_ratio(&fit.covariates.curve, model, markov);
+        return telegraph::kurtosis_ratio(&fit.curve, model, markov);
     }
     let rest = rest?;
     let mut estimator = GappedCascade::default();

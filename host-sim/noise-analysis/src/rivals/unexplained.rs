@@ -47,7 +47,7 @@ pub(crate) fn by_curve(
     resolution: f64,
     of_covariates: f64,
 ) -> Option<Unexplained> {
-    let (curve, model) = (&fit.covariates.curve, fit.after());
+    let (curve, model) = (&fit.curve, fit.after());
     // Without dither the rounding error is no white noise.
     let is_dithered = fit.is_dithered(profile, resolution, DITHERED_OCTAVES);
     let own = if is_dithered { 0.0 } else { resolution * resolution };

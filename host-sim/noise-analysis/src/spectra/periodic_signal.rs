@@ -172,6 +172,15 @@ impl PeriodicSignal {
         })
     }
 
+    /// The series without its harmonics, in which it was found.
+    pub(crate) fn subtracted_from(&self, series: &UniformSeries) -> UniformSeries {
+        let spacing = 0.5 / series.duration();
+        let without = |rest: UniformSeries, number: usize| {
+            Sine::fit_near(&rest, number as f64 * self.frequency.value, spacing).subtracted_from(&rest)
+        };
+        (1..=HARMONICS).fold(series.clone(), without)
+    }
+
     /// Whether a frequency, Hz, is a multiple of the signal's within `within` Hz.
     pub(crate) fn has(&self, frequency: f64, within: f64) -> bool {
         let multiple = (frequency / self.frequency.value).round().max(1.0);

@@ -1,0 +1,169 @@
+//! The share of signals in the Allan variance of a channel: a slow periodic one that is no sinusoid, and a line whose frequency runs.
+//!
+//! No term of the noise model has them. They are independent of the noise beneath, so that their variances add: a model is fitted to the
+//! curve less their share, and the share is a part of what the model foretells. A periodic signal is the same in any part of a recording.
+//! A frequency that runs goes on at the same rate.
+
+use crate::OCTAVES;
+use crate::spectra::frequency_track::FrequencyTrack;
+use crate::spectra::periodic_signal::PeriodicSignal;
+use allan_core::term::Sinusoid;
+use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
+
+/// Frequencies of a run whose Allan variances are averaged.
+const FREQUENCIES: u32 = 32;
+
+/// What the signals in a part of a recording add to the Allan variance of a channel.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct SignalShare {
+    periodic: Option<Harmonics>,
+    run: Option<Run>,
+}
+
+/// Of a periodic signal.
+#[derive(Debug, Clone, PartialEq)]
+struct Harmonics {
+    /// Of the fundamental, Hz.
+    frequency: f64,
+    /// From that of the fundamental on, in the unit of the channel.
+    amplitudes: Vec<f64>,
+}
+
+/// Of a line whose frequency runs.
+#[derive(Debug, Clone, PartialEq)]
+struct Run {
+    amplitude: f64,
+    /// At the beginning and at the end of the part, Hz.
+    frequencies: [f64; 2],
+}
+
+impl SignalShare {
+    /// Of the signals that a part of a recording shows.
+    pub(crate) fn new(periodic: Option<&PeriodicSignal>, track: Option<&FrequencyTrack>) -> Self {
+        let harmonics = |found: &PeriodicSignal| Harmonics {
+            frequency: found.frequency.value,
+            amplitudes: std::iter::once(found.amplitude.value).chain(found.harmonics).collect(),
+        };
+        let run = |found: &FrequencyTrack| Run { amplitude: found.amplitude.value, frequencies: found.frequencies };
+        Self { periodic: periodic.map(harmonics), run: track.map(run) }
+    }
+
+    /// Whether there are no signals.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.periodic.is_none() && self.run.is_none()
+    }
+
+    /// Whether there is a line whose frequency runs.
+    pub(crate) fn has_run(&self) -> bool {
+        self.run.is_some()
+    }
+
+    /// The signals from one time to another, in lengths of the part: 1 to 2 is as long a part that follows it.
+    ///
+    /// A frequency beyond half the sample rate shows at its alias. One below 0 is that of a turn the other way, which has the same line.
+    pub(crate) fn within(&self, times: [f64; 2]) -> Self {
+        let run = |Run { amplitude, frequencies: [first, last] }: &Run| Run {
+            amplitude: *amplitude,
+            frequencies: times.map(|time| first + (last - first) * time),
+        };
+        Self { periodic: self.periodic.clone(), run: self.run.as_ref().map(run) }
+    }
+
+    /// Their share in the Allan variance at an averaging factor.
+    pub(crate) fn avar(&self, n: u64, period_s: f64) -> f64 {
+        let of_periodic = |Harmonics { frequency, amplitudes }: &Harmonics| {
+            avar_of_harmonics(*frequency, amplitudes.iter().copied(), n, period_s)
+        };
+        let of_run = |Run { amplitude, frequencies }: &Run| avar_of_run(*amplitude, *frequencies, n, period_s);
+        self.periodic.as_ref().map_or(0.0, of_periodic) + self.run.as_ref().map_or(0.0, of_run)
+    }
+
+    /// What they leave of a curve: of every point at least a tenth. The scatter of a point stays that of what was measured, so that one
+    /// which they have most of says little of the noise.
+    pub(crate) fn left_of(&self, curve: &Curve<OCTAVES>) -> Curve<OCTAVES> {
+        let mut left = curve.clone();
+        if !self.is_empty() {
+            left.subtract_interpolation(|n| self.avar(n, curve.sample_period()));
+        }
+        left
+    }
+
+    /// The Allan variance of `model` with these signals, and the degrees of freedom of a `point` that measures it: those of its noise.
+    pub(crate) fn predicted(&self, model: &Model, point: &AllanPoint) -> (f64, f64) {
+        (model.avar(point.n) + self.avar(point.n, model.sample_period()), model.edf(point))
+    }
+}
+
+/// Allan variance of a signal with these `amplitudes` of its harmonics, the first of which is at a `frequency` in Hz.
+pub(crate) fn avar_of_harmonics(frequency: f64, amplitudes: impl Iterator<Item = f64>, n: u64, period_s: f64) -> f64 {
+    let of = |(number, amplitude): (f64, f64)| amplitude * amplitude * avar_of_sine(number * frequency, n, period_s);
+    (1..).map(f64::from).zip(amplitudes).map(of).sum()
+}
+
+/// Allan variance of a line whose frequency runs evenly from one to another, in Hz: the mean of those of sinusoids at each of the
+/// frequencies.
+pub(crate) fn avar_of_run(amplitude: f64, [first, last]: [f64; 2], n: u64, period_s: f64) -> f64 {
+    let frequency = |number: u32| first + (last - first) * (f64::from(number) + 0.5) / f64::from(FREQUENCIES);
+    let mean = (0..FREQUENCIES).map(|number| avar_of_sine(frequency(number), n, period_s)).sum::<f64>()
+        / f64::from(FREQUENCIES);
+    amplitude * amplitude * mean
+}
+
+/// Allan variance of a sinusoid of amplitude 1. Its closed form is that of the alias of a frequency beyond half the sample rate; one of 0 has
+/// none.
+fn avar_of_sine(frequency: f64, n: u64, period_s: f64) -> f64 {
+    let avar = NoiseTerm::Sinusoid(Sinusoid { frequency }).avar(n, period_s);
+    if avar.is_finite() { avar } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Run, SignalShare};
+    use crate::OVERLAP;
+    use allan_core::Cascade;
+    use std::f64::consts::TAU;
+
+    const PERIOD_S: f64 = 0.01;
+    const SAMPLES: usize = 60_000;
+
+    /// The frequency of a line rises from 30 to 60 Hz in one part of a record and from 60 to 90 Hz in the next, which samples at 100 Hz show
+    /// as 40 to 10 Hz; that of another falls from 6 Hz to 1 Hz, through 0 to 4 Hz the other way. The Allan variance of the samples of the
+    /// next part is by definition half the mean square of the second differences of their sums, over n².
+    #[test]
+    fn a_frequency_goes_on_at_the_same_rate() {
+        const AMPLITUDE: f64 = 0.3;
+        let duration_s = SAMPLES as f64 * PERIOD_S;
+        for frequencies in [[30.0, 60.0], [6.0, 1.0]] {
+            let [first, last] = frequencies;
+            let sample = |at: usize| {
+                let time_s = at as f64 * PERIOD_S;
+                AMPLITUDE * (TAU * (first + 0.5 * (last - first) * time_s / duration_s) * time_s).sin()
+            };
+            let mut sums = vec![0.0];
+            (0..SAMPLES).for_each(|at| sums.push(sums[at] + sample(SAMPLES + at)));
+            let share = SignalShare { periodic: None, run: Some(Run { amplitude: AMPLITUDE, frequencies }) };
+            let next = share.within([1.0, 2.0]);
+            for n in [1_usize, 2, 4, 8, 16] {
+                let differences = sums.windows(2 * n + 1).map(|of| (of[2 * n] - 2.0 * of[n] + of[0]) / n as f64);
+                let expected = 0.5 * differences.map(|of| of * of).sum::<f64>() / (SAMPLES + 1 - 2 * n) as f64;
+                let found = next.avar(n as u64, PERIOD_S);
+                assert!((found / expected - 1.0).abs() < 0.01, "{frequencies:?}, {n}: {found} {expected}");
+            }
+        }
+    }
+
+    /// A line that is alone in a record has all of its variance: a tenth is left.
+    #[test]
+    fn a_tenth_of_a_point_is_left() {
+        let mut cascade = Cascade::<{ crate::OCTAVES }, OVERLAP>::new();
+        let line = |at: usize| 1000.0 * (TAU * 7.0 * PERIOD_S * at as f64).sin();
+        (0..SAMPLES).for_each(|at| cascade.push(line(at).round() as i32));
+        let curve = cascade.curve(PERIOD_S);
+        let share = SignalShare { periodic: None, run: Some(Run { amplitude: 1000.0, frequencies: [7.0; 2] }) };
+        let left = share.left_of(&curve);
+        for (left, point) in left.points().iter().zip(curve.points()).take(3) {
+            assert!((left.avar / point.avar - 0.1).abs() < 1e-9, "{left:?}");
+        }
+        assert_eq!(SignalShare::default().left_of(&curve), curve);
+    }
+}
