@@ -102,10 +102,18 @@ impl ChannelFit {
         Self { lines: Some(lines.to_vec()), ..Self::new(covariates, traced) }
     }
 
-    /// The same with what the baseline model lacks beside `signals`, traced with `lines` and `filters` in the curve that they leave.
-    pub(crate) fn beside(self, signals: SignalShare, lines: &[NoiseTerm], filters: &[MovingAverageFilter]) -> Self {
-        let curve = signals.left_of(&self.curve);
-        let traced = TracedModel::new(&traced_with(&curve, lines, filters), &curve);
+    /// The same with what the baseline model lacks beside `signals`, traced with `lines` and `filters` in the curve that they leave: with
+    /// the amplitudes, within their bounds, with which both describe the curve best.
+    pub(crate) fn beside(self, signals: &SignalShare, lines: &[NoiseTerm], filters: &[MovingAverageFilter]) -> Self {
+        let recorded = &self.covariates.curve;
+        let fitted = |signals: SignalShare| {
+            let curve = signals.left_of(recorded);
+            let traced = TracedModel::new(&traced_with(&curve, lines, filters), &curve);
+            let cost = signals.deviance(traced.model(), recorded) + traced.cost_of_terms();
+            (cost, signals, curve, traced)
+        };
+        let best = signals.within_bounds().map(fitted).min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, signals, curve, traced)) = best else { return self };
         Self { signals, traced, lines: Some(lines.to_vec()), curve, ..self }
     }
 

@@ -5,11 +5,14 @@
 //! A frequency that runs goes on at the same rate.
 
 use crate::OCTAVES;
+use crate::bounds::BoundedEstimate;
 use crate::spectra::frequency_track::FrequencyTrack;
 use crate::spectra::periodic_signal::PeriodicSignal;
 use allan_core::term::Sinusoid;
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 
+/// Amplitudes that are tried, in parts of the way from the estimate to either 95 % bound: half of that is a standard deviation.
+const STEPS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 /// Frequencies of a run whose Allan variances are averaged.
 const FREQUENCIES: u32 = 32;
 
@@ -27,12 +30,16 @@ struct Harmonics {
     frequency: f64,
     /// From that of the fundamental on, in the unit of the channel.
     amplitudes: Vec<f64>,
+    /// Factors from the amplitudes to their bounds.
+    bounds: [f64; 2],
 }
 
 /// Of a line whose frequency runs.
 #[derive(Debug, Clone, PartialEq)]
 struct Run {
     amplitude: f64,
+    /// Factors from the amplitude to its bounds.
+    bounds: [f64; 2],
     /// At the beginning and at the end of the part, Hz.
     frequencies: [f64; 2],
 }
@@ -43,8 +50,13 @@ impl SignalShare {
         let harmonics = |found: &PeriodicSignal| Harmonics {
             frequency: found.frequency.value,
             amplitudes: std::iter::once(found.amplitude.value).chain(found.harmonics).collect(),
+            bounds: bounds(found.amplitude),
         };
-        let run = |found: &FrequencyTrack| Run { amplitude: found.amplitude.value, frequencies: found.frequencies };
+        let run = |found: &FrequencyTrack| Run {
+            amplitude: found.amplitude.value,
+            bounds: bounds(found.amplitude),
+            frequencies: found.frequencies,
+        };
         Self { periodic: periodic.map(harmonics), run: track.map(run) }
     }
 
@@ -62,19 +74,37 @@ impl SignalShare {
     ///
     /// A frequency beyond half the sample rate shows at its alias. One below 0 is that of a turn the other way, which has the same line.
     pub(crate) fn within(&self, times: [f64; 2]) -> Self {
-        let run = |Run { amplitude, frequencies: [first, last] }: &Run| Run {
-            amplitude: *amplitude,
-            frequencies: times.map(|time| first + (last - first) * time),
+        let mut within = self.clone();
+        if let Some(Run { frequencies, .. }) = &mut within.run {
+            let [first, last] = *frequencies;
+            *frequencies = times.map(|time| first + (last - first) * time);
+        }
+        within
+    }
+
+    /// The same with amplitudes from their lower bounds to their upper ones.
+    pub(crate) fn within_bounds(&self) -> impl Iterator<Item = Self> {
+        let factor = |[low, high]: [f64; 2], step: f64| {
+            if step < 0.0 { 1.0 + step * (1.0 - low) } else { 1.0 + step * (high - 1.0) }
         };
-        Self { periodic: self.periodic.clone(), run: self.run.as_ref().map(run) }
+        STEPS.into_iter().map(move |step| {
+            let mut scaled = self.clone();
+            if let Some(Harmonics { amplitudes, bounds, .. }) = &mut scaled.periodic {
+                amplitudes.iter_mut().for_each(|amplitude| *amplitude *= factor(*bounds, step));
+            }
+            if let Some(Run { amplitude, bounds, .. }) = &mut scaled.run {
+                *amplitude *= factor(*bounds, step);
+            }
+            scaled
+        })
     }
 
     /// Their share in the Allan variance at an averaging factor.
     pub(crate) fn avar(&self, n: u64, period_s: f64) -> f64 {
-        let of_periodic = |Harmonics { frequency, amplitudes }: &Harmonics| {
+        let of_periodic = |Harmonics { frequency, amplitudes, .. }: &Harmonics| {
             avar_of_harmonics(*frequency, amplitudes.iter().copied(), n, period_s)
         };
-        let of_run = |Run { amplitude, frequencies }: &Run| avar_of_run(*amplitude, *frequencies, n, period_s);
+        let of_run = |Run { amplitude, frequencies, .. }: &Run| avar_of_run(*amplitude, *frequencies, n, period_s);
         self.periodic.as_ref().map_or(0.0, of_periodic) + self.run.as_ref().map_or(0.0, of_run)
     }
 
@@ -92,6 +122,22 @@ impl SignalShare {
     pub(crate) fn predicted(&self, model: &Model, point: &AllanPoint) -> (f64, f64) {
         (model.avar(point.n) + self.avar(point.n, model.sample_period()), model.edf(point))
     }
+
+    /// The deviance from `curve` of `model` with these signals, over the averaging times up to an eighth of the curve.
+    pub(crate) fn deviance(&self, model: &Model, curve: &Curve<OCTAVES>) -> f64 {
+        let of = |point: &AllanPoint| {
+            let (avar, edf) = self.predicted(model, point);
+            let measured = point.avar / avar;
+            edf * (measured - 1.0 - measured.ln())
+        };
+        let is_compared = |point: &&AllanPoint| point.n <= curve.samples() / 8 && point.avar > 0.0;
+        curve.points().iter().filter(is_compared).map(of).sum()
+    }
+}
+
+/// Factors from an amplitude to its bounds.
+fn bounds(amplitude: BoundedEstimate) -> [f64; 2] {
+    [amplitude.low, amplitude.high].map(|bound| if amplitude.value > 0.0 { bound / amplitude.value } else { 1.0 })
 }
 
 /// Allan variance of a signal with these `amplitudes` of its harmonics, the first of which is at a `frequency` in Hz.
@@ -141,7 +187,8 @@ mod tests {
             };
             let mut sums = vec![0.0];
             (0..SAMPLES).for_each(|at| sums.push(sums[at] + sample(SAMPLES + at)));
-            let share = SignalShare { periodic: None, run: Some(Run { amplitude: AMPLITUDE, frequencies }) };
+            let share =
+                SignalShare { periodic: None, run: Some(Run { amplitude: AMPLITUDE, bounds: [1.0; 2], frequencies }) };
             let next = share.within([1.0, 2.0]);
             for n in [1_usize, 2, 4, 8, 16] {
                 let differences = sums.windows(2 * n + 1).map(|of| (of[2 * n] - 2.0 * of[n] + of[0]) / n as f64);
@@ -159,7 +206,10 @@ mod tests {
         let line = |at: usize| 1000.0 * (TAU * 7.0 * PERIOD_S * at as f64).sin();
         (0..SAMPLES).for_each(|at| cascade.push(line(at).round() as i32));
         let curve = cascade.curve(PERIOD_S);
-        let share = SignalShare { periodic: None, run: Some(Run { amplitude: 1000.0, frequencies: [7.0; 2] }) };
+        let share = SignalShare {
+            periodic: None,
+            run: Some(Run { amplitude: 1000.0, bounds: [1.0; 2], frequencies: [7.0; 2] }),
+        };
         let left = share.left_of(&curve);
         for (left, point) in left.points().iter().zip(curve.points()).take(3) {
             assert!((left.avar / point.avar - 0.1).abs() < 1e-9, "{left:?}");

@@ -126,7 +126,12 @@ impl TracedModel {
 
     /// Deviance with what the added terms must take off at least.
     pub(crate) fn cost(&self) -> f64 {
-        self.goodness.deviance + COST_OF_A_TERM * self.additions.iter().flatten().count() as f64
+        self.goodness.deviance + self.cost_of_terms()
+    }
+
+    /// What the added terms must take off the deviance at least.
+    pub(crate) fn cost_of_terms(&self) -> f64 {
+        COST_OF_A_TERM * self.additions.iter().flatten().count() as f64
     }
 
     /// What adds a term behind all others.

@@ -232,7 +232,7 @@ impl ChannelTrace {
         if !share.is_empty() {
             let kinds: Vec<NoiseTerm> = lines.iter().map(MergedLine::kind).collect();
             let filters = profile.filters_read_at(1.0 / fit.curve.sample_period());
-            fit = fit.beside(share, &kinds, &filters);
+            fit = fit.beside(&share, &kinds, &filters);
         }
         let slowest = CosineSpectrum::new(noise.as_ref().unwrap_or(&rest));
         let spectrum = samples.record.spectrum_within(channel, own.span.clone());
