@@ -29,6 +29,13 @@ pub enum LowPassDesign {
     Butterworth,
 }
 
+impl LowPassDesign {
+    /// Whether it is of the second order.
+    pub(crate) fn is_second_order(self) -> bool {
+        matches!(self, Self::TwoStages | Self::Butterworth)
+    }
+}
+
 impl Kind for LowPassFilter {
     const NAME: &'static str = "filter_bandwidth";
 

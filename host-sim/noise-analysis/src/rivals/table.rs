@@ -195,6 +195,10 @@ pub static RIVALRIES: [Rivalry; 46] = [
     row("first-order filter", "Markov process of the curve", "below 64 samples, with no white noise left but rounding",
         "white noise is never absent, filtered it is such a process",
         Rule::Channel(|of| of.loses_to(|effect| matches!(effect, Effect::LowPassFilter(_))))),
+    row("low-pass filter of the second order", "quantization of the curve", "always",
+        "rounding behind a filter is white, and the filter has its form to a part of what it leaves at half the rate",
+        Rule::Channel(|of| of.kind() == Some(NoiseTerm::Quantization) && of.others().any(|other|
+            matches!(&other.effect, Effect::LowPassFilter(filter) if filter.design.is_second_order())))),
     row("unexplained octave of irreversible changes", "Markov process of the curve", "the changes up and down differ by 2·10⁻⁴",
         "a Gaussian process is the same when time runs backwards",
         Rule::Channel(|of| of.loses_to(|effect| matches!(refutation(effect), Some(Refutation::Irreversible { .. }))))),

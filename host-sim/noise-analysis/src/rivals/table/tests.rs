@@ -155,6 +155,7 @@ const fn of_resonance(frequency: f64) -> Origin {
 }
 
 const OF_RAMP: Origin = Origin::Term { number: 0, kind: NoiseTerm::RateRamp };
+const OF_QUANTIZATION: Origin = Origin::Term { number: 1, kind: NoiseTerm::Quantization };
 const OF_LINE: Origin = Origin::Line { is_slow: false };
 const OF_LEVELS: Origin = Origin::Levels { is_reversible: true };
 
@@ -269,6 +270,8 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
     let level_change = |explained| -> Effect {
         LevelChange { time_s: known(500.0), ratio: known(2.0), explained, p_value: 1e-9 }.into()
     };
+    let two_stages =
+        LowPassFilter { bandwidth_hz: known(1.0), design: LowPassDesign::TwoStages, evidence: CURVE };
     let low_pass = LowPassFilter {
         bandwidth_hz: known(1.0),
         design: LowPassDesign::OneStage { time_constant_s: 0.16 },
@@ -331,6 +334,8 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
             channel([of_term(0, markov(1.0)), of(common_mode(1.0), Origin::CrossSpectra)]), vec!["common_mode"]),
         (["first-order filter", "Markov process of the curve"],
             channel([of_term(0, low_pass.into()), of_term(0, markov(1.0))]), vec![LowPassFilter::NAME]),
+        (["low-pass filter of the second order", "quantization of the curve"],
+            channel([of_term(0, two_stages.into()), of(quantization(), OF_QUANTIZATION)]), vec![LowPassFilter::NAME]),
         (["unexplained octave of irreversible changes", "Markov process of the curve"],
             channel([of_term(0, refuted(IRREVERSIBLE)), of_term(0, markov(1.0))]), vec!["unexplained"]),
         (["telegraph noise by the kurtosis of a stronger term", "telegraph noise or an unexplained octave by the kurtosis of a Markov process"],
