@@ -47,6 +47,7 @@ pub(crate) fn relative_covariance(model: &Model, points: &[&AllanPoint]) -> DMat
     let short: Vec<DVector<f64>> = points.iter().take_while(|point| point.n <= LONGEST).map(weighted).collect();
     let duration = |point: &AllanPoint| point.count as f64 * point.n as f64 / f64::from(point.overlap) * period;
     let fractions: Vec<_> = points.iter().map(|point| model.variance_fractions(point.n)).collect();
+    let edfs: Vec<f64> = points.iter().map(|point| model.edf(point)).collect();
     DMatrix::from_fn(points.len(), points.len(), |a, b| {
         let (first, second) = (points[a], points[b]);
         if let (Some(x), Some(y)) = (short.get(a), short.get(b)) {
@@ -54,7 +55,7 @@ pub(crate) fn relative_covariance(model: &Model, points: &[&AllanPoint]) -> DMat
         }
         let octaves = first.n.ilog2().abs_diff(second.n.ilog2()) as usize;
         let correlation = octave_correlation(octaves, fractions[a], fractions[b]);
-        2.0 * correlation / (model.edf(first) * model.edf(second)).sqrt()
+        2.0 * correlation / (edfs[a] * edfs[b]).sqrt()
     })
 }
 

@@ -252,12 +252,12 @@ impl TrackedModel {
             points.iter().map(|(point, edf)| (edf / 2.0).sqrt() * slope(index, point)).collect()
         };
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let fractions: Vec<_> = points.iter().map(|(point, _)| self.model.variance_fractions(point.n)).collect();
         let spread = |along: &[f64]| -> f64 {
             let mut sum = 0.0;
-            for (i, (a, _)) in points.iter().enumerate() {
-                for (j, (b, _)) in points.iter().enumerate() {
-                    let (a, b) = (self.model.variance_fractions(a.n), self.model.variance_fractions(b.n));
-                    sum += along[i] * along[j] * octave_correlation(i.abs_diff(j), a, b);
+            for (i, a) in fractions.iter().enumerate() {
+                for (j, b) in fractions.iter().enumerate() {
+                    sum += along[i] * along[j] * octave_correlation(i.abs_diff(j), *a, *b);
                 }
             }
             sum
