@@ -33,6 +33,8 @@ const SCORING_ROUNDS: usize = 50;
 const LEAST_GAIN: f64 = 1e-4;
 /// Shortest part of a step of the scoring that is tried.
 const SHORTEST_STEP: f64 = 1e-3;
+/// Most shapes of a mixture.
+const MOST_TERMS: usize = 16;
 
 /// Probability that ordinates of a true density depart from it as far, in the order of their frequencies: `bands` are means over that
 /// density, with the number of ordinates. Bartlett's test of the cumulative periodogram.
@@ -167,21 +169,38 @@ fn weighted_least_squares<R: AsRef<[f64]>>(
 
 /// Fisher's information of the bands on the densities.
 pub(super) fn information<R: AsRef<[f64]>>(bands: &[SpectralBand], bases: &[R], densities: &[f64]) -> DMatrix<f64> {
+    let of_terms = match densities.len() {
+        ..=4 => information_of::<4, R>,
+        5 => information_of::<5, R>,
+        6 => information_of::<6, R>,
+        ..=8 => information_of::<8, R>,
+        _ => information_of::<MOST_TERMS, R>,
+    };
+    of_terms(bands, bases, densities)
+}
+
+/// The same of up to `TERMS` terms, a number that the compiler knows: the sums then stay in registers.
+fn information_of<const TERMS: usize, R: AsRef<[f64]>>(
+    bands: &[SpectralBand],
+    bases: &[R],
+    densities: &[f64],
+) -> DMatrix<f64> {
     let terms = densities.len();
-    let mut information = DMatrix::zeros(terms, terms);
+    let mut sums = [[0.0; TERMS]; TERMS];
     for (band, basis) in bands.iter().zip(bases) {
-        let basis = basis.as_ref();
-        let density = mixture_density(basis, densities);
+        let density = mixture_density(basis.as_ref(), densities);
         if density <= 0.0 {
             continue;
         }
         let weight = band.ordinates / (density * density);
-        for (column, mut entries) in information.column_iter_mut().enumerate() {
-            let of_column = weight * basis[column];
-            entries.iter_mut().zip(basis).for_each(|(entry, shape)| *entry += of_column * shape);
+        let mut shapes = [0.0; TERMS];
+        shapes[..terms].copy_from_slice(&basis.as_ref()[..terms]);
+        for (entries, shape) in sums.iter_mut().zip(shapes) {
+            let of_column = weight * shape;
+            entries.iter_mut().zip(shapes).for_each(|(entry, shape)| *entry += of_column * shape);
         }
     }
-    information
+    DMatrix::from_fn(terms, terms, |row, column| sums[column][row])
 }
 
 /// A round of the multiplicative fit of the terms that are nowhere negative.
