@@ -92,19 +92,18 @@ impl SpectralShape {
 
     /// Values of the terms for a density of 1 at 1 Hz. Without a filter the floor is the same as the white noise, and left out.
     fn basis(&self, frequency: f64) -> [f64; TERMS] {
-        let gain = self.gain(frequency);
-        let walk = walk_amplitude(frequency, self.sample_period);
+        let sine = (PI * frequency * self.sample_period).sin();
+        let gain = self.gain(frequency, sine);
+        let walk = PI * self.sample_period / sine;
         [gain, gain / frequency, gain * walk * walk, if self.taps > 1 { 1.0 } else { 0.0 }]
     }
 
-    /// Power gain of the filter. Of one that is read slowly it has what of white noise is folded down.
-    fn gain(&self, frequency: f64) -> f64 {
+    /// Power gain of the filter at a frequency whose phase in one sample has this `sine`. Of one that is read slowly it has what of white
+    /// noise is folded down.
+    fn gain(&self, frequency: f64, sine: f64) -> f64 {
         match &self.read_slowly {
             Some(filter) => filter.density(frequency, self.sample_period),
-            None => {
-                let sine = (PI * frequency * self.sample_period).sin();
-                filter_gain(frequency, self.sample_period, self.taps, sine)
-            }
+            None => filter_gain(frequency, self.sample_period, self.taps, sine),
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::distributions::mean_ratio_tail;
 use crate::effects::findings::SIGNIFICANCE;
 use crate::samples::rounding::Rounding;
 use crate::samples::uniform_series::UniformSeries;
+use std::cell::OnceCell;
 use std::f64::consts::PI;
 
 /// Lowest frequency that is searched, in periods per record: below, lines cannot be distinguished from drift.
@@ -118,14 +119,15 @@ pub(super) struct Resonance {
 
 /// A record's spectrum divided by its background.
 pub(super) struct WhitenedSpectrum<'a> {
+    periodogram: &'a Periodogram,
     resolution: f64,
     background: Background<'a>,
     /// Ordinates at the multiples of the resolution, over the background's shape.
     whitened: Vec<f64>,
-    /// Ordinates at the multiples of `1/PADDING` of the resolution.
-    padded: Vec<f64>,
-    /// Factor by which resonances were removed from each of the `padded` ordinates.
-    deflation: Vec<f64>,
+    /// Ordinates at the multiples of `1/PADDING` of the resolution, which a resonance does not need.
+    padded: OnceCell<Vec<f64>>,
+    /// The resonances that were removed.
+    removed: Vec<Lorentz>,
     /// As those of the [`Spectrum`].
     independent: f64,
     floor: &'a Rounding,
@@ -141,28 +143,41 @@ impl<'a> WhitenedSpectrum<'a> {
         kept: Option<usize>,
     ) -> Option<Self> {
         let &Spectrum { ref periodogram, sample_period, read_every, independent, ref floor } = spectrum;
-        let looks = periodogram.looks();
-        let bin = |at: usize| at as f64 / PADDING as f64;
+        let (looks, resolution) = (periodogram.looks(), periodogram.resolution());
         let others = resonances.iter().enumerate().filter(|(index, _)| Some(*index) != kept);
-        let mut deflation = vec![1.0; periodogram.padded().len()];
-        for (_, other) in others {
-            deflation.iter_mut().enumerate().for_each(|(at, factor)| *factor *= other.lorentz.deflation(bin(at)));
-        }
-        let mut density: Vec<f64> =
-            periodogram.independent().iter().zip(deflation.iter().step_by(PADDING)).map(|(a, b)| a * b).collect();
-        if let Some(kept) = kept.and_then(|kept| resonances.get(kept)) {
-            density.iter_mut().enumerate().for_each(|(bin, ordinate)| *ordinate *= kept.lorentz.deflation(bin as f64));
-        }
-        let background =
-            Background::fit(&density, looks, known, periodogram.resolution(), (sample_period, read_every))?;
-        let over_shape = |(at, (ordinate, deflation)): (usize, (&f64, &f64))| match at {
-            0 => 0.0,
-            at => ordinate * deflation / background.shape_at(bin(at)),
-        };
-        let padded: Vec<f64> = periodogram.padded().iter().zip(&deflation).enumerate().map(over_shape).collect();
-        let whitened = padded.iter().copied().step_by(PADDING).collect();
-        let resolution = periodogram.resolution();
-        Some(Self { resolution, background, whitened, padded, deflation, independent, floor, looks })
+        let removed: Vec<Lorentz> = others.map(|(_, other)| other.lorentz).collect();
+        let mut whitened = periodogram.independent();
+        whitened.iter_mut().enumerate().for_each(|(bin, ordinate)| *ordinate *= deflation(&removed, bin as f64));
+        let kept = kept.and_then(|kept| resonances.get(kept));
+        let density = kept.map(|kept| {
+            whitened.iter().enumerate().map(|(bin, ordinate)| ordinate * kept.lorentz.deflation(bin as f64)).collect()
+        });
+        let density: &Vec<f64> = density.as_ref().unwrap_or(&whitened);
+        let background = Background::fit(density, looks, known, resolution, (sample_period, read_every))?;
+        let over_shape = |(bin, ordinate): (usize, &mut f64)| *ordinate /= background.shape_at(bin as f64);
+        whitened.iter_mut().enumerate().skip(1).for_each(over_shape);
+        whitened[0] = 0.0;
+        let padded = OnceCell::new();
+        Some(Self { periodogram, resolution, background, whitened, padded, removed, independent, floor, looks })
+    }
+
+    /// Ordinates at the multiples of `1/PADDING` of the resolution, over the background's shape.
+    fn padded(&self) -> &[f64] {
+        self.padded.get_or_init(|| {
+            let over_shape = |(at, ordinate): (usize, &f64)| {
+                let bin = at as f64 / PADDING as f64;
+                match at % PADDING {
+                    0 => self.whitened[at / PADDING],
+                    _ => ordinate * deflation(&self.removed, bin) / self.background.shape_at(bin),
+                }
+            };
+            self.periodogram.padded().iter().enumerate().map(over_shape).collect()
+        })
+    }
+
+    /// Factor by which resonances were removed from an ordinate of [`padded`](Self::padded).
+    fn deflation_at(&self, at: usize) -> f64 {
+        deflation(&self.removed, at as f64 / PADDING as f64)
     }
 
     /// Least density of the background at a bin.
@@ -217,7 +232,7 @@ impl<'a> WhitenedSpectrum<'a> {
             let bin = sine.frequency / self.resolution;
             let level = self.background.level(&self.whitened, at / PADDING);
             let background = (level.value * self.background.shape_at(bin)).max(self.floor_at(bin));
-            let ratio = sine.density(series) * self.deflation[at] / background;
+            let ratio = sine.density(series) * self.deflation_at(at) / background;
             (ratio, level, sine)
         });
         let (ratio, level, sine) = candidates.max_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -229,14 +244,15 @@ impl<'a> WhitenedSpectrum<'a> {
         let mut level = 1.0;
         let mut until = 0;
         let mut peaks = Vec::new();
-        for at in PADDING * FEWEST_PERIODS..self.padded.len().saturating_sub(2 * PADDING) {
+        let padded = self.padded();
+        for at in PADDING * FEWEST_PERIODS..padded.len().saturating_sub(2 * PADDING) {
             let bin = at / PADDING;
             if bin >= until {
                 // The level is computed at every few ordinates: it changes little over a fraction of its window.
                 level = self.background.level(&self.whitened, bin).value;
                 until = bin + (bin / 16).clamp(1, WINDOW / 8);
             }
-            let [left, here, right] = [self.padded[at - 1], self.padded[at], self.padded[at + 1]];
+            let [left, here, right] = [padded[at - 1], padded[at], padded[at + 1]];
             let is_peak = here >= left && here > right && here > 4.0 * level;
             let bin = at as f64 / PADDING as f64;
             if is_peak && here * self.background.shape_at(bin) > 4.0 * self.floor_at(bin) {
@@ -306,17 +322,18 @@ impl<'a> WhitenedSpectrum<'a> {
     /// The sinusoid whose peak is nearest to `bin`, within `width`, both in resolutions; and the padded ordinates that it reaches, with the
     /// densities that they would have without it.
     pub(super) fn sinusoid_near(&self, bin: f64, width: f64, p_value: f64) -> (SpectralLine, Vec<(usize, f64)>) {
-        let last = self.padded.len() - PADDING - 1;
+        let padded = self.padded();
+        let last = padded.len() - PADDING - 1;
         let position = |bin: f64| (bin * PADDING as f64).clamp(1.0, last as f64 - 1.0) as usize;
         let near = position(bin - width)..=position(bin + width);
-        let highest = near.max_by(|&a, &b| self.padded[a].total_cmp(&self.padded[b])).unwrap_or(1);
+        let highest = near.max_by(|&a, &b| padded[a].total_cmp(&padded[b])).unwrap_or(1);
         let level = self.background.level(&self.whitened, highest / PADDING).value;
         // The logarithm of the main lobe of a taper is a parabola but for a hundredth of the resolution.
-        let [left, here, right] = [highest - 1, highest, highest + 1].map(|at| self.padded[at].ln());
+        let [left, here, right] = [highest - 1, highest, highest + 1].map(|at| padded[at].ln());
         let curvature = 2.0 * here - left - right;
         let shift = if curvature > 0.0 { (0.5 * (right - left) / curvature).clamp(-0.5, 0.5) } else { 0.0 };
         let centre = (highest as f64 + shift) / PADDING as f64;
-        let exceeds = |at: &usize| self.padded[*at] > level * (1.0 + EXCEEDS / self.independent.sqrt());
+        let exceeds = |at: &usize| padded[*at] > level * (1.0 + EXCEEDS / self.independent.sqrt());
         let below = (1..highest).rev().take(MOST_REACHED).take_while(exceeds).count().max(PADDING).min(highest - 1);
         let above = (highest + 1..last).take(MOST_REACHED).take_while(exceeds).count().max(PADDING);
         let reached = highest - below..=(highest + above).min(last);
@@ -324,7 +341,7 @@ impl<'a> WhitenedSpectrum<'a> {
         let over: f64 = reached
             .clone()
             .filter(|at| at.is_multiple_of(PADDING))
-            .map(|at| self.padded[at] * self.background.shape_at((at / PADDING) as f64) - without(at))
+            .map(|at| padded[at] * self.background.shape_at((at / PADDING) as f64) - without(at))
             .sum();
         let ordinates = (below + above) as f64 / PADDING as f64;
         // Energy of the sinusoid over the density of the noise, in all stretches together, and the scatter of both.
@@ -332,7 +349,7 @@ impl<'a> WhitenedSpectrum<'a> {
         let relative = 0.5 * (self.independent * ordinates + 2.0 * ratio).sqrt() / ratio;
         let deviation = (over.max(0.0) * self.resolution).sqrt();
         let by_noise = relative * 3f64.sqrt() / PI;
-        let peak = (self.padded[highest] / level).max(1.0);
+        let peak = (padded[highest] / level).max(1.0);
         let line = SpectralLine {
             // Cramér-Rao bound for a sinusoid in white noise, whose phase is another one in each stretch.
             frequency: MeasuredValue {
@@ -346,7 +363,7 @@ impl<'a> WhitenedSpectrum<'a> {
             shape_p_value: 1.0,
             modulation: None,
         };
-        let replaced = reached.map(|at| (at, without(at) / self.deflation[at])).collect();
+        let replaced = reached.map(|at| (at, without(at) / self.deflation_at(at))).collect();
         (line, replaced)
     }
 
@@ -367,6 +384,11 @@ impl<'a> WhitenedSpectrum<'a> {
             modulation: None,
         }
     }
+}
+
+/// Factor on the ordinate at `bin` resolutions that removes resonances.
+fn deflation(removed: &[Lorentz], bin: f64) -> f64 {
+    removed.iter().fold(1.0, |factor, lorentz| factor * lorentz.deflation(bin))
 }
 
 /// Medians of the averages around each of them, each over `size` ordinates.
