@@ -50,14 +50,15 @@ fn taken<'a, T>(next: &AtomicUsize, items: &'a [T]) -> Option<(usize, &'a T)> {
     Some((at, items.get(at)?))
 }
 
-/// Runs `work` on `count` threads at the same time; a single one is that of the caller. A panic is passed on. It is not generic, so that
-/// what starts and joins threads is compiled once.
+/// Runs `work` on `count` threads at the same time, one of which is that of the caller: it has memory at hand that a new thread takes
+/// from the system. A panic is passed on. It is not generic, so that what starts and joins threads is compiled once.
 fn on_threads(count: usize, work: &(dyn Fn() + Sync)) {
     if count <= 1 {
         return work();
     }
     std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..count).map(|_| scope.spawn(work)).collect();
+        let workers: Vec<_> = (1..count).map(|_| scope.spawn(work)).collect();
+        work();
         workers.into_iter().for_each(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic)));
     });
 }
@@ -77,10 +78,9 @@ pub(crate) fn for_each<T: Send>(changed: &mut [T], task: impl Fn(&mut T) + Sync)
 
 /// Runs `task` for each of `changed` with the one of `others` at the same position, on as many threads as there are cores.
 pub(crate) fn for_each_pair<T: Send, U: Sync>(changed: &mut [T], others: &[U], task: impl Fn(&mut T, &U) + Sync) {
-    let each = changed.len().div_ceil(threads()).max(1);
-    let parts: Vec<_> = changed.chunks_mut(each).zip(others.chunks(each)).map(Mutex::new).collect();
-    in_parallel(&parts, |part| {
-        let (changed, others) = &mut *part.lock().unwrap_or_else(PoisonError::into_inner);
-        changed.iter_mut().zip(*others).for_each(|(changed, other)| task(changed, other));
+    let pairs: Vec<_> = changed.iter_mut().zip(others).map(Mutex::new).collect();
+    in_parallel(&pairs, |pair| {
+        let (changed, other) = &mut *pair.lock().unwrap_or_else(PoisonError::into_inner);
+        task(changed, other);
     });
 }

@@ -24,7 +24,7 @@ pub(crate) use channel_deviance::FilteredChannel;
 use crate::OCTAVES;
 use crate::bounds::BoundedEstimate;
 use crate::effects::findings::{REFUTED, SIGNIFICANCE};
-use crate::parallel;
+use crate::parallel::{self, in_parallel};
 use allan_core::term::MovingAverageFilter;
 use allan_core::{Curve, NoiseTerm};
 use channel_deviance::{ChannelDeviance, without_rounding};
@@ -100,7 +100,7 @@ pub(crate) fn estimate(
     if unfiltered.iter().sum::<f64>() - best.total() <= required {
         return Err(Unidentified::NotCorrelated);
     }
-    let scatters: Vec<f64> = joint.iter().map(|channel| channel.scatter(best.filter)).collect();
+    let scatters = in_parallel(&joint, |channel| channel.scatter(best.filter));
     let falls = |of: &Hypothesis| -> Vec<f64> {
         let standardised = unfiltered.iter().zip(&of.deviances).zip(&scatters);
         standardised.map(|((before, after), scatter)| (before - after) / scatter).collect()

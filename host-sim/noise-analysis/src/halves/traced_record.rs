@@ -90,7 +90,7 @@ impl<'a> TracedRecord<'a> {
             let common = commons.iter().find(|common| common.channels.contains(&channel));
             if self.record.is_traced(channel) { self.effects_of(channel, common) } else { Vec::new() }
         };
-        self.series.ids().map(of).collect()
+        per_channel(self.series.ids(), of)
     }
 
     fn effects_of(&self, channel: ChannelId, common: Option<&ChannelsInCommon>) -> Vec<Effect> {
