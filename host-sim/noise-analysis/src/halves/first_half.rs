@@ -9,7 +9,7 @@ use crate::fit::signal_share::SignalShare;
 use crate::halves::traced_part::{BiasByBlocks, PartData, PartSamples, TracedPart};
 use crate::halves::traced_record::TracedRecord;
 use crate::nonstationarity::{self, ChannelEpochs, EpochCurves, Nonstationarity, TracedChannel};
-use crate::parallel::per_channel;
+use crate::parallel::{self, per_channel};
 use crate::record::estimators::{RecordEstimators, RecordPart};
 use crate::report::assessment::Assessment;
 use crate::report::{
@@ -78,14 +78,15 @@ impl FirstHalf {
             let curves = curves.in_samples(&record.record.channels[channel].samples).without(&fit.signals);
             Some(ChannelEpochs::compare(curves, fit.after()))
         });
-        for (trace, epochs) in part.channels.iter_mut().zip(&channels) {
+        let of_channels: Vec<&Option<ChannelEpochs>> = channels.iter().collect();
+        parallel::for_each_pair(part.channels.as_mut_slice(), &of_channels, |trace, epochs| {
             if let Some(epochs) = epochs {
                 trace.fit.take_terms_that_foretell(epochs.quarter_curves());
             }
             if let Some(recent) = epochs.as_ref().and_then(ChannelEpochs::recent_curve) {
                 trace.fit.fit_to(&recent);
             }
-        }
+        });
         part.take_coefficients_of_samples();
         let has_rules = series.ids().any(|of| record.has_rules(of));
         let raw = per_channel(series.ids(), |channel| {

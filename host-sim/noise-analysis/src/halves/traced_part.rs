@@ -10,7 +10,7 @@ use crate::fit::covariates::CovariateFit;
 use crate::fit::part_filter::{self, FilteredChannel, PartFilter, Unidentified};
 use crate::fit::sample_coefficients::SamplesOfCurve;
 use crate::fit::signal_share::SignalShare;
-use crate::parallel::per_channel;
+use crate::parallel::{self, per_channel};
 use crate::record::condensed_record::CondensedRecord;
 use crate::record::estimators::RecordPart;
 use crate::rivals::channel_lines::fit_with_lines;
@@ -97,36 +97,37 @@ impl TracedPart {
             return Self { channels, filter: Err(Unidentified::NotSought) };
         }
         let filter = agree_on_filter(part, &mut channels);
-        for ChannelTrace { fit, slowest, lines, signals, .. } in &mut channels {
+        parallel::for_each(channels.as_mut_slice(), |ChannelTrace { fit, slowest, lines, signals, .. }| {
             // Before the spectrum shows the same process.
             signals.iter().filter_map(Signal::decays).for_each(|decays| fit.add_shot_noise(decays));
             let frequencies = || lines.iter().map(|line| line.frequency.value);
             slowest.iter().for_each(|spectrum| fit.add_markov_of_spectrum(spectrum, frequencies()));
-        }
+        });
         Self { channels, filter }
     }
 
     /// Makes the terms of `first_half` those of this part, the whole, where the second half, `unseen`, does not contradict them.
     pub(crate) fn take_terms_that_held(&mut self, first_half: &Self, unseen: &RecordPart) {
         let filter = self.filter.as_ref().ok();
-        for (channel, ChannelTrace { fit, .. }) in first_half.channels.with_ids() {
+        let of_half: Vec<(ChannelId, &ChannelTrace)> = first_half.channels.with_ids().collect();
+        parallel::for_each_pair(self.channels.as_mut_slice(), &of_half, |own, (channel, ChannelTrace { fit, .. })| {
             let held = || {
                 let (model, signals) = (fit.after(), fit.signals.within([1.0, 2.0]));
-                let curve = fit.covariates.compensated(unseen, channel);
+                let curve = fit.covariates.compensated(unseen, *channel);
                 Contradiction::find_by(model, &curve, |point| signals.predicted(model, point)).is_none()
             };
-            if unseen.channels[channel].quantity.is_inertial() && held() {
-                self.channels[channel].fit.take_terms_that_held(&fit.traced, filter);
+            if unseen.channels[*channel].quantity.is_inertial() && held() {
+                own.fit.take_terms_that_held(&fit.traced, filter);
             }
-        }
+        });
     }
 
     /// Completes the models with the lines of the spectrum that the curve does not resolve.
     pub(crate) fn add_lines_of_spectrum(&mut self) {
-        for trace in &mut self.channels {
+        parallel::for_each(self.channels.as_mut_slice(), |trace| {
             let lines: Vec<FittedTerm> = trace.lines.iter().map(MergedLine::fitted_term).collect();
             trace.fit.add_lines_of_spectrum(&lines);
-        }
+        });
     }
 
     /// Gives the models the coefficients by all samples.
@@ -269,10 +270,12 @@ fn agree_on_filter(part: &PartData, channels: &mut PerChannel<ChannelTrace>) -> 
         })
         .collect();
     let filter = part_filter::estimate(&filtered, (&profile.filters, profile.may_be_low_pass), decimation);
-    let dithered: Vec<bool> = filtered.iter().map(|channel| channel.is_dithered).collect();
-    for (channel, is_dithered) in inertial.into_iter().zip(dithered) {
-        channels[channel].fit.agree(filter.as_ref().ok(), is_dithered);
-    }
+    let mut dithered = vec![None; curves.channels.iter().len()];
+    inertial.iter().zip(&filtered).for_each(|(channel, of)| dithered[channel.position()] = Some(of.is_dithered));
+    let common = filter.as_ref().ok();
+    parallel::for_each_pair(channels.as_mut_slice(), &dithered, |trace, is_dithered| {
+        is_dithered.iter().for_each(|is_dithered| trace.fit.agree(common, *is_dithered));
+    });
     filter
 }
 
