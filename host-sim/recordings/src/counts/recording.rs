@@ -125,9 +125,9 @@ impl Recorder {
         self.recording.range = range;
     }
 
-    /// The samples that were added since they were taken last.
-    pub(crate) fn take_samples(&mut self) -> Vec<RecordedSample> {
-        std::mem::take(&mut self.recording.samples)
+    /// The samples that were added since they were taken last; their memory is kept for the next ones.
+    pub(crate) fn drain_samples(&mut self) -> impl Iterator<Item = RecordedSample> {
+        self.recording.samples.drain(..)
     }
 
     /// The recording of all bursts that were added.

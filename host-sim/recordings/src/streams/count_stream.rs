@@ -22,7 +22,7 @@ pub(crate) fn head(
     most: u64,
 ) -> Result<(Recording, bool), InputError> {
     let mut table = CountTable::new(file, Lines::open_monitored(file, monitor)?)?;
-    let mut recorder = Recorder::new(table.channels(), range);
+    let mut recorder = Recorder::new(table.channels(), range).with_capacity(most);
     while table.rows() < most {
         let Some(row) = table.next()? else { return Ok((recorder.finish(), true)) };
         recorder.push(row.time_stamp, &Burst::from_counts(&row.counts));
@@ -92,24 +92,27 @@ impl CountStream {
 
     /// The next samples, of channels with the profiles of `profile`; `None` at the end.
     pub(crate) fn next(&mut self, profile: &SensorProfile) -> Result<Option<SampleBlock>, StreamError> {
-        let Some(usable) = self.next_usable()? else { return Ok(None) };
-        let first = self.first.map_or(0, |first| first.period);
-        Ok(Some(SampleBlock {
-            channels: channels(&self.table.channels(), profile, usable.iter().map(|(_, sample)| *sample)),
-            slots: usable.iter().map(|(placed, _)| placed.period - first).collect(),
-        }))
+        let (mut slots, mut usable) = (Vec::with_capacity(BLOCK), Vec::with_capacity(BLOCK));
+        let take = |slot: u64, sample: &RecordedSample| {
+            slots.push(slot);
+            usable.push(*sample);
+        };
+        let is_there = self.next_usable(take)?;
+        let block =
+            || SampleBlock { channels: channels(&self.table.channels(), profile, usable.iter().copied()), slots };
+        Ok(is_there.then(block))
     }
 
     /// Reads to the end, for what is counted on the way.
     pub(crate) fn read_to_end(&mut self) -> Result<(), StreamError> {
-        while self.next_usable()?.is_some() {}
+        while self.next_usable(|_, _| {})? {}
         Ok(())
     }
 
-    /// The next samples that can be used, with their sample periods; `None` at the end.
-    fn next_usable(&mut self) -> Result<Option<Vec<(Placed, RecordedSample)>>, StreamError> {
+    /// Calls `take` with each of the next samples that can be used, and its sample period counted from the first one; false at the end.
+    fn next_usable(&mut self, mut take: impl FnMut(u64, &RecordedSample)) -> Result<bool, StreamError> {
         if self.is_finished {
-            return Ok(None);
+            return Ok(false);
         }
         let mut rows = 0;
         while rows < BLOCK && self.table.rows() < self.most {
@@ -122,7 +125,7 @@ impl CountStream {
         }
         self.is_finished |= self.table.rows() >= self.most;
         let before = self.arrived.len();
-        for sample in self.recorder.take_samples() {
+        for sample in self.recorder.drain_samples() {
             let time_s = sample.time_stamp.time_s;
             let is_short =
                 matches!((self.before_s, time_s), (Some(before), Some(now)) if now - before < self.shortest_s);
@@ -137,9 +140,15 @@ impl CountStream {
         let stamp =
             |sample: &RecordedSample| Stamp { time_s: sample.time_stamp.time_s, index: sample.time_stamp.index };
         let placed = self.clock.place(self.arrived[before..].iter().map(stamp), self.is_finished)?;
-        let later = self.arrived.split_off(placed.len());
-        let ready = std::mem::replace(&mut self.arrived, later);
-        Ok(Some(placed.into_iter().zip(ready).filter(|(placed, sample)| self.is_usable(*placed, sample)).collect()))
+        let mut arrived = std::mem::take(&mut self.arrived);
+        for (placed, sample) in placed.iter().zip(&arrived) {
+            if self.is_usable(*placed, sample) {
+                take(placed.period - self.first.map_or(0, |first| first.period), sample);
+            }
+        }
+        arrived.drain(..placed.len());
+        self.arrived = arrived;
+        Ok(true)
     }
 
     /// Counts a sample, and tells whether it can be used.
