@@ -3,7 +3,7 @@
 //! Tables of register counts, tables in any units and arrays of NumPy are read twice: once for the sample rate, the length, and the
 //! size of a count, and once for the samples. Their first rows are read before that, as many as the caller says, to tell the clock of
 //! the time stamps; a recording that has no more rows, or another format, is held in memory and is the same as that of the other
-//! readers. What a simulation or a log of the bus recorded is in memory already: it is read once, and released as it is read.
+//! readers. The samples of a table of counts that has not many more are kept from the first of the two readings for the second one. What a simulation or a log of the bus recorded is in memory already: it is read once, and released as it is read.
 
 use crate::counts::recording::Recording;
 use crate::formats::file_format::{FileFormat, InputFile};
@@ -73,8 +73,17 @@ pub struct SampleStream {
 enum Content {
     Held,
     Recorded(Box<RecordedBlocks>),
-    Counts(Box<Source<GyroRange>>),
+    Counts(Box<Counts>),
     Values(Box<Values>),
+}
+
+/// A table of register counts.
+struct Counts {
+    source: Source<GyroRange>,
+    /// Rows of the longest table whose samples are kept when it is surveyed.
+    most_kept: u64,
+    /// The samples of all of it, until they are used.
+    kept: Vec<SampleBlock>,
 }
 
 /// Numbers in any units.
@@ -201,7 +210,7 @@ impl SampleStream {
         let mut description = RecordingDescription::from(&base.measurement);
         let beginning = base.measurement.before(BEGINNING);
         drop((recording, base.measurement));
-        let content = Content::Counts(Box::new(source));
+        let content = Content::Counts(Box::new(Counts { source, most_kept: kept.rows_with_losses, kept: Vec::new() }));
         description.samples = 0;
         let mut stream = Self { content, beginning, description, notes: Vec::new(), monitor: monitor.clone() };
         stream.survey()?;
@@ -327,8 +336,12 @@ impl SampleStream {
                 blocks.for_each(take);
                 None
             }
-            Content::Counts(source) => {
-                let mut pass = open_counts(source, &self.monitor)?;
+            Content::Counts(counts) if !counts.kept.is_empty() => {
+                std::mem::take(&mut counts.kept).into_iter().for_each(take);
+                None
+            }
+            Content::Counts(counts) => {
+                let mut pass = open_counts(&counts.source, &self.monitor)?;
                 for_each_ahead(|| pass.next(&self.description.profile), take)?;
                 pass.is_stopped().then(|| pass.rows())
             }
@@ -353,7 +366,7 @@ impl SampleStream {
         let Some(rows) = stopped_at else { return Ok(true) };
         match &mut self.content {
             Content::Held | Content::Recorded(_) => {}
-            Content::Counts(source) => source.most = rows,
+            Content::Counts(counts) => counts.source.most = rows,
             Content::Values(values) => values.source.most = rows,
         }
         self.survey()?;
@@ -363,7 +376,7 @@ impl SampleStream {
     /// An error of the file under the name by which the user knows it.
     fn renamed(&self, error: StreamError) -> StreamError {
         match (&self.content, error) {
-            (Content::Counts(source), StreamError::Input(error)) => source.input.rename(error).into(),
+            (Content::Counts(counts), StreamError::Input(error)) => counts.source.input.rename(error).into(),
             (Content::Values(values), StreamError::Input(error)) => values.source.input.rename(error).into(),
             (_, error) => error,
         }
@@ -379,9 +392,18 @@ impl SampleStream {
         monitor.begin_pass(ReadPass::Survey);
         match content {
             Content::Held | Content::Recorded(_) => {}
-            Content::Counts(source) => {
+            Content::Counts(counts) => {
+                let Counts { source, most_kept, kept } = counts.as_mut();
                 let mut pass = open_counts(source, monitor)?;
-                pass.read_to_end()?;
+                while pass.rows() <= *most_kept
+                    && let Some(block) = pass.next(&description.profile)?
+                {
+                    kept.push(block);
+                }
+                if pass.rows() > *most_kept {
+                    *kept = Vec::new();
+                    pass.read_to_end()?;
+                }
                 if pass.is_stopped() {
                     source.most = pass.rows();
                 }
