@@ -35,7 +35,11 @@ struct CoupledPair {
 impl CoupledEstimators {
     /// Estimators of so many channels, of which those at the positions `coupled` have a covariance with each other.
     pub(crate) fn new(channels: usize, coupled: &[usize]) -> Self {
-        let pairs = coupled.iter().enumerate().flat_map(|(at, &a)| coupled[..at].iter().map(move |&b| [a, b]));
+        Self::of_pairs(channels, pairs(coupled))
+    }
+
+    /// Estimators of so many channels, of which these pairs have a covariance.
+    fn of_pairs(channels: usize, pairs: impl Iterator<Item = [usize; 2]>) -> Self {
         Self {
             cascades: vec![GappedCascade::default(); channels],
             couplings: pairs.map(|channels| CoupledPair { channels, coupling: Coupling::new() }).collect(),
@@ -88,6 +92,11 @@ impl CoupledEstimators {
     }
 }
 
+/// All pairs of channels at these positions.
+fn pairs(coupled: &[usize]) -> impl Iterator<Item = [usize; 2]> {
+    coupled.iter().enumerate().flat_map(|(at, &a)| coupled[..at].iter().map(move |&b| [a, b]))
+}
+
 /// Estimators of one half of a recording, or of both halves, in physical units.
 #[derive(Clone)]
 pub(crate) struct RecordPart {
@@ -119,21 +128,14 @@ pub(crate) struct RecordEstimators {
 impl RecordEstimators {
     /// Estimates from the means of `record`, and from the curves of its samples at shorter averaging times.
     pub(crate) fn estimate(record: &CondensedRecord, preprocessing: &Preprocessing) -> Self {
-        let (ruled, both) = (Exclusion::ByFirstHalf, Exclusion::ByWhole);
-        // Nothing is estimated twice.
-        let mut distinct = vec![Exclusion::None];
-        let is_distinct = |of: Exclusion| {
-            preprocessing.excludes_any(of) || (of == both && preprocessing.corrects_otherwise_by_whole())
-        };
-        distinct.extend([ruled, both].into_iter().filter(|&of| is_distinct(of)));
-        let work: Vec<(Exclusion, Half)> =
-            distinct.iter().flat_map(|&of| [Half::First, Half::Second].map(|half| (of, half))).collect();
-        let parts = in_parallel(&work, |&(exclusion, of)| half(record, preprocessing, exclusion, of));
-        let of = |exclusion: Exclusion| {
-            let position = distinct.iter().position(|of| *of == exclusion).unwrap_or(0);
-            [parts[2 * position].clone(), parts[2 * position + 1].clone()]
-        };
-        let (raw, ruled, [first, second]) = (of(Exclusion::None), of(ruled), of(both));
+        let alike = AlikeExclusions::new(record.means.as_ref(), preprocessing);
+        let work: Vec<(usize, Half)> =
+            (0..EXCLUSIONS.len()).flat_map(|of| [Half::First, Half::Second].map(|half| (of, half))).collect();
+        let own =
+            in_parallel(&work, |&(of, half)| own_estimators(record.means.as_ref(), preprocessing, (&alike, of), half));
+        let [raw, ruled, [first, second]] = std::array::from_fn(|of| {
+            [0, 1].map(|half| RecordPart::of_means(record, alike.estimators(of, |of| &own[2 * of + half])))
+        });
         let both = first.followed_by(&second);
         let halves = |parts: [RecordPart; 2], exclusion: Exclusion| {
             let [first, second] = parts;
@@ -149,13 +151,71 @@ impl RecordEstimators {
     }
 }
 
-/// The estimators of a half of a recording, by time, without the samples of `exclusion`.
-fn half(record: &CondensedRecord, preprocessing: &Preprocessing, exclusion: Exclusion, half: Half) -> RecordPart {
-    let measurement = record.means.as_ref();
-    let is_coupled = |quantity: Quantity| quantity.is_inertial() || quantity.is_environment();
-    let coupled = measurement.ids().filter(|&channel| is_coupled(measurement[channel].profile.quantity));
-    let coupled: Vec<usize> = coupled.map(ChannelId::position).collect();
-    let mut estimators = CoupledEstimators::new(measurement.channels.len(), &coupled);
+/// What may be left out of a recording.
+const EXCLUSIONS: [Exclusion; 3] = [Exclusion::None, Exclusion::ByFirstHalf, Exclusion::ByWhole];
+
+/// Which of the [`EXCLUSIONS`] leave a channel the same samples: nothing is estimated twice.
+struct AlikeExclusions {
+    /// For each exclusion and channel, the number of the first exclusion that does.
+    first: [Vec<usize>; EXCLUSIONS.len()],
+    /// Pairs of channels that have a covariance.
+    coupled: Vec<[usize; 2]>,
+}
+
+impl AlikeExclusions {
+    fn new(measurement: &Measurement, preprocessing: &Preprocessing) -> Self {
+        let is_coupled = |quantity: Quantity| quantity.is_inertial() || quantity.is_environment();
+        let coupled = measurement.ids().filter(|&channel| is_coupled(measurement[channel].profile.quantity));
+        let coupled: Vec<usize> = coupled.map(ChannelId::position).collect();
+        let first = EXCLUSIONS.map(|of| {
+            let is_alike = |channel, other: &Exclusion| preprocessing.leaves_the_same(channel, *other, of);
+            let first = |channel| EXCLUSIONS.iter().position(|other| is_alike(channel, other)).unwrap_or(0);
+            measurement.ids().map(first).collect()
+        });
+        Self { first, coupled: pairs(&coupled).collect() }
+    }
+
+    /// The number of the first exclusion that leaves both channels the same samples as the one of this number.
+    fn first_of_pair(&self, of: usize, pair: &[usize; 2]) -> usize {
+        let is_alike =
+            |other: &usize| pair.iter().all(|&channel| self.first[*other][channel] == self.first[of][channel]);
+        (0..of).find(is_alike).unwrap_or(of)
+    }
+
+    /// The pairs of channels of which no exclusion before this one leaves the same samples.
+    fn own_pairs(&self, of: usize) -> impl Iterator<Item = [usize; 2]> {
+        self.coupled.iter().copied().filter(move |pair| self.first_of_pair(of, pair) == of)
+    }
+
+    /// The estimators for an exclusion, from its own ones and those of the exclusions before it.
+    fn estimators<'e>(&self, of: usize, own: impl Fn(usize) -> &'e CoupledEstimators) -> CoupledEstimators {
+        let cascade = |(channel, &first): (usize, &usize)| own(first).cascades[channel].clone();
+        let coupling = |pair: &[usize; 2]| {
+            own(self.first_of_pair(of, pair)).couplings.iter().find(|known| known.channels == *pair).cloned()
+        };
+        CoupledEstimators {
+            cascades: self.first[of].iter().enumerate().map(cascade).collect(),
+            couplings: self.coupled.iter().filter_map(coupling).collect(),
+        }
+    }
+}
+
+/// The estimators of a half of a recording, by time, of the channels and the pairs that are an exclusion's own.
+fn own_estimators(
+    measurement: &Measurement,
+    preprocessing: &Preprocessing,
+    (alike, of): (&AlikeExclusions, usize),
+    half: Half,
+) -> CoupledEstimators {
+    let exclusion = EXCLUSIONS[of];
+    let mut estimators = CoupledEstimators::of_pairs(measurement.channels.len(), alike.own_pairs(of));
+    let is_own = |channel: usize| {
+        alike.first[of][channel] == of || estimators.couplings.iter().any(|pair| pair.channels.contains(&channel))
+    };
+    let is_own: Vec<bool> = (0..measurement.channels.len()).map(is_own).collect();
+    if !is_own.contains(&true) {
+        return estimators;
+    }
     let recorded: Vec<RecordedSamples> = measurement
         .ids()
         .map(|id| {
@@ -184,8 +244,8 @@ fn half(record: &CondensedRecord, preprocessing: &Preprocessing, exclusion: Excl
         // Of a gap over the middle, each half has the samples on its side.
         let own = u32::try_from(slot - begins_at).unwrap_or(u32::MAX);
         estimators.gap(measurement.missing_before(position).min(own));
-        estimators.push(recorded.iter().map(|of| {
-            (!of.is_excluded[position]).then(|| {
+        estimators.push(recorded.iter().zip(&is_own).map(|(of, is_own)| {
+            (*is_own && !of.is_excluded[position]).then(|| {
                 let counts = f64::from(of.channel.counts[position]) - f64::from(of.origin);
                 let steps = counts * STEPS_PER_COUNT;
                 if !of.is_corrected {
@@ -196,15 +256,7 @@ fn half(record: &CondensedRecord, preprocessing: &Preprocessing, exclusion: Excl
             })
         }));
     }
-    RecordPart {
-        channels: measurement.profiles().collect(),
-        estimators,
-        resolutions: record.channels.map(|of| of.samples.resolution),
-        period_s: measurement.period_s(),
-        samples_per_mean: record.samples_per_mean,
-        until: 1,
-        shorter: measurement.ids().map(|_| (Curve::empty(), 0)).collect(),
-    }
+    estimators
 }
 
 /// A half of a recording, by time.
@@ -239,6 +291,20 @@ fn positions(measurement: &Measurement, channel: &MeasuredChannel, excluded: &[u
 }
 
 impl RecordPart {
+    /// With these estimators of the means of `record`.
+    fn of_means(record: &CondensedRecord, estimators: CoupledEstimators) -> Self {
+        let measurement = record.means.as_ref();
+        Self {
+            channels: measurement.profiles().collect(),
+            estimators,
+            resolutions: record.channels.map(|of| of.samples.resolution),
+            period_s: measurement.period_s(),
+            samples_per_mean: record.samples_per_mean,
+            until: 1,
+            shorter: measurement.ids().map(|_| (Curve::empty(), 0)).collect(),
+        }
+    }
+
     /// This part followed, after a gap, by `later`.
     pub(crate) fn followed_by(&self, later: &Self) -> Self {
         Self { estimators: self.estimators.clone().followed_by(&later.estimators), ..self.clone() }

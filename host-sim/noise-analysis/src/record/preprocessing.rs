@@ -94,11 +94,6 @@ impl Preprocessing {
         !self.channels[channel].exclusion.slots(exclusion).is_empty()
     }
 
-    /// Whether `exclusion` leaves out a sample of any channel, beyond those that were read twice.
-    pub(crate) fn excludes_any(&self, exclusion: Exclusion) -> bool {
-        self.channels.ids().any(|channel| self.excludes(channel, exclusion))
-    }
-
     /// Whether the series of a channel is the same for two exclusions.
     pub(crate) fn leaves_the_same(&self, channel: ChannelId, one: Exclusion, other: Exclusion) -> bool {
         let bias = |exclusion| self.channels[channel].bias(exclusion);
@@ -136,13 +131,6 @@ impl Preprocessing {
         let bias = self.channels[channel].bias(exclusion);
         let steps = bias.offsets.iter().filter(|(from, _)| slot >= *from).map(|(_, size)| *size);
         steps.chain(bias.responses.iter().map(|response| response.bias(slot))).sum()
-    }
-
-    /// Whether other offsets and responses are subtracted by the first half than by the whole record.
-    pub(crate) fn corrects_otherwise_by_whole(&self) -> bool {
-        let is_other =
-            |[half, whole]: &[ChannelBias; 2]| half.offsets != whole.offsets || half.responses != whole.responses;
-        self.channels.iter().any(|of| is_other(&of.bias))
     }
 
     /// A channel's series as measured, with its resolution.
