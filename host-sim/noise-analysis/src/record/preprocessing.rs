@@ -76,7 +76,9 @@ impl Preprocessing {
         let counts_per_step = record.channels.map(|of| of.counts_per_step);
         let preprocessing = Self { slots, counts_per_step, repeated: record.repeated.clone(), channels };
         let series = per_channel(measurement.ids(), |channel| preprocessing.measured(measurement, channel));
-        let knocks = KnocksInChannels::find(record, &series);
+        let middle = measurement.middle();
+        let halves = series.map(|of| of.before(middle));
+        let knocks = KnocksInChannels::find(record, &series, &halves);
         // What a channel may depend on, without its own knocks.
         let quiet: PerChannel<Series> =
             series.with_ids().map(|(channel, series)| knocks.removed_from(series, channel)).collect();
@@ -84,7 +86,7 @@ impl Preprocessing {
             if !record.is_traced(channel) {
                 return ChannelPreprocessing::default();
             }
-            ChannelPreprocessing::detect(record, channel, (&series, &quiet, &knocks), noise_grids)
+            ChannelPreprocessing::detect(record, channel, (&series, &halves), (&quiet, &knocks), noise_grids)
         });
         Self { channels: found, ..preprocessing }
     }
@@ -170,11 +172,12 @@ impl Preprocessing {
 }
 
 impl ChannelPreprocessing {
-    /// What the samples of `channel` show. `series` and `quiet` are those of all channels, with and without `knocks`.
+    /// What the samples of `channel` show. `series` and their first `halves` are those of all channels, `quiet` without `knocks`.
     fn detect(
         record: &CondensedRecord,
         channel: ChannelId,
-        (series, quiet, knocks): (&PerChannel<Series>, &PerChannel<Series>, &KnocksInChannels),
+        (series, halves): (&PerChannel<Series>, &PerChannel<Series>),
+        (quiet, knocks): (&PerChannel<Series>, &KnocksInChannels),
         noise_grids: &NoiseGrids,
     ) -> Self {
         let measurement = record.means.as_ref();
@@ -197,12 +200,12 @@ impl ChannelPreprocessing {
         let own = without_lines(quiet[channel].clone().without(&exclusion.spikes));
         let whole = bias::find(&own, &others, &accelerations(measurement, series, channel), noise_grids, &least_step);
         let half = {
-            let all = series.map(|of| of.before(middle));
-            let quiet = |&of: &ChannelId| all[of].clone().without(&slots_within(&all[of], &knocks.by_first_half[of]));
+            let quiet =
+                |&of: &ChannelId| halves[of].clone().without(&slots_within(&halves[of], &knocks.by_first_half[of]));
             let others: Vec<Series> = regressors.iter().map(quiet).collect();
             let others: Vec<&Series> = others.iter().collect();
-            let own = without_lines(all[channel].clone().without(&exclusion.by_first_half));
-            bias::find(&own, &others, &accelerations(measurement, &all, channel), noise_grids, &least_step)
+            let own = without_lines(halves[channel].clone().without(&exclusion.by_first_half));
+            bias::find(&own, &others, &accelerations(measurement, halves, channel), noise_grids, &least_step)
         };
         // The differences measure a sensitivity to motion better; the slow part of an accelerometer's signal is its own drift.
         let is_slow = |regressor: ChannelId| measurement[regressor].profile.quantity.is_environment();
@@ -289,14 +292,13 @@ struct KnocksInChannels {
 }
 
 impl KnocksInChannels {
-    fn find(record: &CondensedRecord, series: &PerChannel<Series>) -> Self {
+    fn find(record: &CondensedRecord, series: &PerChannel<Series>, halves: &PerChannel<Series>) -> Self {
         let measurement = record.means.as_ref();
         let (middle, dithered) = (measurement.middle(), measurement.profile.dithered_avar_counts2);
         let inertial: Vec<ChannelId> = measurement.inertial().collect();
-        let of_all = |part: &dyn Fn(&Series) -> Series| inertial.iter().map(|&of| part(&series[of])).collect();
-        let whole: Vec<Series> = of_all(&Series::clone);
-        let first: Vec<Series> = of_all(&|of| of.before(middle));
-        let second: Vec<Series> = of_all(&|of| of.from(middle));
+        let whole: Vec<Series> = inertial.iter().map(|&of| series[of].clone()).collect();
+        let first: Vec<Series> = inertial.iter().map(|&of| halves[of].clone()).collect();
+        let second: Vec<Series> = inertial.iter().map(|&of| series[of].from(middle)).collect();
         let rules = in_parallel(&first, |first| KnockRule::fit(first, dithered));
         let parts = in_parallel(&[first, second], |part| knocks::find_by(&rules, part));
         let nothing = || measurement.ids().map(|_| Vec::new()).collect::<PerChannel<Vec<Knock>>>();
