@@ -8,6 +8,7 @@
 use crate::bounds::BoundedEstimate;
 use crate::effects::findings::SIGNIFICANCE;
 use crate::effects::{Effect, StuckOutput};
+use crate::parallel::{self, in_parallel};
 use measurement::{MeasuredChannel, Measurement, SampleBlock};
 use std::borrow::Cow;
 
@@ -87,7 +88,7 @@ impl StuckScreen {
                 }
             })
         };
-        Self { channels: beginning.channels.iter().map(channel).collect(), samples, last: Vec::new() }
+        Self { channels: in_parallel(&beginning.channels, channel), samples, last: Vec::new() }
     }
 
     /// The next samples, those of a run refused from the one on by which chance does not make it.
@@ -107,15 +108,19 @@ impl StuckScreen {
                     block.channels.len() == 1 || channels.any(|(number, of)| before(number) != Some(of.counts[at]))
                 })
                 .collect();
-            for (number, channel) in self.channels.iter_mut().enumerate() {
-                let (Some(channel), Some(measured)) = (channel, block.channels.get(number)) else { continue };
+            let together = self.channels.iter_mut().zip(&block.channels).map(|(channel, of)| (channel, of, Vec::new()));
+            let mut together: Vec<_> = together.collect();
+            parallel::for_each(&mut together, |(channel, measured, stuck)| {
+                let Some(channel) = channel else { return };
                 let refused = measured.refused.iter().filter(|(cause, _)| **cause != CAUSE);
                 let mut is_usable = is_new.clone();
                 let refused = refused.flat_map(|(_, refused)| refused).filter(|at| positions.contains(at));
                 refused.for_each(|at| is_usable[at - from] = false);
                 let samples: Vec<(usize, i32)> =
                     positions.clone().filter(|at| is_usable[at - from]).map(|at| (at, measured.counts[at])).collect();
-                let stuck = channel.take(&block.slots, &samples, self.samples);
+                *stuck = channel.take(&block.slots, &samples, self.samples);
+            });
+            for (number, (_, _, stuck)) in together.into_iter().enumerate() {
                 if !stuck.is_empty() {
                     let of = screened.to_mut().channels[number].refused.entry(CAUSE).or_default();
                     of.extend(stuck);
