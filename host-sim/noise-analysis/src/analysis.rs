@@ -16,7 +16,7 @@ use crate::halves::first_half::{Epochs, FirstHalf};
 use crate::halves::traced_part::ChannelTrace;
 use crate::halves::traced_record::TracedRecord;
 use crate::nonstationarity::CommonModeRegression;
-use crate::parallel::per_channel;
+use crate::parallel::{self, per_channel};
 use crate::record::condensed_record::CondensedRecord;
 use crate::record::long_record;
 use crate::report::assessment::{AssessedModels, Assessment};
@@ -106,13 +106,13 @@ pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Rep
     watch(Stage::Effects);
     let effects = whole.effects();
     // What the first half shows by itself, to compare with what the whole record shows.
-    let effects_of_half = if effects.iter().all(Vec::is_empty) {
-        effects.clone()
-    } else {
-        TracedRecord::new(&record.first_half()).effects()
+    let of_half = || {
+        let is_compared = effects.iter().any(|of| !of.is_empty());
+        if is_compared { TracedRecord::new(&record.first_half()).effects() } else { effects.clone() }
     };
+    let (effects_of_half, mut channels) =
+        parallel::both(of_half, || channel_reports(&whole, &first_half, &epochs, &effects));
     watch(Stage::Assessment);
-    let mut channels = channel_reports(&whole, &first_half, &epochs, &effects);
     let duration_s = description.periods as f64 * description.period_s();
     let (effects, effects_of_half) = (effects.into_vec(), effects_of_half.into_vec());
     let findings = causes::find(&mut channels, &effects, &effects_of_half, &description.profile, duration_s);

@@ -63,6 +63,18 @@ fn on_threads(count: usize, work: &(dyn Fn() + Sync)) {
     });
 }
 
+/// The results of two tasks, the second of which is done on the thread of the caller.
+pub(crate) fn both<A: Send, B>(first: impl FnOnce() -> A + Send, second: impl FnOnce() -> B) -> (A, B) {
+    if threads() <= 1 {
+        return (first(), second());
+    }
+    std::thread::scope(|scope| {
+        let first = scope.spawn(first);
+        let second = second();
+        (first.join().unwrap_or_else(|panic| resume_unwind(panic)), second)
+    })
+}
+
 /// What `task` makes of each channel, on as many threads as there are cores.
 pub(crate) fn per_channel<T: Send>(
     channels: impl Iterator<Item = ChannelId>,
