@@ -82,6 +82,10 @@ impl SquaredDifferences {
             if a.min(b) < (LEAST_FILL * n as f64).max(1.0) {
                 return f64::NAN;
             }
+            let full = n as f64;
+            if a == full && b == full {
+                return sums[at + 1] / full - sums[at] / full;
+            }
             // White noise has the same variance in every difference, however many samples are missing.
             (sums[at + 1] / b - sums[at] / a) / (0.5 * n as f64 * (1.0 / a + 1.0 / b)).sqrt()
         };
