@@ -126,11 +126,11 @@ impl UniformSeries {
     /// is small behind a filter or beside drift.
     #[must_use]
     pub fn interpolated(&self) -> (Cow<'_, Self>, f64) {
-        let level = self.mean();
         let missing: Vec<usize> = (0..self.values.len()).filter(|&at| !self.values[at].is_finite()).collect();
         if missing.is_empty() || missing.len() == self.values.len() {
             return (Cow::Borrowed(self), 0.0);
         }
+        let level = self.mean();
         let covariance = self.autocovariance(level);
         let mut known: BTreeMap<Neighbours, Option<PartialInterpolation>> = BTreeMap::new();
         let (mut values, mut replaced) = (self.values.clone(), 0_usize);
