@@ -289,10 +289,15 @@ impl<'a> WhitenedSpectrum<'a> {
             // An average over one ordinate cannot be shifted by half of it.
             for (offset, values) in [(0, &averages), (size / 2, &shifted)].into_iter().take(size) {
                 for (at, (&value, level)) in values.iter().zip(&levels).enumerate() {
+                    let [own, others] = [size as f64, level.ordinates].map(|count| self.independent * count);
+                    let most = 1.0 + LEAST_EXCESS.max(EXAMINED * (1.0 / own + 1.0 / others).sqrt());
+                    // The floor is not needed where the level alone is too near.
+                    if value / level.value <= most {
+                        continue;
+                    }
                     let centre = (first + offset + at * size) as f64 + size as f64 / 2.0;
                     let excess = value / level.value.max(self.floor_at(centre) / self.background.shape_at(centre));
-                    let [own, others] = [size as f64, level.ordinates].map(|count| self.independent * count);
-                    if excess > 1.0 + LEAST_EXCESS.max(EXAMINED * (1.0 / own + 1.0 / others).sqrt()) {
+                    if excess > most {
                         let p_value = trials * mean_ratio_tail(excess, own, others);
                         peaks.push((centre, size as f64, p_value));
                     }
