@@ -136,7 +136,7 @@ pub(crate) fn without_sines(mut series: UniformSeries) -> UniformSeries {
 /// ordinates of noise over their mean are exponential variables.
 fn sine_that_stands_out(series: &UniformSeries) -> Option<Sine> {
     let spectrum = Periodogram::new(series)?;
-    let ordinates = spectrum.independent();
+    let ordinates: Vec<f64> = spectrum.independent().collect();
     let over_others = |at: usize| {
         let around = at.saturating_sub(NEARBY).max(FEWEST_PERIODS)..(at + NEARBY + 1).min(ordinates.len());
         let mut others: Vec<f64> = around.filter(|&of| of.abs_diff(at) > 1).map(|of| ordinates[of]).collect();
@@ -209,7 +209,7 @@ impl SlowSine {
 
 /// The sum of the ordinates from one period a record up to those that are searched for lines.
 fn slow_variation(spectrum: &Periodogram) -> f64 {
-    spectrum.independent()[1..=FEWEST_PERIODS].iter().sum()
+    spectrum.independent().skip(1).take(FEWEST_PERIODS).sum()
 }
 
 /// The part of the slow variation `slow` of a series that it has without a sinusoid and the straight line beside it.

@@ -83,8 +83,8 @@ impl Periodogram {
     }
 
     /// Ordinates at the multiples of the resolution, from 0 Hz; those of white noise are independent of each other.
-    pub(super) fn independent(&self) -> Vec<f64> {
-        self.density.iter().copied().step_by(PADDING).collect()
+    pub(super) fn independent(&self) -> impl Iterator<Item = f64> {
+        self.density.iter().copied().step_by(PADDING)
     }
 
     /// All ordinates, [`PADDING`] to a resolution, from 0 Hz.

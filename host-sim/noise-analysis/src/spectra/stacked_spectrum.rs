@@ -80,7 +80,7 @@ impl StackedSpectrum {
             Some(mean) => stretch.averaged((mean.sample_period / self.sample_period).round() as usize),
         };
         let Some(spectrum) = Spectrum::new(&averaged.detrended()) else { return };
-        let level = median(&mut spectrum.periodogram.independent());
+        let level = median(&mut spectrum.periodogram.independent().collect::<Vec<f64>>());
         self.levels = [self.levels[0] + level, self.levels[1] + level * level];
         match &mut self.mean {
             None => self.mean = Some(spectrum),

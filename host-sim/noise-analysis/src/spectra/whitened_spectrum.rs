@@ -146,8 +146,8 @@ impl<'a> WhitenedSpectrum<'a> {
         let (looks, resolution) = (periodogram.looks(), periodogram.resolution());
         let others = resonances.iter().enumerate().filter(|(index, _)| Some(*index) != kept);
         let removed: Vec<Lorentz> = others.map(|(_, other)| other.lorentz).collect();
-        let mut whitened = periodogram.independent();
-        whitened.iter_mut().enumerate().for_each(|(bin, ordinate)| *ordinate *= deflation(&removed, bin as f64));
+        let deflated = |(bin, ordinate)| ordinate * deflation(&removed, bin as f64);
+        let mut whitened: Vec<f64> = periodogram.independent().enumerate().map(deflated).collect();
         let kept = kept.and_then(|kept| resonances.get(kept));
         let density = kept.map(|kept| {
             whitened.iter().enumerate().map(|(bin, ordinate)| ordinate * kept.lorentz.deflation(bin as f64)).collect()
