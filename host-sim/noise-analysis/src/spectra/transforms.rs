@@ -3,8 +3,9 @@
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Lengths that are kept: those of one analysis are of the whole record, of its half, of its means and of stretches.
-const KEPT: usize = 6;
+/// Lengths that are kept: those of one analysis are of the whole record, of its half, of its means and of stretches, each with and without
+/// padding.
+const KEPT: usize = 16;
 
 /// The lengths that were asked for last, the latest first, each with a planner that keeps the plans for it.
 static PLANNERS: Mutex<Vec<(usize, RealFftPlanner<f64>)>> = Mutex::new(Vec::new());
