@@ -1,7 +1,7 @@
 //! Discrete Fourier transforms of a whole record: the tapered periodogram, at the resolution that the record's length
 //! allows, and transforms under sine tapers for its lowest frequencies.
 
-use super::transforms;
+use super::transforms::{self, BufferedTransform};
 use crate::samples::uniform_series::UniformSeries;
 use realfft::num_complex::Complex;
 use std::f64::consts::PI;
@@ -34,10 +34,9 @@ impl Periodogram {
         if values.iter().filter(|value| value.is_finite()).count() < 2 {
             return None;
         }
-        let transform = transforms::forward(PADDING * length);
-        let mut input = transform.make_input_vec();
+        let mut transform = BufferedTransform::new(PADDING * length);
         let mut power = 0.0;
-        for (at, (slot, value)) in input.iter_mut().zip(values).enumerate() {
+        for (at, (slot, value)) in transform.input().iter_mut().zip(values).enumerate() {
             let weight = taper(at, length);
             if value.is_finite() {
                 *slot = weight * value;
@@ -47,13 +46,10 @@ impl Periodogram {
                 power += weight * weight;
             }
         }
-        let mut output = transform.make_output_vec();
-        // An error means buffers of the wrong length; these are the planner's own.
-        transform.process(&mut input, &mut output).ok()?;
         let scale = 2.0 * series.sample_period() / power;
         Some(Self {
             spacing: 1.0 / (PADDING as f64 * length as f64 * series.sample_period()),
-            density: output.iter().map(|bin| scale * bin.norm_sqr()).collect(),
+            density: transform.output()?.iter().map(|bin| scale * bin.norm_sqr()).collect(),
             looks: 1,
         })
     }

@@ -10,7 +10,7 @@
 //! walk whose first value is unknown: their coefficients are independent, with the variance `S(k/2T)/dt` of the two-sided density `S`.
 
 use super::line_models::Sine;
-use super::transforms;
+use super::transforms::BufferedTransform;
 use super::welch::Welch;
 use super::whittle::SpectralBand;
 use crate::samples::rounding::Rounding;
@@ -149,13 +149,10 @@ fn squared_coefficients(values: &[f64], mean: f64) -> Vec<f64> {
     let count = values.len();
     // The transform of the even samples, followed by the odd ones in reverse, turned by a quarter of its phase (J. Makhoul, "A fast
     // cosine transform in one and two dimensions", IEEE Trans. ASSP 28, 1980).
-    let transform = transforms::forward(count);
-    let mut input: Vec<f64> = values.iter().step_by(2).map(|value| value - mean).collect();
-    input.extend(values.iter().skip(1).step_by(2).rev().map(|value| value - mean));
-    let mut output = transform.make_output_vec();
-    if transform.process(&mut input, &mut output).is_err() {
-        return Vec::new();
-    }
+    let mut transform = BufferedTransform::new(count);
+    let in_order = values.iter().step_by(2).chain(values.iter().skip(1).step_by(2).rev());
+    transform.input().iter_mut().zip(in_order).for_each(|(slot, value)| *slot = value - mean);
+    let Some(output) = transform.output() else { return Vec::new() };
     let mut squares = vec![0.0; count - 1];
     for (order, value) in output.iter().enumerate().skip(1) {
         let (sine, cosine) = (PI * order as f64 / (2 * count) as f64).sin_cos();

@@ -1,5 +1,7 @@
 //! Plans of Fourier transforms of real numbers, which are made once for each length.
 
+use crate::parallel::threads;
+use realfft::num_complex::Complex;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -9,6 +11,57 @@ const KEPT: usize = 16;
 
 /// The lengths that were asked for last, the latest first, each with a planner that keeps the plans for it.
 static PLANNERS: Mutex<Vec<(usize, RealFftPlanner<f64>)>> = Mutex::new(Vec::new());
+
+/// Buffers that no transform uses: new ones of megabytes would have to be cleared by the system.
+static BUFFERS: Mutex<Vec<Buffers>> = Mutex::new(Vec::new());
+
+#[derive(Default)]
+struct Buffers {
+    input: Vec<f64>,
+    output: Vec<Complex<f64>>,
+    scratch: Vec<Complex<f64>>,
+}
+
+/// A transform of real numbers with its buffers.
+pub(super) struct BufferedTransform {
+    transform: Arc<dyn RealToComplex<f64>>,
+    buffers: Buffers,
+}
+
+impl BufferedTransform {
+    /// Of `length` numbers, 2 or more, which are 0 at first.
+    pub(super) fn new(length: usize) -> Self {
+        let transform = forward(length);
+        let mut buffers = BUFFERS.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default();
+        buffers.input.clear();
+        buffers.input.resize(length, 0.0);
+        buffers.output.resize(transform.complex_len(), Complex::ZERO);
+        buffers.scratch.resize(transform.get_scratch_len(), Complex::ZERO);
+        Self { transform, buffers }
+    }
+
+    /// The numbers to be transformed.
+    pub(super) fn input(&mut self) -> &mut [f64] {
+        &mut self.buffers.input
+    }
+
+    /// Their transform, for which the numbers are overwritten.
+    pub(super) fn output(&mut self) -> Option<&[Complex<f64>]> {
+        let Buffers { input, output, scratch } = &mut self.buffers;
+        // An error means buffers of the wrong length; these have the transform's own.
+        self.transform.process_with_scratch(input, output, scratch).ok()?;
+        Some(output)
+    }
+}
+
+impl Drop for BufferedTransform {
+    fn drop(&mut self) {
+        let mut free = BUFFERS.lock().unwrap_or_else(PoisonError::into_inner);
+        if free.len() < threads() {
+            free.push(std::mem::take(&mut self.buffers));
+        }
+    }
+}
 
 /// The transform of `length` real numbers, 2 or more.
 pub(super) fn forward(length: usize) -> Arc<dyn RealToComplex<f64>> {
