@@ -195,10 +195,10 @@ pub static RIVALRIES: [Rivalry; 47] = [
     row("first-order filter", "Markov process of the curve", "below 64 samples, with no white noise left but rounding",
         "white noise is never absent, filtered it is such a process",
         Rule::Channel(|of| of.loses_to(|effect| matches!(effect, Effect::LowPassFilter(_))))),
-    row("low-pass filter of the second order", "quantization of the curve", "always",
-        "rounding behind a filter is white, and the filter has its form to a part of what it leaves at half the rate",
-        Rule::Channel(|of| of.kind() == Some(NoiseTerm::Quantization) && of.others().any(|other|
-            matches!(&other.effect, Effect::LowPassFilter(filter) if filter.design.is_second_order())))),
+    row("low-pass filter of the second order", "quantization, or unexplained line of the curve",
+        "always; the line above half of its bandwidth", "the form of the filter is known to a part of what it leaves there, and rounding behind it is white",
+        Rule::Channel(|of| of.bandwidth_hz().is_some_and(|bandwidth| of.kind() == Some(NoiseTerm::Quantization)
+            || is_absent_in_spectrum(of.effect()) && of.line_of_curve().is_some_and(|frequency| frequency > 0.5 * bandwidth)))),
     row("unexplained octave of irreversible changes", "Markov process of the curve", "the changes up and down differ by 2·10⁻⁴",
         "a Gaussian process is the same when time runs backwards",
         Rule::Channel(|of| of.loses_to(|effect| matches!(refutation(effect), Some(Refutation::Irreversible { .. }))))),
@@ -419,6 +419,14 @@ impl<'a> Claim<'a> {
     /// Whether it is of a Markov process or a ramp of the curve.
     fn is_slow_term(&self) -> bool {
         matches!(self.kind(), Some(NoiseTerm::Markov(_) | NoiseTerm::RateRamp))
+    }
+
+    /// Bandwidth of the low-pass filter of the second order that the channel has, Hz.
+    fn bandwidth_hz(&self) -> Option<f64> {
+        self.others().find_map(|other| match &other.effect {
+            Effect::LowPassFilter(filter) if filter.design.is_second_order() => Some(filter.bandwidth_hz.value),
+            _ => None,
+        })
     }
 
     /// Frequency of the term of the curve, if that is a line, Hz.

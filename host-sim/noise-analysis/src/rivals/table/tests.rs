@@ -334,7 +334,7 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
             channel([of_term(0, markov(1.0)), of(common_mode(1.0), Origin::CrossSpectra)]), vec!["common_mode"]),
         (["first-order filter", "Markov process of the curve"],
             channel([of_term(0, low_pass.into()), of_term(0, markov(1.0))]), vec![LowPassFilter::NAME]),
-        (["low-pass filter of the second order", "quantization of the curve"],
+        (["low-pass filter of the second order", "quantization, or unexplained line of the curve"],
             channel([of_term(0, two_stages.into()), of(quantization(), OF_QUANTIZATION)]), vec![LowPassFilter::NAME]),
         (["unexplained octave of irreversible changes", "Markov process of the curve"],
             channel([of_term(0, refuted(IRREVERSIBLE)), of_term(0, markov(1.0))]), vec!["unexplained"]),
