@@ -318,7 +318,7 @@ mod tests {
         let profile = SensorProfile::generic();
         let mut held = 0;
         for (frequency_hz, seed) in
-            [(25.0, 1), (25.0, 2), (60.0, 3), (60.0, 4), (60.0, 5), (90.0, 6), (90.0, 7), (90.0, 8)]
+            [(25.0, 1), (25.0, 2), (60.0, 3), (60.0, 4), (60.0, 5), (40.0, 6), (40.0, 7), (40.0, 8)]
         {
             let recorded = behind_two_stages(frequency_hz, seed);
             let found = estimated_from(&recorded, (&profile, 250.0), Evidence::Samples).expect("a filter");
