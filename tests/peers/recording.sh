@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Time and memory of this program and of a script of pandas and allantools on the same table, plain and gzip, from the file to the
-# curves, in one run; then of one virtual hour, and of a table of a million rows beside the recordings of a minute that it is cut into:
+# curves, in one run; then of run 1 of the measured recordings, if ADIS_RECORDINGS names their folder, of one virtual hour, and of a table of
+# a million rows beside the recordings of a minute that it is cut into:
 #
 #     tests/peers/recording.sh [--quick-only] [ROWS…]   (a million rows by default, of six channels)
 #
@@ -68,6 +69,14 @@ done
 
 if $only_quick; then
     exit
+fi
+run=${ADIS_RECORDINGS:-}/adis16405-static/run1.csv.gz
+if [ -f "$run" ]; then
+    echo "a measured run of a million rows with a dozen findings, thrice in turn"
+    for _ in 1 2 3; do
+        measure "pandas and allantools.oadev" 1000000 "$python" tests/peers/recording/curves.py "$run" 100
+        measure "host-sim analyze" 1000000 "$target/release/host-sim" analyze "$run" --rate 100 --quiet
+    done
 fi
 echo "virtual hour"
 hour=$((3600 * 2048 / 10))

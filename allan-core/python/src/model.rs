@@ -63,9 +63,13 @@ fn term(name: &str, shape: &[f64]) -> PyResult<NoiseTerm> {
         ("sinusoid", &[frequency]) => {
             NoiseTerm::Sinusoid(Sinusoid { frequency: positive(name, "frequency", frequency)? })
         }
-        ("low_pass", &[frequency, damping]) if damping < 1.0 => NoiseTerm::LowPass(LowPass {
+        ("low_pass", &[frequency, damping]) => NoiseTerm::LowPass(LowPass {
             frequency: positive(name, "frequency", frequency)?,
-            damping: positive(name, "damping", damping)?,
+            damping: if damping < 1.0 {
+                positive(name, "damping", damping)?
+            } else {
+                return Err(PyValueError::new_err(format!("{name}: damping is {damping}, it must be below 1")));
+            },
         }),
         ("filter_bandwidth", &[stages, taps, decimation]) => NoiseTerm::Filtered(filter(stages, taps, decimation)?),
         _ => {

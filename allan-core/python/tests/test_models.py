@@ -75,6 +75,7 @@ def test_terms_that_do_not_exist_are_refused() -> None:
         (Term("markov", time_constant=-1.0), "time_constant is -1"),
         (Term("sinusoid", frequency=np.nan), "frequency is NaN"),
         (Term("filter_bandwidth", taps=1000), "1000 taps"),
+        (Term("low_pass", frequency=2.0, damping=1.0), "damping is 1"),
     ]:
         with pytest.raises(ValueError, match=message):
             allan_core.fit(curve, [term])
@@ -108,6 +109,21 @@ def test_lines_from_a_spectrum_are_kept_and_a_trace_can_be_ended() -> None:
         allan_core.trace(gyro(), lines=[-1.0])
     with pytest.raises(ValueError, match="markov is no filter"):
         allan_core.trace(gyro(), filters=[Term("markov", time_constant=1.0)])
+
+
+def test_noise_behind_a_butterworth_filter_has_its_frequency() -> None:
+    # The bilinear transform of a Butterworth filter whose half-power frequency is a twentieth of the rate: its form is that of the analog
+    # one to 1 % there.
+    corner = RATE / 20
+    tangent = np.tan(np.pi * corner / RATE)
+    scale = 1 + np.sqrt(2) * tangent + tangent**2
+    smooth = np.zeros_like(WHITE)
+    for k in range(2, len(WHITE)):
+        white = tangent**2 * (WHITE[k] + 2 * WHITE[k - 1] + WHITE[k - 2])
+        smooth[k] = (white - 2 * (tangent**2 - 1) * smooth[k - 1] - (1 - np.sqrt(2) * tangent + tangent**2) * smooth[k - 2]) / scale
+    start = Term("low_pass", frequency=1.5 * corner, damping=float(np.sqrt(0.5)))
+    found = allan_core.fit(allan_core.curve(smooth, RATE), [start], shapes=True)["low_pass"]
+    assert found.shape["frequency"][0] == pytest.approx(corner, rel=0.03)
 
 
 def test_a_filter_of_the_sensor_is_found() -> None:

@@ -22,6 +22,7 @@ _SHAPES: dict[str, dict[str, float | None]] = {
     "markov": {"time_constant": None},
     "resonance": {"frequency": None, "bandwidth": None},
     "sinusoid": {"frequency": None},
+    "low_pass": {"frequency": None, "damping": None},
     "filter_bandwidth": {"stages": 2.0, "taps": None, "decimation": 1.0},
 }
 
@@ -43,6 +44,8 @@ class Term:
     ``markov``                exponentially correlated; ``time_constant`` in s    unit
     ``resonance``             ``frequency`` and ``bandwidth`` in Hz               unit
     ``sinusoid``              ``frequency`` in Hz; the coefficient its amplitude  unit
+    ``low_pass``              N after a low-pass filter of the second order: its  unit·√s
+                              natural ``frequency`` in Hz, ``damping`` below 1
     ``filter_bandwidth``      N after ``stages`` (2) moving averages of ``taps``  unit·√s
                               values, each ``decimation``-th (1) of them read
     ========================  ==================================================  =============

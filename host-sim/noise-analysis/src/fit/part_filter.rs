@@ -10,7 +10,8 @@
 //! degree of freedom, as those of overdispersed observations are (P. McCullagh and J. Nelder, "Generalized Linear Models",
 //! chapter 9).
 //!
-//! Where the samples are kept, their likelihood chooses among the filters that the curves allow, and finds the decimation.
+//! Where the samples are kept, their likelihood chooses among the filters that the curves allow, and finds the decimation. A part of which no
+//! filter is stated may have a low-pass filter of the second order in the place of moving averages.
 
 mod channel_deviance;
 mod decimation;
