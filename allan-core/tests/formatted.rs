@@ -6,7 +6,7 @@ use allan_core::regression::{Covariate, Sensitivity};
 use allan_core::slope_method::SlopeEstimate;
 use allan_core::telegraph::KurtosisRatio;
 use allan_core::term::{
-    AngleRandomWalk, BiasInstability, CoefficientUnit, Markov, MovingAverageFilter, Quantization, RateRamp,
+    AngleRandomWalk, BiasInstability, CoefficientUnit, LowPass, Markov, MovingAverageFilter, Quantization, RateRamp,
     RateRandomWalk, Resonance, Shape, Sinusoid,
 };
 use allan_core::trace::{AddedTerm, LineCandidates, Residual, Trace};
@@ -48,7 +48,7 @@ fn every_public_value_can_be_printed_by_defmt() {
     let mut formatted: Vec<&str> = formatted![
         AddedTerm, AllanPoint, AngleRandomWalk, BiasInstability, Cascade<8, 4>, CoefficientUnit, Coupling<8>, Covariance,
         Covariate<8>, Curve<8>, CurveView, Discrepancy, FittedTerm, FractionalOctaves<8, 8>, Goodness, Hadamard<8, 4>,
-        HadamardPoint, Interpolation, KurtosisRatio, LineCandidates, Markov, Model, MovingAverageFilter, NoiseTerm,
+        HadamardPoint, Interpolation, KurtosisRatio, LineCandidates, LowPass, Markov, Model, MovingAverageFilter, NoiseTerm,
         OctaveSums, PhaseCounts, PowerLaw, Quantization, Quantizer, RateRamp, RateRandomWalk, Residual, Resonance,
         SampleError, Sensitivity, Shape, Sinusoid, SlopeEstimate, Snapshot<8, 4>, TableError, TimeStampError, TimeStamps, Trace,
         VarianceFractions,

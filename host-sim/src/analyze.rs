@@ -205,7 +205,7 @@ fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor, kept: Kept
             }
         },
         Opened::Counts(input) => SampleStream::counts(input, recording.input.range.into(), recording.rate, kept),
-        Opened::AnySensor(input, options) => SampleStream::any_sensor(input, options, recording.rate, kept),
+        Opened::AnySensor(input, options) => SampleStream::any_sensor(input, *options, recording.rate, kept),
         Opened::Replayed(replayed) => {
             return SampleStream::recorded(replayed, recording.rate, kept).with_context(name);
         }
@@ -257,7 +257,7 @@ enum Opened {
     /// Register counts of an ADIS16405.
     Counts(InputFile),
     /// Numbers of any sensor.
-    AnySensor(InputFile, ReadOptions),
+    AnySensor(InputFile, Box<ReadOptions>),
     /// A log of the bus of an ADIS16405, which was read.
     Replayed(Recording),
 }
@@ -279,7 +279,8 @@ fn open(arguments: &InputArguments, monitor: &ReadMonitor) -> Result<Opened> {
         FileFormat::CountTable if is_adis16405 && selection.is_empty() => Ok(Opened::Counts(input)),
         _ => {
             let sensor = sensor.unwrap_or_else(SensorProfile::generic);
-            Ok(Opened::AnySensor(input, ReadOptions { sensor, selection, topic: topic.clone() }))
+            let options = ReadOptions { sensor, selection, topic: topic.clone() };
+            Ok(Opened::AnySensor(input, Box::new(options)))
         }
     }
 }

@@ -19,7 +19,7 @@ const IMAGES: [(&str, &str, u32); 5] = [
     ("and `curve_without_confidence`", "variances", 10 * 1024),
     ("and `fit_power_laws` of N, B and K", "power-laws", 25 * 1024),
     ("`push` and `curve`", "curve", 30 * 1024),
-    ("and `fit` of N, B and K", "fit", 55 * 1024),
+    ("and `fit` of N, B and K", "fit", 57 * 1024),
 ];
 
 /// A kB is 1,024 bytes.

@@ -1,8 +1,11 @@
 //! A chirp: a line whose frequency runs evenly from one end of the record to the other, as that of a motor whose speed changes.
 
 use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
+use super::sinusoid::avar_of_sine;
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
-use crate::fit::signal_share::avar_of_run;
+
+/// Frequencies of a run whose Allan variances are averaged.
+const FREQUENCIES: u32 = 32;
 
 /// A line whose frequency runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +60,15 @@ impl Kind for Chirp {
     }
 
     no_course!();
+}
+
+/// Allan variance of a line whose frequency runs evenly from one to another, in Hz: the mean of those of sinusoids at each of the
+/// frequencies.
+pub(crate) fn avar_of_run(amplitude: f64, [first, last]: [f64; 2], n: u64, period_s: f64) -> f64 {
+    let frequency = |number: u32| first + (last - first) * (f64::from(number) + 0.5) / f64::from(FREQUENCIES);
+    let mean = (0..FREQUENCIES).map(|number| avar_of_sine(frequency(number), n, period_s)).sum::<f64>()
+        / f64::from(FREQUENCIES);
+    amplitude * amplitude * mean
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! A slow signal that is the same every period and no sinusoid, as of a thermostat or of a load that comes on every minute.
 
 use super::kind::{AddedVariance, AveragingTime, Kind, amplitude_at_frequency, no_course};
+use super::sinusoid::avar_of_sine;
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
-use crate::fit::signal_share::avar_of_harmonics;
 
 /// A signal that repeats.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,6 +40,12 @@ impl Kind for Periodic {
     }
 
     no_course!();
+}
+
+/// Allan variance of a signal with these `amplitudes` of its harmonics, the first of which is at a `frequency` in Hz.
+pub(crate) fn avar_of_harmonics(frequency: f64, amplitudes: impl Iterator<Item = f64>, n: u64, period_s: f64) -> f64 {
+    let of = |(number, amplitude): (f64, f64)| amplitude * amplitude * avar_of_sine(number * frequency, n, period_s);
+    (1..).map(f64::from).zip(amplitudes).map(of).sum()
 }
 
 #[cfg(test)]

@@ -44,3 +44,10 @@ impl Kind for SinusoidalLine {
 
     no_course!();
 }
+
+/// Allan variance of a sinusoid of amplitude 1. Its closed form is that of the alias of a frequency beyond half the sample rate; one of 0 has
+/// none.
+pub(super) fn avar_of_sine(frequency: f64, n: u64, period_s: f64) -> f64 {
+    let avar = NoiseTerm::Sinusoid(Sinusoid { frequency }).avar(n, period_s);
+    if avar.is_finite() { avar } else { 0.0 }
+}

@@ -6,16 +6,13 @@
 
 use crate::OCTAVES;
 use crate::bounds::BoundedEstimate;
+use crate::effects::{avar_of_harmonics, avar_of_run};
 use crate::spectra::frequency_track::FrequencyTrack;
 use crate::spectra::periodic_signal::PeriodicSignal;
-use allan_core::term::Sinusoid;
-use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
+use allan_core::{AllanPoint, Curve, Model};
 
 /// Amplitudes that are tried, in parts of the way from the estimate to either 95 % bound: half of that is a standard deviation.
 const STEPS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
-/// Frequencies of a run whose Allan variances are averaged.
-const FREQUENCIES: u32 = 32;
-
 /// What the signals in a part of a recording add to the Allan variance of a channel.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct SignalShare {
@@ -138,28 +135,6 @@ impl SignalShare {
 /// Factors from an amplitude to its bounds.
 fn bounds(amplitude: BoundedEstimate) -> [f64; 2] {
     [amplitude.low, amplitude.high].map(|bound| if amplitude.value > 0.0 { bound / amplitude.value } else { 1.0 })
-}
-
-/// Allan variance of a signal with these `amplitudes` of its harmonics, the first of which is at a `frequency` in Hz.
-pub(crate) fn avar_of_harmonics(frequency: f64, amplitudes: impl Iterator<Item = f64>, n: u64, period_s: f64) -> f64 {
-    let of = |(number, amplitude): (f64, f64)| amplitude * amplitude * avar_of_sine(number * frequency, n, period_s);
-    (1..).map(f64::from).zip(amplitudes).map(of).sum()
-}
-
-/// Allan variance of a line whose frequency runs evenly from one to another, in Hz: the mean of those of sinusoids at each of the
-/// frequencies.
-pub(crate) fn avar_of_run(amplitude: f64, [first, last]: [f64; 2], n: u64, period_s: f64) -> f64 {
-    let frequency = |number: u32| first + (last - first) * (f64::from(number) + 0.5) / f64::from(FREQUENCIES);
-    let mean = (0..FREQUENCIES).map(|number| avar_of_sine(frequency(number), n, period_s)).sum::<f64>()
-        / f64::from(FREQUENCIES);
-    amplitude * amplitude * mean
-}
-
-/// Allan variance of a sinusoid of amplitude 1. Its closed form is that of the alias of a frequency beyond half the sample rate; one of 0 has
-/// none.
-fn avar_of_sine(frequency: f64, n: u64, period_s: f64) -> f64 {
-    let avar = NoiseTerm::Sinusoid(Sinusoid { frequency }).avar(n, period_s);
-    if avar.is_finite() { avar } else { 0.0 }
 }
 
 #[cfg(test)]

@@ -170,10 +170,10 @@ fn weighted_least_squares<R: AsRef<[f64]>>(
 /// Fisher's information of the bands on the densities.
 pub(super) fn information<R: AsRef<[f64]>>(bands: &[SpectralBand], bases: &[R], densities: &[f64]) -> DMatrix<f64> {
     let of_terms = match densities.len() {
-        ..=4 => information_of::<4, R>,
+        0..=4 => information_of::<4, R>,
         5 => information_of::<5, R>,
         6 => information_of::<6, R>,
-        ..=8 => information_of::<8, R>,
+        7..=8 => information_of::<8, R>,
         _ => information_of::<MOST_TERMS, R>,
     };
     of_terms(bands, bases, densities)
