@@ -33,8 +33,6 @@ const SCORING_ROUNDS: usize = 50;
 const LEAST_GAIN: f64 = 1e-4;
 /// Shortest part of a step of the scoring that is tried.
 const SHORTEST_STEP: f64 = 1e-3;
-/// Most shapes of a mixture.
-const MOST_TERMS: usize = 16;
 
 /// Probability that ordinates of a true density depart from it as far, in the order of their frequencies: `bands` are means over that
 /// density, with the number of ordinates. Bartlett's test of the cumulative periodogram.
@@ -174,7 +172,7 @@ pub(super) fn information<R: AsRef<[f64]>>(bands: &[SpectralBand], bases: &[R], 
         5 => information_of::<5, R>,
         6 => information_of::<6, R>,
         7..=8 => information_of::<8, R>,
-        _ => information_of::<MOST_TERMS, R>,
+        _ => information_of_many,
     };
     of_terms(bands, bases, densities)
 }
@@ -201,6 +199,25 @@ fn information_of<const TERMS: usize, R: AsRef<[f64]>>(
         }
     }
     DMatrix::from_fn(terms, terms, |row, column| sums[column][row])
+}
+
+/// The same of any number of terms: white noise that is correlated with many neighbours has one for each.
+fn information_of_many<R: AsRef<[f64]>>(bands: &[SpectralBand], bases: &[R], densities: &[f64]) -> DMatrix<f64> {
+    let terms = densities.len();
+    let mut information = DMatrix::zeros(terms, terms);
+    for (band, basis) in bands.iter().zip(bases) {
+        let basis = basis.as_ref();
+        let density = mixture_density(basis, densities);
+        if density <= 0.0 {
+            continue;
+        }
+        let weight = band.ordinates / (density * density);
+        for (column, mut entries) in information.column_iter_mut().enumerate() {
+            let of_column = weight * basis[column];
+            entries.iter_mut().zip(basis).for_each(|(entry, shape)| *entry += of_column * shape);
+        }
+    }
+    information
 }
 
 /// A round of the multiplicative fit of the terms that are nowhere negative.
@@ -245,6 +262,27 @@ fn mixture_objective<R: AsRef<[f64]>>(bands: &[SpectralBand], bases: &[R], densi
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Σ g·b_i·b_j/S² of every pair of shapes, for as many as are summed in registers and more.
+    #[test]
+    fn the_information_is_that_of_any_number_of_terms() {
+        for terms in [1, 4, 5, 6, 7, 8, 9, 16, 17, 20] {
+            let basis = |band: usize| (0..terms).map(|term| 1.0 + ((band * (term + 1)) as f64).cos().abs()).collect();
+            let bases: Vec<Vec<f64>> = (0..30).map(basis).collect();
+            let band = |of: usize| SpectralBand { frequency: of as f64, density: 1.0, ordinates: 3.0 + of as f64 };
+            let bands: Vec<SpectralBand> = (0..30).map(band).collect();
+            let densities: Vec<f64> = (0..terms).map(|term| 0.5 + term as f64).collect();
+            let found = information(&bands, &bases, &densities);
+            for (row, column) in (0..terms).flat_map(|row| (0..terms).map(move |column| (row, column))) {
+                let of = |(band, basis): (&SpectralBand, &Vec<f64>)| {
+                    let density: f64 = basis.iter().zip(&densities).map(|(shape, density)| shape * density).sum();
+                    band.ordinates * basis[row] * basis[column] / (density * density)
+                };
+                let expected: f64 = bands.iter().zip(&bases).map(of).sum();
+                assert!((found[(row, column)] / expected - 1.0).abs() < 1e-12, "{terms} terms");
+            }
+        }
+    }
 
     /// Bands whose densities are exactly those of a mixture: the fit is that mixture, of either sign.
     #[test]
