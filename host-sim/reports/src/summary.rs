@@ -380,7 +380,8 @@ pub fn longest_at_rest(report: &Report) -> Option<Stretch> {
 pub fn time_options(from_s: f64, to_s: f64) -> String {
     // A tenth is none in binary.
     const ROUNDING: f64 = 1e-6;
-    let (from, to) = ((10.0 * from_s - ROUNDING).ceil() / 10.0, (10.0 * to_s + ROUNDING).floor() / 10.0);
+    // What rounds up to 0 from below is −0, which the sum is not.
+    let (from, to) = ((10.0 * from_s - ROUNDING).ceil() / 10.0 + 0.0, (10.0 * to_s + ROUNDING).floor() / 10.0);
     format!("--from {from} --to {to}")
 }
 

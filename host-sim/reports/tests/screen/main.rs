@@ -162,6 +162,7 @@ fn what_is_not_known_is_not_claimed() {
     let moved = "It moved for up to 2 h 37 min; for the longest part at rest, add --from 9418.5 --to 10018.9.";
     let sentences = reports::summary::record_sentences(&report);
     assert!(sentences.iter().any(|sentence| sentence == moved), "{sentences:#?}");
+    assert_eq!(reports::summary::time_options(0.0, 51.13), "--from 0 --to 51.1");
 }
 
 /// The means of blocks of a constant temperature differ by rounding; those of a supply with white noise by that noise.
