@@ -49,21 +49,20 @@ impl SamplesOfCurve<'_> {
         }
     }
 
-    /// The spectrum of their longest part without a gap; `None` where the means alone are kept.
+    /// The spectrum of their longest part without a gap that interpolation does not close; `None` where the means alone are kept.
     fn spectrum_without_gaps(&self, curve: &Curve<OCTAVES>, lines: &[f64]) -> Option<SampleSpectrum> {
         let are_samples = self.rest.sample_period() < 1.5 * curve.sample_period();
-        are_samples.then(|| SampleSpectrum::of_samples(&self.rest.longest_without_gaps(), lines))?
+        are_samples.then(|| SampleSpectrum::of_samples(&self.rest.longest_interpolated(), lines))?
     }
 }
 
-/// Probability that the spectrum of the `samples`, or where too many of them are missing that of their longest part without a gap, departs as
-/// far from that of `model` where that has quantization; `None` where it has none, or the spectrum does not show its shape.
+/// Probability that the spectrum of the `samples`, or that of their longest part without a long gap, contradicts as much the quantization of
+/// `model`; `None` where it has none, or too few samples tell its shape.
 pub(crate) fn quantization_p_value(curve: &Curve<OCTAVES>, model: &Model, samples: SamplesOfCurve) -> Option<f64> {
-    let kinds: Vec<NoiseTerm> = model.terms().iter().map(|term| term.kind).collect();
-    let at = kinds.iter().position(|kind| *kind == NoiseTerm::Quantization)?;
-    let lines = sinusoids(kinds.iter());
-    let of_all = samples.spectrum(curve, &lines).and_then(|spectrum| spectrum.shape_p_value(&kinds, at));
-    of_all.or_else(|| samples.spectrum_without_gaps(curve, &lines)?.shape_p_value(&kinds, at))
+    let at = model.terms().iter().position(|term| term.kind == NoiseTerm::Quantization)?;
+    let lines = sinusoids(model.terms().iter().map(|term| &term.kind));
+    let of_all = samples.spectrum(curve, &lines).and_then(|spectrum| spectrum.term_p_value(model, at));
+    of_all.or_else(|| samples.spectrum_without_gaps(curve, &lines)?.term_p_value(model, at))
 }
 
 /// `model`, fitted to `curve`, with the coefficients and the bounds by its samples; otherwise what those of `model` are from.
@@ -83,6 +82,7 @@ pub(crate) fn by_samples(
 mod tests {
     use super::*;
     use crate::effects::findings::REFUTED;
+    use allan_core::model::FittedTerm;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
@@ -94,39 +94,46 @@ mod tests {
     const KINDS: [NoiseTerm; 4] =
         [NoiseTerm::AngleRandomWalk, NoiseTerm::BiasInstability, NoiseTerm::RateRandomWalk, NoiseTerm::Quantization];
 
-    /// The probability of white noise of [`DEVIATION`] with what `added` makes, of which every 80th sample is missing.
-    fn p_value(seed: u64, mut added: impl FnMut(&mut ChaCha8Rng) -> f64) -> f64 {
+    /// White angle error of half the power, in counts times s: 3·Q²/τ² is the variance of its differences, which has no other Q.
+    const QUANTIZATION: f64 = DEVIATION * std::f64::consts::FRAC_1_SQRT_2 * PERIOD_S;
+
+    /// The probability of a quantization of at least `low` in white noise of [`DEVIATION`] with what `added` makes, of which one of so many
+    /// samples is missing.
+    fn p_value(seed: u64, low: f64, one_of: usize, mut added: impl FnMut(&mut ChaCha8Rng) -> f64) -> f64 {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut values = Vec::new();
         for at in 0..SAMPLES {
             let value = (added(&mut random) + DEVIATION * random.sample::<f64, _>(StandardNormal)).round();
-            values.push(if at % 80 == 40 { f64::NAN } else { value });
+            values.push(if at % one_of == 40 { f64::NAN } else { value });
         }
         let spectrum = SampleSpectrum::of_samples(&UniformSeries::new(PERIOD_S, values), &[]).expect("a spectrum");
-        spectrum.shape_p_value(&KINDS, 3).expect("few are interpolated")
+        let model = Model::new(PERIOD_S, KINDS.map(|kind| FittedTerm::exact(kind, low)));
+        spectrum.term_p_value(&model, 3).expect("few are interpolated")
+    }
+
+    /// Differences of white errors of half the power of the noise.
+    fn angle_error() -> impl FnMut(&mut ChaCha8Rng) -> f64 {
+        let mut last = 0.0;
+        move |random| {
+            let error = DEVIATION / 2_f64.sqrt() * random.sample::<f64, _>(StandardNormal);
+            let difference = error - last;
+            last = error;
+            difference
+        }
     }
 
     /// Of true quantization, with half of the power, one in 5,000 is refuted by chance: of 60 more than one in 14,000 cases. A band
     /// at 0.45 of the sample rate, a tenth of it wide and of a third of the power, raises the curve at one sample as well.
     #[test]
     fn the_spectrum_tells_quantization_from_a_band() {
-        let quantized = |seed: u64| {
-            let mut last = 0.0;
-            p_value(seed, move |random| {
-                let error = DEVIATION / 2_f64.sqrt() * random.sample::<f64, _>(StandardNormal);
-                let difference = error - last;
-                last = error;
-                difference
-            })
-        };
-        let refuted = (0..60).filter(|&seed| quantized(seed) < REFUTED).count();
+        let refuted = (0..60).filter(|&seed| p_value(seed, 0.0, 80, angle_error()) < REFUTED).count();
         assert!(refuted <= 1, "{refuted} of 60");
         let banded = |seed: u64| {
             let (mut re, mut im) = (0.0, 0.0);
             let kept = (-0.1_f64 * TAU / 2.0).exp();
             let (sine, cosine) = (0.45 * TAU).sin_cos();
             let drive = DEVIATION / 2_f64.sqrt() * (1.0 - kept * kept).sqrt();
-            p_value(seed, move |random| {
+            p_value(seed, 0.0, 80, move |random| {
                 let [a, b]: [f64; 2] = [(); 2].map(|()| random.sample(StandardNormal));
                 (re, im) = (kept * (re * cosine - im * sine) + drive * a, kept * (re * sine + im * cosine) + drive * b);
                 re
@@ -134,5 +141,17 @@ mod tests {
         };
         let refuted = (0..20).filter(|&seed| banded(seed) < REFUTED).count();
         assert_eq!(refuted, 20);
+    }
+
+    /// Q is known to 2 % where its power is that of the noise. White noise alone shows its square, over that of this power, to 0.018: 0.16 is
+    /// nine deviations.
+    #[test]
+    fn the_spectrum_contradicts_more_quantization_than_it_shows() {
+        let refuted =
+            (0..60).filter(|&seed| p_value(seed, 0.95 * QUANTIZATION, SAMPLES, angle_error()) < REFUTED).count();
+        assert!(refuted <= 1, "{refuted} of 60");
+        for seed in 0..20 {
+            assert!(p_value(seed, 0.4 * QUANTIZATION, SAMPLES, |_| 0.0) < REFUTED, "{seed}");
+        }
     }
 }

@@ -184,7 +184,7 @@ pub static RIVALRIES: [Rivalry; 47] = [
         "a line would stand out of the spectrum",
         Rule::Channel(|of| of.loses_to(is_absent_in_spectrum))),
     row("unexplained octave of another spectrum", "quantization",
-        "where quantization has a tenth of the density or more, the spectrum has another shape: 2·10⁻⁴",
+        "the spectrum shows less of it, or has another shape where it has a tenth of the density or more: 2·10⁻⁴",
         "the density of quantization rises with the square of the frequency",
         Rule::Channel(|of| of.loses_to(|effect| matches!(refutation(effect), Some(Refutation::ShapeOfSpectrum { .. }))))),
     row("telegraph noise of the samples", "Markov process or ramp of the curve", "always",

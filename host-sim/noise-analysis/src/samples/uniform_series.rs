@@ -100,10 +100,18 @@ impl UniformSeries {
         self.values.iter().filter(|value| value.is_finite()).count()
     }
 
-    /// The longest part of which no sample is missing.
-    pub(crate) fn longest_without_gaps(&self) -> Self {
-        let parts = self.values.split(|value| !value.is_finite());
-        self.with_values(parts.max_by_key(|part| part.len()).unwrap_or_default().to_vec())
+    /// The longest part whose gaps [`interpolated`](Self::interpolated) closes, as it is.
+    pub(crate) fn longest_interpolated(&self) -> Self {
+        let (closed, _) = self.interpolated();
+        let mut from = 0;
+        let part = |part: &[f64]| {
+            let range = from..from + part.len();
+            from = range.end + 1;
+            range
+        };
+        let parts = closed.values.split(|value| !value.is_finite()).map(part);
+        let longest = parts.max_by_key(ExactSizeIterator::len).unwrap_or_default();
+        self.with_values(self.values[longest].to_vec())
     }
 
     /// Number of values, missing ones included, times the sample period, s.

@@ -14,7 +14,7 @@ use super::cosine_spectrum::flicker_leakage;
 use super::filtered_noise::FilteredNoise;
 use super::sample_spectrum::{Place, SampleBand, SampleSpectrum};
 use super::whittle::{Sign, SpectralBand, departure_by_chance, fit_mixture, fit_mixture_with, least_departure};
-use crate::distributions::NORMAL_975;
+use crate::distributions::{NORMAL_975, upper_tail};
 use crate::effects::findings::REFUTED;
 use crate::samples::rounding::Rounding;
 use allan_core::model::FittedTerm;
@@ -82,13 +82,17 @@ impl SampleSpectrum {
         Some(Model::new(model.sample_period(), terms.collect::<Option<Vec<FittedTerm>>>()?))
     }
 
-    /// Probability that the spectrum departs as far from that of the terms `kinds`, at their likeliest, where the term at the position `at`
-    /// has a tenth of the density or more: Bartlett's test ([`departure_by_chance`]). `None` where so many samples are interpolated that
-    /// this may be what departs.
-    pub(crate) fn shape_p_value(&self, kinds: &[NoiseTerm], at: usize) -> Option<f64> {
-        let likelihood = Likelihood::new(self, kinds);
-        let filtered = match kinds {
-            [NoiseTerm::Filtered(filter), ..] => Some(FilteredNoise::new(filter, self.period, 1)),
+    /// Probability that the spectrum contradicts as much of the `model` term at the position `at`; `None` where so many samples are
+    /// interpolated that this may be what contradicts it. The smaller one of
+    ///
+    /// - that of a departure from the terms of `model`, at their likeliest, where this one has a tenth of the density or more: Bartlett's test
+    ///   ([`departure_by_chance`]);
+    /// - where that is less than its lower bound, that of the likelihood ratio of this bound: the spectrum does not show the term.
+    pub(crate) fn term_p_value(&self, model: &Model, at: usize) -> Option<f64> {
+        let kinds: Vec<NoiseTerm> = model.terms().iter().map(|term| term.kind).collect();
+        let likelihood = Likelihood::new(self, &kinds);
+        let filtered = match kinds[..] {
+            [NoiseTerm::Filtered(ref filter), ..] => Some(FilteredNoise::new(filter, self.period, 1)),
             _ => None,
         };
         let shown = kinds[..at].iter().filter(|kind| !is_sinusoid(kind)).count();
@@ -101,11 +105,15 @@ impl SampleSpectrum {
             is_shown.then_some((band.measured.density / density, band.measured.ordinates))
         };
         let bands: Vec<(f64, f64)> = self.bands.iter().zip(&likelihood.bases).filter_map(with_shape).collect();
-        let ordinates: f64 = bands.iter().map(|(_, ordinates)| ordinates).sum();
+        let ordinates: f64 = bands.iter().fold(0.0, |sum, (_, ordinates)| sum + ordinates);
         // An interpolated sample has no noise at some frequencies and all of it at others, which moves the cumulative sum by a quarter of
         // their share at most.
         let moved = self.interpolated / 4.0;
-        (moved < 0.5 * least_departure(ordinates, REFUTED)).then(|| departure_by_chance(&bands))
+        let by_shape = (moved < 0.5 * least_departure(ordinates, REFUTED)).then(|| departure_by_chance(&bands));
+        let least = model.terms()[at].low.powi(2);
+        let is_less = self.has_all_noise() && likelihood.densities[shown] < least;
+        let by_size = is_less.then(|| 2.0 * upper_tail(likelihood.ratio(shown, least).sqrt()));
+        by_shape.into_iter().chain(by_size).reduce(f64::min)
     }
 
     /// Its likelihood with the terms `kinds`, of which the first is noise behind a filter.
@@ -371,10 +379,15 @@ impl Likelihood {
     }
 
     fn is_within(&self, term: usize, density: f64) -> bool {
+        self.ratio(term, density) < NORMAL_975 * NORMAL_975
+    }
+
+    /// −2 ln of the ratio of the likelihood with this density of a term to its maximum.
+    fn ratio(&self, term: usize, density: f64) -> f64 {
         let mut densities = self.densities.clone();
         densities[term] = density;
         let held: Vec<usize> = std::iter::once(term).chain(self.known).collect();
         let objective = fit_mixture_with(&self.bands, &self.bases, Sign::NonNegative, &held, &mut densities);
-        objective - self.objective < NORMAL_975 * NORMAL_975 / 2.0
+        2.0 * (objective - self.objective).max(0.0)
     }
 }
