@@ -243,6 +243,28 @@ fn assert_knocks_are_found(lost: f64) {
     assert!(covered >= all - 3, "{covered} of {all}");
 }
 
+/// A mount that rings at an 18th of the sample rate and loses its amplitude, 30 deviations of the noise behind the part's filter, in ten
+/// samples. It is found wherever it is against the blocks.
+#[test]
+fn a_knock_of_a_few_samples_is_found_behind_a_filter() {
+    let begin = |seed: u64| 20_000 + 7 * seed as usize;
+    let record = |seed: u64| {
+        let mut noise = filtered(4);
+        series(seed, |random, at| {
+            let since = at as f64 - begin(seed) as f64;
+            let ringing = if since < 0.0 { 0.0 } else { 30.0 * (-since / 10.0).exp() * (TAU * since / 18.0).sin() };
+            ringing + noise(random, at)
+        })
+    };
+    for seed in 0..20 {
+        let found = find(&[record(seed)], DITHERED).remove(0);
+        let [knock] = &found[..] else { panic!("{seed}: {found:?}") };
+        let (begin, slots) = (begin(seed) as u64, &knock.slots);
+        assert!(slots.start <= begin + 4 && slots.start + 40 > begin, "{seed}: {begin}, {knock:?}");
+        assert!((begin + 15..begin + 80).contains(&slots.end), "{seed}: {begin}, {knock:?}");
+    }
+}
+
 #[test]
 fn a_decaying_shock_is_left_out_to_its_end() {
     let record = white(70, |at| {

@@ -1,13 +1,13 @@
-//! Knocks: stretches of seconds to minutes whose noise level the neighbouring stretches exclude, on both sides.
+//! Knocks: stretches of some samples to minutes whose noise level the neighbouring stretches exclude, on both sides.
 //!
-//! Blocks of several lengths are tested at several averaging times, in each channel by itself. The probability of a knock
-//! by chance anywhere in the record of a channel is [`SIGNIFICANCE`], divided equally among all blocks. The likeliest stretch
-//! around a block that is too loud is the knock; the record without it is tested again. Where one channel has a knock, the
-//! others are tested in that stretch alone.
+//! Blocks of several lengths are tested at several averaging times, in each channel by itself, short ones where no longer one is too loud.
+//! The probability of a knock by chance anywhere in the record of a channel is [`SIGNIFICANCE`], divided equally among all blocks of either
+//! kind. The likeliest stretch around a block that is too loud is the knock; the record without it is tested again. Where one channel has
+//! a knock, the others are tested in that stretch alone.
 
 use super::noise_levels::{
-    DIFFERENCES, HALF_EFFICIENCY, LevelScatter, NEIGHBOURS, SquaredDifferences, TRIMMED_MEAN, Wandering,
-    averaging_factors, doublings, exceedance, longer_levels, median, neighbouring_level, neighbours_freedom,
+    DIFFERENCES, FEW_DIFFERENCES, HALF_EFFICIENCY, LevelScatter, NEIGHBOURS, Neighbourhood, SquaredDifferences,
+    TRIMMED_MEAN, Wandering, averaging_factors, doublings, exceedance, longer_levels, median,
 };
 use super::spikes::Disturbance;
 use crate::bounds::BoundedEstimate;
@@ -76,7 +76,15 @@ pub(crate) struct KnockRule {
 #[derive(Debug, Clone)]
 struct Scale {
     n: usize,
-    /// For each doubling of the length of a block.
+    /// Of blocks of [`FEW_DIFFERENCES`] and of [`DIFFERENCES`].
+    blocks: [Blocks; 2],
+}
+
+/// Blocks of so many differences and of doublings of their length.
+#[derive(Debug, Clone)]
+struct Blocks {
+    size: usize,
+    /// For each doubling.
     freedoms: Vec<BlockFreedom>,
 }
 
@@ -89,6 +97,7 @@ struct BlockFreedom {
 }
 
 /// A block that is too loud.
+#[derive(Clone)]
 struct LoudBlock {
     scale: usize,
     /// Differences of the block.
@@ -131,32 +140,21 @@ impl KnockRule {
         let mut scales = Vec::new();
         for n in averaging_factors(series.period_s) {
             let differences = SquaredDifferences::new(series, n);
-            let levels = differences.levels();
-            let noise = differences.freedom();
-            let mut freedoms: Vec<BlockFreedom> = Vec::new();
-            for doublings in doublings(&differences, series.period_s) {
-                let longer = longer_levels(&levels, doublings);
-                let of_noise = noise * f64::from(1_u32 << doublings);
-                let by_length = freedoms.last().map_or(noise, |freedom| 2.0 * freedom.block);
-                let scatter = LevelScatter::new(&longer);
-                let block = scatter.as_ref().map_or(by_length, |scatter| scatter.freedom().min(by_length));
-                // Levels that move together at a short length do so at a longer one, which has too few blocks to show it.
-                let neighbours = freedoms.last().map_or(f64::INFINITY, |freedom| 2.0 * freedom.neighbours);
-                let neighbours = neighbours_freedom(&longer, block).min(neighbours);
-                // A level that moves at a short length does so at a longer one, by no more. Of the shortest length the second one of half the
-                // averaging time is as long.
-                let of_half = scales.last().and_then(|scale: &Scale| scale.freedoms.get(1).or(scale.freedoms.last()));
-                let shorter = freedoms.last().or(of_half).and_then(|freedom| freedom.wandering);
-                let wandering = scatter.and_then(|of| of.wandering(of_noise, shorter.is_some())).or(shorter);
-                freedoms.push(BlockFreedom { block, neighbours, wandering });
-            }
-            let typical = median(levels.into_iter().flatten().collect()) / TRIMMED_MEAN;
+            let [few_noise, noise] = differences.freedoms();
+            let of_half = scales.last().and_then(|half: &Scale| half.blocks[0].freedoms.last()?.wandering);
+            let unknown = BlockFreedom { block: f64::INFINITY, neighbours: f64::INFINITY, wandering: of_half };
+            let few = Blocks::fit(&differences, series.period_s, (FEW_DIFFERENCES, few_noise), unknown);
+            let shorter = few.freedoms.last().map_or(unknown, |last| {
+                last.times(DIFFERENCES as f64 / (FEW_DIFFERENCES << (few.freedoms.len() - 1)) as f64)
+            });
+            let blocks = Blocks::fit(&differences, series.period_s, (DIFFERENCES, noise), shorter);
+            let typical = median(differences.levels(DIFFERENCES, 0).into_iter().flatten().collect()) / TRIMMED_MEAN;
             // The Allan variance is half the mean square of the differences.
             is_dithered |= 0.5 * typical > dithered_avar(dithered_avar_counts2, n as u64) * count;
-            if freedoms.is_empty() {
+            if few.freedoms.is_empty() {
                 break;
             }
-            scales.push(Scale { n, freedoms });
+            scales.push(Scale { n, blocks: [few, blocks] });
         }
         let floor = if is_dithered { 0.0 } else { count };
         Self { scales, floor }
@@ -183,17 +181,32 @@ impl KnockRule {
         knocks
     }
 
-    /// The knocks around the loudest blocks of a series; none overlaps another.
+    /// The knocks around the loudest blocks of a series; none overlaps another. Where none is as long as [`DIFFERENCES`], the shorter blocks
+    /// are tested: they would find the loudest part of a longer knock alone.
     fn loudest(&self, series: &Series) -> Vec<Knock> {
         let scales: Vec<SquaredDifferences> =
             self.scales.iter().map(|scale| SquaredDifferences::new(series, scale.n)).collect();
+        let knocks = |few: bool| self.loudest_blocks(&scales, series.period_s, few);
+        Some(knocks(false)).filter(|knocks| !knocks.is_empty()).unwrap_or_else(|| knocks(true))
+    }
+
+    /// The same by blocks of [`FEW_DIFFERENCES`] or of [`DIFFERENCES`], by chance in half of [`SIGNIFICANCE`].
+    fn loudest_blocks(&self, scales: &[SquaredDifferences], period_s: f64, few: bool) -> Vec<Knock> {
         let (mut blocks, mut tests) = (Vec::<LoudBlock>::new(), 0_usize);
         for (scale, differences) in scales.iter().enumerate() {
-            let (found, tested) = self.loud_blocks(scale, differences, series.period_s);
+            let [of_few, of_more] = &self.scales[scale].blocks;
+            let (found, tested) = if few {
+                // A short knock may be in halves of two blocks.
+                let [found, shifted] =
+                    [0, FEW_DIFFERENCES / 2].map(|from| self.loud_blocks((scale, of_few), differences, from, period_s));
+                ([found.0, shifted.0].concat(), found.1 + shifted.1)
+            } else {
+                self.loud_blocks((scale, of_more), differences, 0, period_s)
+            };
             blocks.extend(found);
             tests += tested;
         }
-        let limit = SIGNIFICANCE / tests.max(1) as f64;
+        let limit = 0.5 * SIGNIFICANCE / tests.max(1) as f64;
         let slots_of = |block: &LoudBlock| scales[block.scale].slots(block.differences.clone());
         // Of a level that moves by itself, where that shows most.
         let by_itself = |block: &LoudBlock| {
@@ -220,23 +233,30 @@ impl KnockRule {
             };
             // What is near a louder block is tested again without it.
             if !knocks.iter().any(is_near) {
-                knocks.push(knock_around(block, &scales[block.scale], block.p_value * tests as f64));
+                knocks.push(knock_around(block, &scales[block.scale], 2.0 * block.p_value * tests as f64));
             }
         }
         knocks
     }
 
-    /// The blocks of one averaging time with the probability of each by chance, and how many were tested.
-    fn loud_blocks(&self, scale: usize, differences: &SquaredDifferences, period_s: f64) -> (Vec<LoudBlock>, usize) {
+    /// The blocks of one averaging time and size, from the difference `from` on, with the probability of each by chance, and how many were
+    /// tested.
+    fn loud_blocks(
+        &self,
+        (scale, Blocks { size, freedoms }): (usize, &Blocks),
+        differences: &SquaredDifferences,
+        from: usize,
+        period_s: f64,
+    ) -> (Vec<LoudBlock>, usize) {
         let (mut loud, mut tested) = (Vec::new(), 0);
-        let levels = differences.levels();
-        for doublings in doublings(differences, period_s) {
+        let levels = differences.levels(*size, from);
+        for doublings in doublings(differences, *size, period_s) {
             let longer = longer_levels(&levels, doublings);
-            let freedoms = &self.scales[scale].freedoms;
             let Some(&freedom) = freedoms.get(doublings as usize).or(freedoms.last()) else { continue };
-            let size = DIFFERENCES << doublings;
+            let size = size << doublings;
+            let neighbourhood = Neighbourhood::new(&longer);
             for (at, level) in longer.iter().enumerate() {
-                let (Some(level), Some(quiet)) = (level, neighbouring_level(&longer, at, freedom.block)) else {
+                let (Some(level), Some(quiet)) = (level, neighbourhood.level(at, freedom.block)) else {
                     continue;
                 };
                 tested += 1;
@@ -244,7 +264,7 @@ impl KnockRule {
                 let ratio = level / quiet;
                 if ratio > 1.0 && ratio.is_finite() {
                     let p_value = exceedance(ratio, freedom.block, freedom.neighbours);
-                    let differences = at * size..(at + 1) * size;
+                    let differences = from + at * size..from + (at + 1) * size;
                     loud.push(LoudBlock { scale, differences, quiet, ratio, freedom, p_value });
                 }
             }
@@ -256,13 +276,13 @@ impl KnockRule {
     /// several times in a block, some of its squares are large and the others are as elsewhere.
     fn is_loud_throughout(&self, block: &LoudBlock, differences: &SquaredDifferences) -> bool {
         let size = block.differences.len();
-        let at = block.differences.start / size;
+        let (at, from) = (block.differences.start / size, block.differences.start % size);
         let first = at.saturating_sub(NEIGHBOURS + 1);
-        let blocks = first..(at + NEIGHBOURS + 2).min(differences.len() / size);
+        let blocks = first..(at + NEIGHBOURS + 2).min((differences.len() - from) / size);
         let levels: Vec<Option<f64>> =
-            blocks.map(|block| differences.half_level(block * size..(block + 1) * size)).collect();
+            blocks.map(|block| differences.half_level(from + block * size..from + (block + 1) * size)).collect();
         let freedom = HALF_EFFICIENCY * block.freedom.block;
-        let Some(quiet) = neighbouring_level(&levels, at - first, freedom) else { return false };
+        let Some(quiet) = Neighbourhood::new(&levels).level(at - first, freedom) else { return false };
         let Some(level) = levels[at - first] else { return false };
         let others = HALF_EFFICIENCY * block.freedom.neighbours;
         exceedance(level / quiet.max(self.floor), freedom, others) < SIGNIFICANCE_THROUGHOUT
@@ -279,7 +299,9 @@ impl KnockRule {
                 return None;
             }
             let level = differences.trimmed_level(from..from + length)?;
-            let freedom = scale.freedoms.first()?.block * length as f64 / DIFFERENCES as f64;
+            let [few, more] = &scale.blocks;
+            let of_length = if more.size <= length && !more.freedoms.is_empty() { more } else { few };
+            let freedom = of_length.freedoms.first()?.block * length as f64 / of_length.size as f64;
             let beside = (2..2 + SIDE).flat_map(|distance| [-distance, distance]).filter_map(|distance| {
                 let start = from as i64 + distance * length as i64;
                 let start = usize::try_from(start).ok()?;
@@ -305,6 +327,39 @@ impl KnockRule {
             })
         };
         self.scales.iter().filter_map(of_scale).min_by(|a, b| a.p_value.total_cmp(&b.p_value))
+    }
+}
+
+impl Blocks {
+    /// `size` differences have `noise` degrees of freedom in noise that does not change, and by shorter blocks at most those of `shorter`.
+    fn fit(
+        differences: &SquaredDifferences,
+        period_s: f64,
+        (size, noise): (usize, f64),
+        shorter: BlockFreedom,
+    ) -> Self {
+        let levels = differences.levels(size, 0);
+        let mut freedoms: Vec<BlockFreedom> = Vec::new();
+        for doublings in doublings(differences, size, period_s) {
+            let longer = longer_levels(&levels, doublings);
+            let of_noise = noise * f64::from(1_u32 << doublings);
+            // Levels that move at a short length, by themselves or together, do so at a longer one, which may have too few blocks to show it.
+            let shorter = freedoms.last().map_or(shorter, |freedom| freedom.times(2.0));
+            let scatter = LevelScatter::new(&longer);
+            let by_scatter = scatter.as_ref().map_or(f64::INFINITY, LevelScatter::freedom);
+            let block = of_noise.min(shorter.block).min(by_scatter);
+            let neighbours = Neighbourhood::new(&longer).freedom(block).min(shorter.neighbours);
+            let wandering = scatter.and_then(|of| of.wandering(of_noise, shorter.wandering.is_some()));
+            freedoms.push(BlockFreedom { block, neighbours, wandering: wandering.or(shorter.wandering) });
+        }
+        Self { size, freedoms }
+    }
+}
+
+impl BlockFreedom {
+    /// Of a block of so many times the length, at most.
+    fn times(self, longer: f64) -> Self {
+        Self { block: longer * self.block, neighbours: longer * self.neighbours, ..self }
     }
 }
 

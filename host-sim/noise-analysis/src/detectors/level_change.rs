@@ -42,7 +42,7 @@ struct TwoLevels {
 /// The change of the level of a series; `None` where there is none, or more than one.
 pub(crate) fn find(series: &Series) -> Option<LevelChange> {
     let differences = SquaredDifferences::new(series, 1);
-    let all = differences.levels();
+    let all = differences.levels(DIFFERENCES, 0);
     let doublings = (all.len() / LEAST_BLOCKS).checked_ilog2()?;
     let levels = Levels::new(&longer_levels(&all, doublings))?;
     let count = levels.of_blocks.len() as f64;

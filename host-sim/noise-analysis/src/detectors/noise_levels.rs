@@ -11,8 +11,10 @@ use crate::samples::series::Series;
 use statrs::function::beta::checked_beta_reg;
 use std::ops::Range;
 
-/// Differences of the shortest block.
+/// Differences of a block, at least.
 pub(super) const DIFFERENCES: usize = 64;
+/// Differences of the shortest block, which the few periods fill for which a knock rings. A level without the largest tenth has all but two.
+pub(super) const FEW_DIFFERENCES: usize = 20;
 /// Longest averaging time of the differences, s: what moves more slowly is motion or drift and no level of noise.
 const LONGEST_AVERAGE_S: f64 = 0.5;
 /// Longest block, s. Disturbances last seconds to minutes.
@@ -115,18 +117,20 @@ impl SquaredDifferences {
 
     /// Mean of the squares of some differences without the largest tenth; `None` where half of them are missing.
     pub(super) fn trimmed_level(&self, differences: Range<usize>) -> Option<f64> {
-        self.level_without(TRIMMED, differences)
+        self.level_without(TRIMMED, differences, &mut Vec::new())
     }
 
     /// The same without the larger half.
     pub(super) fn half_level(&self, differences: Range<usize>) -> Option<f64> {
-        self.level_without(0.5, differences)
+        self.level_without(0.5, differences, &mut Vec::new())
     }
 
-    fn level_without(&self, left_out: f64, differences: Range<usize>) -> Option<f64> {
+    /// `present` is a buffer.
+    fn level_without(&self, left_out: f64, differences: Range<usize>, present: &mut Vec<f64>) -> Option<f64> {
         let all = differences.len();
         let within = self.differences.get(differences)?.iter().map(|value| value * value);
-        let mut present: Vec<f64> = within.filter(|square| square.is_finite()).collect();
+        present.clear();
+        present.extend(within.filter(|square| square.is_finite()));
         if present.is_empty() || 2 * present.len() < all {
             return None;
         }
@@ -137,26 +141,29 @@ impl SquaredDifferences {
         Some(present[..kept].iter().sum::<f64>() / kept as f64)
     }
 
-    /// Levels of the blocks of [`DIFFERENCES`] differences.
-    pub(super) fn levels(&self) -> Vec<Option<f64>> {
-        let blocks = self.differences.len() / DIFFERENCES;
-        (0..blocks).map(|block| self.trimmed_level(block * DIFFERENCES..(block + 1) * DIFFERENCES)).collect()
+    /// Levels of the blocks of `size` differences, from the difference `from` on.
+    pub(super) fn levels(&self, size: usize, from: usize) -> Vec<Option<f64>> {
+        let mut present = Vec::with_capacity(size);
+        let starts = (from..(self.differences.len() + 1).saturating_sub(size)).step_by(size);
+        starts.map(|start| self.level_without(TRIMMED, start..start + size, &mut present)).collect()
     }
 
-    /// Degrees of freedom of the shortest block, by the correlation of the differences: `m/(1 + 2 Σ (1 − k/m) ρ_k²)` with
-    /// their autocorrelation ρ, for `m` = [`DIFFERENCES`] of them.
-    pub(super) fn freedom(&self) -> f64 {
+    /// Degrees of freedom of the blocks of [`FEW_DIFFERENCES`] and of [`DIFFERENCES`], by the correlation of the differences:
+    /// `m/(1 + 2 Σ (1 − k/m) ρ_k²)` with their autocorrelation ρ, for `m` of them.
+    pub(super) fn freedoms(&self) -> [f64; 2] {
         let covariances = Covariances::new(&self.differences);
         let variance = covariances.at(0).0;
-        let m = DIFFERENCES as f64;
-        let squares = |lag: usize| {
+        let square = |lag: usize| {
             let (covariance, count) = covariances.at(lag);
             // The square of an estimated correlation is too large by about one over the number of products.
-            let square = (covariance / variance).powi(2) - f64::max(count, 1.0).recip();
-            (1.0 - lag as f64 / m) * square.max(0.0)
+            ((covariance / variance).powi(2) - f64::max(count, 1.0).recip()).max(0.0)
         };
-        let sum: f64 = if variance > 0.0 { (1..DIFFERENCES).map(squares).sum() } else { 0.0 };
-        EFFICIENCY * m / (1.0 + 2.0 * sum)
+        let squares: Vec<f64> = (1..DIFFERENCES).map(|lag| if variance > 0.0 { square(lag) } else { 0.0 }).collect();
+        [FEW_DIFFERENCES, DIFFERENCES].map(|size| {
+            let m = size as f64;
+            let weighted = |(lag, square): (usize, &f64)| (1.0 - (lag + 1) as f64 / m) * square;
+            EFFICIENCY * m / (1.0 + 2.0 * squares[..size - 1].iter().enumerate().map(weighted).sum::<f64>())
+        })
     }
 }
 
@@ -231,47 +238,86 @@ pub(super) fn longer_levels(levels: &[Option<f64>], doublings: u32) -> Vec<Optio
     levels.chunks_exact(size).map(mean).collect()
 }
 
-/// Sizes of the blocks, as doublings of the shortest one, at which a record is examined: as long as a block has neighbours.
-pub(super) fn doublings(differences: &SquaredDifferences, period_s: f64) -> impl Iterator<Item = u32> {
-    let shortest_s = (DIFFERENCES * differences.n) as f64 * period_s;
-    let blocks = differences.len() / DIFFERENCES;
+/// Sizes of the blocks, as doublings of `size` differences, at which a record is examined: as long as a block has neighbours.
+pub(super) fn doublings(differences: &SquaredDifferences, size: usize, period_s: f64) -> impl Iterator<Item = u32> {
+    let shortest_s = (size * differences.n) as f64 * period_s;
+    let blocks = differences.len() / size;
     let is_examined = move |doublings: &u32| {
-        let size = 1_usize << doublings;
-        blocks / size >= 2 * FEWEST_NEIGHBOURS + 3 && (*doublings == 0 || size as f64 * shortest_s <= LONGEST_BLOCK_S)
+        let doubled = 1_usize << doublings;
+        let is_short = if size < DIFFERENCES {
+            size * doubled < DIFFERENCES
+        } else {
+            doubled as f64 * shortest_s <= LONGEST_BLOCK_S
+        };
+        blocks / doubled >= 2 * FEWEST_NEIGHBOURS + 3 && (*doublings == 0 || is_short)
     };
     (0..24).take_while(is_examined)
 }
 
-/// The level that the neighbours of a block show.
-///
-/// It is the larger of the medians of the blocks on either side, with at most [`NEIGHBOURS`] each. At an end of the record,
-/// where one side has too few blocks, it is that of the other side.
-pub(super) fn neighbouring_level(levels: &[Option<f64>], at: usize, freedom: f64) -> Option<f64> {
-    let level = side_levels(levels, at).into_iter().flatten().max_by(f64::total_cmp)?;
-    // Median of χ²/ν by Wilson and Hilferty.
-    Some(level / (1.0 - 2.0 / (9.0 * freedom)).max(0.3).powi(3))
+/// For each block the medians of the blocks before it and after it, [`NEIGHBOURS`] at most, without the next one on either side.
+pub(super) struct Neighbourhood {
+    sides: Vec<[Option<f64>; 2]>,
 }
 
-/// Medians of the blocks before and after a block, without the next one on either side.
-fn side_levels(levels: &[Option<f64>], at: usize) -> [Option<f64>; 2] {
-    let after = levels[(at + 2).min(levels.len())..].iter().flatten().take(NEIGHBOURS);
-    let before = levels[..at.saturating_sub(1)].iter().rev().flatten().take(NEIGHBOURS);
-    let side = |levels: Vec<f64>| (levels.len() >= FEWEST_NEIGHBOURS).then(|| median(levels));
-    [side(before.copied().collect()), side(after.copied().collect())]
+impl Neighbourhood {
+    pub(super) fn new(levels: &[Option<f64>]) -> Self {
+        let known: Vec<f64> = levels.iter().copied().flatten().collect();
+        let medians = running_medians(&known, NEIGHBOURS);
+        let side = |known_of: Range<usize>| match known_of.len() {
+            NEIGHBOURS => medians.get(known_of.start).copied(),
+            FEWEST_NEIGHBOURS.. => Some(median(known[known_of].to_vec())),
+            _ => None,
+        };
+        // How many levels are known before each block.
+        let mut before = vec![0];
+        for level in levels {
+            before.push(before[before.len() - 1] + usize::from(level.is_some()));
+        }
+        let sides = |at: usize| {
+            let (until, from) = (before[at.saturating_sub(1)], before[(at + 2).min(levels.len())]);
+            [until.saturating_sub(NEIGHBOURS)..until, from..known.len().min(from + NEIGHBOURS)].map(side)
+        };
+        Self { sides: (0..levels.len()).map(sides).collect() }
+    }
+
+    /// The level that the neighbours of a block of `freedom` degrees of freedom show: the larger one of the sides. At an end of the record,
+    /// where one side has too few blocks, it is that of the other side.
+    pub(super) fn level(&self, at: usize, freedom: f64) -> Option<f64> {
+        let level = self.sides[at].into_iter().flatten().max_by(f64::total_cmp)?;
+        // Median of χ²/ν by Wilson and Hilferty.
+        Some(level / (1.0 - 2.0 / (9.0 * freedom)).max(0.3).powi(3))
+    }
+
+    /// Degrees of freedom of that level, for blocks of `freedom` each: those of the median of as many independent blocks, and no more than
+    /// the medians of both sides of the blocks differ from each other.
+    pub(super) fn freedom(&self, freedom: f64) -> f64 {
+        let independent = freedom * NEIGHBOURS as f64 / MEDIAN_LOSS;
+        let change = |sides: &[Option<f64>; 2]| match *sides {
+            [Some(before), Some(after)] => Some((after / before).ln()).filter(|change| change.is_finite()),
+            _ => None,
+        };
+        let Some(changes) = sorted(self.sides.iter().filter_map(change).collect()) else { return independent };
+        let deviation = (quantile_of(&changes, 0.9) - quantile_of(&changes, 0.1)) / (2.0 * NORMAL_90);
+        // The logarithm of a mean square of ν degrees of freedom has the variance 2/ν, and there are two sides.
+        independent.min(4.0 / (deviation * deviation))
+    }
 }
 
-/// Degrees of freedom of the level of the neighbours, for blocks of `freedom` each: those of the median of as many
-/// independent blocks, and no more than the medians of both sides of the blocks differ from each other.
-pub(super) fn neighbours_freedom(levels: &[Option<f64>], freedom: f64) -> f64 {
-    let independent = freedom * NEIGHBOURS as f64 / MEDIAN_LOSS;
-    let change = |at: usize| match side_levels(levels, at) {
-        [Some(before), Some(after)] => Some((after / before).ln()).filter(|change| change.is_finite()),
-        _ => None,
-    };
-    let Some(changes) = sorted((0..levels.len()).filter_map(change).collect()) else { return independent };
-    let deviation = (quantile_of(&changes, 0.9) - quantile_of(&changes, 0.1)) / (2.0 * NORMAL_90);
-    // The logarithm of a mean square of ν degrees of freedom has the variance 2/ν, and there are two sides.
-    independent.min(4.0 / (deviation * deviation))
+/// The [`median`]s of each `width` neighbouring values.
+fn running_medians(values: &[f64], width: usize) -> Vec<f64> {
+    let mut window: Vec<f64> = Vec::with_capacity(width);
+    let mut medians = Vec::with_capacity(values.len());
+    for (at, &value) in values.iter().enumerate() {
+        let place = |window: &[f64], value: f64| window.partition_point(|other| other.total_cmp(&value).is_lt());
+        if window.len() == width {
+            window.remove(place(&window, values[at - width]));
+        }
+        window.insert(place(&window, value), value);
+        if window.len() == width {
+            medians.push(window[width / 2]);
+        }
+    }
+    medians
 }
 
 /// How the levels of the blocks of one length scatter around those nearby.
@@ -283,13 +329,12 @@ pub(super) struct LevelScatter {
 impl LevelScatter {
     /// `None` for few blocks.
     pub(super) fn new(levels: &[Option<f64>]) -> Option<Self> {
-        let around = |at: usize| {
-            let nearby = at.saturating_sub(NEIGHBOURS)..(at + NEIGHBOURS + 1).min(levels.len());
-            median(levels[nearby].iter().copied().flatten().collect())
-        };
-        let ratio = |(at, level): (usize, &Option<f64>)| level.map(|level| level / around(at));
+        let known: Vec<f64> = levels.iter().copied().flatten().collect();
+        let medians = running_medians(&known, (2 * NEIGHBOURS + 1).min(known.len()));
+        let around = |at: usize| medians[at.saturating_sub(NEIGHBOURS).min(medians.len() - 1)];
+        let ratio = |(at, level): (usize, &f64)| level / around(at);
         let is_measured = |ratio: &f64| *ratio > 0.0 && ratio.is_finite();
-        let ratios = sorted(levels.iter().enumerate().filter_map(ratio).filter(is_measured).collect())?;
+        let ratios = sorted(known.iter().enumerate().map(ratio).filter(is_measured).collect())?;
         Some(Self { ratios })
     }
 
