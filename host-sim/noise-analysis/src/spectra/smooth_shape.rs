@@ -15,6 +15,15 @@ const LARGEST_TAPS_LOG2: u32 = 6;
 /// Most taps of a filter that is read slowly: those of a [`MovingAverageFilter`].
 const MOST_TAPS: u32 = 128;
 
+/// Which filters a shape may be behind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Filters {
+    /// None.
+    Without,
+    /// Any, of which each sample is one of so many values.
+    ReadEvery(u32),
+}
+
 /// White, 1/f and 1/f² noise behind the filter, and an unfiltered floor.
 const TERMS: usize = 4;
 
@@ -31,13 +40,17 @@ pub struct SpectralShape {
 }
 
 impl SpectralShape {
-    /// The likeliest shape over all lengths of the filter, without a filter if `bands` is empty. Where each sample is one of `read_every`
-    /// values, a filter of which only these are read is a candidate: it resembles one that is as long in samples and of which every value
+    /// The likeliest shape over all lengths of the filter, without a filter if `bands` is empty. Where each sample is one of several values,
+    /// a filter of which only these are read is a candidate: it resembles one that is as long in samples and of which every value
     /// is read, but in its nulls.
     #[must_use]
-    pub fn fit(bands: &[SpectralBand], sample_period: f64, read_every: u32) -> Self {
+    pub fn fit(bands: &[SpectralBand], sample_period: f64, filters: Filters) -> Self {
         let fit = |taps: u32, decimation: u32| Self::fit_with_filter(bands, sample_period, (taps, decimation));
-        let own_rate = (0..=LARGEST_TAPS_LOG2).map(|log2| fit(1 << log2, 1));
+        let (read_every, largest) = match filters {
+            Filters::Without => (1, 0),
+            Filters::ReadEvery(values) => (values, LARGEST_TAPS_LOG2),
+        };
+        let own_rate = (0..=largest).map(|log2| fit(1 << log2, 1));
         let Some((shape, objective)) = own_rate.min_by(|(_, a), (_, b)| a.total_cmp(b)) else {
             return Self { sample_period, taps: 1, read_slowly: None, densities: [0.0; TERMS] };
         };
@@ -162,7 +175,7 @@ impl<'a> Background<'a> {
         looks: f64,
         known: &'a dyn Fn(f64) -> f64,
         resolution: f64,
-        (sample_period, read_every): (f64, u32),
+        (sample_period, filters): (f64, Filters),
     ) -> Option<Self> {
         let bands: Vec<SpectralBand> = background_bands(density.len())
             .map(|range| {
@@ -178,7 +191,7 @@ impl<'a> Background<'a> {
         let enough = bands.len() >= 8 && bands.iter().all(|band| band.density > 0.0);
         enough.then(|| Self {
             known,
-            shape: SpectralShape::fit(&bands, sample_period, read_every),
+            shape: SpectralShape::fit(&bands, sample_period, filters),
             floor: FLOOR * median(&mut bands.iter().map(|band| band.density).collect::<Vec<f64>>()),
             resolution,
             ordinates: density.len(),

@@ -1,6 +1,6 @@
 //! Welch's estimate of a power spectral density: the average of the periodograms of overlapping windowed segments.
 
-use super::smooth_shape::SpectralShape;
+use super::smooth_shape::{Filters, SpectralShape};
 use super::transforms;
 use super::whittle::SpectralBand;
 use crate::samples::uniform_series::UniformSeries;
@@ -190,6 +190,6 @@ impl Welch {
     #[must_use]
     pub fn shape(&self, is_line: impl Fn(f64) -> bool) -> (SpectralShape, Vec<SpectralBand>) {
         let bands = self.bands(is_line);
-        (SpectralShape::fit(&bands, self.sample_period, 1), bands)
+        (SpectralShape::fit(&bands, self.sample_period, Filters::ReadEvery(1)), bands)
     }
 }
