@@ -7,7 +7,7 @@
 
 use super::noise_levels::{
     DIFFERENCES, FEW_DIFFERENCES, HALF_EFFICIENCY, LevelScatter, NEIGHBOURS, Neighbourhood, SquaredDifferences,
-    TRIMMED_MEAN, Wandering, averaging_factors, doublings, exceedance, longer_levels, median,
+    TRIMMED_MEAN, Wandering, averaging_factors, doublings, exceedance, longer_levels, median, ratio_by_chance,
 };
 use super::spikes::Disturbance;
 use crate::bounds::BoundedEstimate;
@@ -106,6 +106,7 @@ struct LoudBlock {
     quiet: f64,
     ratio: f64,
     freedom: BlockFreedom,
+    /// 1 where it is above [`SIGNIFICANCE`].
     p_value: f64,
 }
 
@@ -255,6 +256,7 @@ impl KnockRule {
             let Some(&freedom) = freedoms.get(doublings as usize).or(freedoms.last()) else { continue };
             let size = size << doublings;
             let neighbourhood = Neighbourhood::new(&longer);
+            let least = ratio_by_chance(SIGNIFICANCE, freedom.block, freedom.neighbours);
             for (at, level) in longer.iter().enumerate() {
                 let (Some(level), Some(quiet)) = (level, neighbourhood.level(at, freedom.block)) else {
                     continue;
@@ -263,7 +265,9 @@ impl KnockRule {
                 let quiet = quiet.max(self.floor);
                 let ratio = level / quiet;
                 if ratio > 1.0 && ratio.is_finite() {
-                    let p_value = exceedance(ratio, freedom.block, freedom.neighbours);
+                    // The probability of most is of no use, and takes longest.
+                    let p_value =
+                        if ratio < least { 1.0 } else { exceedance(ratio, freedom.block, freedom.neighbours) };
                     let differences = from + at * size..from + (at + 1) * size;
                     loud.push(LoudBlock { scale, differences, quiet, ratio, freedom, p_value });
                 }

@@ -405,6 +405,20 @@ pub(super) fn exceedance(ratio: f64, freedom: f64, of_other: f64) -> f64 {
     checked_beta_reg(0.5 * of_other, 0.5 * freedom, of_other / (of_other + freedom * ratio)).unwrap_or(1.0)
 }
 
+/// The ratio whose [`exceedance`] is `p_value`, to one part in a million.
+pub(super) fn ratio_by_chance(p_value: f64, freedom: f64, of_other: f64) -> f64 {
+    let exceeds = |ratio: f64| exceedance(ratio, freedom, of_other) > p_value;
+    let (mut low, mut high) = (1.0, 2.0);
+    while exceeds(high) && high < f64::MAX / 2.0 {
+        (low, high) = (high, 2.0 * high);
+    }
+    while high - low > 1e-6 * low {
+        let middle = 0.5 * (low + high);
+        if exceeds(middle) { low = middle } else { high = middle }
+    }
+    low
+}
+
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
     if values.is_empty() {
         return f64::NAN;

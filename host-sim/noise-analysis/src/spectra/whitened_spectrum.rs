@@ -473,16 +473,17 @@ fn independent_part(series: &UniformSeries) -> f64 {
 }
 
 /// Refits each resonance over the background without any of them, until that moves it by less than its errors: a strong one biases the
-/// first estimates of it, and those the background. The skirts of a wide one are taken for noise behind a filter, so that neither has its
-/// form; where one has not, all are refitted to noise that is behind none, and kept if the worst of them has its form rather.
+/// first estimates of it, and those the background. The skirts of the first one, which is the strongest, may be taken for noise behind a
+/// filter, so that neither has its form; it is then refitted to noise that is behind none, and kept if it has its form there.
 pub(super) fn refit(spectrum: &Spectrum, known: &dyn Fn(f64) -> f64, resonances: &mut [Resonance]) {
-    let worst = |of: &[Resonance]| of.iter().map(|of| of.lorentz.shape_p_value).fold(1.0, f64::min);
-    let mut without_filter = resonances.to_vec();
+    let mut first = resonances.to_vec();
     refit_behind(spectrum, known, resonances, spectrum.filters);
-    if worst(resonances) < REFUTED {
-        refit_behind(spectrum, known, &mut without_filter, Filters::Without);
-        if worst(&without_filter) >= REFUTED {
-            resonances.copy_from_slice(&without_filter);
+    if let ([refitted], [other]) = (resonances, &mut first[..])
+        && refitted.lorentz.shape_p_value < REFUTED
+    {
+        refit_behind(spectrum, known, std::slice::from_mut(other), Filters::Without);
+        if other.lorentz.shape_p_value >= REFUTED {
+            *refitted = *other;
         }
     }
 }
