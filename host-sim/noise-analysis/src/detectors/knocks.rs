@@ -182,8 +182,8 @@ impl KnockRule {
         knocks
     }
 
-    /// The knocks around the loudest blocks of a series; none overlaps another. Where none is as long as [`DIFFERENCES`], the shorter blocks
-    /// are tested: they would find the loudest part of a longer knock alone.
+    /// The knocks around the loudest blocks of a series; none overlaps another. Blocks of [`FEW_DIFFERENCES`] are tested where none of
+    /// [`DIFFERENCES`] or more has one: of a longer knock they would find the loudest part.
     fn loudest(&self, series: &Series) -> Vec<Knock> {
         let scales: Vec<SquaredDifferences> =
             self.scales.iter().map(|scale| SquaredDifferences::new(series, scale.n)).collect();

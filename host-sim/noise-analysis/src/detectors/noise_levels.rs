@@ -11,9 +11,9 @@ use crate::samples::series::Series;
 use statrs::function::beta::checked_beta_reg;
 use std::ops::Range;
 
-/// Differences of a block, at least.
+/// Differences of a block, the shortest of several lengths.
 pub(super) const DIFFERENCES: usize = 64;
-/// Differences of the shortest block, which the few periods fill for which a knock rings. A level without the largest tenth has all but two.
+/// Differences of a shorter one: as many as a knock has that rings for a few periods. Without the largest tenth all but two are left.
 pub(super) const FEW_DIFFERENCES: usize = 20;
 /// Longest averaging time of the differences, s: what moves more slowly is motion or drift and no level of noise.
 const LONGEST_AVERAGE_S: f64 = 0.5;

@@ -1,4 +1,4 @@
-//! The minimum of a function of one variable.
+//! The minimum of a function of one variable, and the end of a condition.
 
 /// Part of an interval that a step of the golden section leaves: (√5 − 1)/2.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -39,9 +39,21 @@ pub(crate) fn downhill(of: impl Fn(f64) -> f64, (start, step): (f64, f64), farth
     golden_section((low, high), steps, of)
 }
 
+/// Where a condition that `holds` at `inside` ends towards `outside`, after so many `steps` by halves; `outside` if it holds there.
+pub(crate) fn end_of((mut inside, mut outside): (f64, f64), steps: usize, mut holds: impl FnMut(f64) -> bool) -> f64 {
+    if holds(outside) {
+        return outside;
+    }
+    for _ in 0..steps {
+        let middle = 0.5 * (inside + outside);
+        *(if holds(middle) { &mut inside } else { &mut outside }) = middle;
+    }
+    0.5 * (inside + outside)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{downhill, golden_section};
+    use super::{downhill, end_of, golden_section};
 
     #[test]
     fn parabolas_have_their_minimum_at_the_vertex() {
@@ -53,5 +65,15 @@ mod tests {
         }
         // No farther than allowed, but for the last step.
         assert!(downhill(|x| -x, (0.0, 0.1), 1.0, 1e-5) < 1.5);
+    }
+
+    #[test]
+    fn conditions_end_at_their_limit_or_not_at_all() {
+        for (inside, outside) in [(0.0, 10.0), (0.0, -10.0)] {
+            // 2⁻³⁰ of 10 is 9·10⁻⁹.
+            let end = end_of((inside, outside), 30, |x| x.abs() < 3.7);
+            assert!((end.abs() - 3.7).abs() < 1e-8 && end * outside > 0.0, "{end}");
+            assert_eq!(end_of((inside, outside), 30, |_| true), outside);
+        }
     }
 }

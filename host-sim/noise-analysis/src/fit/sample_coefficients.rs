@@ -94,7 +94,7 @@ mod tests {
     const KINDS: [NoiseTerm; 4] =
         [NoiseTerm::AngleRandomWalk, NoiseTerm::BiasInstability, NoiseTerm::RateRandomWalk, NoiseTerm::Quantization];
 
-    /// White angle error of half the power, in counts times s: 3·Q²/τ² is the variance of its differences, which has no other Q.
+    /// Q of [`angle_error`], in counts times s: the deviation of the errors of the angle.
     const QUANTIZATION: f64 = DEVIATION * std::f64::consts::FRAC_1_SQRT_2 * PERIOD_S;
 
     /// The probability of a quantization of at least `low` in white noise of [`DEVIATION`] with what `added` makes, of which one of so many
@@ -111,7 +111,7 @@ mod tests {
         spectrum.term_p_value(&model, 3).expect("few are interpolated")
     }
 
-    /// Differences of white errors of half the power of the noise.
+    /// Rates by an angle with white errors, of the same power as the noise: differences of errors that have half of it.
     fn angle_error() -> impl FnMut(&mut ChaCha8Rng) -> f64 {
         let mut last = 0.0;
         move |random| {

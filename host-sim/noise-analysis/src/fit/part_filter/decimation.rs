@@ -1,6 +1,6 @@
 //! How many values of its own clock a filter makes for each sample that is read: where a deviance is least, and where it is small.
 
-use crate::fit::minimum::golden_section;
+use crate::fit::minimum::{end_of, golden_section};
 use allan_core::term::MovingAverageFilter;
 
 /// Decimations are tried in steps of this factor, a quarter of an octave: with the shape of the filter known, the curve of the
@@ -72,15 +72,9 @@ pub(super) fn allowed_within(
 ) -> (f64, f64) {
     let mut is_allowed = |log: f64| deviance(MovingAverageFilter { decimation: log.exp(), ..filter }) <= limit;
     let mut bound = |outside: f64| {
-        if is_allowed(outside.ln()) {
-            return outside;
-        }
-        let (mut inside, mut outside) = (filter.decimation.ln(), outside.ln());
-        for _ in 0..steps {
-            let middle = 0.5 * (inside + outside);
-            if is_allowed(middle) { inside = middle } else { outside = middle }
-        }
-        (0.5 * (inside + outside)).exp()
+        let end = end_of((filter.decimation.ln(), outside.ln()), steps, &mut is_allowed);
+        // The end of the range as it is.
+        if end == outside.ln() { outside } else { end.exp() }
     };
     (bound(from), bound(to))
 }

@@ -4,7 +4,7 @@
 use super::channel_deviance::ChannelDeviance;
 use super::hypothesis::{BOUNDED, chi_squared_quantile};
 use crate::bounds::BoundedEstimate;
-use crate::fit::minimum::golden_section;
+use crate::fit::minimum::{end_of, golden_section};
 use allan_core::NoiseTerm;
 use allan_core::term::{LowPass, MovingAverageFilter};
 
@@ -49,14 +49,7 @@ pub(super) fn in_place_of(
         channels.iter_mut().zip(&dispersions).map(of).sum::<f64>()
     };
     let limit = sum(at.ln()) + chi_squared_quantile(BOUNDED, 1.0);
-    let mut bound = |outside: f64| {
-        let (mut inside, mut outside) = (at.ln(), outside.ln());
-        for _ in 0..SEARCH_STEPS {
-            let middle = 0.5 * (inside + outside);
-            *(if sum(middle) <= limit { &mut inside } else { &mut outside }) = middle;
-        }
-        inside.exp()
-    };
+    let mut bound = |outside: f64| end_of((at.ln(), outside.ln()), SEARCH_STEPS, |log| sum(log) <= limit).exp();
     let (low, high) = (bound(at / STEP), bound(at * STEP));
     Some((design(at), BoundedEstimate { value: at, low, high }))
 }
