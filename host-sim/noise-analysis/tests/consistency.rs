@@ -217,9 +217,13 @@ fn terms_in_findings(channel: &ChannelReport, add: &mut impl FnMut(String)) {
         // Disturbances of which the curve shows a line have the averaging time at which that is largest, 0.371/f, within an octave on
         // either side and the tenths to which octaves tell a frequency.
         let is_octave = |effect: &Effect| {
-            let Effect::Unexplained(unexplained) = effect else { return false };
-            let tau_s = unexplained.tau_s().zip(of_term);
-            tau_s.is_some_and(|(tau_s, frequency)| (tau_s.value * frequency / 0.371).ln().abs() < 3f64.ln())
+            let tau_s = match effect {
+                Effect::Unexplained(unexplained) => unexplained.tau_s().map(|tau_s| tau_s.value),
+                // The Allan deviation of exponential decays, as of a Markov process, is largest at 1.89 time constants.
+                Effect::ShotNoise(decays) => Some(1.89 * decays.time_constant_s.value),
+                _ => None,
+            };
+            tau_s.zip(of_term).is_some_and(|(tau_s, frequency)| (tau_s * frequency / 0.371).ln().abs() < 3f64.ln())
         };
         let is_told = match term.kind() {
             "sinusoid" | "resonance" => effects().any(|effect| {
