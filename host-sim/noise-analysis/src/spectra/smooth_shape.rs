@@ -17,7 +17,7 @@ const MOST_TAPS: u32 = 128;
 
 /// Which filters a shape may be behind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Filters {
+pub(super) enum Filters {
     /// None.
     Without,
     /// Any, of which each sample is one of so many values.
@@ -44,7 +44,7 @@ impl SpectralShape {
     /// a filter of which only these are read is a candidate: it resembles one that is as long in samples and of which every value
     /// is read, but in its nulls.
     #[must_use]
-    pub fn fit(bands: &[SpectralBand], sample_period: f64, filters: Filters) -> Self {
+    pub(super) fn fit(bands: &[SpectralBand], sample_period: f64, filters: Filters) -> Self {
         let fit = |taps: u32, decimation: u32| Self::fit_with_filter(bands, sample_period, (taps, decimation));
         let (read_every, largest) = match filters {
             Filters::Without => (1, 0),
