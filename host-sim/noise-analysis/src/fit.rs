@@ -5,7 +5,6 @@ pub mod contradiction;
 pub(crate) mod covariates;
 pub(crate) mod event_share;
 pub mod gauss_markov;
-pub(crate) mod minimum;
 pub(crate) mod noise_terms;
 pub(crate) mod octave_covariance;
 pub(crate) mod part_filter;

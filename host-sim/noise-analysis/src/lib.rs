@@ -30,6 +30,7 @@ pub mod distributions;
 pub mod effects;
 pub mod fit;
 mod halves;
+mod minimum;
 pub mod nonstationarity;
 pub mod parallel;
 pub mod quick;

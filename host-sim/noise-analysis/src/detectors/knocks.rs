@@ -144,12 +144,14 @@ impl KnockRule {
             let [few_noise, noise] = differences.freedoms();
             let of_half = scales.last().and_then(|half: &Scale| half.blocks[0].freedoms.last()?.wandering);
             let unknown = BlockFreedom { block: f64::INFINITY, neighbours: f64::INFINITY, wandering: of_half };
-            let few = Blocks::fit(&differences, series.period_s, (FEW_DIFFERENCES, few_noise), unknown);
+            let few_levels = differences.levels(FEW_DIFFERENCES, 0);
+            let few = Blocks::fit(&differences, &few_levels, series.period_s, (FEW_DIFFERENCES, few_noise), unknown);
             let shorter = few.freedoms.last().map_or(unknown, |last| {
                 last.times(DIFFERENCES as f64 / (FEW_DIFFERENCES << (few.freedoms.len() - 1)) as f64)
             });
-            let blocks = Blocks::fit(&differences, series.period_s, (DIFFERENCES, noise), shorter);
-            let typical = median(differences.levels(DIFFERENCES, 0).into_iter().flatten().collect()) / TRIMMED_MEAN;
+            let levels = differences.levels(DIFFERENCES, 0);
+            let blocks = Blocks::fit(&differences, &levels, series.period_s, (DIFFERENCES, noise), shorter);
+            let typical = median(levels.into_iter().flatten().collect()) / TRIMMED_MEAN;
             // The Allan variance is half the mean square of the differences.
             is_dithered |= 0.5 * typical > dithered_avar(dithered_avar_counts2, n as u64) * count;
             if few.freedoms.is_empty() {
@@ -188,7 +190,8 @@ impl KnockRule {
         let scales: Vec<SquaredDifferences> =
             self.scales.iter().map(|scale| SquaredDifferences::new(series, scale.n)).collect();
         let knocks = |few: bool| self.loudest_blocks(&scales, series.period_s, few);
-        Some(knocks(false)).filter(|knocks| !knocks.is_empty()).unwrap_or_else(|| knocks(true))
+        let longer = knocks(false);
+        if longer.is_empty() { knocks(true) } else { longer }
     }
 
     /// The same by blocks of [`FEW_DIFFERENCES`] or of [`DIFFERENCES`], by chance in half of [`SIGNIFICANCE`].
@@ -335,17 +338,18 @@ impl KnockRule {
 }
 
 impl Blocks {
-    /// `size` differences have `noise` degrees of freedom in noise that does not change, and by shorter blocks at most those of `shorter`.
+    /// `levels` are those of `size` differences, which have `noise` degrees of freedom in noise that does not change, and by shorter blocks at
+    /// most those of `shorter`.
     fn fit(
         differences: &SquaredDifferences,
+        levels: &[Option<f64>],
         period_s: f64,
         (size, noise): (usize, f64),
         shorter: BlockFreedom,
     ) -> Self {
-        let levels = differences.levels(size, 0);
         let mut freedoms: Vec<BlockFreedom> = Vec::new();
         for doublings in doublings(differences, size, period_s) {
-            let longer = longer_levels(&levels, doublings);
+            let longer = longer_levels(levels, doublings);
             let of_noise = noise * f64::from(1_u32 << doublings);
             // Levels that move at a short length, by themselves or together, do so at a longer one, which may have too few blocks to show it.
             let shorter = freedoms.last().map_or(shorter, |freedom| freedom.times(2.0));

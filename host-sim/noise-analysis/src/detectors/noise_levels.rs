@@ -7,6 +7,7 @@
 
 use crate::distributions::{quantile, student_tail};
 use crate::effects::findings::REFUTED;
+use crate::minimum::end_of;
 use crate::samples::series::Series;
 use statrs::function::beta::checked_beta_reg;
 use std::ops::Range;
@@ -48,6 +49,8 @@ const MOST_FREEDOM: f64 = 1e6;
 /// Relative standard deviation of a scatter by the distance of the 90 % quantile from the median of n normal numbers, times √n: that distance
 /// has the variance 0.1·0.9/0.1755² + 0.5²/0.3989² − 2·0.1·0.5/(0.1755·0.3989) = 3.07, over [`NORMAL_90`]².
 const SCATTER_ERROR: f64 = 1.37;
+/// Steps by halves within an octave in which a ratio is sought.
+const RATIO_STEPS: usize = 20;
 /// The 90 % quantile of the standard normal distribution.
 const NORMAL_90: f64 = 1.2816;
 
@@ -405,18 +408,14 @@ pub(super) fn exceedance(ratio: f64, freedom: f64, of_other: f64) -> f64 {
     checked_beta_reg(0.5 * of_other, 0.5 * freedom, of_other / (of_other + freedom * ratio)).unwrap_or(1.0)
 }
 
-/// The ratio whose [`exceedance`] is `p_value`, to one part in a million.
+/// The ratio whose [`exceedance`] is `p_value`, to less than one part in a million.
 pub(super) fn ratio_by_chance(p_value: f64, freedom: f64, of_other: f64) -> f64 {
     let exceeds = |ratio: f64| exceedance(ratio, freedom, of_other) > p_value;
     let (mut low, mut high) = (1.0, 2.0);
     while exceeds(high) && high < f64::MAX / 2.0 {
         (low, high) = (high, 2.0 * high);
     }
-    while high - low > 1e-6 * low {
-        let middle = 0.5 * (low + high);
-        if exceeds(middle) { low = middle } else { high = middle }
-    }
-    low
+    end_of((low, high), RATIO_STEPS, exceeds)
 }
 
 pub(super) fn median(mut values: Vec<f64>) -> f64 {

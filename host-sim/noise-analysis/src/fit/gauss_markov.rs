@@ -6,7 +6,7 @@
 //! least deviance `Σ edf·(ln(m/v) + v/m − 1)`, the measure of every other fit here, so it is close where the record
 //! determines the curve and not where white noise hides the slow part.
 
-use crate::fit::minimum::golden_section;
+use crate::minimum::golden_section;
 use allan_core::term::Markov;
 use allan_core::{Model, NoiseTerm, model::FittedTerm};
 

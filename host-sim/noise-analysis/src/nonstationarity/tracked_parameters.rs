@@ -1,8 +1,8 @@
 //! A model whose white noise and one of whose lines may change from epoch to epoch.
 
 use super::epochs::SIGNIFICANCE;
-use crate::fit::minimum::downhill;
 use crate::fit::noise_terms::is_white;
+use crate::minimum::downhill;
 use allan_core::confidence::octave_correlation;
 use allan_core::model::FittedTerm;
 use allan_core::term::{Resonance, Shape, Sinusoid};

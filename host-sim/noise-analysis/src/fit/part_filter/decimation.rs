@@ -1,6 +1,6 @@
 //! How many values of its own clock a filter makes for each sample that is read: where a deviance is least, and where it is small.
 
-use crate::fit::minimum::{end_of, golden_section};
+use crate::minimum::{end_of, golden_section};
 use allan_core::term::MovingAverageFilter;
 
 /// Decimations are tried in steps of this factor, a quarter of an octave: with the shape of the filter known, the curve of the

@@ -4,7 +4,7 @@
 use super::channel_deviance::ChannelDeviance;
 use super::hypothesis::{BOUNDED, chi_squared_quantile};
 use crate::bounds::BoundedEstimate;
-use crate::fit::minimum::{end_of, golden_section};
+use crate::minimum::{end_of, golden_section};
 use allan_core::NoiseTerm;
 use allan_core::term::{LowPass, MovingAverageFilter};
 
