@@ -1,9 +1,9 @@
 //! The pipeline from a recording to its report.
 //!
 //! ```text
-//! Measurement ─► CondensedRecord ─► TracedRecord: preprocessing, curves, models of the whole ─► effects ─► causes ─► Report
-//!                     │                  └─► FirstHalf: models of the first half, errors on the second ───────────┤
-//!                     └─► its first half ─► TracedRecord ─► effects, to validate those of the whole ──────────────┘
+//! Measurement ─► CondensedRecord ─► PreprocessedRecord: curves ─► TracedPart: models of the whole ─► effects ─► causes ─► Report
+//!                     │                   └─► FirstHalf: models of the first half, errors on the second ──────────────┤
+//!                     └─► its first half ─► PreprocessedRecord ─► TracedPart ─► effects, to validate those of the whole ┘
 //! ```
 //!
 //! Effects are named on the whole record. The errors before and after come from models of the first half alone, compared
@@ -13,8 +13,8 @@
 use crate::OCTAVES;
 use crate::effects::Effect;
 use crate::halves::first_half::{Epochs, FirstHalf};
-use crate::halves::traced_part::ChannelTrace;
-use crate::halves::traced_record::TracedRecord;
+use crate::halves::preprocessed_record::PreprocessedRecord;
+use crate::halves::traced_part::{ChannelTrace, TracedPart};
 use crate::nonstationarity::CommonModeRegression;
 use crate::parallel::{self, per_channel};
 use crate::record::condensed_record::CondensedRecord;
@@ -35,10 +35,10 @@ use std::fmt;
 /// What an analysis does, in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// Fits the models of the whole record.
-    WholeRecord,
-    /// Fits the models of the first half, and compares them with the second.
-    FirstHalf,
+    /// Looks for what the samples show before models are fitted to them.
+    Preprocessing,
+    /// Fits the models of the whole record, and those of the first half, which are compared with the second.
+    Models,
     /// Names the effects, in the whole record and in its first half alone.
     Effects,
     /// Assesses the models, and gathers the figures of the report.
@@ -53,8 +53,8 @@ impl Stage {
 impl fmt::Display for Stage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::WholeRecord => "models of the whole record",
-            Self::FirstHalf => "models of the first half",
+            Self::Preprocessing => "preprocessing",
+            Self::Models => "models of the whole record and of the first half",
             Self::Effects => "effects",
             Self::Assessment => "assessment",
         })
@@ -96,29 +96,34 @@ pub fn analyze_samples(measurement: &Measurement) -> Report {
 #[must_use]
 pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Report {
     let CondensedRecord { description, means: measurement, .. } = record;
-    watch(Stage::WholeRecord);
-    let mut whole = TracedRecord::new(record);
-    watch(Stage::FirstHalf);
-    let (first_half, epochs) = FirstHalf::fit(&whole);
-    whole.part.take_terms_that_held(&first_half.part, &whole.estimators.ruled[1]);
-    whole.part.add_lines_of_spectrum();
-    whole.part.take_coefficients_of_samples();
+    watch(Stage::Preprocessing);
+    let whole = PreprocessedRecord::new(record);
+    watch(Stage::Models);
+    // Beside each other: where one waits for its slowest channel, the other goes on.
+    let ((first_half, epochs), mut models) = parallel::both(|| FirstHalf::fit(&whole), || whole.fit());
+    models.take_terms_that_held(&first_half.part, &whole.estimators.ruled[1]);
+    models.add_lines_of_spectrum();
+    models.take_coefficients_of_samples();
     watch(Stage::Effects);
-    let effects = whole.effects();
+    let effects = whole.effects(&models);
     // What the first half shows by itself, to compare with what the whole record shows.
     let of_half = || {
-        let is_compared = effects.iter().any(|of| !of.is_empty());
-        if is_compared { TracedRecord::new(&record.first_half()).effects() } else { effects.clone() }
+        if effects.iter().all(Vec::is_empty) {
+            return effects.clone();
+        }
+        let half = record.first_half();
+        let half = PreprocessedRecord::new(&half);
+        half.effects(&half.fit())
     };
     let (effects_of_half, mut channels) =
-        parallel::both(of_half, || channel_reports(&whole, &first_half, &epochs, &effects));
+        parallel::both(of_half, || channel_reports((&whole, &models), &first_half, &epochs, &effects));
     watch(Stage::Assessment);
     let duration_s = description.periods as f64 * description.period_s();
     let (effects, effects_of_half) = (effects.into_vec(), effects_of_half.into_vec());
     let findings = causes::find(&mut channels, &effects, &effects_of_half, &description.profile, duration_s);
-    let part = part_report::report(record.first_samples(), &whole.part.filter);
+    let part = part_report::report(record.first_samples(), &models.filter);
     // The samples are transformed once more for the figures: what is not needed then is released.
-    drop((whole, first_half, epochs));
+    drop((whole, models, first_half, epochs));
     let mut report = Report {
         schema: SCHEMA,
         quick: false,
@@ -138,18 +143,19 @@ pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Rep
 
 /// The report of every channel, without its `effects`.
 fn channel_reports(
-    whole: &TracedRecord,
+    (whole, models): (&PreprocessedRecord, &TracedPart),
     first_half: &FirstHalf,
     epochs: &Epochs,
     effects: &PerChannel<Vec<Effect>>,
 ) -> Vec<ChannelReport> {
     let record = whole.record;
-    let assessments =
-        per_channel(record.channels.ids(), |channel| Assessed::new(whole, channel, &first_half.part.channels[channel]));
+    let assessments = per_channel(record.channels.ids(), |channel| {
+        Assessed::new(whole, channel, (&models.channels[channel], &first_half.part.channels[channel]))
+    });
     let nonstationarities = epochs.nonstationarities(whole, first_half);
     let at_rest = whole.at_rest(effects);
     let report = |(channel, Assessed { assessment, by_spectrum })| {
-        let mut report = first_half.report(&whole.part, &whole.estimators, channel, whole.has_rules(channel));
+        let mut report = first_half.report(models, &whole.estimators, channel, whole.has_rules(channel));
         for point in &mut report.curve {
             point.adev_by_spectrum = by_spectrum.get(point.n.ilog2() as usize).copied().flatten();
         }
@@ -166,7 +172,7 @@ fn channel_reports(
 }
 
 /// Samples of a channel that are missing in its model.
-fn missing_samples(whole: &TracedRecord, channel: ChannelId) -> MissingSamples {
+fn missing_samples(whole: &PreprocessedRecord, channel: ChannelId) -> MissingSamples {
     let CondensedRecord { description, samples_per_mean, channels, .. } = whole.record;
     // Of means, a knock has all of their samples.
     let by_rules = whole.preprocessing.refused(channel).map(|(cause, means)| (cause, means * samples_per_mean));
@@ -205,8 +211,8 @@ struct Assessed {
 }
 
 impl Assessed {
-    fn new(whole: &TracedRecord, channel: ChannelId, half: &ChannelTrace) -> Self {
-        let trace = &whole.part.channels[channel];
+    /// By the models of the whole record and of its first half.
+    fn new(whole: &PreprocessedRecord, channel: ChannelId, (trace, half): (&ChannelTrace, &ChannelTrace)) -> Self {
         let recorded = Series::from_measurement(whole.measurement(), channel);
         let own = if whole.record.is_traced(channel) { &whole.series[channel] } else { &recorded };
         // Models that are assessed by samples that still have the share of the covariates.

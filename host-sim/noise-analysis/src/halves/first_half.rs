@@ -6,8 +6,8 @@ use crate::fit::covariates::CovariateFit;
 use crate::fit::event_share::EventShare;
 use crate::fit::sample_coefficients::{SamplesOfCurve, by_samples};
 use crate::fit::signal_share::SignalShare;
+use crate::halves::preprocessed_record::PreprocessedRecord;
 use crate::halves::traced_part::{BiasByBlocks, PartData, PartSamples, TracedPart};
-use crate::halves::traced_record::TracedRecord;
 use crate::nonstationarity::{self, ChannelEpochs, EpochCurves, Nonstationarity, TracedChannel};
 use crate::parallel::{self, per_channel};
 use crate::record::estimators::{RecordEstimators, RecordPart};
@@ -35,7 +35,7 @@ pub(crate) struct FirstHalf {
 
 /// How the noise of each channel changes.
 pub(crate) struct Epochs {
-    /// The series of [`TracedRecord::series`] without what the rules of the first half exclude, in both halves.
+    /// The series of [`PreprocessedRecord::series`] without what the rules of the first half exclude, in both halves.
     series: PerChannel<Series>,
     /// Curves of the channel's epochs, with the part of the first half that its model is fitted to; `None` of a record that is too
     /// short for them, and of a channel that is not traced.
@@ -44,8 +44,8 @@ pub(crate) struct Epochs {
 
 impl FirstHalf {
     /// The models, and how the noise changes.
-    pub(crate) fn fit(record: &TracedRecord) -> (Self, Epochs) {
-        let TracedRecord { estimators, preprocessing, .. } = record;
+    pub(crate) fn fit(record: &PreprocessedRecord) -> (Self, Epochs) {
+        let PreprocessedRecord { estimators, preprocessing, .. } = record;
         let series = record.series_without(Exclusion::ByFirstHalf);
         let middle = record.measurement().middle();
         let halves = series.map(|series| series.before(middle));
@@ -237,7 +237,7 @@ impl Epochs {
     /// How the noise of each traced channel changes.
     pub(crate) fn nonstationarities(
         &self,
-        record: &TracedRecord,
+        record: &PreprocessedRecord,
         first_half: &FirstHalf,
     ) -> PerChannel<Option<Nonstationarity>> {
         let traced: Vec<ChannelId> = record.measurement().inertial().collect();

@@ -1,4 +1,4 @@
-//! What all of a recording shows: the effects in the samples of each channel, and the models of the whole.
+//! A recording before and after models are fitted to all of it: what the samples of each channel show, and the effects by both.
 
 use crate::detectors::level_change;
 use crate::detectors::noise_grid::NoiseGrids;
@@ -19,20 +19,18 @@ use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use measurement::{ChannelId, Measurement, PerChannel, Quantity};
 
-/// A recording with what was found in all of it.
-pub(crate) struct TracedRecord<'a> {
+/// A recording with what its samples show before models are fitted to them.
+pub(crate) struct PreprocessedRecord<'a> {
     pub record: &'a CondensedRecord<'a>,
     pub preprocessing: Preprocessing,
     pub estimators: RecordEstimators,
     /// After preprocessing.
     pub series: PerChannel<Series>,
-    /// The models of the whole record.
-    pub part: TracedPart,
     motions: PerChannel<Option<PlatformMotion>>,
 }
 
-impl<'a> TracedRecord<'a> {
-    /// What `record` shows.
+impl<'a> PreprocessedRecord<'a> {
+    /// What the samples of `record` show.
     pub(crate) fn new(record: &'a CondensedRecord<'a>) -> Self {
         let measurement = record.means.as_ref();
         let preprocessing = Preprocessing::detect(record, &NoiseGrids::default());
@@ -44,15 +42,20 @@ impl<'a> TracedRecord<'a> {
         let motions = motion::told_by_two(motions);
         let series =
             per_channel(measurement.ids(), |channel| preprocessing.series(measurement, channel, Exclusion::ByWhole));
+        Self { record, preprocessing, estimators, series, motions }
+    }
+
+    /// The models of the whole record.
+    pub(crate) fn fit(&self) -> TracedPart {
+        let (measurement, preprocessing) = (self.measurement(), &self.preprocessing);
         let bias = |channel: ChannelId| BiasByBlocks {
             has_ramp: preprocessing.has_ramp(channel, Exclusion::ByWhole),
             sensitivities: preprocessing.sensitivities(channel, Exclusion::ByWhole).to_vec(),
         };
         let biases = measurement.ids().map(bias).collect();
-        let samples = PartSamples { record, series: &series, biases, seeks_levels: true };
-        let data = PartData { profile: &measurement.profile, curves: &estimators.both, samples: Some(samples) };
-        let part = TracedPart::fit(&data);
-        Self { record, preprocessing, estimators, series, part, motions }
+        let samples = PartSamples { record: self.record, series: &self.series, biases, seeks_levels: true };
+        let data = PartData { profile: &measurement.profile, curves: &self.estimators.both, samples: Some(samples) };
+        TracedPart::fit(&data)
     }
 
     /// The samples, or their means.
@@ -83,18 +86,18 @@ impl<'a> TracedRecord<'a> {
         motion::at_rest(moved.filter_map(|(motion, _)| motion.as_ref()), duration_s)
     }
 
-    /// The effects of each channel.
-    pub(crate) fn effects(&self) -> PerChannel<Vec<Effect>> {
-        let commons = self.common_modes();
+    /// The effects of each channel, by the models of the `whole` record.
+    pub(crate) fn effects(&self, whole: &TracedPart) -> PerChannel<Vec<Effect>> {
+        let commons = self.common_modes(whole);
         let of = |channel: ChannelId| {
             let common = commons.iter().find(|common| common.channels.contains(&channel));
-            if self.record.is_traced(channel) { self.effects_of(channel, common) } else { Vec::new() }
+            if self.record.is_traced(channel) { self.effects_of(whole, channel, common) } else { Vec::new() }
         };
         per_channel(self.series.ids(), of)
     }
 
-    fn effects_of(&self, channel: ChannelId, common: Option<&ChannelsInCommon>) -> Vec<Effect> {
-        let (measurement, trace, own) = (self.measurement(), &self.part.channels[channel], &self.series[channel]);
+    fn effects_of(&self, whole: &TracedPart, channel: ChannelId, common: Option<&ChannelsInCommon>) -> Vec<Effect> {
+        let (measurement, trace, own) = (self.measurement(), &whole.channels[channel], &self.series[channel]);
         let moved = self.motions[channel].iter().map(|motion| {
             let mut others = self.motions.with_ids().filter(|(other, _)| *other != channel);
             let is_shared = others.any(|(_, other)| other.as_ref().is_some_and(|other| motion.is_shared_with(other)));
@@ -102,7 +105,7 @@ impl<'a> TracedRecord<'a> {
         });
         let of_samples = self.record.channels[channel].effects.iter().chain(self.preprocessing.effects(channel));
         let of_samples = of_samples.map(|effect| Proposal::new(effect.clone(), Origin::Samples));
-        let (of_model, facts) = self.part.proposals(&measurement.profile, &self.estimators.both, channel, common);
+        let (of_model, facts) = whole.proposals(&measurement.profile, &self.estimators.both, channel, common);
         let of_signals = trace.signals.iter().map(|signal| signals::proposal(signal, own.unit));
         let temperature = measurement.of_quantity(Quantity::Temperature).next();
         let level = temperature.and_then(|of| unexplained::level_by_temperature(own, &self.series[of]));
@@ -114,8 +117,8 @@ impl<'a> TracedRecord<'a> {
     }
 
     /// The drift that the gyroscopes have in common, and that of the accelerometers.
-    fn common_modes(&self) -> Vec<ChannelsInCommon> {
-        let traces = &self.part.channels;
+    fn common_modes(&self, whole: &TracedPart) -> Vec<ChannelsInCommon> {
+        let traces = &whole.channels;
         let filter_s = traces.iter().map(|trace| filter_length_s(trace.fit.after())).fold(0.0, f64::max);
         let of_quantity = |quantity: &Quantity| {
             let named = |channel: ChannelId| (channel, self.measurement()[channel].profile.name);
