@@ -92,8 +92,8 @@ impl CoupledEstimators {
     }
 }
 
-/// All pairs of channels at these positions.
-fn pairs(coupled: &[usize]) -> impl Iterator<Item = [usize; 2]> {
+/// All pairs of these channels.
+fn pairs<T: Copy>(coupled: &[T]) -> impl Iterator<Item = [T; 2]> {
     coupled.iter().enumerate().flat_map(|(at, &a)| coupled[..at].iter().map(move |&b| [a, b]))
 }
 
@@ -158,21 +158,24 @@ const EXCLUSIONS: [Exclusion; 3] = [Exclusion::None, Exclusion::ByFirstHalf, Exc
 struct AlikeExclusions {
     /// For each exclusion and channel, the number of the first exclusion that does.
     first: [Vec<usize>; EXCLUSIONS.len()],
-    /// Pairs of channels that have a covariance.
+    /// Pairs of channels whose covariance is asked for.
     coupled: Vec<[usize; 2]>,
 }
 
 impl AlikeExclusions {
     fn new(measurement: &Measurement, preprocessing: &Preprocessing) -> Self {
-        let is_coupled = |quantity: Quantity| quantity.is_inertial() || quantity.is_environment();
-        let coupled = measurement.ids().filter(|&channel| is_coupled(measurement[channel].profile.quantity));
-        let coupled: Vec<usize> = coupled.map(ChannelId::position).collect();
+        let quantity = |channel: ChannelId| measurement[channel].profile.quantity;
+        let is_coupled = |of: Quantity| of.is_inertial() || of.is_environment();
+        let coupled: Vec<ChannelId> = measurement.ids().filter(|&channel| is_coupled(quantity(channel))).collect();
+        // No rate is a covariate of another one.
+        let is_rate = |channel: &ChannelId| quantity(*channel) == Quantity::AngularRate;
+        let coupled = pairs(&coupled).filter(|pair| !pair.iter().all(is_rate));
         let first = EXCLUSIONS.map(|of| {
             let is_alike = |channel, other: &Exclusion| preprocessing.leaves_the_same(channel, *other, of);
             let first = |channel| EXCLUSIONS.iter().position(|other| is_alike(channel, other)).unwrap_or(0);
             measurement.ids().map(first).collect()
         });
-        Self { first, coupled: pairs(&coupled).collect() }
+        Self { first, coupled: coupled.map(|pair| pair.map(ChannelId::position)).collect() }
     }
 
     /// The number of the first exclusion that leaves both channels the same samples as the one of this number.
