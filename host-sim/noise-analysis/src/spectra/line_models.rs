@@ -6,6 +6,7 @@ use crate::samples::uniform_series::UniformSeries;
 use nalgebra::{Matrix4, Vector4};
 use realfft::num_complex::Complex;
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
 /// Samples after which the rotating phasor is computed anew: its recursion loses about one bit in a thousand steps.
 const STEPS: usize = 512;
@@ -236,25 +237,31 @@ struct Group {
 }
 
 impl Lorentz {
-    /// The likeliest curve near `centre` with about `width`, both in resolutions, over the ordinates from `lowest` on, each the
-    /// mean of `looks` exponential variables; `None` if the fit fails.
-    pub(super) fn fit(whitened: &[f64], looks: f64, lowest: usize, centre: f64, width: f64) -> Option<Self> {
-        let near = Self::fit_within(whitened, looks, lowest, centre, width, REACH * width)?;
+    /// The likeliest curve near `centre` with about `width`, both in resolutions, over the ordinates at `bins` of a whitened `spectrum`, each
+    /// the mean of `looks` exponential variables; `None` if the fit fails.
+    pub(super) fn fit(
+        spectrum: &dyn Fn(Range<usize>) -> Vec<f64>,
+        bins: Range<usize>,
+        looks: f64,
+        centre: f64,
+        width: f64,
+    ) -> Option<Self> {
+        let within = |centre: f64, width: f64, reach: f64| {
+            let reach = reach.max(LEAST);
+            let low = ((centre - reach).max(bins.start as f64)) as usize;
+            let high = ((centre + reach) as usize).min(bins.end.checked_sub(2)?);
+            let is_enough = high >= low + LEAST as usize;
+            is_enough.then(|| Self::fit_groups(&groups(&spectrum(low..high + 1), low, looks), centre, width, reach))?
+        };
+        let near = within(centre, width, REACH * width)?;
         // The skirts of a high line exceed the level far beyond its width.
         let skirts = near.width * near.height.sqrt().max(REACH);
-        let reach = skirts.min(whitened.len() as f64 / 8.0);
-        Self::fit_within(whitened, looks, lowest, near.centre, near.width, reach).or(Some(near))
+        let reach = skirts.min(bins.end as f64 / 8.0);
+        within(near.centre, near.width, reach).or(Some(near))
     }
 
-    /// As [`fit`](Self::fit), to the ordinates within `reach` of the centre.
-    fn fit_within(whitened: &[f64], looks: f64, lowest: usize, centre: f64, width: f64, reach: f64) -> Option<Self> {
-        let reach = reach.max(LEAST);
-        let low = ((centre - reach).max(lowest as f64)) as usize;
-        let high = ((centre + reach) as usize).min(whitened.len().checked_sub(2)?);
-        if high < low + LEAST as usize {
-            return None;
-        }
-        let groups = groups(&whitened[low..=high], low, looks);
+    /// As [`fit`](Self::fit), to groups of the ordinates within `reach` of the centre.
+    fn fit_groups(groups: &[Group], centre: f64, width: f64, reach: f64) -> Option<Self> {
         let weight: f64 = groups.iter().map(|group| group.ordinates).sum();
         let mean = |groups: &mut dyn Iterator<Item = &Group>| {
             let (sum, weight) = groups.fold((0.0, 0.0), |(sum, weight), group| {
@@ -264,17 +271,17 @@ impl Lorentz {
         };
         let everything = mean(&mut groups.iter());
         let floor = mean(&mut groups.iter().filter(|group| (group.position - centre).abs() > 0.6 * reach));
-        let summit = mean(&mut around(&groups, centre, width).iter().copied());
+        let summit = mean(&mut around(groups, centre, width).iter().copied());
         // The mean of a Lorentz curve over its full width is π/4 of its height.
         let height = ((summit / floor - 1.0) * 4.0 / PI).max(0.1);
         let mut parameters = Vector4::new(floor.ln(), height.ln(), centre, width.ln());
-        let mut likelihood = log_likelihood(&groups, &parameters);
+        let mut likelihood = log_likelihood(groups, &parameters);
         let mut damping = 1e-2;
         for _ in 0..ROUNDS {
-            let (information, score) = normal_equations(&groups, &parameters);
+            let (information, score) = normal_equations(groups, &parameters);
             let damped = information + Matrix4::from_diagonal(&(damping * information.diagonal()));
             let next = parameters + damped.cholesky()?.solve(&score);
-            let better = log_likelihood(&groups, &next);
+            let better = log_likelihood(groups, &next);
             let inside = (next[2] - centre).abs() < 2.0 * width.max(reach / REACH)
                 && next[3] < reach.ln()
                 && next[3] > NARROWEST.ln();
@@ -291,7 +298,7 @@ impl Lorentz {
             }
         }
         let level_alone = -weight * (everything.ln() + 1.0);
-        let covariance = normal_equations(&groups, &parameters).0.cholesky()?.inverse();
+        let covariance = normal_equations(groups, &parameters).0.cholesky()?.inverse();
         Some(Self {
             level: parameters[0].exp(),
             height: parameters[1].exp(),
@@ -300,7 +307,7 @@ impl Lorentz {
             errors: [1, 2, 3].map(|at| covariance[(at, at)].sqrt()),
             height_and_width: covariance[(1, 3)],
             statistic: 2.0 * (likelihood - level_alone),
-            shape_p_value: shape_p_value(&groups, &parameters),
+            shape_p_value: shape_p_value(groups, &parameters),
         })
     }
 

@@ -11,6 +11,7 @@ use crate::samples::rounding::Rounding;
 use crate::samples::uniform_series::UniformSeries;
 use std::cell::OnceCell;
 use std::f64::consts::PI;
+use std::ops::Range;
 
 /// Lowest frequency that is searched, in periods per record: below, lines cannot be distinguished from drift.
 pub(super) const FEWEST_PERIODS: usize = 8;
@@ -122,8 +123,10 @@ pub(super) struct WhitenedSpectrum<'a> {
     periodogram: &'a Periodogram,
     resolution: f64,
     background: Background<'a>,
-    /// Ordinates at the multiples of the resolution, over the background's shape.
-    whitened: Vec<f64>,
+    /// Ordinates at the multiples of the resolution, without the resonances that were removed.
+    ordinates: Vec<f64>,
+    /// The same over the background's shape; a resonance that is fitted once more needs a few of them.
+    whitened: OnceCell<Vec<f64>>,
     /// Ordinates at the multiples of `1/PADDING` of the resolution, which a resonance does not need.
     padded: OnceCell<Vec<f64>>,
     /// The resonances that were removed.
@@ -158,18 +161,36 @@ impl<'a> WhitenedSpectrum<'a> {
         let others = resonances.iter().enumerate().filter(|(index, _)| Some(*index) != kept);
         let removed: Vec<Lorentz> = others.map(|(_, other)| other.lorentz).collect();
         let deflated = |(bin, ordinate)| ordinate * deflation(&removed, bin as f64);
-        let mut whitened: Vec<f64> = periodogram.independent().enumerate().map(deflated).collect();
+        let ordinates: Vec<f64> = periodogram.independent().enumerate().map(deflated).collect();
         let kept = kept.and_then(|kept| resonances.get(kept));
         let density = kept.map(|kept| {
-            whitened.iter().enumerate().map(|(bin, ordinate)| ordinate * kept.lorentz.deflation(bin as f64)).collect()
+            ordinates.iter().enumerate().map(|(bin, ordinate)| ordinate * kept.lorentz.deflation(bin as f64)).collect()
         });
-        let density: &Vec<f64> = density.as_ref().unwrap_or(&whitened);
+        let density: &Vec<f64> = density.as_ref().unwrap_or(&ordinates);
         let background = Background::fit(density, looks, known, resolution, (sample_period, filters))?;
-        let over_shape = |(bin, ordinate): (usize, &mut f64)| *ordinate /= background.shape_at(bin as f64);
-        whitened.iter_mut().enumerate().skip(1).for_each(over_shape);
-        whitened[0] = 0.0;
-        let padded = OnceCell::new();
-        Some(Self { periodogram, resolution, background, whitened, padded, removed, independent, floor, looks })
+        let (whitened, padded) = (OnceCell::new(), OnceCell::new());
+        Some(Self {
+            periodogram,
+            resolution,
+            background,
+            ordinates,
+            whitened,
+            padded,
+            removed,
+            independent,
+            floor,
+            looks,
+        })
+    }
+
+    /// Ordinates at the multiples of the resolution, over the background's shape.
+    fn whitened(&self) -> &[f64] {
+        self.whitened.get_or_init(|| std::iter::once(0.0).chain(self.over_shape(1..self.ordinates.len())).collect())
+    }
+
+    /// Some of these, but for the first of all.
+    fn over_shape(&self, bins: Range<usize>) -> impl Iterator<Item = f64> {
+        bins.map(|bin| self.ordinates[bin] / self.background.shape_at(bin as f64))
     }
 
     /// Ordinates at the multiples of `1/PADDING` of the resolution, over the background's shape.
@@ -178,7 +199,7 @@ impl<'a> WhitenedSpectrum<'a> {
             let over_shape = |(at, ordinate): (usize, &f64)| {
                 let bin = at as f64 / PADDING as f64;
                 match at % PADDING {
-                    0 => self.whitened[at / PADDING],
+                    0 => self.whitened()[at / PADDING],
                     _ => ordinate * deflation(&self.removed, bin) / self.background.shape_at(bin),
                 }
             };
@@ -202,7 +223,7 @@ impl<'a> WhitenedSpectrum<'a> {
         if let Some((line, sine)) = sine {
             let bin = line.frequency.value / self.resolution;
             let widths =
-                (0..).map(|power| 2f64.powi(2 * power)).take_while(|width| *width < self.whitened.len() as f64 / 32.0);
+                (0..).map(|power| 2f64.powi(2 * power)).take_while(|width| *width < self.ordinates.len() as f64 / 32.0);
             // A sinusoid that is switched, or swells and fades, is a band of a few lines.
             let change = || {
                 let density = 2.0 * sine.density(series) / line.statistic;
@@ -233,7 +254,7 @@ impl<'a> WhitenedSpectrum<'a> {
             peaks.truncate(FITTED_PEAKS);
         }
         peaks.retain(|(ratio, at)| {
-            let level = self.background.level(&self.whitened, at / PADDING);
+            let level = self.background.level(self.whitened(), at / PADDING);
             self.sine_p_value(LARGEST_RISE * ratio, level) < SIGNIFICANCE
         });
         peaks.sort_by(highest_first);
@@ -241,7 +262,7 @@ impl<'a> WhitenedSpectrum<'a> {
             let spacing = self.resolution / PADDING as f64;
             let sine = Sine::fit_near(series, at as f64 * spacing, spacing);
             let bin = sine.frequency / self.resolution;
-            let level = self.background.level(&self.whitened, at / PADDING);
+            let level = self.background.level(self.whitened(), at / PADDING);
             let background = (level.value * self.background.shape_at(bin)).max(self.floor_at(bin));
             let ratio = sine.density(series) * self.deflation_at(at) / background;
             (ratio, level, sine)
@@ -260,7 +281,7 @@ impl<'a> WhitenedSpectrum<'a> {
             let bin = at / PADDING;
             if bin >= until {
                 // The level is computed at every few ordinates: it changes little over a fraction of its window.
-                level = self.background.level(&self.whitened, bin).value;
+                level = self.background.level(self.whitened(), bin).value;
                 until = bin + (bin / 16).clamp(1, WINDOW / 8);
             }
             let [left, here, right] = [padded[at - 1], padded[at], padded[at + 1]];
@@ -278,22 +299,23 @@ impl<'a> WhitenedSpectrum<'a> {
     fn sine_p_value(&self, ratio: f64, level: LocalLevel) -> f64 {
         let ordinates = self.independent * level.ordinates;
         let one = (1.0 + ratio / ordinates).powf(-ordinates);
-        let frequencies = self.whitened.len() as f64 * (PI / 3.0).sqrt();
+        let frequencies = self.ordinates.len() as f64 * (PI / 3.0).sqrt();
         (one * (1.0 + frequencies * ratio.sqrt())).min(1.0)
     }
 
     /// The most significant peak in averages of `4^least_log4` ordinates or more: its position and width in resolutions and its p-value.
     pub(super) fn broad_peak(&self, least_log4: u32) -> Option<(f64, f64, f64)> {
-        let ordinates = self.whitened.len();
+        let ordinates = self.ordinates.len();
         let sizes = || (least_log4..).map(|power| 4_usize.pow(power)).take_while(move |size| *size <= ordinates / 64);
+        let whitened = self.whitened();
         let trials: f64 = sizes().map(|size| 2.0 * ordinates as f64 / size as f64).sum();
         let peaks = sizes().flat_map(|size| {
             let first = FEWEST_PERIODS.max(size);
-            let averages: Vec<f64> = self.whitened[first..ordinates - 1]
+            let averages: Vec<f64> = whitened[first..ordinates - 1]
                 .chunks_exact(size)
                 .map(|chunk| chunk.iter().sum::<f64>() / size as f64)
                 .collect();
-            let shifted = self.whitened[first + size / 2..ordinates - 1].chunks_exact(size);
+            let shifted = whitened[first + size / 2..ordinates - 1].chunks_exact(size);
             let shifted: Vec<f64> = shifted.map(|chunk| chunk.iter().sum::<f64>() / size as f64).collect();
             let levels = neighbourhoods(&averages, size, self.looks);
             let mut peaks = Vec::new();
@@ -331,7 +353,12 @@ impl<'a> WhitenedSpectrum<'a> {
     }
 
     fn lorentz_fits(&self, bin: f64, widths: impl IntoIterator<Item = f64>) -> impl Iterator<Item = Lorentz> {
-        let fit = move |width| Lorentz::fit(&self.whitened, self.looks, FEWEST_PERIODS, bin, width);
+        let spectrum = move |bins: Range<usize>| match self.whitened.get() {
+            Some(whitened) => whitened[bins].to_vec(),
+            None => self.over_shape(bins).collect(),
+        };
+        let bins = FEWEST_PERIODS..self.ordinates.len();
+        let fit = move |width| Lorentz::fit(&spectrum, bins.clone(), self.looks, bin, width);
         widths.into_iter().filter_map(fit)
     }
 
@@ -343,7 +370,7 @@ impl<'a> WhitenedSpectrum<'a> {
         let position = |bin: f64| (bin * PADDING as f64).clamp(1.0, last as f64 - 1.0) as usize;
         let near = position(bin - width)..=position(bin + width);
         let highest = near.max_by(|&a, &b| padded[a].total_cmp(&padded[b])).unwrap_or(1);
-        let level = self.background.level(&self.whitened, highest / PADDING).value;
+        let level = self.background.level(self.whitened(), highest / PADDING).value;
         // The logarithm of the main lobe of a taper is a parabola but for a hundredth of the resolution.
         let [left, here, right] = [highest - 1, highest, highest + 1].map(|at| padded[at].ln());
         let curvature = 2.0 * here - left - right;
