@@ -44,11 +44,12 @@ impl MovingAverageFilter {
     /// clock.
     fn autocorrelation(&self, samples: f64) -> f64 {
         let position = samples * self.decimation;
-        let (below, above) = (floor(position), position - floor(position));
+        let below = position as i64;
+        let above = position - below as f64;
         if above == 0.0 {
-            return self.value_autocorrelation(below as i64);
+            return self.value_autocorrelation(below);
         }
-        (1.0 - above) * self.value_autocorrelation(below as i64) + above * self.value_autocorrelation(below as i64 + 1)
+        (1.0 - above) * self.value_autocorrelation(below) + above * self.value_autocorrelation(below + 1)
     }
 
     /// Autocorrelation of the impulse response at a lag of `j` filter values; it sums to 1 over all lags.
@@ -169,11 +170,11 @@ impl MovingAverageFilter {
         }
         sum / (weights * 4.0 * n * n)
     }
+}
 
-    /// Sum of the autocorrelation over all lags in samples: the gain at low frequencies.
-    fn sum(&self) -> f64 {
-        self.autocorrelation(0.0) + 2.0 * (1..=self.reach()).map(|j| self.autocorrelation(f64::from(j))).sum::<f64>()
-    }
+/// The numbers of samples that the entries of a table at strides of `stride` samples are of, with these.
+fn sums(stride: f64, table: &mut [f64]) -> impl Iterator<Item = (f64, &mut f64)> {
+    table.iter_mut().enumerate().map(move |(at, entry)| (at as f64 * stride, entry))
 }
 
 /// `m² ln |m|`.
@@ -193,9 +194,26 @@ const WALKS: f64 = 1e-3;
 
 impl Process for MovingAverageFilter {
     fn sum_variance(&self, m: f64, sample_period: f64) -> f64 {
-        let lags = (m as u32).saturating_sub(1).min(self.reach());
-        let pairs: f64 = (1..=lags).map(|j| (m - f64::from(j)) * self.autocorrelation(f64::from(j))).sum();
-        (m * self.autocorrelation(0.0) + 2.0 * pairs) / (self.sum() * sample_period)
+        let mut at_0_and_m = [0.0; 2];
+        self.sum_variances(m, sample_period, &mut at_0_and_m);
+        at_0_and_m[1]
+    }
+
+    /// As the provided method, with one pass over the lags.
+    fn sum_variances(&self, stride: f64, sample_period: f64, table: &mut [f64]) {
+        let at_zero = self.autocorrelation(0.0);
+        let mut others = 0.0;
+        table.fill(0.0);
+        for lag in 1..=self.reach() {
+            let correlation = self.autocorrelation(f64::from(lag));
+            others += correlation;
+            for (m, pairs) in sums(stride, table).filter(|(m, _)| lag < *m as u32) {
+                *pairs += (m - f64::from(lag)) * correlation;
+            }
+        }
+        // Over the sum of the autocorrelation over all lags: the gain at low frequencies.
+        let scale = (at_zero + 2.0 * others) * sample_period;
+        sums(stride, table).for_each(|(m, pairs)| *pairs = (m * at_zero + 2.0 * *pairs) / scale);
     }
 
     /// As the provided method, with one pass over the lags.
