@@ -80,12 +80,24 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     #[inline]
     pub fn observe<const OVERLAP: usize>(&mut self, a: &Cascade<OCTAVES, OVERLAP>, b: &Cascade<OCTAVES, OVERLAP>) {
-        if a.now() != b.now() {
+        let newest = |octave: usize| (a.newest_difference(octave), b.newest_difference(octave));
+        self.add_newest(a.now() == b.now(), a.octaves_due(), newest);
+    }
+
+    /// Adds the products of the newest differences of both channels at the first octaves, if these are in step.
+    #[inline]
+    pub(crate) fn add_newest(
+        &mut self,
+        are_in_step: bool,
+        octaves: usize,
+        newest: impl Fn(usize) -> (Option<i64>, Option<i64>),
+    ) {
+        if !are_in_step {
             self.out_of_step += 1;
             return;
         }
-        for octave in 0..a.octaves_due() {
-            if let (Some(a), Some(b)) = (a.newest_difference(octave), b.newest_difference(octave)) {
+        for octave in 0..octaves {
+            if let (Some(a), Some(b)) = newest(octave) {
                 self.add(octave, i128::from(a) * i128::from(b), 1);
             }
         }

@@ -1,6 +1,8 @@
 //! What an analysis of whole recordings on a host needs beside the calls above (feature `host`): curves that are put together
-//! or changed, and fits with shapes that were estimated elsewhere.
+//! or changed, covariances of many channels, and fits with shapes that were estimated elsewhere.
 
+use crate::cascade::Cascade;
+use crate::coupling::Coupling;
 use crate::curve::{AllanPoint, Curve, CurveView};
 use crate::fit::{Baseline, FreeShapes, estimate, set_free_bounds};
 use crate::model::Model;
@@ -42,6 +44,34 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
     /// not at all.
     pub fn replace_avar(&mut self, avar: impl Fn(&AllanPoint) -> f64) {
         self.set_variances(avar);
+    }
+}
+
+/// The second differences that the newest sample of a channel completed: computed once for all the channels that it is coupled with.
+#[derive(Debug, Clone, Copy)]
+pub struct NewestDifferences<const OCTAVES: usize> {
+    now: (u64, u64),
+    due: usize,
+    octaves: [Option<i64>; OCTAVES],
+}
+
+impl<const OCTAVES: usize> NewestDifferences<OCTAVES> {
+    /// Of this channel, until its next sample.
+    #[must_use]
+    pub fn of<const OVERLAP: usize>(channel: &Cascade<OCTAVES, OVERLAP>) -> Self {
+        let due = channel.octaves_due();
+        let mut octaves = [None; OCTAVES];
+        for (octave, newest) in octaves.iter_mut().enumerate().take(due) {
+            *newest = channel.newest_difference(octave);
+        }
+        Self { now: channel.now(), due, octaves }
+    }
+}
+
+impl<const OCTAVES: usize> Coupling<OCTAVES> {
+    /// As [`observe`](Self::observe), by the newest differences of both channels.
+    pub fn observe_differences(&mut self, a: &NewestDifferences<OCTAVES>, b: &NewestDifferences<OCTAVES>) {
+        self.add_newest(a.now == b.now, a.due, |octave| (a.octaves[octave], b.octaves[octave]));
     }
 }
 

@@ -13,6 +13,7 @@ use crate::samples::exclusion::Exclusion;
 use crate::samples::gapped_cascade::GappedCascade;
 use crate::samples::rounding::Rounding;
 use crate::samples::streamed_curves::STEPS_PER_COUNT;
+use allan_core::host::NewestDifferences;
 use allan_core::regression::CovarianceCurve;
 use allan_core::{Coupling, Curve};
 use measurement::{ChannelId, ChannelProfile, MeasuredChannel, Measurement, PerChannel, Quantity};
@@ -23,6 +24,8 @@ use nalgebra::DMatrix;
 pub(crate) struct CoupledEstimators {
     cascades: Vec<GappedCascade>,
     couplings: Vec<CoupledPair>,
+    /// Of each cascade, while a sample is taken.
+    newest: Vec<Option<NewestDifferences<OCTAVES>>>,
 }
 
 /// The covariance of two channels, by their positions.
@@ -43,17 +46,21 @@ impl CoupledEstimators {
         Self {
             cascades: vec![GappedCascade::default(); channels],
             couplings: pairs.map(|channels| CoupledPair { channels, coupling: Coupling::new() }).collect(),
+            newest: Vec::new(),
         }
     }
 
     /// Takes the sample of every channel in the next sample period; `None` where a channel has none.
     pub(crate) fn push(&mut self, values: impl Iterator<Item = Option<i32>>) {
-        self.cascades.iter_mut().zip(values).for_each(|(cascade, value)| cascade.push_one(value));
+        self.newest.clear();
+        for (cascade, value) in self.cascades.iter_mut().zip(values) {
+            cascade.push_one(value);
+            self.newest.push(cascade.has_latest().then(|| NewestDifferences::of(cascade.cascade())));
+        }
         for CoupledPair { channels: [a, b], coupling } in &mut self.couplings {
             // Products are taken where both channels have a sample.
-            let (a, b) = (&self.cascades[*a], &self.cascades[*b]);
-            if a.has_latest() && b.has_latest() {
-                coupling.observe(a.cascade(), b.cascade());
+            if let (Some(a), Some(b)) = (&self.newest[*a], &self.newest[*b]) {
+                coupling.observe_differences(a, b);
             }
         }
     }
@@ -199,6 +206,7 @@ impl AlikeExclusions {
         CoupledEstimators {
             cascades: self.first[of].iter().enumerate().map(cascade).collect(),
             couplings: self.coupled.iter().filter_map(coupling).collect(),
+            newest: Vec::new(),
         }
     }
 }
@@ -319,7 +327,7 @@ impl RecordPart {
             resolutions: channels.map(|channel| channel.lsb),
             shorter: channels.map(|_| (Curve::empty(), 0)),
             channels,
-            estimators: CoupledEstimators { cascades, couplings: Vec::new() },
+            estimators: CoupledEstimators { cascades, couplings: Vec::new(), newest: Vec::new() },
             period_s,
             samples_per_mean: 1,
             until: 1,
