@@ -125,16 +125,7 @@ fn weighted_least_squares<R: AsRef<[f64]>>(
     held: &[usize],
     densities: &[f64],
 ) -> Option<Vec<f64>> {
-    let information = information(bands, bases, densities);
-    let mut pull = vec![0.0; densities.len()];
-    for (band, basis) in bands.iter().zip(bases) {
-        let density = mixture_density(basis.as_ref(), densities);
-        if density > 0.0 {
-            let of_held: f64 = held.iter().map(|&held| densities[held] * basis.as_ref()[held]).sum();
-            let towards = band.ordinates * (band.density - of_held) / (density * density);
-            pull.iter_mut().zip(basis.as_ref()).for_each(|(pull, shape)| *pull += towards * shape);
-        }
-    }
+    let NormalEquations { information, pull } = NormalEquations::new(bands, bases, held, densities);
     // In units in which each term alone is known to 1.
     let scale = information.diagonal().map(f64::sqrt);
     let mut is_left_out: Vec<bool> = scale.iter().map(|scale| *scale == 0.0).collect();
@@ -167,57 +158,84 @@ fn weighted_least_squares<R: AsRef<[f64]>>(
 
 /// Fisher's information of the bands on the densities.
 pub(super) fn information<R: AsRef<[f64]>>(bands: &[SpectralBand], bases: &[R], densities: &[f64]) -> DMatrix<f64> {
-    let of_terms = match densities.len() {
-        0..=4 => information_of::<4, R>,
-        5 => information_of::<5, R>,
-        6 => information_of::<6, R>,
-        7..=8 => information_of::<8, R>,
-        _ => information_of_many,
-    };
-    of_terms(bands, bases, densities)
+    NormalEquations::new(bands, bases, &[], densities).information
 }
 
-/// The same of up to `TERMS` terms, a number that the compiler knows: the sums then stay in registers.
-fn information_of<const TERMS: usize, R: AsRef<[f64]>>(
+/// What the weighted least squares solve.
+struct NormalEquations {
+    /// Fisher's information.
+    information: DMatrix<f64>,
+    /// Of each term the sum of the bands, less the terms that are held, times its shape and their weight.
+    pull: Vec<f64>,
+}
+
+impl NormalEquations {
+    fn new<R: AsRef<[f64]>>(bands: &[SpectralBand], bases: &[R], held: &[usize], densities: &[f64]) -> Self {
+        let of_terms = match densities.len() {
+            0..=4 => Self::of::<4, R>,
+            5 => Self::of::<5, R>,
+            6 => Self::of::<6, R>,
+            7..=8 => Self::of::<8, R>,
+            _ => Self::of_many,
+        };
+        of_terms(bands, bases, held, densities)
+    }
+
+    /// Of up to `TERMS` terms, a number that the compiler knows: the sums then stay in registers.
+    fn of<const TERMS: usize, R: AsRef<[f64]>>(
+        bands: &[SpectralBand],
+        bases: &[R],
+        held: &[usize],
+        densities: &[f64],
+    ) -> Self {
+        let terms = densities.len();
+        let (mut sums, mut pull) = ([[0.0; TERMS]; TERMS], [0.0; TERMS]);
+        for_each_weight(bands, bases, held, densities, |basis, weight, towards| {
+            let mut shapes = [0.0; TERMS];
+            shapes[..terms].copy_from_slice(&basis[..terms]);
+            for ((entries, pull), shape) in sums.iter_mut().zip(&mut pull).zip(shapes) {
+                let of_column = weight * shape;
+                entries.iter_mut().zip(shapes).for_each(|(entry, shape)| *entry += of_column * shape);
+                *pull += towards * shape;
+            }
+        });
+        let information = DMatrix::from_fn(terms, terms, |row, column| sums[column][row]);
+        Self { information, pull: pull[..terms].to_vec() }
+    }
+
+    /// Of any number of terms: white noise that is correlated with many neighbours has one for each.
+    fn of_many<R: AsRef<[f64]>>(bands: &[SpectralBand], bases: &[R], held: &[usize], densities: &[f64]) -> Self {
+        let terms = densities.len();
+        let (mut information, mut pull) = (DMatrix::zeros(terms, terms), vec![0.0; terms]);
+        for_each_weight(bands, bases, held, densities, |basis, weight, towards| {
+            for (column, mut entries) in information.column_iter_mut().enumerate() {
+                let of_column = weight * basis[column];
+                entries.iter_mut().zip(basis).for_each(|(entry, shape)| *entry += of_column * shape);
+            }
+            pull.iter_mut().zip(basis).for_each(|(pull, shape)| *pull += towards * shape);
+        });
+        Self { information, pull }
+    }
+}
+
+/// Calls `add` with the shapes in each band where there is a density, the inverse of the variance of the band, and that times what the band
+/// has beside the terms that are held.
+fn for_each_weight<R: AsRef<[f64]>>(
     bands: &[SpectralBand],
     bases: &[R],
+    held: &[usize],
     densities: &[f64],
-) -> DMatrix<f64> {
-    let terms = densities.len();
-    let mut sums = [[0.0; TERMS]; TERMS];
-    for (band, basis) in bands.iter().zip(bases) {
-        let density = mixture_density(basis.as_ref(), densities);
-        if density <= 0.0 {
-            continue;
-        }
-        let weight = band.ordinates / (density * density);
-        let mut shapes = [0.0; TERMS];
-        shapes[..terms].copy_from_slice(&basis.as_ref()[..terms]);
-        for (entries, shape) in sums.iter_mut().zip(shapes) {
-            let of_column = weight * shape;
-            entries.iter_mut().zip(shapes).for_each(|(entry, shape)| *entry += of_column * shape);
-        }
-    }
-    DMatrix::from_fn(terms, terms, |row, column| sums[column][row])
-}
-
-/// The same of any number of terms: white noise that is correlated with many neighbours has one for each.
-fn information_of_many<R: AsRef<[f64]>>(bands: &[SpectralBand], bases: &[R], densities: &[f64]) -> DMatrix<f64> {
-    let terms = densities.len();
-    let mut information = DMatrix::zeros(terms, terms);
+    mut add: impl FnMut(&[f64], f64, f64),
+) {
     for (band, basis) in bands.iter().zip(bases) {
         let basis = basis.as_ref();
         let density = mixture_density(basis, densities);
-        if density <= 0.0 {
-            continue;
-        }
-        let weight = band.ordinates / (density * density);
-        for (column, mut entries) in information.column_iter_mut().enumerate() {
-            let of_column = weight * basis[column];
-            entries.iter_mut().zip(basis).for_each(|(entry, shape)| *entry += of_column * shape);
+        if density > 0.0 {
+            let of_held: f64 = held.iter().map(|&held| densities[held] * basis[held]).sum();
+            let square = density * density;
+            add(basis, band.ordinates / square, band.ordinates * (band.density - of_held) / square);
         }
     }
-    information
 }
 
 /// A round of the multiplicative fit of the terms that are nowhere negative.
