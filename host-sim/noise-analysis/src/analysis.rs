@@ -115,8 +115,11 @@ pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Rep
         let half = PreprocessedRecord::new(&half);
         half.effects(&half.fit())
     };
-    let (effects_of_half, mut channels) =
-        parallel::both(of_half, || channel_reports((&whole, &models), &first_half, &epochs, &effects));
+    let reports = || {
+        let channels = channel_reports((&whole, &models), &first_half, &epochs, &effects);
+        (common_mode_regression(measurement, &channels), channels)
+    };
+    let (effects_of_half, (common_mode, mut channels)) = parallel::both(of_half, reports);
     watch(Stage::Assessment);
     let duration_s = description.periods as f64 * description.period_s();
     let (effects, effects_of_half) = (effects.into_vec(), effects_of_half.into_vec());
@@ -133,7 +136,7 @@ pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Rep
         flagged: by_cause(&description.flagged),
         part,
         findings,
-        common_mode: common_mode_regression(measurement, &channels),
+        common_mode,
         longest_at_rest: None,
         channels,
     };

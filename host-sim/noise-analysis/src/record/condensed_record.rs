@@ -12,6 +12,7 @@ use measurement::{ChannelId, Measurement, PerChannel, RecordingDescription};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::{Arc, LazyLock};
 
 /// A recording, condensed.
 pub struct CondensedRecord<'a> {
@@ -27,6 +28,10 @@ pub struct CondensedRecord<'a> {
     pub(crate) channels: PerChannel<CondensedChannel>,
 }
 
+/// Lines that means do not show. They are sought when they are first asked for: where that takes one channel longer than the others, these
+/// go on with their fits.
+pub(crate) type FasterLines = Arc<LazyLock<Vec<MergedLine>, Box<dyn FnOnce() -> Vec<MergedLine> + Send>>>;
+
 /// What is known of the samples of one channel beside their means.
 #[derive(Clone)]
 pub(crate) struct CondensedChannel {
@@ -36,8 +41,7 @@ pub(crate) struct CondensedChannel {
     /// Whether spikes can be looked for: not in means, from which they are left out, and not in values that are cut off, which are no
     /// noise around which a sample could be a spike.
     pub can_show_spikes: bool,
-    /// Lines that the means do not show.
-    pub faster_lines: Vec<MergedLine>,
+    pub faster_lines: FasterLines,
     /// What only the samples themselves show, in an inertial channel.
     pub effects: Vec<Effect>,
     /// The same of the first half of the recording, as far as it is known.
@@ -47,6 +51,11 @@ pub(crate) struct CondensedChannel {
     pub screened: Vec<(u64, f64)>,
     /// Samples that are refused in the channel alone, by cause.
     pub refused: BTreeMap<&'static str, u64>,
+}
+
+/// The lines that `find` finds.
+pub(crate) fn faster_lines(find: impl FnOnce() -> Vec<MergedLine> + Send + 'static) -> FasterLines {
+    Arc::new(LazyLock::new(Box::new(find)))
 }
 
 impl<'a> CondensedRecord<'a> {
@@ -63,7 +72,7 @@ impl<'a> CondensedRecord<'a> {
                 samples: SampleCurves::of_all(&measurement, id, resolution),
                 counts_per_step,
                 can_show_spikes: channel.profile.quantity.is_inertial() && !shown.is_saturated(id),
-                faster_lines: Vec::new(),
+                faster_lines: faster_lines(Vec::new),
                 effects: shown.of(id).cloned().chain(stuck[id.position()].effect(samples, period_s)).collect(),
                 effects_of_first_half: Vec::new(),
                 screened: Vec::new(),

@@ -19,7 +19,7 @@ use crate::detectors::spikes::SpikeRule;
 use crate::detectors::stuck_output::{self, StuckRuns, StuckScreen};
 use crate::effects::Effect;
 use crate::parallel::{self, in_parallel};
-use crate::record::condensed_record::{CondensedChannel, CondensedRecord};
+use crate::record::condensed_record::{CondensedChannel, CondensedRecord, faster_lines};
 use crate::record::sample_curves::SampleCurves;
 use crate::record::sample_effects::SampleEffects;
 use crate::record::sample_screen::SampleScreen;
@@ -138,13 +138,18 @@ impl LongChannel {
             epochs.push(slot, value);
         }
     }
+}
 
-    /// The lines that are too fast for the means.
-    fn faster_lines(&self, description: &RecordingDescription, samples_per_mean: u64) -> Vec<MergedLine> {
-        let Some(SampleSpectra { stacked, .. }) = &self.spectra else { return Vec::new() };
-        let (period_s, rate_error) = (description.period_s(), description.profile.sample_rate_error);
-        let highest_hz = description.sample_rate_hz / samples_per_mean as f64 / MEANS_PER_PERIOD;
-        let [resolved_s, duration_s] = [STRETCH_PERIODS, description.periods].map(|periods| periods as f64 * period_s);
+/// The lines of a spectrum of samples that are too fast for their means.
+fn lines_above_means(
+    stacked: StackedSpectrum,
+    description: &RecordingDescription,
+    samples_per_mean: u64,
+) -> impl FnOnce() -> Vec<MergedLine> + Send + 'static {
+    let (period_s, rate_error) = (description.period_s(), description.profile.sample_rate_error);
+    let highest_hz = description.sample_rate_hz / samples_per_mean as f64 / MEANS_PER_PERIOD;
+    let [resolved_s, duration_s] = [STRETCH_PERIODS, description.periods].map(|periods| periods as f64 * period_s);
+    move || {
         let lines = spectral_lines::merged(stacked.lines(), resolved_s, duration_s, rate_error);
         lines.into_iter().filter(|line| line.frequency.value > highest_hz).collect()
     }
@@ -255,7 +260,6 @@ impl LongRecordReader {
         let lost = sampling_faults::lost_samples(description.samples, &description.dropped, gaps);
         let period_s = description.period_s();
         let means = measurement_of_means(&description, samples_per_mean, &channels);
-        let faster_lines = in_parallel(&channels, |of| of.faster_lines(&description, samples_per_mean));
         let screened: Vec<Vec<(u64, f64)>> = screen.found_before(middle).collect();
         let [events, events_of_half] =
             [(description.periods, found), (middle, of_first_half)].map(|(periods, stuck)| {
@@ -267,8 +271,8 @@ impl LongRecordReader {
             });
         let mut condensed = Vec::new();
         let events = events.zip(events_of_half).zip(screened);
-        for ((((channel, fast), profile), faster_lines), ((events, events_of_first_half), screened)) in
-            channels.into_iter().zip(fast).zip(&description.channels).zip(faster_lines).zip(events)
+        for (((channel, fast), profile), ((events, events_of_first_half), screened)) in
+            channels.into_iter().zip(fast).zip(&description.channels).zip(events)
         {
             let is_inertial = profile.quantity.is_inertial();
             let shows_codes = |effect: &Effect| !matches!(effect, Effect::NoiseBelowCount(_) | Effect::EffectiveLsb(_));
@@ -280,6 +284,13 @@ impl LongRecordReader {
             let found = lost.iter().cloned().map(|found| found.effect).chain(fast.effects);
             let found = found.chain(range.map(|found| found.effect)).chain(events);
             let parts = |curves: &StreamedCurves| curves.parts().map(|(start, part)| (start, part.clone())).collect();
+            let (faster_lines, spectra) = match channel.spectra {
+                Some(SampleSpectra { stacked, epochs }) => (
+                    faster_lines(lines_above_means(stacked, &description, samples_per_mean)),
+                    epochs.finish(description.periods),
+                ),
+                None => (faster_lines(Vec::new), PartSpectra::default()),
+            };
             condensed.push(CondensedChannel {
                 samples: SampleCurves {
                     samples_per_mean,
@@ -288,9 +299,7 @@ impl LongRecordReader {
                     recorded: parts(&channel.recorded),
                     screened: parts(&channel.screened),
                     middle,
-                    spectra: channel
-                        .spectra
-                        .map_or_else(PartSpectra::default, |of| of.epochs.finish(description.periods)),
+                    spectra,
                     is_screened: channel.screened.refused != channel.recorded.refused,
                     period_s,
                     lsb: profile.lsb,

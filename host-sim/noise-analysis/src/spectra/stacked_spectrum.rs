@@ -89,8 +89,8 @@ impl StackedSpectrum {
     }
 
     /// The lines with a p-value below 2·10⁻⁵, the strongest first; at most 6 and one at half the sample rate.
-    pub(crate) fn lines(&self) -> Vec<SpectralLine> {
-        let Some(mut spectrum) = self.mean.clone() else { return Vec::new() };
+    pub(crate) fn lines(self) -> Vec<SpectralLine> {
+        let Some(mut spectrum) = self.mean else { return Vec::new() };
         // Where the level of the noise changes from stretch to stretch, the loud ones have most of the weight.
         let [sum, squares] = self.levels;
         spectrum.independent *= sum * sum / squares / spectrum.periodogram.looks();

@@ -106,7 +106,7 @@ struct JointSpectra<'a> {
 
 impl JointSpectra<'_> {
     fn deviances(&self, filter: MovingAverageFilter) -> Vec<f64> {
-        in_parallel(&self.channels, |(of, dispersion)| of.spectrum.deviance(filter) / dispersion)
+        self.channels.iter().map(|(of, dispersion)| of.spectrum.deviance(filter) / dispersion).collect()
     }
 
     fn likeliest(&self) -> Hypothesis {
@@ -145,7 +145,7 @@ pub(super) fn identified(
     for TriedChannel { behind, dispersion, .. } in tried_alone {
         joint.iter_mut().zip(behind).for_each(|(joint, of)| joint.channels.push((of, dispersion)));
     }
-    let tried: Vec<Hypothesis> = joint.iter().map(JointSpectra::likeliest).collect();
+    let tried: Vec<Hypothesis> = in_parallel(&joint, JointSpectra::likeliest);
     let least = tried.iter().map(Hypothesis::total).fold(f64::INFINITY, f64::min);
     let rise = chi_squared_quantile(BOUNDED, 1.0);
     let (chosen, other_taps) = simplest(&tried, least + rise, nominal_decimation).filter(|_| !spectra.is_empty())?;
