@@ -72,8 +72,9 @@ pub struct LongRecordReader {
     stuck: StuckScreen,
     /// What is stuck in the first half.
     stuck_in_first_half: Option<Vec<StuckRuns>>,
+    recorded: Vec<RecordedChannel>,
     screen: SampleScreen,
-    channels: Vec<LongChannel>,
+    screened: Vec<ScreenedChannel>,
     fast: Vec<FastFindings>,
     last: Option<u64>,
     gaps: usize,
@@ -112,13 +113,16 @@ fn is_fast(effect: &Effect) -> bool {
     )
 }
 
-/// What is kept of one channel.
-struct LongChannel {
-    recorded: StreamedCurves,
-    /// Without what the screen leaves out.
-    screened: StreamedCurves,
-    means: Means,
+/// What is kept of one channel as it was recorded.
+struct RecordedChannel {
+    curves: StreamedCurves,
     values: ValueCounts,
+}
+
+/// What is kept of one channel without what the screen leaves out.
+struct ScreenedChannel {
+    curves: StreamedCurves,
+    means: Means,
     /// Of the inertial channels.
     spectra: Option<SampleSpectra>,
 }
@@ -129,7 +133,7 @@ struct SampleSpectra {
     epochs: EpochSpectra,
 }
 
-impl LongChannel {
+impl ScreenedChannel {
     fn push_to_spectra(&mut self, slots: &[u64], channel: &MeasuredChannel) {
         let Some(SampleSpectra { stacked, epochs }) = &mut self.spectra else { return };
         for (slot, count) in channel.used_samples(slots) {
@@ -203,18 +207,21 @@ impl LongRecordReader {
             stacked: StackedSpectrum::new(period_s, STRETCH_PERIODS as usize, fast.resolution, read_every),
             epochs: EpochSpectra::new(period_s, &epochs),
         };
-        let channel = |((profile, fast), of_first): ((&ChannelProfile, &FastFindings), &Option<ChannelId>)| {
+        let recorded = |_: &ChannelProfile| RecordedChannel {
+            curves: StreamedCurves::new(&halves),
+            values: ValueCounts::default(),
+        };
+        let recorded = description.channels.iter().map(recorded).collect();
+        let screened = |((profile, fast), of_first): ((&ChannelProfile, &FastFindings), &Option<ChannelId>)| {
             let counts = of_first.iter().flat_map(|&of| &first[of].counts);
             let largest = counts.map(|count| count.unsigned_abs()).max();
-            LongChannel {
-                recorded: StreamedCurves::new(&halves),
-                screened: StreamedCurves::new(&epochs),
+            ScreenedChannel {
+                curves: StreamedCurves::new(&epochs),
                 means: Means::new(samples_per_mean, means, largest.unwrap_or(0)),
-                values: ValueCounts::default(),
                 spectra: profile.quantity.is_inertial().then(|| spectra(fast)),
             }
         };
-        let channels = description.channels.iter().zip(&fast).zip(&of_first).map(channel).collect();
+        let screened = description.channels.iter().zip(&fast).zip(&of_first).map(screened).collect();
         let [_, middle] = halves;
         let (stuck_in_first_half, last) = (None, None);
         Self {
@@ -224,8 +231,9 @@ impl LongRecordReader {
             middle,
             stuck,
             stuck_in_first_half,
+            recorded,
             screen,
-            channels,
+            screened,
             fast,
             last,
             gaps: 0,
@@ -242,25 +250,27 @@ impl LongRecordReader {
             self.stuck_in_first_half.get_or_insert_with(|| self.stuck.found());
         }
         let block = self.stuck.screen(block);
-        parallel::for_each_pair(&mut self.channels, &block.channels, |of, channel| {
-            of.recorded.push(&block.slots, channel);
-            channel.used_samples(&block.slots).for_each(|(_, count)| of.values.push(count));
-        });
-        let channels = &mut self.channels;
-        self.screen.push(&block, |screened| push_screened(channels, screened));
+        let Self { recorded, screen, screened, .. } = self;
+        let as_recorded = || {
+            parallel::for_each_pair(recorded, &block.channels, |of, channel| {
+                of.curves.push(&block.slots, channel);
+                channel.used_samples(&block.slots).for_each(|(_, count)| of.values.push(count));
+            });
+        };
+        parallel::both(as_recorded, || screen.push(&block, |block| push_screened(screened, block)));
     }
 
     /// The recording, all of which was read.
     #[must_use]
     pub fn finish(mut self) -> CondensedRecord<'static> {
-        push_screened(&mut self.channels, &self.screen.finish());
+        push_screened(&mut self.screened, &self.screen.finish());
         let found = self.stuck.found();
         let of_first_half = self.stuck_in_first_half.unwrap_or_else(|| found.clone());
-        let Self { description, first, samples_per_mean, middle, screen, channels, fast, gaps, .. } = self;
+        let Self { description, first, samples_per_mean, middle, recorded, screen, screened, fast, gaps, .. } = self;
         let lost = sampling_faults::lost_samples(description.samples, &description.dropped, gaps);
         let period_s = description.period_s();
-        let means = measurement_of_means(&description, samples_per_mean, &channels);
-        let screened: Vec<Vec<(u64, f64)>> = screen.found_before(middle).collect();
+        let means = measurement_of_means(&description, samples_per_mean, &screened);
+        let left_out: Vec<Vec<(u64, f64)>> = screen.found_before(middle).collect();
         let [events, events_of_half] =
             [(description.periods, found), (middle, of_first_half)].map(|(periods, stuck)| {
                 let share = periods as f64 / description.periods as f64;
@@ -270,21 +280,22 @@ impl LongRecordReader {
                 events.zip(stuck).map(|(events, stuck)| events.into_iter().chain(stuck).collect::<Vec<Effect>>())
             });
         let mut condensed = Vec::new();
-        let events = events.zip(events_of_half).zip(screened);
-        for (((channel, fast), profile), ((events, events_of_first_half), screened)) in
-            channels.into_iter().zip(fast).zip(&description.channels).zip(events)
+        let events = events.zip(events_of_half).zip(left_out);
+        let channels = recorded.into_iter().zip(screened).zip(fast).zip(&description.channels);
+        for ((((recorded, screened), fast), profile), ((events, events_of_first_half), left_out)) in
+            channels.zip(events)
         {
             let is_inertial = profile.quantity.is_inertial();
             let shows_codes = |effect: &Effect| !matches!(effect, Effect::NoiseBelowCount(_) | Effect::EffectiveLsb(_));
-            let missing_codes = || channel.values.missing_codes(profile.lsb, profile.unit);
-            let range = channel
+            let missing_codes = || recorded.values.missing_codes(profile.lsb, profile.unit);
+            let range = recorded
                 .values
                 .saturation(profile, fast.resolution)
                 .or_else(|| missing_codes().filter(|_| fast.effects.iter().all(shows_codes)));
             let found = lost.iter().cloned().map(|found| found.effect).chain(fast.effects);
             let found = found.chain(range.map(|found| found.effect)).chain(events);
             let parts = |curves: &StreamedCurves| curves.parts().map(|(start, part)| (start, part.clone())).collect();
-            let (faster_lines, spectra) = match channel.spectra {
+            let (faster_lines, spectra) = match screened.spectra {
                 Some(SampleSpectra { stacked, epochs }) => (
                     faster_lines(lines_above_means(stacked, &description, samples_per_mean)),
                     epochs.finish(description.periods),
@@ -295,12 +306,12 @@ impl LongRecordReader {
                 samples: SampleCurves {
                     samples_per_mean,
                     resolution: fast.resolution,
-                    measured: channel.recorded.whole().curve(period_s).scaled(profile.lsb),
-                    recorded: parts(&channel.recorded),
-                    screened: parts(&channel.screened),
+                    measured: recorded.curves.whole().curve(period_s).scaled(profile.lsb),
+                    recorded: parts(&recorded.curves),
+                    screened: parts(&screened.curves),
                     middle,
                     spectra,
-                    is_screened: channel.screened.refused != channel.recorded.refused,
+                    is_screened: screened.curves.refused != recorded.curves.refused,
                     period_s,
                     lsb: profile.lsb,
                 },
@@ -309,8 +320,8 @@ impl LongRecordReader {
                 faster_lines,
                 effects: found.filter(|_| is_inertial).collect(),
                 effects_of_first_half: events_of_first_half,
-                screened,
-                refused: channel.screened.refused,
+                screened: left_out,
+                refused: screened.curves.refused,
             });
         }
         CondensedRecord {
@@ -333,9 +344,9 @@ fn epoch_starts(means: u64) -> impl Iterator<Item = u64> {
     starts.into_iter().filter(move |start| (1..means).contains(start))
 }
 
-fn push_screened(channels: &mut [LongChannel], block: &SampleBlock) {
+fn push_screened(channels: &mut [ScreenedChannel], block: &SampleBlock) {
     parallel::for_each_pair(channels, &block.channels, |of, channel| {
-        of.screened.push(&block.slots, channel);
+        of.curves.push(&block.slots, channel);
         of.means.push(&block.slots, channel);
         of.push_to_spectra(&block.slots, channel);
     });
@@ -344,14 +355,14 @@ fn push_screened(channels: &mut [LongChannel], block: &SampleBlock) {
 fn measurement_of_means(
     description: &RecordingDescription,
     samples_per_mean: u64,
-    channels: &[LongChannel],
+    channels: &[ScreenedChannel],
 ) -> Measurement {
     let rate = description.sample_rate_hz / samples_per_mean as f64;
     let count = channels.iter().map(|channel| channel.means.counts.len()).max().unwrap_or(0);
-    let mean = |of: &LongChannel, at: usize| of.means.counts.get(at).copied().filter(|mean| *mean != MISSING);
+    let mean = |of: &ScreenedChannel, at: usize| of.means.counts.get(at).copied().filter(|mean| *mean != MISSING);
     let present: Vec<usize> =
         (0..count).filter(|&at| channels.iter().any(|channel| mean(channel, at).is_some())).collect();
-    let channel = |(profile, of): (&ChannelProfile, &LongChannel)| {
+    let channel = |(profile, of): (&ChannelProfile, &ScreenedChannel)| {
         let counts: Vec<i32> = present.iter().map(|&at| mean(of, at).unwrap_or(0)).collect();
         let missing: Vec<usize> =
             (0..present.len()).filter(|&position| mean(of, present[position]).is_none()).collect();
