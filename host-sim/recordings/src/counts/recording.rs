@@ -125,9 +125,10 @@ impl Recorder {
         self.recording.range = range;
     }
 
-    /// The samples that were added since they were taken last; their memory is kept for the next ones.
-    pub(crate) fn drain_samples(&mut self) -> impl Iterator<Item = RecordedSample> {
-        self.recording.samples.drain(..)
+    /// The samples that were added since they were taken last.
+    pub(crate) fn take_samples(&mut self) -> Vec<RecordedSample> {
+        let samples = self.recording.samples.len();
+        std::mem::replace(&mut self.recording.samples, Vec::with_capacity(samples))
     }
 
     /// The recording of all bursts that were added.

@@ -79,10 +79,10 @@ impl Read for ReadAhead {
     }
 }
 
-/// Calls `take` with each of the items that `next` gives, while another thread makes the next one.
+/// Calls `take` with each of the items that `next` gives, while another thread makes the next one, until one of them fails.
 pub(crate) fn for_each_ahead<T: Send, E: Send>(
     mut next: impl FnMut() -> Result<Option<T>, E> + Send,
-    take: impl FnMut(T),
+    take: impl FnMut(T) -> Result<(), E>,
 ) -> Result<(), E> {
     let (send, items) = sync_channel(1);
     thread::scope(|scope| {
@@ -94,8 +94,8 @@ pub(crate) fn for_each_ahead<T: Send, E: Send>(
             }
             Ok(())
         });
-        items.into_iter().for_each(take);
-        reader.join().unwrap_or_else(|panic| resume_unwind(panic))
+        let taken = items.into_iter().try_for_each(take);
+        taken.and(reader.join().unwrap_or_else(|panic| resume_unwind(panic)))
     })
 }
 
@@ -155,7 +155,21 @@ mod tests {
             number += 1;
             if number > 100 { Err("damaged") } else { Ok(Some(number)) }
         };
-        assert_eq!(for_each_ahead(next, |item| taken.push(item)), Err("damaged"));
+        let take = |item| {
+            taken.push(item);
+            Ok(())
+        };
+        assert_eq!(for_each_ahead(next, take), Err("damaged"));
         assert_eq!(taken, (1..=100).collect::<Vec<i32>>());
+    }
+
+    #[test]
+    fn an_item_that_cannot_be_taken_ends_the_reading() {
+        let mut number = 0;
+        let next = || {
+            number += 1;
+            Ok(Some(number))
+        };
+        assert_eq!(for_each_ahead(next, |item| if item == 10 { Err("full") } else { Ok(()) }), Err("full"));
     }
 }

@@ -4,12 +4,13 @@ use crate::counts::count_table::CountTable;
 use crate::counts::recording::{RecordedSample, Recorder, Recording};
 use crate::input::delimited_text::Lines;
 use crate::input::input_error::InputError;
+use crate::input::read_ahead::for_each_ahead;
 use crate::input::read_monitor::ReadMonitor;
 use crate::time_base::channels;
 use crate::time_base::sample_slots::MAX_REPEATED_READ_INTERVAL;
 use crate::time_base::stream_clock::{BLOCK, Placed, Stamp, StreamClock};
 use crate::time_base::time_base_error::StreamError;
-use adis16405_driver::{Burst, Faults, GyroRange};
+use adis16405_driver::{Burst, Channel, Faults, GyroRange};
 use measurement::{SampleBlock, SensorProfile};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -32,13 +33,35 @@ pub(crate) fn head(
 
 /// One pass over a table.
 pub(crate) struct CountStream {
+    rows: CountRows,
+    /// With what was counted until now.
+    pub(crate) placer: RowPlacer,
+}
+
+/// The rows of a table, read in blocks.
+struct CountRows {
     table: CountTable,
     recorder: Recorder,
+    /// Rows to read at most.
+    most: u64,
+    is_finished: bool,
+}
+
+/// Some rows that follow each other.
+struct RowBlock {
+    samples: Vec<RecordedSample>,
+    /// Rows of the table up to the last of these.
+    rows: u64,
+    /// Whether no row follows.
+    is_last: bool,
+}
+
+/// Gives the rows of a table their sample periods, and counts what can be used.
+pub(crate) struct RowPlacer {
+    channels: Vec<Channel>,
     clock: StreamClock,
     /// Shortest interval of two samples that are not one that was read twice, s; 0 where there are no time stamps.
     shortest_s: f64,
-    /// Rows to read at most.
-    most: u64,
     /// Time of the last row that was read, s.
     before_s: Option<f64>,
     /// Rows that arrived and are not placed yet.
@@ -48,7 +71,6 @@ pub(crate) struct CountStream {
     /// Period of the first usable sample, and the periods missing before it.
     first: Option<Placed>,
     last: Placed,
-    is_finished: bool,
     /// Usable samples so far.
     pub(crate) samples: u64,
     /// Samples that never arrived.
@@ -70,49 +92,65 @@ impl CountStream {
         most: u64,
     ) -> Result<Self, InputError> {
         let table = CountTable::new(file, Lines::open_monitored(file, monitor)?)?.of_any_length();
-        let recorder = Recorder::new(table.channels(), range);
-        Ok(Self {
-            table,
-            recorder,
+        let placer = RowPlacer {
+            channels: table.channels(),
             clock,
             shortest_s: MAX_REPEATED_READ_INTERVAL * period_s.unwrap_or(0.0),
-            most,
             before_s: None,
             arrived: Vec::new(),
             left_out: 0,
             first: None,
             last: Placed { period: 0, missing: 0 },
-            is_finished: false,
             samples: 0,
             never_arrived: 0,
             dropped: BTreeMap::new(),
             flagged: BTreeMap::new(),
-        })
+        };
+        let recorder = Recorder::new(table.channels(), range);
+        Ok(Self { rows: CountRows { table, recorder, most, is_finished: false }, placer })
     }
 
     /// The next samples, of channels with the profiles of `profile`; `None` at the end.
     pub(crate) fn next(&mut self, profile: &SensorProfile) -> Result<Option<SampleBlock>, StreamError> {
-        let (mut slots, mut usable) = (Vec::with_capacity(BLOCK), Vec::with_capacity(BLOCK));
-        let take = |slot: u64, sample: &RecordedSample| {
-            slots.push(slot);
-            usable.push(*sample);
-        };
-        let is_there = self.next_usable(take)?;
-        let block =
-            || SampleBlock { channels: channels(&self.table.channels(), profile, usable.iter().copied()), slots };
-        Ok(is_there.then(block))
+        let Some(rows) = self.rows.next()? else { return Ok(None) };
+        self.placer.block(rows, profile).map(Some)
     }
 
-    /// Reads to the end, for what is counted on the way.
-    pub(crate) fn read_to_end(&mut self) -> Result<(), StreamError> {
-        while self.next_usable(|_, _| {})? {}
-        Ok(())
+    /// Reads to the end, for what is counted on the way; the samples of a table that has at most `most` rows. The next rows are read
+    /// while these are placed.
+    pub(crate) fn survey(&mut self, most: u64, profile: &SensorProfile) -> Result<Vec<SampleBlock>, StreamError> {
+        let Self { rows, placer } = self;
+        let mut kept = Vec::new();
+        for_each_ahead(
+            || rows.next(),
+            |rows| {
+                if rows.rows <= most {
+                    kept.push(placer.block(rows, profile)?);
+                    return Ok(());
+                }
+                kept = Vec::new();
+                placer.place(rows, |_, _| {})
+            },
+        )?;
+        Ok(kept)
     }
 
-    /// Calls `take` with each of the next samples that can be used, and its sample period counted from the first one; false at the end.
-    fn next_usable(&mut self, mut take: impl FnMut(u64, &RecordedSample)) -> Result<bool, StreamError> {
+    /// Rows that were read.
+    pub(crate) fn rows(&self) -> u64 {
+        self.rows.table.rows()
+    }
+
+    /// Whether the reading was stopped before the end of the table.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.rows.table.is_stopped()
+    }
+}
+
+impl CountRows {
+    /// The next ones; `None` at the end.
+    fn next(&mut self) -> Result<Option<RowBlock>, StreamError> {
         if self.is_finished {
-            return Ok(false);
+            return Ok(None);
         }
         let mut rows = 0;
         while rows < BLOCK && self.table.rows() < self.most {
@@ -124,8 +162,27 @@ impl CountStream {
             rows += 1;
         }
         self.is_finished |= self.table.rows() >= self.most;
+        let samples = self.recorder.take_samples();
+        Ok(Some(RowBlock { samples, rows: self.table.rows(), is_last: self.is_finished }))
+    }
+}
+
+impl RowPlacer {
+    /// The next samples, of channels with the profiles of `profile`.
+    fn block(&mut self, rows: RowBlock, profile: &SensorProfile) -> Result<SampleBlock, StreamError> {
+        let (mut slots, mut usable) = (Vec::with_capacity(BLOCK), Vec::with_capacity(BLOCK));
+        let take = |slot: u64, sample: &RecordedSample| {
+            slots.push(slot);
+            usable.push(*sample);
+        };
+        self.place(rows, take)?;
+        Ok(SampleBlock { channels: channels(&self.channels, profile, usable.iter().copied()), slots })
+    }
+
+    /// Calls `take` with each of the next samples that can be used, and its sample period counted from the first one.
+    fn place(&mut self, rows: RowBlock, mut take: impl FnMut(u64, &RecordedSample)) -> Result<(), StreamError> {
         let before = self.arrived.len();
-        for sample in self.recorder.drain_samples() {
+        for sample in rows.samples {
             let time_s = sample.time_stamp.time_s;
             let is_short =
                 matches!((self.before_s, time_s), (Some(before), Some(now)) if now - before < self.shortest_s);
@@ -139,7 +196,7 @@ impl CountStream {
         }
         let stamp =
             |sample: &RecordedSample| Stamp { time_s: sample.time_stamp.time_s, index: sample.time_stamp.index };
-        let placed = self.clock.place(self.arrived[before..].iter().map(stamp), self.is_finished)?;
+        let placed = self.clock.place(self.arrived[before..].iter().map(stamp), rows.is_last)?;
         let mut arrived = std::mem::take(&mut self.arrived);
         for (placed, sample) in placed.iter().zip(&arrived) {
             if self.is_usable(*placed, sample) {
@@ -148,7 +205,7 @@ impl CountStream {
         }
         arrived.drain(..placed.len());
         self.arrived = arrived;
-        Ok(true)
+        Ok(())
     }
 
     /// Counts a sample, and tells whether it can be used.
@@ -184,15 +241,5 @@ impl CountStream {
     /// The clock that placed the rows.
     pub(crate) fn clock(&self) -> &StreamClock {
         &self.clock
-    }
-
-    /// Rows that were read.
-    pub(crate) fn rows(&self) -> u64 {
-        self.table.rows()
-    }
-
-    /// Whether the reading was stopped before the end of the table.
-    pub(crate) fn is_stopped(&self) -> bool {
-        self.table.is_stopped()
     }
 }

@@ -12,7 +12,7 @@ use crate::input::read_ahead::for_each_ahead;
 use crate::input::read_monitor::{ReadMonitor, ReadPass};
 use crate::streams::count_stream::{self, CountStream};
 use crate::streams::recorded_blocks::RecordedBlocks;
-use crate::streams::value_stream::{self, ColumnSample, ValueColumn, ValueHead, ValueStream};
+use crate::streams::value_stream::{self, ColumnSample, PlacedRows, ValueColumn, ValueHead, ValueStream};
 use crate::tables::any_sensor::{ReadOptions, SensorRecording};
 use crate::tables::quantizer::Quantizer;
 use crate::tables::sensor_measurement::rounding_note;
@@ -342,7 +342,11 @@ impl SampleStream {
             }
             Content::Counts(counts) => {
                 let mut pass = open_counts(&counts.source, &self.monitor)?;
-                for_each_ahead(|| pass.next(&self.description.profile), take)?;
+                let take_block = |block| {
+                    take(block);
+                    Ok(())
+                };
+                for_each_ahead(|| pass.next(&self.description.profile), take_block)?;
                 pass.is_stopped().then(|| pass.rows())
             }
             Content::Values(values) => {
@@ -351,7 +355,11 @@ impl SampleStream {
                 let known: Vec<ValueColumn> = columns.iter().map(|of| of.column.clone()).collect();
                 let quantizers: Vec<Option<Quantizer>> = columns.iter().map(|of| of.quantizer).collect();
                 let mut off_step = vec![false; columns.len()];
-                for_each_ahead(|| pass.next(), |rows| take(rows.into_block(&known, &quantizers, &mut off_step)))?;
+                let take_rows = |rows: PlacedRows| {
+                    take(rows.into_block(&known, &quantizers, &mut off_step));
+                    Ok(())
+                };
+                for_each_ahead(|| pass.next(), take_rows)?;
                 let stopped_at = pass.is_stopped().then(|| pass.rows());
                 if stopped_at.is_none() && off_step.contains(&true) {
                     for (of, _) in columns.iter_mut().zip(&off_step).filter(|(_, off_step)| **off_step) {
@@ -395,28 +403,21 @@ impl SampleStream {
             Content::Counts(counts) => {
                 let Counts { source, most_kept, kept } = counts.as_mut();
                 let mut pass = open_counts(source, monitor)?;
-                while pass.rows() <= *most_kept
-                    && let Some(block) = pass.next(&description.profile)?
-                {
-                    kept.push(block);
-                }
-                if pass.rows() > *most_kept {
-                    *kept = Vec::new();
-                    pass.read_to_end()?;
-                }
+                *kept = pass.survey(*most_kept, &description.profile)?;
                 if pass.is_stopped() {
                     source.most = pass.rows();
                 }
-                description.samples = pass.samples;
-                description.periods = pass.periods();
-                description.dropped = pass.dropped.clone();
-                pass.clock().check(description.samples, description.periods, &description.dropped)?;
-                description.dropped.insert("gap", pass.never_arrived);
-                description.flagged = pass.flagged.clone();
-                description.flagged.extend(pass.clock().warnings());
+                let placer = pass.placer;
+                description.samples = placer.samples;
+                description.periods = placer.periods();
+                description.dropped = placer.dropped.clone();
+                placer.clock().check(description.samples, description.periods, &description.dropped)?;
+                description.dropped.insert("gap", placer.never_arrived);
+                description.flagged = placer.flagged.clone();
+                description.flagged.extend(placer.clock().warnings());
                 description.sample_rate_hz =
-                    source.stated_hz.or(pass.clock().rate_hz()).ok_or(TimeBaseError::NoRate)?;
-                *notes = pass.clock().note().into_iter().collect();
+                    source.stated_hz.or(placer.clock().rate_hz()).ok_or(TimeBaseError::NoRate)?;
+                *notes = placer.clock().note().into_iter().collect();
             }
             Content::Values(values) => {
                 let Values { source, time_unit_s, columns, notes } = values.as_mut();
