@@ -100,7 +100,7 @@ pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Rep
     let whole = PreprocessedRecord::new(record);
     watch(Stage::Models);
     // Beside each other: where one waits for its slowest channel, the other goes on.
-    let ((first_half, epochs), mut models) = parallel::both(|| FirstHalf::fit(&whole), || whole.fit());
+    let ((first_half, epochs), mut models) = parallel::both(|| FirstHalf::fit(&whole), || whole.fit(None));
     models.take_terms_that_held(&first_half.part, &whole.estimators.ruled[1]);
     models.add_lines_of_spectrum();
     models.take_coefficients_of_samples();
@@ -113,7 +113,7 @@ pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Rep
         }
         let half = record.first_half();
         let half = PreprocessedRecord::new(&half);
-        half.effects(&half.fit())
+        half.effects(&half.fit(Some(&first_half.part)))
     };
     let reports = || {
         let channels = channel_reports((&whole, &models), &first_half, &epochs, &effects);

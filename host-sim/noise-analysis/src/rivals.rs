@@ -10,6 +10,7 @@ pub(crate) mod channel_lines;
 pub(crate) mod motion;
 pub(crate) mod proposal;
 pub(crate) mod proposals;
+pub(crate) mod shown_by_samples;
 pub(crate) mod signals;
 pub(crate) mod slow_drift;
 pub mod table;

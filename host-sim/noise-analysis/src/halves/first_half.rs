@@ -53,8 +53,13 @@ impl FirstHalf {
             has_ramp: preprocessing.has_ramp(channel, Exclusion::ByFirstHalf),
             sensitivities: preprocessing.sensitivities(channel, Exclusion::ByFirstHalf).to_vec(),
         });
-        let samples =
-            PartSamples { record: record.record, series: &halves, biases: biases.clone(), seeks_levels: false };
+        let samples = PartSamples {
+            record: record.record,
+            series: &halves,
+            biases: biases.clone(),
+            known: None,
+            seeks_levels: false,
+        };
         let profile = &record.measurement().profile;
         let data = PartData { profile, curves: &estimators.ruled[0], samples: Some(samples) };
         // The filter of the whole record is the one that is reported.

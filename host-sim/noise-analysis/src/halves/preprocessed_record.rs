@@ -45,15 +45,15 @@ impl<'a> PreprocessedRecord<'a> {
         Self { record, preprocessing, estimators, series, motions }
     }
 
-    /// The models of the whole record.
-    pub(crate) fn fit(&self) -> TracedPart {
+    /// The models of the whole record; of samples that a `known` part has too, what they show is taken from there.
+    pub(crate) fn fit(&self, known: Option<&TracedPart>) -> TracedPart {
         let (measurement, preprocessing) = (self.measurement(), &self.preprocessing);
         let bias = |channel: ChannelId| BiasByBlocks {
             has_ramp: preprocessing.has_ramp(channel, Exclusion::ByWhole),
             sensitivities: preprocessing.sensitivities(channel, Exclusion::ByWhole).to_vec(),
         };
         let biases = measurement.ids().map(bias).collect();
-        let samples = PartSamples { record: self.record, series: &self.series, biases, seeks_levels: true };
+        let samples = PartSamples { record: self.record, series: &self.series, biases, known, seeks_levels: true };
         let data = PartData { profile: &measurement.profile, curves: &self.estimators.both, samples: Some(samples) };
         TracedPart::fit(&data)
     }

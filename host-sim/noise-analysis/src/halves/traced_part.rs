@@ -16,6 +16,7 @@ use crate::record::estimators::RecordPart;
 use crate::rivals::channel_lines::fit_with_lines;
 use crate::rivals::proposal::{ChannelFacts, Origin, Proposal, Signal};
 use crate::rivals::proposals::{ChannelFindings, propose};
+use crate::rivals::shown_by_samples::ShownBySamples;
 use crate::rivals::signals::SpectrumProposals;
 use crate::rivals::slow_drift::ChannelsInCommon;
 use crate::rivals::table::standing_in_spectrum;
@@ -30,6 +31,7 @@ use allan_core::NoiseTerm;
 use allan_core::model::FittedTerm;
 use allan_core::regression::Sensitivity;
 use measurement::{ChannelId, PerChannel, SensorProfile};
+use std::sync::Arc;
 
 /// What a part of a recording is fitted from.
 pub(crate) struct PartData<'a> {
@@ -45,6 +47,8 @@ pub(crate) struct PartSamples<'a> {
     pub series: &'a PerChannel<Series>,
     /// What block means show of each channel.
     pub biases: PerChannel<BiasByBlocks>,
+    /// Another part, which may have the same samples: what they show is then known.
+    pub known: Option<&'a TracedPart>,
     /// Whether two levels are looked for, which the model has as a Markov process.
     pub seeks_levels: bool,
 }
@@ -77,6 +81,7 @@ pub(crate) struct ChannelTrace {
     pub telegraph: Option<TelegraphNoise>,
     /// Signals in the samples.
     pub signals: Vec<Signal>,
+    shown: Option<Arc<ShownBySamples>>,
     slowest: Option<CosineSpectrum>,
     /// The spectrum of the samples where their means alone are kept.
     spectrum: Option<Welch>,
@@ -204,6 +209,7 @@ impl ChannelTrace {
             noise: None,
             telegraph: None,
             signals: Vec::new(),
+            shown: None,
             slowest: None,
             spectrum: None,
         }
@@ -217,16 +223,22 @@ impl ChannelTrace {
     ) -> Self {
         let (own, bias) = (&samples.series[channel], &samples.biases[channel]);
         let covariates = CovariateFit::estimate(curves, channel, bias.has_ramp, |to| bias.sensitivity(to));
-        let rest = covariates.compensated_series(own, samples.series);
+        let compensated = covariates.compensated_series(own, samples.series);
+        let rest = UniformSeries::from_series(compensated.as_ref().unwrap_or(own));
+        let rest = rest.with_rounding(covariates.rounding().clone());
+        let samples_per_mean = samples.record.samples_per_mean;
+        let known = samples.known.and_then(|part| part.channels[channel].shown.clone());
+        let shown =
+            known.filter(|known| known.is_of(own, compensated.as_ref(), rest.rounding())).unwrap_or_else(|| {
+                ShownBySamples::find(own, compensated.as_ref(), &rest, (profile, samples_per_mean)).into()
+            });
         let faster = &samples.record.channels[channel].faster_lines;
-        let (mut fit, lines) =
-            fit_with_lines(covariates, own, rest.as_ref(), profile, (samples.record.samples_per_mean, faster));
-        let rest = UniformSeries::from_series(rest.as_ref().unwrap_or(own));
-        let rest = rest.with_rounding(fit.covariates.rounding().clone());
+        let (mut fit, lines) = fit_with_lines(covariates, &shown, profile, (samples_per_mean, faster));
         let correlation_times = || fit.correlation_times().collect::<Vec<f64>>();
         let levels = || telegraph_noise(&rest, own.unit, &correlation_times());
         let telegraph = if samples.seeks_levels { levels() } else { None };
-        let found = standing_in_spectrum(SpectrumProposals::find(&rest, lines, fit.bands()));
+        let found = SpectrumProposals::new(shown.signals.clone(), rest.duration(), lines, fit.bands());
+        let found = standing_in_spectrum(found);
         let share = SignalShare::new(found.periodic.as_ref(), found.track.as_ref());
         let noise = found.periodic.as_ref().map(|periodic| periodic.subtracted_from(&rest));
         let (lines, signals) = found.into_lines_and_signals();
@@ -237,7 +249,7 @@ impl ChannelTrace {
         }
         let slowest = CosineSpectrum::new(noise.as_ref().unwrap_or(&rest));
         let spectrum = samples.record.spectrum_within(channel, own.span.clone());
-        Self { fit, lines, rest: Some(rest), noise, telegraph, signals, slowest, spectrum }
+        Self { fit, lines, rest: Some(rest), noise, telegraph, signals, shown: Some(shown), slowest, spectrum }
     }
 }
 

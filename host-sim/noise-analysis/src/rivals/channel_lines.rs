@@ -2,38 +2,32 @@
 
 use crate::fit::channel_fit::ChannelFit;
 use crate::fit::covariates::CovariateFit;
+use crate::rivals::shown_by_samples::ShownBySamples;
 use crate::rivals::table::{LineClaim, stands_as_line};
-use crate::samples::series::Series;
-use crate::spectra::spectral_lines::{self, MergedLine, before_averaging, is_read_slowly};
+use crate::spectra::spectral_lines::{MergedLine, before_averaging, is_read_slowly};
 use allan_core::Model;
 use allan_core::term::NoiseTerm;
 use measurement::SensorProfile;
 
-/// Finds the lines of `series` and traces what the baseline model lacks with them.
+/// Traces what the baseline model lacks with the lines that the samples have shown; lines that come from a covariate are left out.
 ///
-/// `rest` is the series less its covariates, if the channel depends on any; lines that come from a covariate are left out.
 /// Of a series that has means of so many samples, `faster` are the lines that it does not show, and that are known beforehand; what
 /// they look like in the series is left out.
 pub(crate) fn fit_with_lines(
     covariates: CovariateFit,
-    series: &Series,
-    rest: Option<&Series>,
+    shown: &ShownBySamples,
     profile: &SensorProfile,
     (samples_per_mean, faster): (u64, &[MergedLine]),
 ) -> (ChannelFit, Vec<MergedLine>) {
-    let rate_error = profile.sample_rate_error;
-    let read_every = if samples_per_mean > 1 { 1 } else { profile.read_every(1.0 / series.period_s) };
-    let rounding = covariates.rounding().clone();
-    let find = |series: &Series, known: Option<&Model>| {
-        let mut lines = spectral_lines::find(series, &rounding, known, rate_error, read_every);
-        lines.retain(|line| stands_as_line(&LineClaim { faster, ..LineClaim::new(line, series.period_s) }));
-        lines.iter_mut().for_each(|line| line.deviation = before_averaging(line, series.period_s, samples_per_mean));
+    let period_s = shown.series.period_s;
+    let standing = |mut lines: Vec<MergedLine>| {
+        lines.retain(|line| stands_as_line(&LineClaim { faster, ..LineClaim::new(line, period_s) }));
+        lines.iter_mut().for_each(|line| line.deviation = before_averaging(line, period_s, samples_per_mean));
         lines
     };
-    let mut lines = find(series, None);
-    if let Some(rest) = rest {
-        let left = find(rest, None);
-        lines.retain(|line| stands_as_line(&LineClaim { left: Some(&left), ..LineClaim::new(line, series.period_s) }));
+    let mut lines = standing(shown.lines.clone());
+    if let Some(left) = shown.lines_of_rest.clone().map(standing) {
+        lines.retain(|line| stands_as_line(&LineClaim { left: Some(&left), ..LineClaim::new(line, period_s) }));
     }
     lines.extend(faster);
     let kinds = |lines: &[MergedLine]| lines.iter().map(MergedLine::kind).collect::<Vec<NoiseTerm>>();
@@ -51,13 +45,13 @@ pub(crate) fn fit_with_lines(
             same.fold(line, |best, other| if other.shape_p_value > best.shape_p_value { *other } else { best })
         };
         lines = others;
-        lines.extend(find(series, Some(fit.after())).into_iter().filter(MergedLine::is_broad).map(likelier));
+        lines.extend(standing(shown.lines_over(fit.after())).into_iter().filter(MergedLine::is_broad).map(likelier));
         lines.extend(faster.iter().filter(|line| line.is_broad()));
         fit = ChannelFit::fit_traced(fit.covariates, &kinds(&lines), &filters);
     }
     lines.retain(|line| {
         let gain = filter_gain(fit.after(), line.frequency.value);
-        stands_as_line(&LineClaim { gain, ..LineClaim::new(line, series.period_s) })
+        stands_as_line(&LineClaim { gain, ..LineClaim::new(line, period_s) })
     });
     (fit, lines)
 }

@@ -13,6 +13,25 @@ use crate::spectra::spectral_lines::MergedLine;
 /// Seconds in an hour.
 const HOUR_S: f64 = 3600.0;
 
+/// Signals in the samples of a channel.
+#[derive(Clone)]
+pub(crate) struct SampleSignals {
+    periodic: Option<PeriodicSignal>,
+    track: Option<FrequencyTrack>,
+    decays: Option<DecayingDisturbances>,
+}
+
+impl SampleSignals {
+    /// The signals in `series`, a channel's samples less its covariates.
+    pub(crate) fn find(series: &UniformSeries) -> Self {
+        Self {
+            periodic: PeriodicSignal::find(series),
+            track: FrequencyTrack::find(series),
+            decays: DecayingDisturbances::find(series),
+        }
+    }
+}
+
 /// Lines of the spectrum of a channel and signals in its samples.
 #[derive(Clone)]
 pub(crate) struct SpectrumProposals {
@@ -34,16 +53,15 @@ pub(crate) enum SpectrumClaim<'a> {
 }
 
 impl SpectrumProposals {
-    /// The signals in `series`, a channel's samples less its covariates, beside the `lines` of its spectrum.
-    pub(crate) fn find(series: &UniformSeries, lines: Vec<MergedLine>, bands_of_curve: Vec<(f64, f64)>) -> Self {
-        Self {
-            lines,
-            periodic: PeriodicSignal::find(series),
-            track: FrequencyTrack::find(series),
-            decays: DecayingDisturbances::find(series),
-            bands_of_curve,
-            resolution_hz: 1.0 / series.duration(),
-        }
+    /// The signals in samples over so many seconds, beside the `lines` of their spectrum.
+    pub(crate) fn new(
+        signals: SampleSignals,
+        duration_s: f64,
+        lines: Vec<MergedLine>,
+        bands_of_curve: Vec<(f64, f64)>,
+    ) -> Self {
+        let SampleSignals { periodic, track, decays } = signals;
+        Self { lines, periodic, track, decays, bands_of_curve, resolution_hz: 1.0 / duration_s }
     }
 
     /// Frequencies of the bands of spectrum and curve, Hz, each with its statistic.
@@ -109,7 +127,7 @@ fn shot_noise(decays: &DecayingDisturbances, unit: &'static str) -> ShotNoise {
 
 #[cfg(test)]
 mod tests {
-    use super::{SpectrumProposals, proposal};
+    use super::{SampleSignals, SpectrumProposals, proposal};
     use crate::effects::Effect;
     use crate::samples::uniform_series::UniformSeries;
     use rand::{Rng, SeedableRng};
@@ -125,7 +143,9 @@ mod tests {
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let value = |at: usize| signal(at as f64 / RATE_HZ) + random.sample::<f64, _>(StandardNormal);
         let series = UniformSeries::new(1.0 / RATE_HZ, (0..SAMPLES).map(value).collect());
-        let (_, signals) = SpectrumProposals::find(&series, Vec::new(), Vec::new()).into_lines_and_signals();
+        let found = SampleSignals::find(&series);
+        let (_, signals) =
+            SpectrumProposals::new(found, series.duration(), Vec::new(), Vec::new()).into_lines_and_signals();
         signals.iter().map(|signal| proposal(signal, "g").effect).collect()
     }
 

@@ -1,0 +1,61 @@
+//! What the samples of a channel show, whatever its curve is: the lines of their spectrum, and signals.
+//!
+//! The first half of a record is traced twice, as a part of it and as a record of its own. Most of its channels have the same samples in
+//! both, and what these show is looked for once.
+
+use crate::rivals::signals::SampleSignals;
+use crate::samples::rounding::Rounding;
+use crate::samples::series::Series;
+use crate::samples::uniform_series::UniformSeries;
+use crate::spectra::spectral_lines::{self, MergedLine};
+use allan_core::Model;
+use measurement::SensorProfile;
+
+/// What the samples of a channel show.
+pub(crate) struct ShownBySamples {
+    /// The samples, and the same less the covariates, if the channel depends on any.
+    pub series: Series,
+    rest: Option<Series>,
+    rounding: Rounding,
+    rate_error: f64,
+    /// Values of the sensor for each of the samples.
+    read_every: u32,
+    /// Lines of the spectrum of the samples, and of that of the rest.
+    pub lines: Vec<MergedLine>,
+    pub lines_of_rest: Option<Vec<MergedLine>>,
+    pub signals: SampleSignals,
+}
+
+impl ShownBySamples {
+    /// Of a `series` of samples, or of means of so many of them; the `rest` of it, less the covariates, is `uniform`.
+    pub(crate) fn find(
+        series: &Series,
+        rest: Option<&Series>,
+        uniform: &UniformSeries,
+        (profile, samples_per_mean): (&SensorProfile, u64),
+    ) -> Self {
+        let rate_error = profile.sample_rate_error;
+        let read_every = if samples_per_mean > 1 { 1 } else { profile.read_every(1.0 / series.period_s) };
+        let lines = |of: &Series| spectral_lines::find(of, uniform.rounding(), None, rate_error, read_every);
+        Self {
+            lines: lines(series),
+            lines_of_rest: rest.map(lines),
+            signals: SampleSignals::find(uniform),
+            series: series.clone(),
+            rest: rest.cloned(),
+            rounding: uniform.rounding().clone(),
+            rate_error,
+            read_every,
+        }
+    }
+
+    /// Whether it was found in the same samples of the same sensor.
+    pub(crate) fn is_of(&self, series: &Series, rest: Option<&Series>, rounding: &Rounding) -> bool {
+        self.series == *series && self.rest.as_ref() == rest && self.rounding == *rounding
+    }
+
+    /// Lines of the spectrum of the samples over the background of a model.
+    pub(crate) fn lines_over(&self, model: &Model) -> Vec<MergedLine> {
+        spectral_lines::find(&self.series, &self.rounding, Some(model), self.rate_error, self.read_every)
+    }
+}
