@@ -110,17 +110,20 @@ struct LoudBlock {
     p_value: f64,
 }
 
-/// Knocks in channels that were recorded together, by channel, in the order of time; `dithered_avar_counts2` as in the
-/// sensor's profile.
-pub(crate) fn find(channels: &[Series], dithered_avar_counts2: f64) -> Vec<Vec<Knock>> {
-    let rules = in_parallel(channels, |series| KnockRule::fit(series, dithered_avar_counts2));
-    find_by(&rules, channels)
+/// Which blocks are tested.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum BlockSize {
+    /// [`FEW_DIFFERENCES`] and doublings of their number. Of a longer knock they would find the loudest part, and two or three spikes make one
+    /// of them loud: they are tested where there is neither.
+    Few,
+    /// [`DIFFERENCES`] and doublings of their number.
+    Many,
 }
 
-/// As [`find`], with rules that were fitted to another part of the record; one rule a channel.
-pub(crate) fn find_by(rules: &[KnockRule], channels: &[Series]) -> Vec<Vec<Knock>> {
+/// Knocks in channels that were recorded together, by channel, in the order of time, by one rule a channel.
+pub(crate) fn find_by(rules: &[KnockRule], channels: &[Series], size: BlockSize) -> Vec<Vec<Knock>> {
     let pairs: Vec<(&KnockRule, &Series)> = rules.iter().zip(channels).collect();
-    let mut found: Vec<Vec<Knock>> = in_parallel(&pairs, |(rule, series)| rule.find(series));
+    let mut found: Vec<Vec<Knock>> = in_parallel(&pairs, |(rule, series)| rule.find(series, size));
     let all: Vec<Knock> = found.iter().flatten().cloned().collect();
     for ((rule, series), own) in rules.iter().zip(channels).zip(&mut found) {
         for known in &all {
@@ -164,11 +167,11 @@ impl KnockRule {
     }
 
     /// Knocks of a channel, in no order.
-    fn find(&self, series: &Series) -> Vec<Knock> {
+    fn find(&self, series: &Series, size: BlockSize) -> Vec<Knock> {
         let mut rest = series.clone();
         let mut knocks: Vec<Knock> = Vec::new();
         for _ in 0..PASSES {
-            let next = self.loudest(&rest);
+            let next = self.loudest(&rest, size);
             if next.is_empty() {
                 break;
             }
@@ -184,31 +187,23 @@ impl KnockRule {
         knocks
     }
 
-    /// The knocks around the loudest blocks of a series; none overlaps another. Blocks of [`FEW_DIFFERENCES`] are tested where none of
-    /// [`DIFFERENCES`] or more has one: of a longer knock they would find the loudest part.
-    fn loudest(&self, series: &Series) -> Vec<Knock> {
+    /// The knocks around the loudest blocks of a series, by chance in half of [`SIGNIFICANCE`]; none overlaps another.
+    fn loudest(&self, series: &Series, size: BlockSize) -> Vec<Knock> {
         let scales: Vec<SquaredDifferences> =
             self.scales.iter().map(|scale| SquaredDifferences::new(series, scale.n)).collect();
-        let knocks = |few: bool| self.loudest_blocks(&scales, series.period_s, few);
-        let longer = knocks(false);
-        if longer.is_empty() { knocks(true) } else { longer }
-    }
-
-    /// The same by blocks of [`FEW_DIFFERENCES`] or of [`DIFFERENCES`], by chance in half of [`SIGNIFICANCE`].
-    fn loudest_blocks(&self, scales: &[SquaredDifferences], period_s: f64, few: bool) -> Vec<Knock> {
         let (mut blocks, mut tests) = (Vec::<LoudBlock>::new(), 0_usize);
         for (scale, differences) in scales.iter().enumerate() {
-            let [of_few, of_more] = &self.scales[scale].blocks;
-            let (found, tested) = if few {
-                // A short knock may be in halves of two blocks.
-                let [found, shifted] =
-                    [0, FEW_DIFFERENCES / 2].map(|from| self.loud_blocks((scale, of_few), differences, from, period_s));
-                ([found.0, shifted.0].concat(), found.1 + shifted.1)
-            } else {
-                self.loud_blocks((scale, of_more), differences, 0, period_s)
+            let [few, many] = &self.scales[scale].blocks;
+            // A short knock may be in halves of two blocks.
+            let (of_size, from) = match size {
+                BlockSize::Few => (few, [0, FEW_DIFFERENCES / 2].as_slice()),
+                BlockSize::Many => (many, [0].as_slice()),
             };
-            blocks.extend(found);
-            tests += tested;
+            for &from in from {
+                let (found, tested) = self.loud_blocks((scale, of_size), differences, from, series.period_s);
+                blocks.extend(found);
+                tests += tested;
+            }
         }
         let limit = 0.5 * SIGNIFICANCE / tests.max(1) as f64;
         let slots_of = |block: &LoudBlock| scales[block.scale].slots(block.differences.clone());
@@ -469,15 +464,16 @@ impl From<Disturbance> for Knock {
 }
 
 impl Knock {
-    /// Adds the disturbances that single samples show to the knocks of a channel, up to the part of it that knocks may have.
-    pub(crate) fn add_disturbances(knocks: &mut Vec<Self>, disturbances: Vec<Disturbance>, series: &Series) {
+    /// Adds the disturbances that single samples show to the knocks of a channel of so many samples, up to the part of it that knocks may
+    /// have, and puts all in the order of time.
+    pub(crate) fn add_disturbances(knocks: &mut Vec<Self>, disturbances: Vec<Disturbance>, samples: usize) {
         let mut with = knocks.clone();
         disturbances.into_iter().for_each(|disturbance| join(&mut with, disturbance.into()));
         let share: u64 = with.iter().map(|knock| knock.slots.end - knock.slots.start).sum();
-        if share as f64 <= LARGEST_SHARE * series.values.len() as f64 {
-            with.sort_by_key(|knock| knock.slots.start);
+        if share as f64 <= LARGEST_SHARE * samples as f64 {
             *knocks = with;
         }
+        knocks.sort_by_key(|knock| knock.slots.start);
     }
 
     /// Whether both have a sample period in common.

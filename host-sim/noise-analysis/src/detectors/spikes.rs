@@ -102,6 +102,18 @@ impl FoundSpikes {
         self.kept(|spike| slots.contains(&spike.slot))
     }
 
+    /// Sample periods of those in `slots`, if chance puts as many there or into another stretch of this length, of `samples` samples in all: by
+    /// the rate of the events elsewhere, and one more, which is not known better. Each is of as many samples as those are.
+    pub(crate) fn by_chance_within(&self, slots: &Range<u64>, samples: u64) -> Vec<u64> {
+        let (inside, others) = (self.within(slots), self.kept(|spike| !slots.contains(&spike.slot)));
+        let events = others.events().len() as f64;
+        let samples_of_event = if events > 0.0 { others.spikes.len() as f64 / events } else { 1.0 };
+        let count = (inside.spikes.len() as f64 / samples_of_event).ceil() as u64;
+        let stretches = samples as f64 / (slots.end - slots.start).max(1) as f64;
+        let p_value = stretches * poisson_tail(count, (events + 1.0) / stretches);
+        if p_value < REFUTED { Vec::new() } else { inside.slots().collect() }
+    }
+
     /// Those before a sample period. Where jumps of the bias are, is not known.
     pub(crate) fn before(&self, slot: u64) -> Self {
         Self { jumps: 0, ..self.kept(|spike| spike.slot < slot) }

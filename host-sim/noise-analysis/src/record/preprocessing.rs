@@ -7,7 +7,7 @@
 
 use crate::detectors::bias::{self, BiasChanges, BiasSensitivity};
 use crate::detectors::bias_response::BiasResponse;
-use crate::detectors::knocks::{self, Knock, KnockRule};
+use crate::detectors::knocks::{self, BlockSize, Knock, KnockRule};
 use crate::detectors::noise_grid::NoiseGrids;
 use crate::detectors::output_range::find_noise_below_count;
 use crate::detectors::spikes::{self, Disturbance, FoundSpikes, SpikeRule};
@@ -79,6 +79,8 @@ impl Preprocessing {
         let middle = measurement.middle();
         let halves = series.map(|of| of.before(middle));
         let knocks = KnocksInChannels::find(record, &series, &halves);
+        let once = |series: PerChannel<Series>| series.map(|of| of.clone().without(&record.repeated));
+        let (series, halves) = (once(series), once(halves));
         // What a channel may depend on, without its own knocks.
         let quiet: PerChannel<Series> =
             series.with_ids().map(|(channel, series)| knocks.removed_from(series, channel)).collect();
@@ -266,7 +268,7 @@ struct StandingOut {
 
 impl StandingOut {
     /// By a rule in the parts of a channel, in the order of time.
-    fn find(rule: SpikeRule, parts: &[&Series]) -> Self {
+    fn find(rule: SpikeRule, parts: &[Series]) -> Self {
         let (mut disturbances, mut singles, mut samples) = (Vec::new(), FoundSpikes::default(), 0);
         for part in parts {
             let of_part = part.values.len() as u64;
@@ -276,6 +278,11 @@ impl StandingOut {
             samples += of_part;
         }
         Self { rule, disturbances, singles, samples }
+    }
+
+    /// Its single samples in a knock, if chance puts as many there.
+    fn by_chance_in(&self, knock: &Knock) -> Vec<u64> {
+        self.singles.by_chance_within(&knock.slots, self.samples)
     }
 
     /// What its single samples show of the `known` knocks.
@@ -293,54 +300,12 @@ struct KnocksInChannels {
 
 impl KnocksInChannels {
     fn find(record: &CondensedRecord, series: &PerChannel<Series>, halves: &PerChannel<Series>) -> Self {
-        let measurement = record.means.as_ref();
-        let (middle, dithered) = (measurement.middle(), measurement.profile.dithered_avar_counts2);
-        let inertial: Vec<ChannelId> = measurement.inertial().collect();
-        let whole: Vec<Series> = inertial.iter().map(|&of| series[of].clone()).collect();
-        let first: Vec<Series> = inertial.iter().map(|&of| halves[of].clone()).collect();
-        let second: Vec<Series> = inertial.iter().map(|&of| series[of].from(middle)).collect();
-        let rules = in_parallel(&first, |first| KnockRule::fit(first, dithered));
-        let parts = in_parallel(&[first, second], |part| knocks::find_by(&rules, part));
-        let nothing = || measurement.ids().map(|_| Vec::new()).collect::<PerChannel<Vec<Knock>>>();
-        let (mut by_whole, mut by_first_half) = (nothing(), nothing());
-        for (at, (&channel, found)) in inertial.iter().zip(knocks::find(&whole, dithered)).enumerate() {
-            by_whole[channel] = found;
-            by_first_half[channel] = parts.iter().flat_map(|part| part[at].clone()).collect();
-        }
-        let mut knocks = Self { by_whole, by_first_half };
-        knocks.add_disturbances(record, series, middle);
-        knocks
-    }
-
-    /// Adds what is too short for a level of the noise, and is no single sample; then what single samples show of the knocks that other
-    /// channels have.
-    fn add_disturbances(&mut self, record: &CondensedRecord, series: &PerChannel<Series>, middle: u64) {
-        let found = per_channel(series.ids(), |channel| {
-            if !record.channels[channel].can_show_spikes {
-                return None;
-            }
-            let quiet = |knocks: &PerChannel<Vec<Knock>>| {
-                let own = &series[channel];
-                own.clone().without(&slots_within(own, &knocks[channel]))
-            };
-            let (whole, halves) = (quiet(&self.by_whole), quiet(&self.by_first_half));
-            let (first, second) = (halves.before(middle), halves.from(middle));
-            let of_parts =
-                |fitted: &Series, parts: &[&Series]| SpikeRule::fit(fitted).map(|rule| StandingOut::find(rule, parts));
-            Some([of_parts(&whole, &[&whole]), of_parts(&first, &[&first, &second])])
-        });
-        for (at, knocks) in [&mut self.by_whole, &mut self.by_first_half].into_iter().enumerate() {
-            let of = |channel: ChannelId| found[channel].as_ref().and_then(|found| found[at].as_ref());
-            for ((channel, series), knocks) in series.with_ids().zip(knocks.iter_mut()) {
-                let disturbances = of(channel).map(|found| found.disturbances.clone()).unwrap_or_default();
-                Knock::add_disturbances(knocks, disturbances, series);
-            }
-            let known: Vec<Range<u64>> = knocks.iter().flatten().map(|knock| knock.slots.clone()).collect();
-            for ((channel, series), knocks) in series.with_ids().zip(knocks.iter_mut()) {
-                let parts = of(channel).map(|found| found.parts_of(&known)).unwrap_or_default();
-                Knock::add_disturbances(knocks, parts, series);
-            }
-        }
+        let middle = record.means.as_ref().middle();
+        let second = series.map(|of| of.from(middle));
+        let searches = [(series, vec![series]), (halves, vec![halves, &second])];
+        let mut found = in_parallel(&searches, |(fitted, parts)| knocks_by(record, fitted, parts)).into_iter();
+        let mut next = || found.next().unwrap_or_else(|| series.map(|_| Vec::new()));
+        Self { by_whole: next(), by_first_half: next() }
     }
 
     /// The series of a channel without the knocks of the whole record.
@@ -363,6 +328,68 @@ impl KnocksInChannels {
         };
         self.by_whole[channel].iter().map(detection).collect()
     }
+}
+
+/// The knocks in the `parts` of a record, in the order of time, by the rules of the series that are `fitted`.
+///
+/// Long ones first; without these, what stands out by single samples, and short ones, which are found again without the single samples that
+/// chance puts into them. Then what is too short for a level of the noise and is no single sample, and what single samples show of the knocks
+/// that other channels have.
+fn knocks_by(
+    record: &CondensedRecord,
+    fitted: &PerChannel<Series>,
+    parts: &[&PerChannel<Series>],
+) -> PerChannel<Vec<Knock>> {
+    let measurement = record.means.as_ref();
+    let inertial: Vec<ChannelId> = measurement.inertial().collect();
+    let rules = in_parallel(&inertial, |&of| KnockRule::fit(&fitted[of], measurement.profile.dithered_avar_counts2));
+    let mut knocks: PerChannel<Vec<Knock>> = fitted.map(|_| Vec::new());
+    let quiet = |series: &PerChannel<Series>, channel: ChannelId, knocks: &PerChannel<Vec<Knock>>| {
+        let own = &series[channel];
+        own.clone().without(&slots_within(own, &knocks[channel]))
+    };
+    for part in parts {
+        let part: Vec<Series> = inertial.iter().map(|&of| part[of].clone()).collect();
+        let found = knocks::find_by(&rules, &part, BlockSize::Many);
+        inertial.iter().zip(found).for_each(|(&of, found)| knocks[of].extend(found));
+    }
+    let standing_out = per_channel(fitted.ids(), |channel| {
+        if !record.channels[channel].can_show_spikes {
+            return None;
+        }
+        // A sample that is read twice is loud as its neighbours are, but makes spikes of these.
+        let once = |series: &PerChannel<Series>| quiet(series, channel, &knocks).without(&record.repeated);
+        let rule = SpikeRule::fit(&once(fitted))?;
+        let parts: Vec<Series> = parts.iter().map(|part| once(part)).collect();
+        Some(StandingOut::find(rule, &parts))
+    });
+    let long = knocks.clone();
+    for part in parts {
+        let mut part: Vec<Series> = inertial.iter().map(|&of| quiet(part, of, &long)).collect();
+        let mut found = knocks::find_by(&rules, &part, BlockSize::Few);
+        let by_chance = |(of, found): (&ChannelId, &Vec<Knock>)| -> Vec<u64> {
+            let singles = standing_out[*of].iter().flat_map(|of| found.iter().map(move |knock| of.by_chance_in(knock)));
+            singles.flatten().collect()
+        };
+        let by_chance: Vec<Vec<u64>> = inertial.iter().zip(&found).map(by_chance).collect();
+        if by_chance.iter().any(|of| !of.is_empty()) {
+            part = part.into_iter().zip(by_chance).map(|(part, of)| part.without(&of)).collect();
+            found = knocks::find_by(&rules, &part, BlockSize::Few);
+        }
+        inertial.iter().zip(found).for_each(|(&of, found)| knocks[of].extend(found));
+    }
+    let samples =
+        per_channel(fitted.ids(), |channel| parts.iter().map(|part| part[channel].values.len()).sum::<usize>());
+    let mut add = |of: &dyn Fn(&StandingOut) -> Vec<Disturbance>| {
+        for channel in fitted.ids() {
+            let added = standing_out[channel].as_ref().map(of).unwrap_or_default();
+            Knock::add_disturbances(&mut knocks[channel], added, samples[channel]);
+        }
+        knocks.iter().flatten().map(|knock| knock.slots.clone()).collect::<Vec<Range<u64>>>()
+    };
+    let known = add(&|found| found.disturbances.clone());
+    add(&|found| found.parts_of(&known));
+    knocks
 }
 
 /// The accelerometers, of which these are the `series`, as what may shake `channel`.
