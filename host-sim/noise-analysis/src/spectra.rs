@@ -9,7 +9,7 @@
 //!               ├► alternation                           an offset of every second sample
 //!               ├► epoch_spectra                         the same of each epoch, to follow lines over time
 //!               ├► sine tapers ─► common_mode            drift that several channels share
-//!               ├► periodic_signal                       a slow signal that repeats and is no sinusoid
+//!               ├► periodic_signal ─► harmonics          a slow signal that repeats and is no sinusoid
 //!               ├► frequency_track                       a line whose frequency runs
 //!               ├► decaying_disturbances                 shot noise: disturbances that begin at once and decay
 //!               ├► cosine_spectrum                       a Markov process that the curve does not tell from a walk
@@ -31,10 +31,12 @@ mod equation_5;
 mod filtered_noise;
 mod found_sines;
 pub(crate) mod frequency_track;
+mod harmonics;
 mod line_envelope;
 mod line_models;
 mod lines;
 mod markov_spectrum;
+
 pub(crate) mod periodic_signal;
 mod periodogram;
 mod sample_likelihood;

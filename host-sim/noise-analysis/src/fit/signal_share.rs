@@ -46,7 +46,7 @@ impl SignalShare {
     pub(crate) fn new(periodic: Option<&PeriodicSignal>, track: Option<&FrequencyTrack>) -> Self {
         let harmonics = |found: &PeriodicSignal| Harmonics {
             frequency: found.frequency.value,
-            amplitudes: std::iter::once(found.amplitude.value).chain(found.harmonics).collect(),
+            amplitudes: std::iter::once(found.amplitude.value).chain(found.harmonics.iter().copied()).collect(),
             bounds: bounds(found.amplitude),
         };
         let run = |found: &FrequencyTrack| Run {

@@ -93,7 +93,7 @@ fn periodic(found: &PeriodicSignal, unit: &'static str) -> Periodic {
         frequency_hz: found.frequency,
         amplitude: found.amplitude.in_unit(unit),
         harmonics_percent: found.harmonics_percent,
-        harmonics: found.harmonics.to_vec(),
+        harmonics: found.harmonics.clone(),
         sum: found.sum,
         p_value: found.p_value,
     }

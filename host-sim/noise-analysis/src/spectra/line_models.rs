@@ -90,7 +90,7 @@ const BLOCKS: usize = 1024;
 
 /// Sums over blocks of a series, from which the least-squares sinusoid of any frequency near that of the sums follows without
 /// another pass over the samples.
-struct PhaseSums {
+pub(super) struct PhaseSums {
     /// ω of the sums over 2π, Hz.
     frequency: f64,
     /// Middle of the first block, s after the first sample of the series, and time from one block to the next.
@@ -112,7 +112,8 @@ struct BlockSums {
 }
 
 impl PhaseSums {
-    fn new(series: &UniformSeries, frequency: f64) -> Self {
+    /// Of the frequencies near one in Hz.
+    pub(super) fn new(series: &UniformSeries, frequency: f64) -> Self {
         let length = series.values().len();
         let size = (length / BLOCKS).clamp(1, STEPS);
         let empty = || BlockSums { weight: 0.0, double: Complex::ZERO, product: Complex::ZERO };
@@ -147,14 +148,14 @@ impl PhaseSums {
     }
 
     /// `|Σwye^(−iωt)|²/Σw²` at one frequency, in Hz.
-    fn power_at(&self, frequency: f64) -> f64 {
+    pub(super) fn power_at(&self, frequency: f64) -> f64 {
         let mut product = Complex::<f64>::ZERO;
         self.for_each_block(frequency, |block, turned| product += block.product * turned);
         product.norm_sqr() / self.squared_weights
     }
 
     /// The least-squares sinusoid of one frequency, in Hz.
-    fn fit_at(&self, frequency: f64) -> Sine {
+    pub(super) fn fit_at(&self, frequency: f64) -> Sine {
         let (mut weight, mut double, mut product) = (0.0, Complex::<f64>::ZERO, Complex::<f64>::ZERO);
         self.for_each_block(frequency, |block, turned| {
             weight += block.weight;

@@ -165,7 +165,7 @@ fn periodic() -> PeriodicSignal {
         frequency,
         amplitude: known(0.1),
         harmonics_percent,
-        harmonics: [0.02; 7],
+        harmonics: vec![0.02; 7],
         sum: 100.0,
         p_value: 1e-9,
     }
