@@ -213,11 +213,11 @@ pub static RIVALRIES: [Rivalry; 47] = [
     row("first unexplained octave", "further ones", "always, except for lines", "of one thing that has no name the clearest octave is enough",
         Rule::Channel(|of| is_octave(of.effect()) && of.term().is_some_and(|own| of.others().any(|other|
             is_octave(&other.effect) && other.term().is_some_and(|term| term < own))))),
-    row("chance", "sensitivity, term of the curve, telegraph noise, drift in common",
-        "the interval of its size includes 0, or its time constant is longer than the record", "95 % bounds",
+    row("chance", "sensitivity, term of the curve but a filter, telegraph noise, drift in common",
+        "the interval of its size includes 0, or its time constant is longer than the record", "95 % bounds; a filter is told by all channels",
         Rule::Channel(|of| matches!(of.origin(),
                 Origin::Covariate { .. } | Origin::Term { .. } | Origin::Levels { .. } | Origin::CrossSpectra)
-            && !is_shown(of.effect(), of.facts.duration_s))),
+            && !of.kind().is_some_and(|kind| is_filter(&kind)) && !is_shown(of.effect(), of.facts.duration_s))),
 
     // What several stages see of one thing.
     row("lag or curvature of the temperature", "sensitivity to temperature", "always", "the response that is not proportional has it",

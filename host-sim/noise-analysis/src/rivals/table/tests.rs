@@ -345,7 +345,7 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
             channel([of_term(0, markov(1.0)), of_term(0, refuted(UNDECIDED))]), vec!["unexplained"]),
         (["first unexplained octave", "further ones"],
             channel([of_term(0, refuted(UNDECIDED)), of_term(1, refuted(UNDECIDED))]), vec!["unexplained"]),
-        (["chance", "sensitivity, term of the curve, telegraph noise, drift in common"],
+        (["chance", "sensitivity, term of the curve but a filter, telegraph noise, drift in common"],
             channel([of(common_mode(2000.0), Origin::CrossSpectra)]), vec![]),
         (["lag or curvature of the temperature", "sensitivity to temperature"],
             channel([of(lag.into(), Origin::Samples), of(temperature(), plausible(true))]), vec!["thermal_lag"]),
