@@ -49,6 +49,7 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
 
 /// The second differences that the newest sample of a channel completed: computed once for all the channels that it is coupled with.
 #[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NewestDifferences<const OCTAVES: usize> {
     now: (u64, u64),
     due: usize,

@@ -1,6 +1,7 @@
 //! With the feature `defmt`, every public value can be printed by a microcontroller.
 
 use allan_core::fit::Goodness;
+use allan_core::host::NewestDifferences;
 use allan_core::model::{Discrepancy, FittedTerm};
 use allan_core::regression::{Covariate, Sensitivity};
 use allan_core::slope_method::SlopeEstimate;
@@ -48,7 +49,8 @@ fn every_public_value_can_be_printed_by_defmt() {
     let mut formatted: Vec<&str> = formatted![
         AddedTerm, AllanPoint, AngleRandomWalk, BiasInstability, Cascade<8, 4>, CoefficientUnit, Coupling<8>, Covariance,
         Covariate<8>, Curve<8>, CurveView, Discrepancy, FittedTerm, FractionalOctaves<8, 8>, Goodness, Hadamard<8, 4>,
-        HadamardPoint, Interpolation, KurtosisRatio, LineCandidates, LowPass, Markov, Model, MovingAverageFilter, NoiseTerm,
+        HadamardPoint, Interpolation, KurtosisRatio, LineCandidates, LowPass, Markov, Model, MovingAverageFilter,
+        NewestDifferences<8>, NoiseTerm,
         OctaveSums, PhaseCounts, PowerLaw, Quantization, Quantizer, RateRamp, RateRandomWalk, Residual, Resonance,
         SampleError, Sensitivity, Shape, Sinusoid, SlopeEstimate, Snapshot<8, 4>, TableError, TimeStampError, TimeStamps, Trace,
         VarianceFractions,
