@@ -12,6 +12,7 @@
 //!               ├► periodic_signal ─► harmonics          a slow signal that repeats and is no sinusoid
 //!               ├► frequency_track                       a line whose frequency runs
 //!               ├► decaying_disturbances                 shot noise: disturbances that begin at once and decay
+//!               ├► force_regression                      what of a rate follows the specific force
 //!               ├► cosine_spectrum                       a Markov process that the curve does not tell from a walk
 //!               ├► SampleSpectrum ─► sample_likelihood   the coefficients of a model by all samples
 //!               ├► Welch ─► white_noise                  N, independent of the Allan variance
@@ -29,6 +30,7 @@ pub(crate) mod decaying_disturbances;
 pub(crate) mod epoch_spectra;
 mod equation_5;
 mod filtered_noise;
+pub(crate) mod force_regression;
 mod found_sines;
 pub(crate) mod frequency_track;
 mod harmonics;

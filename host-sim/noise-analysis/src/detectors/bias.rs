@@ -7,7 +7,7 @@
 
 use super::bias_response::BiasResponse;
 use super::bias_step::{self, BiasStep, StepPosition};
-use super::block_means::BlockMeans;
+use super::block_means::{BLOCKS, BlockMeans};
 use super::gls_regression::{GlsRegression, RegressionEstimate};
 use super::noise_grid::{NoiseGrid, NoiseGrids};
 use super::thermal_response::{self, TemperatureCourse};
@@ -33,6 +33,8 @@ pub(crate) struct BiasSensitivity {
     pub sensitivity: f64,
     /// Standard deviation of the sensitivity.
     pub error: f64,
+    /// Of the error.
+    pub degrees_of_freedom: f64,
 }
 
 /// What changes the bias of one channel.
@@ -157,7 +159,8 @@ fn find_on_common_samples(
             }
             Candidate::Regressor(index) => {
                 let RegressionEstimate { size: sensitivity, error, .. } = estimate;
-                changes.sensitivities.push((*index, BiasSensitivity { sensitivity, error }));
+                let degrees_of_freedom = BLOCKS as f64;
+                changes.sensitivities.push((*index, BiasSensitivity { sensitivity, error, degrees_of_freedom }));
                 if covariates.temperature.as_ref().is_some_and(|(of, _)| of == index) {
                     linear = Some(estimate);
                 }

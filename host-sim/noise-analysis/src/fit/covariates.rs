@@ -2,16 +2,12 @@
 
 use crate::OCTAVES;
 use crate::detectors::bias::BiasSensitivity;
-use crate::detectors::block_means::BLOCKS;
 use crate::record::estimators::RecordPart;
 use crate::samples::rounding::Rounding;
 use crate::samples::series::Series;
 use allan_core::Curve;
 use allan_core::regression::{CovarianceCurve, Covariate, CovariateRegression, Sensitivity};
 use measurement::{ChannelId, PerChannel, Quantity};
-
-/// Degrees of freedom of a sensitivity that was estimated from block means: about the number of blocks of a record.
-const BLOCK_DEGREES_OF_FREEDOM: f64 = BLOCKS as f64;
 
 /// The curves of a channel and of its covariates in one part of a recording, and their covariances.
 struct RegressionData {
@@ -73,26 +69,26 @@ impl RegressionData {
 
 impl CovariateFit {
     /// Estimates the sensitivities of `channel` from the second differences in `part`, and takes
-    /// those to temperature and supply from `by_block_means` where these have the smaller error.
+    /// those from `by_samples` where these have the smaller error.
     ///
-    /// With a ramp (`has_ramp`) the sensitivities to temperature and supply come from the block means alone: the second
+    /// With a ramp (`has_ramp`) the sensitivities to temperature and supply come from the samples alone: the second
     /// differences of a ramp correlate with those of anything else that drifts.
     pub(crate) fn estimate(
         part: &RecordPart,
         channel: ChannelId,
         has_ramp: bool,
-        by_block_means: impl Fn(ChannelId) -> Option<BiasSensitivity>,
+        by_samples: impl Fn(ChannelId) -> Option<BiasSensitivity>,
     ) -> Self {
         let data = RegressionData::new(part, channel, None);
         let mut sensitivities: Vec<Sensitivity> =
             data.regress(|regression| regression.sensitivities()).into_iter().collect();
         for (covariate, &regressor) in data.channels.iter().enumerate() {
-            let Some(BiasSensitivity { sensitivity: value, error }) = by_block_means(regressor) else {
+            let Some(BiasSensitivity { sensitivity: value, error, degrees_of_freedom }) = by_samples(regressor) else {
                 let is_dropped = has_ramp && part.channels[regressor].quantity.is_environment();
                 sensitivities.retain(|known| known.covariate != covariate || !is_dropped);
                 continue;
             };
-            let sensitivity = Sensitivity { covariate, value, error, degrees_of_freedom: BLOCK_DEGREES_OF_FREEDOM };
+            let sensitivity = Sensitivity { covariate, value, error, degrees_of_freedom };
             match sensitivities.iter_mut().find(|known| known.covariate == covariate) {
                 Some(known) if known.error <= error => {}
                 Some(known) => *known = sensitivity,

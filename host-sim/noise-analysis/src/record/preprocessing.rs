@@ -21,6 +21,7 @@ use crate::samples::rounding::NEIGHBOURING_COUNTS;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra;
+use crate::spectra::force_regression::force_sensitivities;
 use measurement::{ChannelId, Measurement, PerChannel, Quantity};
 use std::cell::LazyCell;
 use std::ops::Range;
@@ -63,7 +64,7 @@ struct ChannelBias {
     has_ramp: bool,
     /// Responses to temperature and vibration that are subtracted.
     responses: Vec<BiasResponse>,
-    /// The temperature or supply that it depends on, and how much.
+    /// The temperature, the supply or the specific force that it depends on, and how much.
     sensitivities: Vec<(ChannelId, BiasSensitivity)>,
 }
 
@@ -199,30 +200,38 @@ impl ChannelPreprocessing {
                 .map_or(0.0, |_| NEIGHBOURING_COUNTS * series[channel].resolution)
         });
         let least_step = || *smallest_step;
-        let own = without_lines(quiet[channel].clone().without(&exclusion.spikes));
-        let whole = bias::find(&own, &others, &accelerations(measurement, series, channel), noise_grids, &least_step);
-        let half = {
+        let forces: Vec<usize> = (0..regressors.len())
+            .filter(|&at| measurement[regressors[at]].profile.quantity == Quantity::SpecificForce)
+            .collect();
+        // The differences, or what follows the force at each frequency, measure a sensitivity to motion better; the slow part of an
+        // accelerometer's signal is its own drift.
+        let is_slow = |regressor: ChannelId| measurement[regressor].profile.quantity.is_environment();
+        let of_part = |own: Series, others: &[&Series], accelerations: &[Acceleration]| {
+            let found = bias::find(&without_lines(own.clone()), others, accelerations, noise_grids, &least_step);
+            let own = offset(&found).into_iter().fold(own, |own, (from, size)| own.lowered_from(from, size));
+            let of_forces: Vec<&Series> = forces.iter().map(|&at| others[at]).collect();
+            let by_force = force_sensitivities(&own, &of_forces);
+            let slow = found.sensitivities.iter().filter(|(at, _)| is_slow(regressors[*at])).copied();
+            let sensitivities = slow.chain(by_force.into_iter().map(|(place, of)| (forces[place], of)));
+            let bias = ChannelBias {
+                offsets: offset(&found).into_iter().collect(),
+                has_ramp: found.ramp.is_some(),
+                responses: found.responses.clone(),
+                sensitivities: sensitivities.map(|(at, of)| (regressors[at], of)).collect(),
+            };
+            (bias, found)
+        };
+        let own = quiet[channel].clone().without(&exclusion.spikes);
+        let (by_whole, whole) = of_part(own, &others, &accelerations(measurement, series, channel));
+        let (by_half, _) = {
             let quiet =
                 |&of: &ChannelId| halves[of].clone().without(&slots_within(&halves[of], &knocks.by_first_half[of]));
             let others: Vec<Series> = regressors.iter().map(quiet).collect();
             let others: Vec<&Series> = others.iter().collect();
-            let own = without_lines(halves[channel].clone().without(&exclusion.by_first_half));
-            bias::find(&own, &others, &accelerations(measurement, halves, channel), noise_grids, &least_step)
+            let own = halves[channel].clone().without(&exclusion.by_first_half);
+            of_part(own, &others, &accelerations(measurement, halves, channel))
         };
-        // The differences measure a sensitivity to motion better; the slow part of an accelerometer's signal is its own drift.
-        let is_slow = |regressor: ChannelId| measurement[regressor].profile.quantity.is_environment();
-        let of_part = |found: &BiasChanges| ChannelBias {
-            offsets: offset(found).into_iter().collect(),
-            has_ramp: found.ramp.is_some(),
-            responses: found.responses.clone(),
-            sensitivities: found
-                .sensitivities
-                .iter()
-                .map(|&(place, sensitivity)| (regressors[place], sensitivity))
-                .filter(|(regressor, _)| is_slow(*regressor))
-                .collect(),
-        };
-        let mut bias = [of_part(&half), of_part(&whole)];
+        let mut bias = [by_half, by_whole];
         // What the second half is compared with has no step that happens in it.
         bias[0].offsets.extend(offset(&whole).filter(|(from, _)| *from >= middle));
         let BiasChanges { step, ramp, responses, .. } = whole;
