@@ -1,9 +1,9 @@
 //! Detectors of effects in the samples of one channel, which the Allan curve shows badly or not at all.
 //!
 //! ```text
-//! Series ─┬► noise_levels ─┬► knocks                       stretches that are louder than those around them
+//! Series ─┬► noise_levels ─┬► knocks ─► knock_search       stretches that are louder than those around them
 //!         │                └► level_change                 a level that becomes another one
-//!         ├► spikes                                        single samples
+//!         ├► prediction ─► spikes                          single samples
 //!         ├► effective_lsb                                 values rounded to several counts
 //!         ├► output_range                                  values that are cut off, and noise below a count
 //!         ├► stuck_output                                  an output that stays at one value
@@ -26,6 +26,7 @@ pub(crate) mod level_change;
 pub mod noise_grid;
 mod noise_levels;
 pub(crate) mod output_range;
+mod prediction;
 pub(crate) mod random_telegraph;
 pub(crate) mod spikes;
 pub(crate) mod stuck_output;

@@ -2,10 +2,12 @@
 //!
 //! Each sample is compared with the best linear interpolation from its neighbours, which follows from the autocovariance of
 //! the data. In white noise that is their mean; in filtered noise, on a sinusoid or in drift it is far more precise. The
-//! interpolation error is normal, so the threshold for N samples comes from N times the normal tail. Where the noise is louder, as in a
+//! interpolation error is normal, so the threshold for N samples comes from N times the normal tail. Behind a filter, which spreads a spike,
+//! each sample is compared with its [prediction](super::prediction) first. Where the noise is louder, as in a
 //! vibration whose level wanders, it is as many deviations of the errors around a sample.
 
 use super::noise_levels::median;
+use super::prediction::Prediction;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, density, poisson_bounds, poisson_tail, quantile, upper_tail};
 use crate::effects::Spikes;
@@ -13,7 +15,7 @@ use crate::effects::findings::{Correction, Detection, REFUTED, SIGNIFICANCE};
 use crate::samples::interpolation::{ALL_NEIGHBOURS, Autocovariance, Neighbours, PartialInterpolation, REACH};
 use crate::samples::series::Series;
 use nalgebra::{SMatrix, SVector};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -48,10 +50,13 @@ const COINCIDENCE: f64 = 0.05;
 /// Least fraction of the spikes that is assumed to exceed the threshold; bounds the rate that the detected ones imply.
 const LEAST_DETECTED: f64 = 0.05;
 
-/// The interpolation that is expected of a channel, and by how much a spike exceeds its error.
+/// What is expected of the samples of a channel, and by how much a spike exceeds its error.
 pub(crate) struct SpikeRule {
     interpolation: Interpolation,
-    threshold: f64,
+    /// Where a spike in front of a filter shows more by it.
+    prediction: Option<Prediction>,
+    /// Least error of a spike, in standard deviations.
+    least: f64,
     /// Mean of most of the distances of neighbouring samples, in the channel's unit.
     difference: f64,
 }
@@ -70,10 +75,25 @@ pub(crate) struct FoundSpikes {
 struct FoundSpike {
     /// Sample period.
     slot: u64,
-    /// Interpolation error, in the channel's unit, without its sign.
+    /// By how much it exceeds what is expected, in the channel's unit, without its sign.
     size: f64,
+    /// The same in standard deviations of the error of a single sample, or of its prediction.
+    sigmas: f64,
+    /// Whether it is what a filter, as far as it is known, has made of an earlier spike.
+    is_response: bool,
     /// Whether it stands out of the noise around it too.
     stands_out: bool,
+}
+
+/// A spike in front of a filter.
+struct FilteredSpike {
+    /// Of the first sample that it changes.
+    position: usize,
+    /// Error of the prediction, without its sign, in the channel's unit and in standard deviations.
+    size: f64,
+    sigmas: f64,
+    /// Whether it is what the response to a larger one leaves.
+    is_response: bool,
 }
 
 /// Samples in a row that do not belong to the noise: longer than the interpolation reaches over, and so no spikes that a filter has
@@ -168,9 +188,14 @@ impl FoundSpikes {
         events.into_iter().map(|event| self.spikes[event].iter().map(|spike| spike.size).fold(0.0, f64::max)).collect()
     }
 
+    /// How many there are of which none is the response of a filter to another.
+    fn independent(&self) -> usize {
+        self.spikes.iter().filter(|spike| !spike.is_response).count()
+    }
+
     /// Whether there are spikes, and more of them than jumps of the bias.
     fn are_spikes(&self) -> bool {
-        self.spikes.len() > self.jumps
+        self.independent() > self.jumps
     }
 }
 
@@ -185,9 +210,9 @@ impl SpikeRule {
         if series.values.len() < 100 * REACH {
             return None;
         }
-        let interpolation = Interpolation::fit(series)?;
-        let threshold = interpolation.deviation * quantile(0.5 * REFUTED / samples as f64);
-        Some(Self { interpolation, threshold, difference: typical_difference(series) })
+        let (interpolation, prediction) = Interpolation::fit(series)?;
+        let least = quantile(0.5 * REFUTED / samples as f64);
+        Some(Self { interpolation, prediction, least, difference: typical_difference(series) })
     }
 
     /// Sample periods of the spikes in a part of the same channel, in ascending order; none if jumps of the bias are at least
@@ -208,7 +233,7 @@ impl SpikeRule {
         }
         let interpolation = Interpolation { mean, ..self.interpolation };
         let louder = typical_difference(series) / self.difference;
-        interpolation.spikes(series, self.threshold, louder.max(1.0))
+        interpolation.spikes(series, self.prediction.as_ref(), self.least, louder.max(1.0))
     }
 
     /// What was found in `samples` samples as single spikes and as disturbances, in ascending order.
@@ -222,13 +247,13 @@ impl SpikeRule {
         let disturbance = |event: &Range<usize>| {
             let certain = found.spikes[event.start].slot..found.spikes[event.end - 1].slot + 1;
             let length = certain.end - certain.start;
-            let p_value = (events.len() as f64 * near.powi(event.len() as i32 - 1)).min(1.0);
+            let independent = found.spikes[event.clone()].iter().filter(|spike| !spike.is_response).count();
+            let p_value = (events.len() as f64 * near.powi(independent as i32 - 1)).min(1.0);
             if length <= 2 * REACH as u64 || p_value >= REFUTED {
                 return None;
             }
-            let sizes = || found.spikes[event.clone()].iter().map(|spike| spike.size / self.interpolation.deviation);
-            let threshold = self.threshold / self.interpolation.deviation;
-            let times = (threshold / DECAYED).ln() / (sizes().fold(threshold, f64::max) / threshold).ln();
+            let sizes = || found.spikes[event.clone()].iter().map(|spike| spike.sigmas);
+            let times = (self.least / DECAYED).ln() / (sizes().fold(self.least, f64::max) / self.least).ln();
             let decay = (times.min(LONGEST_DECAY) * length as f64).ceil() as u64;
             Some(Disturbance {
                 slots: certain.start.saturating_sub(decay)..certain.end + decay,
@@ -267,7 +292,7 @@ impl SpikeRule {
             let window = around(known);
             // One more than those that are there, whose rate is not known better.
             let expected = (others + 1) as f64 * (window.end - window.start) as f64 / samples.max(1) as f64;
-            let squares = inside.iter().map(|&at| (singles.spikes[at].size / self.interpolation.deviation).powi(2));
+            let squares = inside.iter().map(|&at| singles.spikes[at].sigmas.powi(2));
             let count = inside.len();
             (expected < COINCIDENCE).then(|| Disturbance {
                 certain: first..last + 1,
@@ -283,8 +308,8 @@ impl SpikeRule {
     /// Whether chance finds as many, or one as large, in `samples` samples with less than [`SIGNIFICANCE`]. Beyond the threshold it has
     /// one in a channel with [`REFUTED`], and two with half of its square.
     fn is_beyond_chance(&self, found: &FoundSpikes, samples: u64) -> bool {
-        let large = self.interpolation.deviation * quantile(0.5 * SIGNIFICANCE / samples as f64);
-        found.spikes.len() > 1 || found.spikes.iter().any(|spike| spike.size > large)
+        let large = quantile(0.5 * SIGNIFICANCE / samples as f64);
+        found.independent() > 1 || found.spikes.iter().any(|spike| spike.sigmas > large)
     }
 
     /// The spikes of a channel in `unit` that was looked at for `hours`, in `samples` samples, as they are reported; `None` if there are
@@ -298,10 +323,11 @@ impl SpikeRule {
         if !found.are_spikes() || !self.is_beyond_chance(found, samples) {
             return None;
         }
-        let Self { interpolation, threshold, .. } = self;
         let sizes = &found.sizes_of_events(samples);
-        let largest = sizes.iter().copied().fold(0.0, f64::max);
-        let size = SpikeSize::estimate(sizes, *threshold, interpolation.deviation);
+        let largest = found.spikes.iter().map(|spike| spike.sigmas).fold(0.0, f64::max);
+        // Of a size.
+        let deviation = median(found.spikes.iter().map(|spike| spike.size / spike.sigmas).collect());
+        let size = SpikeSize::estimate(sizes, self.least * deviation, deviation);
         let count = sizes.len() as f64;
         let (fewest, most) = poisson_bounds(count);
         let rate = |count: f64, detected: f64| count / detected / hours;
@@ -313,8 +339,8 @@ impl SpikeRule {
             ),
             size: BoundedEstimate::new(size.value, size.low, size.high).in_unit(unit),
             count: sizes.len(),
-            threshold_sigmas: threshold / interpolation.deviation,
-            largest_sigmas: largest / interpolation.deviation,
+            threshold_sigmas: self.least,
+            largest_sigmas: largest,
         };
         Some(Detection { effect: spikes.into(), correction: Some(Correction::Exclude(found.slots().collect())) })
     }
@@ -358,7 +384,8 @@ struct Interpolation {
 }
 
 impl Interpolation {
-    fn fit(series: &Series) -> Option<Self> {
+    /// With the prediction, where a spike in front of a filter shows more by that.
+    fn fit(series: &Series) -> Option<(Self, Option<Prediction>)> {
         let mean = series.values.iter().sum::<f64>() / series.values.len() as f64;
         let mut interpolation = Self { weights: [0.5 / REACH as f64; REACH], covariance: None, mean, deviation: 0.0 };
         // The plain mean of the neighbours finds the gross spikes, which would distort the covariance.
@@ -374,7 +401,14 @@ impl Interpolation {
         interpolation.covariance = Some(covariance);
         let deviation = clipped_deviation(&interpolation.errors(series, &series.values));
         interpolation.deviation = deviation.max(0.5 * series.resolution);
-        Some(interpolation)
+        let prediction = Prediction::new(&covariance).and_then(|prediction| {
+            let error = |at| prediction.error(series, &series.values, mean, at);
+            let deviation = clipped_deviation(&(0..series.values.len()).map(error).collect::<Vec<f64>>());
+            let prediction = prediction.with_deviation(deviation.max(0.5 * series.resolution));
+            let interpolated = prediction.interpolated(&interpolation.weights) / interpolation.deviation;
+            (interpolated < prediction.deviation.recip()).then_some(prediction)
+        });
+        Some((interpolation, prediction))
     }
 
     fn error(&self, values: &[f64], position: usize) -> f64 {
@@ -448,14 +482,21 @@ impl Interpolation {
         AROUND.map(louder).into_iter().fold(1.0, f64::max)
     }
 
-    /// The spikes above `threshold`, where the series is so many times `louder` than the channel.
-    fn spikes(&self, series: &Series, threshold: f64, louder: f64) -> FoundSpikes {
+    /// The spikes of at least so many standard deviations, where the series is so many times `louder` than the channel.
+    fn spikes(&self, series: &Series, prediction: Option<&Prediction>, least: f64, louder: f64) -> FoundSpikes {
         let mut values = series.values.clone();
+        let filtered = prediction.map(|by| self.filtered_spikes(series, &mut values, by, least * louder));
+        let filtered = filtered.unwrap_or_default();
+        let length = prediction.map_or(0, Prediction::length);
+        let positions: BTreeSet<usize> = filtered.iter().map(|of| of.position).collect();
+        let is_response = |position: usize| has_any(&positions, position.saturating_sub(2 * REACH - 1)..position + 1);
+        let threshold = least * self.deviation;
         let errors = self.errors(series, &values);
         let mut candidates: Vec<usize> =
             (0..errors.len()).filter(|&at| errors[at].abs() > threshold * louder).collect();
         candidates.sort_by(|a, b| errors[*b].abs().total_cmp(&errors[*a].abs()));
         let (mut spikes, mut jumps) = (Vec::<(usize, f64)>::new(), Vec::<(usize, f64)>::new());
+        let (mut larger, mut responses) = (BTreeSet::new(), Vec::new());
         let mut partial = BTreeMap::new();
         for position in candidates {
             // Again, because a larger spike nearby may have been removed.
@@ -468,28 +509,79 @@ impl Interpolation {
             if height > SETTLED * error.abs() {
                 // What a filter spreads over the neighbours of a spike is no jump.
                 let is_part = |&(spike, _): &(usize, f64)| spike.abs_diff(position) <= REACH;
-                if !spikes.iter().any(is_part) {
+                if !spikes.iter().any(is_part) && !is_response(position) {
                     jumps.push((position, height));
                 }
                 continue;
             }
             Arc::make_mut(&mut values)[position] -= error;
+            responses.push(is_response(position) || has_any(&larger, nearer_than(position, length)));
+            larger.insert(position);
             spikes.push((position, error.abs()));
         }
-        spikes.sort_unstable_by_key(|(position, _)| *position);
         // What a filter spreads over the neighbours of a spike is no noise, and a jump is in the errors of the samples that are interpolated
         // over it.
-        let mut least = |position: usize| {
+        let mut louder_around = |position: usize| {
             let around = position.saturating_sub(FARTHEST)..(position + FARTHEST + 1).min(values.len());
             let around = around.map(|at| (at.abs_diff(position), at)).filter(|(distance, _)| *distance > REACH);
             let error = |(distance, at)| (distance, self.normalised_error(series, &values, at, &mut partial));
-            threshold * self.louder_around(&around.map(error).collect::<Vec<(usize, f64)>>())
+            self.louder_around(&around.map(error).collect::<Vec<(usize, f64)>>())
         };
-        jumps.retain(|&(position, height)| height > SETTLED * least(position));
-        let found =
-            |(position, size)| FoundSpike { slot: series.slots[position], size, stands_out: size > least(position) };
-        FoundSpikes { spikes: spikes.into_iter().map(found).collect(), jumps: jumps.len() }
+        jumps.retain(|&(position, height)| height > SETTLED * threshold * louder_around(position));
+        let mut found = Vec::new();
+        for ((position, size), is_response) in spikes.into_iter().zip(responses) {
+            let sigmas = size / self.deviation;
+            let stands_out = sigmas > least * louder_around(position);
+            found.push(FoundSpike { slot: series.slots[position], size, sigmas, is_response, stands_out });
+        }
+        for FilteredSpike { position, size, sigmas, is_response } in filtered {
+            let stands_out = sigmas > least * louder_around(position);
+            let changed =
+                (position..(position + length).min(values.len())).take_while(|&at| series.is_gapless(position, at));
+            found.extend(changed.map(|at| {
+                let is_response = is_response || at > position;
+                FoundSpike { slot: series.slots[at], size, sigmas, is_response, stands_out }
+            }));
+        }
+        found.sort_by_key(|spike| (spike.slot, spike.is_response));
+        found.dedup_by_key(|spike| spike.slot);
+        FoundSpikes { spikes: found, jumps: jumps.len() }
     }
+
+    /// The spikes in front of a filter, of at least so many standard deviations; they are taken off the `values`.
+    fn filtered_spikes(
+        &self,
+        series: &Series,
+        values: &mut Arc<[f64]>,
+        prediction: &Prediction,
+        least: f64,
+    ) -> Vec<FilteredSpike> {
+        let threshold = least * prediction.deviation;
+        let errors = (0..values.len()).map(|at| (at, prediction.error(series, values, self.mean, at)));
+        let mut candidates: Vec<(usize, f64)> = errors.filter(|(_, error)| error.abs() > threshold).collect();
+        candidates.sort_by(|(_, a), (_, b)| b.abs().total_cmp(&a.abs()));
+        let (mut found, mut larger) = (Vec::new(), BTreeSet::new());
+        for (position, _) in candidates {
+            let error = prediction.error(series, values, self.mean, position);
+            if error.abs() > threshold && prediction.is_in_front(series, values, self.mean, position) {
+                prediction.subtract(series, Arc::make_mut(values), position, error);
+                let (size, sigmas) = (error.abs(), error.abs() / prediction.deviation);
+                let is_response = has_any(&larger, nearer_than(position, prediction.length()));
+                larger.insert(position);
+                found.push(FilteredSpike { position, size, sigmas, is_response });
+            }
+        }
+        found
+    }
+}
+
+/// Positions less than `length` from one.
+fn nearer_than(position: usize, length: usize) -> Range<usize> {
+    (position + 1).saturating_sub(length)..position + length
+}
+
+fn has_any(positions: &BTreeSet<usize>, within: Range<usize>) -> bool {
+    !within.is_empty() && positions.range(within).next().is_some()
 }
 
 /// Mean of the smaller three quarters of the distances of neighbouring samples, at least half a count as the deviation of an interpolation

@@ -138,6 +138,22 @@ fn spikes_before_the_filter_are_counted() {
     assert_covers(&spikes::find(&case.series(GYRO)).expect("50 spikes"), "rate", 300.0);
 }
 
+/// Behind two averages of two samples, nine times the deviation of the white noise in front of them: 4 standard deviations of an interpolation
+/// error, of which chance puts 6 into a record, and 7.8 of a prediction error.
+#[test]
+fn a_prediction_shows_spikes_that_an_interpolation_does_not() {
+    let spikes = InjectedEffect::Spikes { channel: SENSED_GYRO, rate_per_hour: 300.0, size: 9.0 * white() };
+    let case = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2: 1 }, spikes], 600.0, 7);
+    let detection = spikes::find(&case.series(GYRO)).expect("50 spikes");
+    assert_covers(&detection, "rate", 300.0);
+    // The first of the samples that it changes has a quarter of it.
+    assert_covers(&detection, "size", 0.25 * 9.0 * white());
+    for (taps_log2, seed) in (1..=3).flat_map(|taps_log2| (10..15).map(move |seed| (taps_log2, seed))) {
+        let case = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2 }], 200.0, seed);
+        assert_eq!(spikes::find(&case.series(GYRO)), None);
+    }
+}
+
 /// A blow that rings at 6.4 Hz and decays within 0.1 s, and a pulse of half a sine of 0.3 s: neighbouring samples differ by a fifth of the one and
 /// a twentieth of the other.
 #[test]

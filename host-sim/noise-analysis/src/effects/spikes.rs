@@ -8,7 +8,7 @@ use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 pub struct Spikes {
     /// 1/h
     pub rate_per_hour: BoundedEstimate,
-    /// Distance from what the neighbours tell.
+    /// Distance from what the neighbours tell; in front of a filter, of the first sample that it changes from what those before it tell.
     pub size: ChannelEstimate,
     /// Number that was found.
     pub count: usize,

@@ -1,0 +1,107 @@
+//! The best linear prediction of a sample from those before it, which shows a spike in front of a filter.
+//!
+//! A filter spreads a spike over as many samples as the noise in front of it. From both sides such a spike is interpolated by its own
+//! samples: what is left has 0.27 of its distance from the noise behind a mean of two values, and 0.5 behind one of eight. The error of a
+//! prediction is what is new in a sample, of the noise and of a spike alike, and keeps 0.96 and 0.84 of it. What an error of 1 adds to the
+//! samples from its own on is the filter's response to a spike.
+
+use crate::samples::interpolation::{Autocovariance, REACH};
+use crate::samples::series::Series;
+use nalgebra::{SMatrix, SVector};
+
+/// Samples from which one is predicted.
+const ORDER: usize = 2 * REACH;
+/// A response ends where less than this part of its largest value follows.
+const LEFT: f64 = 0.25;
+/// White noise, as a part of the variance, that keeps the equations solvable.
+const WHITE: f64 = 1e-9;
+
+/// The prediction of a channel whose noise is that behind a filter.
+pub(super) struct Prediction {
+    /// The weight of the samples before, the latest first.
+    weights: [f64; ORDER],
+    /// What an error of 1 adds to the samples from its own on.
+    response: Vec<f64>,
+    /// Standard deviation of the error, in the channel's unit.
+    pub deviation: f64,
+}
+
+impl Prediction {
+    /// By the autocovariance of the samples. `None` where an error does not end within the samples from which one is predicted, as in drift
+    /// or on a line, or is one of a single sample, as in white noise.
+    pub(super) fn new(covariance: &Autocovariance) -> Option<Self> {
+        let entry = |a: usize, b: usize| covariance[a.abs_diff(b)] + if a == b { WHITE * covariance[0] } else { 0.0 };
+        let with_sample = SVector::<f64, ORDER>::from_fn(|at, _| covariance[at + 1]);
+        let weights: [f64; ORDER] = SMatrix::<f64, ORDER, ORDER>::from_fn(entry).cholesky()?.solve(&with_sample).into();
+        let mut response = vec![1.0];
+        for at in 1..2 * ORDER {
+            response.push((0..at.min(ORDER)).map(|before| weights[before] * response[at - 1 - before]).sum());
+        }
+        let largest = response.iter().map(|of: &f64| of.abs()).fold(0.0, f64::max);
+        let length = response.iter().rposition(|of| of.abs() >= LEFT * largest)? + 1;
+        response.truncate(length);
+        (2..=ORDER).contains(&length).then_some(Self { weights, response, deviation: f64::NAN })
+    }
+
+    /// With this standard deviation of its error.
+    pub(super) fn with_deviation(self, deviation: f64) -> Self {
+        Self { deviation, ..self }
+    }
+
+    /// How many samples a spike changes.
+    pub(super) fn length(&self) -> usize {
+        self.response.len()
+    }
+
+    /// The largest sum of the samples that a spike of an error of 1 changes, with weights for the distances to both sides of one: what is left of
+    /// it by an interpolation.
+    pub(super) fn interpolated(&self, weights: &[f64; REACH]) -> f64 {
+        let sample = |at: i64| usize::try_from(at).ok().and_then(|at| self.response.get(at)).copied().unwrap_or(0.0);
+        let left = |at: i64| {
+            let beside = |(distance, weight): (i64, &f64)| weight * (sample(at - distance) + sample(at + distance));
+            (sample(at) - (1..).zip(weights).map(beside).sum::<f64>()).abs()
+        };
+        let reach = REACH as i64;
+        (-reach..self.length() as i64 + reach).map(left).fold(0.0, f64::max)
+    }
+
+    /// The error of the sample at `position` of values of this `mean`; 0 where one of those before it is missing.
+    pub(super) fn error(&self, series: &Series, values: &[f64], mean: f64, position: usize) -> f64 {
+        if position < ORDER || !series.is_gapless(position - ORDER, position) {
+            return 0.0;
+        }
+        let before = self.weights.iter().zip(values[..position].iter().rev());
+        values[position] - mean - before.map(|(weight, value)| weight * (value - mean)).sum::<f64>()
+    }
+
+    /// Whether an error at `position` is that of a spike in front of the filter: of one error alone. A spike behind the filter is in the samples
+    /// from which the following ones are predicted too, and a jump of the bias, behind it or in front, in these as well. Neither of them, from
+    /// any sample on from which that at `position` is predicted, may take away more of the squares of the errors.
+    pub(super) fn is_in_front(&self, series: &Series, values: &[f64], mean: f64, position: usize) -> bool {
+        let behind: Vec<f64> = std::iter::once(1.0).chain(self.weights.map(|weight| -weight)).collect();
+        let sums = behind.iter().scan(0.0, |sum, of| {
+            *sum += of;
+            Some(*sum)
+        });
+        let jumps = [sums.collect(), vec![1.0; ORDER + 1]];
+        let errors: Vec<f64> = (position - ORDER..(position + ORDER + 1).min(values.len()))
+            .map(|at| self.error(series, values, mean, at))
+            .collect();
+        let own = errors[ORDER].powi(2);
+        let is_less = |shape: &Vec<f64>| {
+            let squares = shape.iter().map(|of| of * of).sum::<f64>();
+            let product = |errors: &[f64]| errors.iter().zip(shape).map(|(error, of)| error * of).sum::<f64>();
+            (0..=ORDER).all(|from| product(&errors[from..]).powi(2) / squares < own)
+        };
+        is_less(&behind) && jumps.iter().all(is_less)
+    }
+
+    /// Takes a spike off the values from `position` on, up to the next gap.
+    pub(super) fn subtract(&self, series: &Series, values: &mut [f64], position: usize, error: f64) {
+        let end = (position + self.length()).min(values.len());
+        let present = (position..end).take_while(|&at| series.is_gapless(position, at));
+        for (at, response) in present.zip(&self.response) {
+            values[at] -= error * response;
+        }
+    }
+}
