@@ -21,6 +21,7 @@ mod bias_step;
 pub mod block_means;
 pub(crate) mod effective_lsb;
 pub mod gls_regression;
+pub(crate) mod knock_search;
 pub(crate) mod knocks;
 pub(crate) mod level_change;
 pub mod noise_grid;

@@ -1,7 +1,7 @@
 //! The detector of knocks on simulated channels: how often it sees one in noise, and which ones it finds.
 
+use super::knock_search::{self, SearchedChannel};
 use super::knocks::{BlockSize, Knock, KnockRule, find_by};
-use super::spikes::SpikeRule;
 use crate::effects::findings::SIGNIFICANCE;
 use crate::parallel::in_parallel;
 use crate::samples::series::Series;
@@ -121,26 +121,10 @@ fn assert_quiet(name: &str, record: impl Fn(u64) -> Series + Sync) {
     assert!(found <= 1, "{name}: {found} of 200 records, {} expected", 200.0 * SIGNIFICANCE);
 }
 
-/// The knocks in channels: long ones, and in what these leave short ones, without the single samples that chance puts into them.
+/// The knocks in channels.
 fn find(channels: &[Series]) -> Vec<Vec<Knock>> {
-    let rules: Vec<KnockRule> = channels.iter().map(|series| KnockRule::fit(series, DITHERED)).collect();
-    let mut found = find_by(&rules, channels, BlockSize::Many);
-    let quiet = |(series, found): (&Series, &Vec<Knock>)| {
-        series.clone().filtered(|slot| !found.iter().any(|knock| knock.slots.contains(&slot)))
-    };
-    let quiet: Vec<Series> = channels.iter().zip(&found).map(quiet).collect();
-    let short = find_by(&rules, &quiet, BlockSize::Few);
-    let without_chance = |(series, short): (&Series, &Vec<Knock>)| {
-        let samples = series.values.len() as u64;
-        let singles =
-            SpikeRule::fit(series).map(|rule| rule.separate(rule.find(series), samples).0).unwrap_or_default();
-        let by_chance = short.iter().flat_map(|knock| singles.by_chance_within(&knock.slots, samples));
-        series.clone().without(&by_chance.collect::<Vec<u64>>())
-    };
-    let quiet: Vec<Series> = quiet.iter().zip(&short).map(without_chance).collect();
-    let short = find_by(&rules, &quiet, BlockSize::Few);
-    found.iter_mut().zip(short).for_each(|(found, short)| found.extend(short));
-    found
+    let searched = |series| SearchedChannel { fitted: series, parts: vec![series], can_show_spikes: true };
+    knock_search::find(&channels.iter().map(searched).collect::<Vec<SearchedChannel>>(), &[], DITHERED)
 }
 
 /// How many of 200.

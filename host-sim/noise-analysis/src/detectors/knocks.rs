@@ -290,6 +290,26 @@ impl KnockRule {
         exceedance(level / quiet.max(self.floor), freedom, others) < SIGNIFICANCE_THROUGHOUT
     }
 
+    /// Whether a level that moves by itself explains how loud a series is in these sample periods: where it is loudest against the blocks around
+    /// them, of all averaging times, one of its blocks has as much with a probability of at least [`SIGNIFICANCE`].
+    pub(crate) fn moves_by_itself(&self, series: &Series, slots: &Range<u64>) -> bool {
+        let of_scale = |scale: &Scale| {
+            let Blocks { size, freedoms } = &scale.blocks[0];
+            let differences = SquaredDifferences::new(series, scale.n);
+            let own = differences.number(slots.start)..differences.number(slots.end);
+            let doublings = (own.len() / size).checked_ilog2().unwrap_or(0).min(freedoms.len().checked_sub(1)? as u32);
+            let levels = longer_levels(&differences.levels(*size, 0), doublings);
+            let (freedom, size) = (freedoms[doublings as usize], size << doublings);
+            let neighbourhood = Neighbourhood::new(&levels);
+            let ratio = |at: usize| Some((*levels.get(at)?)? / neighbourhood.level(at, freedom.block)?.max(self.floor));
+            let ratio = (own.start / size..own.end.div_ceil(size)).filter_map(ratio).fold(0.0, f64::max);
+            let by_itself = freedom.wandering.map_or(0.0, |of| of.exceedance(ratio) * levels.len() as f64);
+            Some((ratio, by_itself))
+        };
+        let loudest = self.scales.iter().filter_map(of_scale).max_by(|(a, _), (b, _)| a.total_cmp(b));
+        loudest.is_some_and(|(_, by_itself)| by_itself >= SIGNIFICANCE)
+    }
+
     /// A knock at the time of one in another channel.
     fn at_known_time(&self, series: &Series, known: &Knock) -> Option<Knock> {
         let tests = self.scales.len() as f64;

@@ -7,10 +7,11 @@
 
 use crate::detectors::bias::{self, BiasChanges, BiasSensitivity};
 use crate::detectors::bias_response::BiasResponse;
-use crate::detectors::knocks::{self, BlockSize, Knock, KnockRule};
+use crate::detectors::knock_search::{self, SearchedChannel, slots_within};
+use crate::detectors::knocks::Knock;
 use crate::detectors::noise_grid::NoiseGrids;
 use crate::detectors::output_range::find_noise_below_count;
-use crate::detectors::spikes::{self, Disturbance, FoundSpikes, SpikeRule};
+use crate::detectors::spikes::{self, SpikeRule};
 use crate::detectors::vibration_rectification::{Acceleration, largest_sensitivity};
 use crate::effects::Effect;
 use crate::effects::findings::{Correction, Detection};
@@ -24,7 +25,6 @@ use crate::spectra;
 use crate::spectra::force_regression::force_sensitivities;
 use measurement::{ChannelId, Measurement, PerChannel, Quantity};
 use std::cell::LazyCell;
-use std::ops::Range;
 use std::sync::Arc;
 
 /// Sample periods that one channel does not use, in ascending order.
@@ -266,40 +266,6 @@ impl ChannelExclusion {
     }
 }
 
-/// What stands out of the noise of one channel by single samples.
-struct StandingOut {
-    rule: SpikeRule,
-    disturbances: Vec<Disturbance>,
-    singles: FoundSpikes,
-    /// Samples that were looked at.
-    samples: u64,
-}
-
-impl StandingOut {
-    /// By a rule in the parts of a channel, in the order of time.
-    fn find(rule: SpikeRule, parts: &[Series]) -> Self {
-        let (mut disturbances, mut singles, mut samples) = (Vec::new(), FoundSpikes::default(), 0);
-        for part in parts {
-            let of_part = part.values.len() as u64;
-            let (single, disturbed) = rule.separate(rule.find(part), of_part);
-            singles.extend(single);
-            disturbances.extend(disturbed);
-            samples += of_part;
-        }
-        Self { rule, disturbances, singles, samples }
-    }
-
-    /// Its single samples in a knock, if chance puts as many there.
-    fn by_chance_in(&self, knock: &Knock) -> Vec<u64> {
-        self.singles.by_chance_within(&knock.slots, self.samples)
-    }
-
-    /// What its single samples show of the `known` knocks.
-    fn parts_of(&self, known: &[Range<u64>]) -> Vec<Disturbance> {
-        self.rule.parts_of(&self.singles, known, self.samples)
-    }
-}
-
 /// The knocks in the inertial channels.
 struct KnocksInChannels {
     by_whole: PerChannel<Vec<Knock>>,
@@ -339,11 +305,8 @@ impl KnocksInChannels {
     }
 }
 
-/// The knocks in the `parts` of a record, in the order of time, by the rules of the series that are `fitted`.
-///
-/// Long ones first; without these, what stands out by single samples, and short ones, which are found again without the single samples that
-/// chance puts into them. Then what is too short for a level of the noise and is no single sample, and what single samples show of the knocks
-/// that other channels have.
+/// The knocks in the `parts` of a record, in the order of time, by the rules of the series that are `fitted`; none in a channel that is not
+/// inertial.
 fn knocks_by(
     record: &CondensedRecord,
     fitted: &PerChannel<Series>,
@@ -351,53 +314,15 @@ fn knocks_by(
 ) -> PerChannel<Vec<Knock>> {
     let measurement = record.means.as_ref();
     let inertial: Vec<ChannelId> = measurement.inertial().collect();
-    let rules = in_parallel(&inertial, |&of| KnockRule::fit(&fitted[of], measurement.profile.dithered_avar_counts2));
+    let searched = |&of: &ChannelId| SearchedChannel {
+        fitted: &fitted[of],
+        parts: parts.iter().map(|part| &part[of]).collect(),
+        can_show_spikes: record.channels[of].can_show_spikes,
+    };
+    let searched: Vec<SearchedChannel> = inertial.iter().map(searched).collect();
+    let found = knock_search::find(&searched, &record.repeated, measurement.profile.dithered_avar_counts2);
     let mut knocks: PerChannel<Vec<Knock>> = fitted.map(|_| Vec::new());
-    let quiet = |series: &PerChannel<Series>, channel: ChannelId, knocks: &PerChannel<Vec<Knock>>| {
-        let own = &series[channel];
-        own.clone().without(&slots_within(own, &knocks[channel]))
-    };
-    for part in parts {
-        let part: Vec<Series> = inertial.iter().map(|&of| part[of].clone()).collect();
-        let found = knocks::find_by(&rules, &part, BlockSize::Many);
-        inertial.iter().zip(found).for_each(|(&of, found)| knocks[of].extend(found));
-    }
-    let standing_out = per_channel(fitted.ids(), |channel| {
-        if !record.channels[channel].can_show_spikes {
-            return None;
-        }
-        // A sample that is read twice is loud as its neighbours are, but makes spikes of these.
-        let once = |series: &PerChannel<Series>| quiet(series, channel, &knocks).without(&record.repeated);
-        let rule = SpikeRule::fit(&once(fitted))?;
-        let parts: Vec<Series> = parts.iter().map(|part| once(part)).collect();
-        Some(StandingOut::find(rule, &parts))
-    });
-    let long = knocks.clone();
-    for part in parts {
-        let mut part: Vec<Series> = inertial.iter().map(|&of| quiet(part, of, &long)).collect();
-        let mut found = knocks::find_by(&rules, &part, BlockSize::Few);
-        let by_chance = |(of, found): (&ChannelId, &Vec<Knock>)| -> Vec<u64> {
-            let singles = standing_out[*of].iter().flat_map(|of| found.iter().map(move |knock| of.by_chance_in(knock)));
-            singles.flatten().collect()
-        };
-        let by_chance: Vec<Vec<u64>> = inertial.iter().zip(&found).map(by_chance).collect();
-        if by_chance.iter().any(|of| !of.is_empty()) {
-            part = part.into_iter().zip(by_chance).map(|(part, of)| part.without(&of)).collect();
-            found = knocks::find_by(&rules, &part, BlockSize::Few);
-        }
-        inertial.iter().zip(found).for_each(|(&of, found)| knocks[of].extend(found));
-    }
-    let samples =
-        per_channel(fitted.ids(), |channel| parts.iter().map(|part| part[channel].values.len()).sum::<usize>());
-    let mut add = |of: &dyn Fn(&StandingOut) -> Vec<Disturbance>| {
-        for channel in fitted.ids() {
-            let added = standing_out[channel].as_ref().map(of).unwrap_or_default();
-            Knock::add_disturbances(&mut knocks[channel], added, samples[channel]);
-        }
-        knocks.iter().flatten().map(|knock| knock.slots.clone()).collect::<Vec<Range<u64>>>()
-    };
-    let known = add(&|found| found.disturbances.clone());
-    add(&|found| found.parts_of(&known));
+    inertial.iter().zip(found).for_each(|(&of, found)| knocks[of] = found);
     knocks
 }
 
@@ -427,12 +352,6 @@ fn without_lines(series: Series) -> Series {
     let value = |slot: &u64| without.values()[(slot - series.span.start) as usize];
     let values = series.slots.iter().map(value).collect();
     Series { values, ..series }
-}
-
-/// Sample periods of the samples of a series within knocks, in ascending order.
-fn slots_within(series: &Series, knocks: &[Knock]) -> Vec<u64> {
-    let is_within = |slot: &u64| knocks.iter().any(|knock| knock.slots.contains(slot));
-    if knocks.is_empty() { Vec::new() } else { series.slots.iter().copied().filter(is_within).collect() }
 }
 
 /// Sample periods within `knocks`, and those of spikes by the rule of the samples before `middle`, in ascending order.
