@@ -43,6 +43,11 @@ pub(crate) fn exponential_sum_tail(count: f64, sum: f64) -> f64 {
     checked_gamma_ur(count, sum).ok().filter(|tail| !tail.is_nan()).unwrap_or(1.0)
 }
 
+/// Probability that the sum of the squares of `count` standard normal numbers exceeds `sum`; 1 where one of these is no positive number.
+pub(crate) fn chi_squared_tail(sum: f64, count: f64) -> f64 {
+    exponential_sum_tail(0.5 * count, 0.5 * sum)
+}
+
 /// Probability that the mean of `above` exponential variables exceeds `ratio` times the mean of `below` others; 1 where one of these is
 /// no positive number.
 pub(crate) fn mean_ratio_tail(ratio: f64, above: f64, below: f64) -> f64 {
@@ -70,12 +75,13 @@ pub(crate) fn poisson_bounds(count: f64) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::{exponential_sum_tail, mean_ratio_tail, student_tail};
+    use super::{chi_squared_tail, exponential_sum_tail, mean_ratio_tail, student_tail};
 
     #[test]
     fn tails_of_exponential_variables() {
         // One of them exceeds 2 with e⁻²; of two, the first is twice the second with 1/3.
         assert!((exponential_sum_tail(1.0, 2.0) - (-2.0f64).exp()).abs() < 1e-12);
+        assert!((chi_squared_tail(4.0, 2.0) - (-2.0f64).exp()).abs() < 1e-12);
         assert!((mean_ratio_tail(2.0, 1.0, 1.0) - 1.0 / 3.0).abs() < 1e-12);
         // A channel that never changes has sums and means of 0, or none.
         for sum in [0.0, -1.0, f64::NAN, f64::INFINITY] {

@@ -38,10 +38,9 @@ pub(crate) fn find(channels: &[SearchedChannel], repeated: &[u64], dithered_avar
     let rules = in_parallel(channels, |of| KnockRule::fit(of.fitted, dithered_avar_counts2));
     let parts = channels.first().map_or(0, |of| of.parts.len());
     let mut knocks: Vec<Vec<Knock>> = channels.iter().map(|_| Vec::new()).collect();
-    let mut add = |found: Vec<Vec<Knock>>| knocks.iter_mut().zip(found).for_each(|(own, found)| own.extend(found));
     for part in 0..parts {
         let part: Vec<Series> = channels.iter().map(|of| of.parts[part].clone()).collect();
-        add(find_by(&rules, &part, BlockSize::Many));
+        add(&mut knocks, find_by(&rules, &part, BlockSize::Many));
     }
     let long = knocks.clone();
     let quiet = |of: usize, series: &Series| series.clone().without(&slots_within(series, &long[of]));
@@ -64,7 +63,7 @@ pub(crate) fn find(channels: &[SearchedChannel], repeated: &[u64], dithered_avar
             part = part.into_iter().zip(by_chance).map(|(part, of)| part.without(&of)).collect();
             found = find_by(&rules, &part, BlockSize::Few);
         }
-        knocks.iter_mut().zip(found).for_each(|(own, found)| own.extend(found));
+        add(&mut knocks, found);
     }
     let mut add_disturbances = |of: &dyn Fn(&StandingOut) -> Vec<Disturbance>| {
         for ((channel, found), knocks) in channels.iter().zip(&standing_out).zip(&mut knocks) {
@@ -76,6 +75,10 @@ pub(crate) fn find(channels: &[SearchedChannel], repeated: &[u64], dithered_avar
     let known = add_disturbances(&|found| found.disturbances.clone());
     add_disturbances(&|found| found.parts_of(&known));
     knocks
+}
+
+fn add(knocks: &mut [Vec<Knock>], found: Vec<Vec<Knock>>) {
+    knocks.iter_mut().zip(found).for_each(|(own, found)| own.extend(found));
 }
 
 /// Sample periods of the samples of a series within knocks, in ascending order.

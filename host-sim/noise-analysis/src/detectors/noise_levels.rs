@@ -12,6 +12,9 @@ use crate::samples::series::Series;
 use statrs::function::beta::checked_beta_reg;
 use std::ops::Range;
 
+/// Errors above this many standard deviations are left out of the estimate of the standard deviation; of normal errors it is
+/// 7·10⁻⁶.
+pub(super) const CLIP: f64 = 4.5;
 /// Differences of a block, the shortest of several lengths.
 pub(super) const DIFFERENCES: usize = 64;
 /// Differences of a shorter one: as many as a knock has that rings for a few periods. Without the largest tenth all but two are left.
@@ -416,6 +419,19 @@ pub(super) fn ratio_by_chance(p_value: f64, freedom: f64, of_other: f64) -> f64 
         (low, high) = (high, 2.0 * high);
     }
     end_of((low, high), RATIO_STEPS, exceeds)
+}
+
+/// Standard deviation of the non-zero entries of `errors`, without those above [`CLIP`] standard deviations.
+pub(super) fn clipped_deviation(errors: &[f64]) -> f64 {
+    let mut limit = f64::INFINITY;
+    let mut deviation = 0.0;
+    for _ in 0..12 {
+        let kept = errors.iter().filter(|error| **error != 0.0 && error.abs() <= limit);
+        let (count, squares) = kept.fold((0u64, 0.0), |(count, sum), error| (count + 1, sum + error * error));
+        deviation = (squares / count.max(1) as f64).sqrt();
+        limit = CLIP * deviation;
+    }
+    deviation
 }
 
 pub(super) fn median(mut values: Vec<f64>) -> f64 {

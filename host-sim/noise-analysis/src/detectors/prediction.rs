@@ -5,7 +5,8 @@
 //! prediction is what is new in a sample, of the noise and of a spike alike, and keeps 0.96 and 0.84 of it. What an error of 1 adds to the
 //! samples from its own on is the filter's response to a spike.
 
-use crate::samples::interpolation::{Autocovariance, REACH};
+use super::noise_levels::clipped_deviation;
+use crate::samples::interpolation::{Autocovariance, LEAST_WHITE, REACH};
 use crate::samples::series::Series;
 use nalgebra::{SMatrix, SVector};
 
@@ -13,8 +14,6 @@ use nalgebra::{SMatrix, SVector};
 const ORDER: usize = 2 * REACH;
 /// A response ends where less than this part of its largest value follows.
 const LEFT: f64 = 0.25;
-/// White noise, as a part of the variance, that keeps the equations solvable.
-const WHITE: f64 = 1e-9;
 
 /// The prediction of a channel whose noise is that behind a filter.
 pub(super) struct Prediction {
@@ -27,10 +26,11 @@ pub(super) struct Prediction {
 }
 
 impl Prediction {
-    /// By the autocovariance of the samples. `None` where an error does not end within the samples from which one is predicted, as in drift
+    /// By the autocovariance of a series of this `mean`. `None` where an error does not end within the samples from which one is predicted, as in drift
     /// or on a line, or is one of a single sample, as in white noise.
-    pub(super) fn new(covariance: &Autocovariance) -> Option<Self> {
-        let entry = |a: usize, b: usize| covariance[a.abs_diff(b)] + if a == b { WHITE * covariance[0] } else { 0.0 };
+    pub(super) fn fit(series: &Series, covariance: &Autocovariance, mean: f64) -> Option<Self> {
+        let white = |a: usize, b: usize| if a == b { LEAST_WHITE * covariance[0] } else { 0.0 };
+        let entry = |a: usize, b: usize| covariance[a.abs_diff(b)] + white(a, b);
         let with_sample = SVector::<f64, ORDER>::from_fn(|at, _| covariance[at + 1]);
         let weights: [f64; ORDER] = SMatrix::<f64, ORDER, ORDER>::from_fn(entry).cholesky()?.solve(&with_sample).into();
         let mut response = vec![1.0];
@@ -40,17 +40,25 @@ impl Prediction {
         let largest = response.iter().map(|of: &f64| of.abs()).fold(0.0, f64::max);
         let length = response.iter().rposition(|of| of.abs() >= LEFT * largest)? + 1;
         response.truncate(length);
-        (2..=ORDER).contains(&length).then_some(Self { weights, response, deviation: f64::NAN })
-    }
-
-    /// With this standard deviation of its error.
-    pub(super) fn with_deviation(self, deviation: f64) -> Self {
-        Self { deviation, ..self }
+        if !(2..=ORDER).contains(&length) {
+            return None;
+        }
+        let mut prediction = Self { weights, response, deviation: 0.0 };
+        let error = |at| prediction.error(series, &series.values, mean, at);
+        let errors: Vec<f64> = (0..series.values.len()).map(error).collect();
+        prediction.deviation = clipped_deviation(&errors).max(0.5 * series.resolution);
+        Some(prediction)
     }
 
     /// How many samples a spike changes.
     pub(super) fn length(&self) -> usize {
         self.response.len()
+    }
+
+    /// The positions of those that a spike changes from one on, up to the next gap.
+    pub(super) fn changed(&self, series: &Series, position: usize) -> impl Iterator<Item = usize> {
+        let end = (position + self.length()).min(series.values.len());
+        (position..end).take_while(move |&at| series.is_gapless(position, at))
     }
 
     /// The largest sum of the samples that a spike of an error of 1 changes, with weights for the distances to both sides of one: what is left of
@@ -96,11 +104,9 @@ impl Prediction {
         is_less(&behind) && jumps.iter().all(is_less)
     }
 
-    /// Takes a spike off the values from `position` on, up to the next gap.
+    /// Takes a spike off the values from `position` on.
     pub(super) fn subtract(&self, series: &Series, values: &mut [f64], position: usize, error: f64) {
-        let end = (position + self.length()).min(values.len());
-        let present = (position..end).take_while(|&at| series.is_gapless(position, at));
-        for (at, response) in present.zip(&self.response) {
+        for (at, response) in self.changed(series, position).zip(&self.response) {
             values[at] -= error * response;
         }
     }

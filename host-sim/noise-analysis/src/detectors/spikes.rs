@@ -6,13 +6,15 @@
 //! each sample is compared with its [prediction](super::prediction) first. Where the noise is louder, as in a
 //! vibration whose level wanders, it is as many deviations of the errors around a sample.
 
-use super::noise_levels::median;
+use super::noise_levels::{CLIP, clipped_deviation, median};
 use super::prediction::Prediction;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, density, poisson_bounds, poisson_tail, quantile, upper_tail};
 use crate::effects::Spikes;
 use crate::effects::findings::{Correction, Detection, REFUTED, SIGNIFICANCE};
-use crate::samples::interpolation::{ALL_NEIGHBOURS, Autocovariance, Neighbours, PartialInterpolation, REACH};
+use crate::samples::interpolation::{
+    ALL_NEIGHBOURS, Autocovariance, LEAST_WHITE, Neighbours, PartialInterpolation, REACH,
+};
 use crate::samples::series::Series;
 use nalgebra::{SMatrix, SVector};
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,9 +24,6 @@ use std::sync::Arc;
 /// Fewest neighbours that must be there on either side.
 const FEWEST_ON_A_SIDE: u32 = REACH as u32 / 2;
 
-/// Errors above this many standard deviations are left out of the estimate of the standard deviation; of normal errors it is
-/// 7·10⁻⁶.
-const CLIP: f64 = 4.5;
 /// Samples around whose median values are clipped for the autocovariance: over several of them a drift that is larger than the noise of a
 /// sample is not.
 const CLIPPED_BLOCK: usize = 256;
@@ -401,13 +400,9 @@ impl Interpolation {
         interpolation.covariance = Some(covariance);
         let deviation = clipped_deviation(&interpolation.errors(series, &series.values));
         interpolation.deviation = deviation.max(0.5 * series.resolution);
-        let prediction = Prediction::new(&covariance).and_then(|prediction| {
-            let error = |at| prediction.error(series, &series.values, mean, at);
-            let deviation = clipped_deviation(&(0..series.values.len()).map(error).collect::<Vec<f64>>());
-            let prediction = prediction.with_deviation(deviation.max(0.5 * series.resolution));
-            let interpolated = prediction.interpolated(&interpolation.weights) / interpolation.deviation;
-            (interpolated < prediction.deviation.recip()).then_some(prediction)
-        });
+        let is_better =
+            |by: &Prediction| by.interpolated(&interpolation.weights) / interpolation.deviation < by.deviation.recip();
+        let prediction = Prediction::fit(series, &covariance, mean).filter(is_better);
         Some((interpolation, prediction))
     }
 
@@ -536,8 +531,7 @@ impl Interpolation {
         }
         for FilteredSpike { position, size, sigmas, is_response } in filtered {
             let stands_out = sigmas > least * louder_around(position);
-            let changed =
-                (position..(position + length).min(values.len())).take_while(|&at| series.is_gapless(position, at));
+            let changed = prediction.into_iter().flat_map(|by| by.changed(series, position));
             found.extend(changed.map(|at| {
                 let is_response = is_response || at > position;
                 FoundSpike { slot: series.slots[at], size, sigmas, is_response, stands_out }
@@ -596,19 +590,6 @@ fn typical_difference(series: &Series) -> f64 {
     (distances[..smaller].iter().sum::<f64>() / smaller as f64).max(0.5 * series.resolution)
 }
 
-/// Standard deviation of the non-zero entries of `errors`, without those above [`CLIP`] standard deviations.
-fn clipped_deviation(errors: &[f64]) -> f64 {
-    let mut limit = f64::INFINITY;
-    let mut deviation = 0.0;
-    for _ in 0..12 {
-        let kept = errors.iter().filter(|error| **error != 0.0 && error.abs() <= limit);
-        let (count, squares) = kept.fold((0u64, 0.0), |(count, sum), error| (count + 1, sum + error * error));
-        deviation = (squares / count.max(1) as f64).sqrt();
-        limit = CLIP * deviation;
-    }
-    deviation
-}
-
 /// Limits the values to [`CLIP`] standard deviations from the median of their block: a disturbance that is longer than the interpolation reaches
 /// would be interpolated from its own samples. The deviation is that of the typical block, at least half a count.
 fn clip(values: &mut [f64], resolution: f64) {
@@ -639,7 +620,7 @@ fn covariance(series: &Series, values: &[f64], mean: f64) -> Autocovariance {
 fn weights(covariance: &Autocovariance) -> Option<[f64; REACH]> {
     let entry = |j: usize, i: usize| {
         // A little white noise keeps the equations solvable for a pure sinusoid.
-        let white = if i == j { 1e-9 * covariance[0] } else { 0.0 };
+        let white = if i == j { LEAST_WHITE * covariance[0] } else { 0.0 };
         covariance[i.abs_diff(j)] + covariance[i + j + 2] + white
     };
     let matrix = SMatrix::<f64, REACH, REACH>::from_fn(entry);

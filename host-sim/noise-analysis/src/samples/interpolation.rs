@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// White noise, as a part of the variance, that keeps the equations solvable for a pure sinusoid: the least that does.
 const WHITE: [f64; 5] = [LEAST_WHITE, 1e-7, 1e-5, 1e-3, 1e-1];
-const LEAST_WHITE: f64 = 1e-9;
+pub(crate) const LEAST_WHITE: f64 = 1e-9;
 
 /// Neighbours on each side.
 pub(crate) const REACH: usize = 6;

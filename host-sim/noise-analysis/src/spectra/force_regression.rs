@@ -6,13 +6,12 @@
 //! motion: what the forces and the rate share otherwise, as by a rotation that tilts the sensor, is not.
 
 use crate::detectors::bias::BiasSensitivity;
-use crate::distributions::{DESCRIBED, NORMAL_975, exponential_sum_tail};
+use crate::distributions::{DESCRIBED, NORMAL_975, chi_squared_tail};
 use crate::effects::findings::SIGNIFICANCE;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
-use crate::spectra::transforms::BufferedTransform;
+use crate::spectra::transforms::cosine_transform;
 use nalgebra::{DMatrix, DVector};
-use std::f64::consts::PI;
 use std::ops::Range;
 
 /// Most values of a transform, means of more samples in a longer record: faster motion has thousands of degrees of freedom, and its
@@ -76,9 +75,9 @@ impl ForceRegression {
     /// `None` where there are too few samples, a gap splits them, or no force shows motion.
     fn new(rate: &Series, forces: &[&Series]) -> Option<Self> {
         let size = (rate.span.end - rate.span.start).div_ceil(MOST_VALUES as u64).max(1) as usize;
-        let rate = cosine_transform(rate, size)?;
+        let rate = transformed(rate, size)?;
         let force = |(place, series): (usize, &&Series)| {
-            let motion = cosine_transform(series, size).filter(|motion| motion.len() == rate.len())?;
+            let motion = transformed(series, size).filter(|motion| motion.len() == rate.len())?;
             Force::new(place, motion)
         };
         let mut forces: Vec<Force> = forces.iter().enumerate().filter_map(force).collect();
@@ -204,34 +203,16 @@ impl Equations {
     }
 }
 
-/// Probability that the sum of the squares of so many standard normal numbers exceeds `sum`.
-fn chi_squared_tail(sum: f64, count: f64) -> f64 {
-    exponential_sum_tail(0.5 * count, 0.5 * sum)
-}
-
-/// The cosine transform (DCT-II, not normalised) of means of `size` samples about their straight line, 0 where samples are missing; `None`
-/// where a long gap splits the series, or there are too few samples.
-fn cosine_transform(series: &Series, size: usize) -> Option<Vec<f64>> {
+/// The cosine transform of means of `size` samples about their straight line, 0 where samples are missing; `None` where a long gap splits the
+/// series, or there are too few samples.
+fn transformed(series: &Series, size: usize) -> Option<Vec<f64>> {
     let uniform = UniformSeries::from_series(series);
-    if uniform.values().len() as u64 != series.span.end - series.span.start
-        || uniform.values().len() < FEWEST_VALUES * size
-    {
+    let is_whole = uniform.values().len() as u64 == series.span.end - series.span.start;
+    if !is_whole || uniform.values().len() < FEWEST_VALUES * size {
         return None;
     }
     let values = uniform.averaged(size).detrended();
-    let count = values.values().len();
-    // The transform of the even continuation, which has no jump.
-    let mut transform = BufferedTransform::new(2 * count);
-    let input = transform.input();
-    for (at, value) in values.values().iter().enumerate().filter(|(_, value)| value.is_finite()) {
-        (input[at], input[2 * count - 1 - at]) = (*value, *value);
-    }
-    let output = transform.output()?;
-    let of_order = |order: usize| {
-        let (sin, cos) = (PI * order as f64 / (2 * count) as f64).sin_cos();
-        output[order].re * cos + output[order].im * sin
-    };
-    Some((0..count).map(of_order).collect())
+    Some(cosine_transform(values.values().iter().map(|value| if value.is_finite() { *value } else { 0.0 })))
 }
 
 /// The mean square of a transform around each order; 0 at the order 0, which is the mean.

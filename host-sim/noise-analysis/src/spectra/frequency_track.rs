@@ -9,7 +9,7 @@
 use super::coherent_track::CoherentTrack;
 use super::transforms;
 use crate::bounds::BoundedEstimate;
-use crate::distributions::{NORMAL_975, exponential_sum_tail};
+use crate::distributions::{NORMAL_975, chi_squared_tail, exponential_sum_tail};
 use crate::effects::findings::SIGNIFICANCE;
 use crate::samples::uniform_series::UniformSeries;
 
@@ -192,7 +192,7 @@ impl Spectrogram {
         let mean = sums.iter().sum::<f64>() / sums.len() as f64;
         let scatter = sums.iter().map(|sum| (sum - mean).powi(2)).sum::<f64>() / (freedom * self.rows.len() as f64);
         // Sums of many variables are nearly normal.
-        let is_of_chance = exponential_sum_tail(0.5 * freedom, 0.5 * freedom * scatter) > SCATTER_BY_CHANCE;
+        let is_of_chance = chi_squared_tail(freedom * scatter, freedom) > SCATTER_BY_CHANCE;
         if is_of_chance { 1.0 } else { scatter }
     }
 

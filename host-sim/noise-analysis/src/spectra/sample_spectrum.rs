@@ -10,12 +10,11 @@
 //! walk whose first value is unknown: their coefficients are independent, with the variance `S(k/2T)/dt` of the two-sided density `S`.
 
 use super::line_models::Sine;
-use super::transforms::BufferedTransform;
+use super::transforms::cosine_transform;
 use super::welch::Welch;
 use super::whittle::SpectralBand;
 use crate::samples::rounding::Rounding;
 use crate::samples::uniform_series::UniformSeries;
-use std::f64::consts::PI;
 use std::ops::Range;
 
 /// Fewest samples.
@@ -146,21 +145,8 @@ fn bands_of_points(welch: &Welch, lines: &[f64], above: f64) -> impl Iterator<It
 /// Squares of the coefficients of the cosine transform of `values` around `mean`, of the orders 1, 2, 3 …, normalised so that those of
 /// white noise have its variance.
 fn squared_coefficients(values: &[f64], mean: f64) -> Vec<f64> {
-    let count = values.len();
-    // The transform of the even samples, followed by the odd ones in reverse, turned by a quarter of its phase (J. Makhoul, "A fast
-    // cosine transform in one and two dimensions", IEEE Trans. ASSP 28, 1980).
-    let mut transform = BufferedTransform::new(count);
-    let in_order = values.iter().step_by(2).chain(values.iter().skip(1).step_by(2).rev());
-    transform.input().iter_mut().zip(in_order).for_each(|(slot, value)| *slot = value - mean);
-    let Some(output) = transform.output() else { return Vec::new() };
-    let mut squares = vec![0.0; count - 1];
-    for (order, value) in output.iter().enumerate().skip(1) {
-        let (sine, cosine) = (PI * order as f64 / (2 * count) as f64).sin_cos();
-        let turned = [value.re * cosine + value.im * sine, value.im * cosine - value.re * sine];
-        squares[order - 1] = 2.0 / count as f64 * turned[0].powi(2);
-        squares[count - order - 1] = 2.0 / count as f64 * turned[1].powi(2);
-    }
-    squares
+    let transform = cosine_transform(values.iter().map(|value| value - mean));
+    transform.into_iter().skip(1).map(|of| 2.0 / values.len() as f64 * of.powi(2)).collect()
 }
 
 /// Bands of `count` coefficients, as indices of their squares: narrow ones at low orders.
@@ -176,6 +162,7 @@ fn bands(count: usize) -> impl Iterator<Item = Range<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::PI;
 
     #[test]
     fn the_squares_are_those_of_the_sums_with_each_cosine() {

@@ -3,6 +3,7 @@
 use crate::parallel::threads;
 use realfft::num_complex::Complex;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use std::f64::consts::PI;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Lengths that are kept: those of one analysis are of the whole record, of its half, of its means and of stretches, each with and without
@@ -61,6 +62,28 @@ impl Drop for BufferedTransform {
             free.push(std::mem::take(&mut self.buffers));
         }
     }
+}
+
+/// The cosine transform of `values` (DCT-II, not normalised), by order: `Σ x·cos(π·order·(2·at + 1)/2N)`. Their even continuation has no jump,
+/// so that little of a drift leaks.
+///
+/// It is the transform of the even samples, followed by the odd ones in reverse, turned by a quarter of its phase (J. Makhoul, "A fast
+/// cosine transform in one and two dimensions", IEEE Trans. ASSP 28, 1980).
+pub(super) fn cosine_transform(values: impl ExactSizeIterator<Item = f64>) -> Vec<f64> {
+    let count = values.len();
+    let mut transform = BufferedTransform::new(count);
+    for (at, value) in values.enumerate() {
+        let place = if at % 2 == 0 { at / 2 } else { count - 1 - at / 2 };
+        transform.input()[place] = value;
+    }
+    let Some(output) = transform.output() else { return Vec::new() };
+    let mut by_order = vec![output[0].re; count];
+    for (order, value) in output.iter().enumerate().skip(1) {
+        let (sine, cosine) = (PI * order as f64 / (2 * count) as f64).sin_cos();
+        by_order[order] = value.re * cosine + value.im * sine;
+        by_order[count - order] = value.re * sine - value.im * cosine;
+    }
+    by_order
 }
 
 /// The transform of `length` real numbers, 2 or more.

@@ -61,8 +61,3 @@ pub(super) fn chi_squared_quantile(probability: f64, degrees_of_freedom: f64) ->
     // The degrees of freedom are constants in the range of the distribution.
     ChiSquared::new(degrees_of_freedom).map_or(f64::INFINITY, |of| of.inverse_cdf(probability))
 }
-
-/// Probability that χ² with so many degrees of freedom, above 0, exceeds `value`.
-pub(super) fn chi_squared_tail(value: f64, degrees_of_freedom: f64) -> f64 {
-    ChiSquared::new(degrees_of_freedom).map_or(0.0, |of| of.sf(value))
-}

@@ -2,10 +2,8 @@
 
 use super::channel_deviance::{FilteredChannel, kinds};
 use super::decimation::{allowed_within, least_within};
-use super::hypothesis::{
-    BOUNDED, Hypothesis, Identified, birge_ratio, chi_squared_quantile, chi_squared_tail, simplest,
-};
-use crate::distributions::DESCRIBED;
+use super::hypothesis::{BOUNDED, Hypothesis, Identified, birge_ratio, chi_squared_quantile, simplest};
+use crate::distributions::{DESCRIBED, chi_squared_tail};
 use crate::fit::noise_terms::{is_white, sinusoids};
 use crate::parallel::in_parallel;
 use crate::spectra::{SampleSpectrum, SpectrumBehindFilter};
@@ -72,7 +70,8 @@ impl<'a> TriedChannel<'a> {
             allowed.iter().map(|filter| ChannelBehindFilter::new(of, *filter)).collect();
         let least = behind.iter().map(|of| of.least).fold(f64::INFINITY, f64::min);
         let bands = of.spectrum.bands() as f64;
-        let is_described = chi_squared_tail(least, bands) >= DESCRIBED;
+        let is_tried = bands > 0.0 && least.is_finite();
+        let is_described = is_tried && chi_squared_tail(least, bands) >= DESCRIBED;
         Self { behind, dispersion: (least / bands).max(1.0), is_described }
     }
 }
