@@ -13,7 +13,9 @@
 use super::cosine_spectrum::flicker_leakage;
 use super::filtered_noise::FilteredNoise;
 use super::sample_spectrum::{Place, SampleBand, SampleSpectrum};
-use super::whittle::{Sign, SpectralBand, departure_by_chance, fit_mixture, fit_mixture_with, least_departure};
+use super::whittle::{
+    Sign, SpectralBand, departure_by_chance, fit_mixture, fit_mixture_with, least_departure, mixture_density,
+};
 use crate::distributions::{NORMAL_975, upper_tail};
 use crate::effects::findings::REFUTED;
 use crate::samples::rounding::Rounding;
@@ -33,9 +35,10 @@ const HANN: [(f64, f64); 3] = [(-1.0, 1.0 / 6.0), (0.0, 2.0 / 3.0), (1.0, 1.0 / 
 const MOST_LEAKAGE: f64 = 0.1;
 /// Least part of a density that a term has where the spectrum shows its shape.
 const SHOWS_SHAPE: f64 = 0.1;
-/// Factor by which a bound is bracketed, and width at which its search ends, as a part of its distance from the value.
-const BRACKET: f64 = 2.0;
+/// Width at which the search of a bound ends, as a part of its normal deviate, and most steps of it, each at most so many times the one before.
 const PRECISION: f64 = 1e-3;
+const MOST_STEPS: usize = 50;
+const LONGEST_STEP: f64 = 4.0;
 
 /// Whether a term is a sinusoid, whose size is no density.
 fn is_sinusoid(kind: &NoiseTerm) -> bool {
@@ -112,7 +115,9 @@ impl SampleSpectrum {
         let by_shape = (moved < 0.5 * least_departure(ordinates, REFUTED)).then(|| departure_by_chance(&bands));
         let least = model.terms()[at].low.powi(2);
         let is_less = self.has_all_noise() && likelihood.densities[shown] < least;
-        let by_size = is_less.then(|| 2.0 * upper_tail(likelihood.ratio(shown, least).sqrt()));
+        let by_size = is_less.then(|| {
+            2.0 * upper_tail(likelihood.deviate(shown, model.terms()[at].low, &mut likelihood.densities.clone()))
+        });
         by_shape.into_iter().chain(by_size).reduce(f64::min)
     }
 
@@ -351,43 +356,60 @@ impl Likelihood {
 
     /// The coefficient of a term and its 95 % bounds. A density is the square of a coefficient.
     fn coefficient(&self, term: usize) -> (f64, f64, f64) {
-        let value = self.densities[term];
-        // Where the term alone explains the spectrum, for one that is not in it.
-        let alone = self.bands.iter().zip(&self.bases).map(|(band, basis)| band.density / basis[term]);
-        let scale = if value > 0.0 { value } else { alone.fold(f64::INFINITY, f64::min) };
-        let high = self.bound(term, value, scale, BRACKET);
-        let low = if self.is_within(term, 0.0) { 0.0 } else { self.bound(term, value, scale, 1.0 / BRACKET) };
-        (value.sqrt(), low.sqrt(), high.sqrt())
+        let density = self.densities[term];
+        let value = density.sqrt();
+        let information: f64 = self
+            .bands
+            .iter()
+            .zip(&self.bases)
+            .map(|(band, basis)| band.ordinates * (basis[term] / mixture_density(basis, &self.densities)).powi(2))
+            .sum();
+        // What the bounds would be if all other densities were known.
+        let scatter = NORMAL_975 / information.sqrt();
+        let upper = value + self.distance(term, 1.0, (density + scatter).sqrt() - value, f64::INFINITY);
+        let lower = if self.deviate(term, 0.0, &mut self.densities.clone()) < NORMAL_975 {
+            0.0
+        } else {
+            let first = if scatter < density { value - (density - scatter).sqrt() } else { value / 2.0 };
+            value - self.distance(term, -1.0, first, value)
+        };
+        (value, lower, upper)
     }
 
-    /// The density beyond `value` at which the likelihood has fallen; it is sought from `scale` on by `factor`.
-    fn bound(&self, term: usize, value: f64, scale: f64, factor: f64) -> f64 {
-        let (mut inside, mut outside) = (value, scale);
-        if value == 0.0 {
-            while !self.is_within(term, outside) && outside > f64::MIN_POSITIVE {
-                outside /= factor;
-            }
-        }
-        while self.is_within(term, outside) && outside.is_finite() && outside > f64::MIN_POSITIVE {
-            (inside, outside) = (outside, outside * factor);
-        }
-        while (outside - inside).abs() > PRECISION * (outside - value).abs() {
-            let middle = (inside + outside) / 2.0;
-            if self.is_within(term, middle) { inside = middle } else { outside = middle }
-        }
-        (inside + outside) / 2.0
-    }
-
-    fn is_within(&self, term: usize, density: f64) -> bool {
-        self.ratio(term, density) < NORMAL_975 * NORMAL_975
-    }
-
-    /// −2 ln of the ratio of the likelihood with this density of a term to its maximum.
-    fn ratio(&self, term: usize, density: f64) -> f64 {
+    /// How far from its value on this `side` the coefficient of a term has the deviate of a bound. The deviate is nearly linear in the
+    /// coefficient, so that the search goes by secants from the `first` distance on; it halves what is left where one leads out of it.
+    fn distance(&self, term: usize, side: f64, first: f64, most: f64) -> f64 {
+        let value = self.densities[term].sqrt();
         let mut densities = self.densities.clone();
-        densities[term] = density;
+        let (mut inside, mut outside) = (0.0, most);
+        let mut before = (0.0, -NORMAL_975);
+        let mut distance = first;
+        for _ in 0..MOST_STEPS {
+            let misfit = self.deviate(term, value + side * distance, &mut densities) - NORMAL_975;
+            if misfit.abs() < PRECISION * NORMAL_975 || !distance.is_finite() {
+                break;
+            }
+            *if misfit < 0.0 { &mut inside } else { &mut outside } = distance;
+            let secant = distance - misfit * (distance - before.0) / (misfit - before.1);
+            before = (distance, misfit);
+            let longest = LONGEST_STEP * distance;
+            distance = if inside < secant && secant < outside.min(longest) {
+                secant
+            } else if outside.is_finite() {
+                inside.midpoint(outside)
+            } else {
+                longest
+            };
+        }
+        distance
+    }
+
+    /// The normal deviate at which the likelihood, with this coefficient of a term, is below its maximum; the other `densities` become the
+    /// likeliest beside it, sought from where they are.
+    fn deviate(&self, term: usize, coefficient: f64, densities: &mut [f64]) -> f64 {
+        densities[term] = coefficient * coefficient;
         let held: Vec<usize> = std::iter::once(term).chain(self.known).collect();
-        let objective = fit_mixture_with(&self.bands, &self.bases, Sign::NonNegative, &held, &mut densities);
-        2.0 * (objective - self.objective).max(0.0)
+        let objective = fit_mixture_with(&self.bands, &self.bases, Sign::NonNegative, &held, densities);
+        (2.0 * (objective - self.objective).max(0.0)).sqrt()
     }
 }
