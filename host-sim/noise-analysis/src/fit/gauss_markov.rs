@@ -6,7 +6,7 @@
 //! least deviance `Σ edf·(ln(m/v) + v/m − 1)`, the measure of every other fit here, so it is close where the record
 //! determines the curve and not where white noise hides the slow part.
 
-use crate::minimum::golden_section;
+use crate::minimum::least_within;
 use allan_core::term::Markov;
 use allan_core::{Model, NoiseTerm, model::FittedTerm};
 
@@ -43,8 +43,8 @@ pub struct GaussMarkovFit {
 
 /// Correlation times that are tried, for every octave between the sample period and ten times the longest averaging time.
 const PER_OCTAVE: usize = 4;
-/// Steps of the golden section: 0.618³⁰ of a quarter octave is below the accuracy of a double's logarithm that matters.
-const SECTIONS: usize = 30;
+/// Octaves to which the likeliest correlation time is sought.
+const ACCURACY: f64 = 1e-6;
 /// Steps of Fisher scoring for the variance at a fixed correlation time.
 const STEPS: usize = 40;
 
@@ -64,7 +64,7 @@ pub fn fit(channels: &[SlowNoise], sample_period: f64) -> Option<GaussMarkovFit>
     let grid = ((to - from) * PER_OCTAVE as f64).ceil() as usize;
     let step = (to - from) / grid as f64;
     let best = (0..=grid).map(|at| from + at as f64 * step).min_by(|a, b| deviance(*a).total_cmp(&deviance(*b)))?;
-    let time_constant = golden_section((best - step, best + step), SECTIONS, deviance).exp2();
+    let time_constant = least_within((best - step, best + step), ACCURACY, deviance).exp2();
     let fits = channels.iter().map(|channel| (channel, variance(channel, time_constant, sample_period).0));
     let ratio = |channel: &SlowNoise, variance: f64| {
         let of = |octave: &SlowOctave| {

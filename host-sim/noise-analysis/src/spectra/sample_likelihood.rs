@@ -18,6 +18,7 @@ use super::whittle::{
 };
 use crate::distributions::{NORMAL_975, upper_tail};
 use crate::effects::findings::REFUTED;
+use crate::minimum::reach;
 use crate::samples::rounding::Rounding;
 use allan_core::model::FittedTerm;
 use allan_core::term::MovingAverageFilter;
@@ -35,11 +36,6 @@ const HANN: [(f64, f64); 3] = [(-1.0, 1.0 / 6.0), (0.0, 2.0 / 3.0), (1.0, 1.0 / 
 const MOST_LEAKAGE: f64 = 0.1;
 /// Least part of a density that a term has where the spectrum shows its shape.
 const SHOWS_SHAPE: f64 = 0.1;
-/// Width at which the search of a bound ends, as a part of its normal deviate, and most steps of it, each at most so many times the one before.
-const PRECISION: f64 = 1e-3;
-const MOST_STEPS: usize = 50;
-const LONGEST_STEP: f64 = 4.0;
-
 /// Whether a term is a sinusoid, whose size is no density.
 fn is_sinusoid(kind: &NoiseTerm) -> bool {
     matches!(kind, NoiseTerm::Sinusoid(_))
@@ -358,50 +354,20 @@ impl Likelihood {
     fn coefficient(&self, term: usize) -> (f64, f64, f64) {
         let density = self.densities[term];
         let value = density.sqrt();
-        let information: f64 = self
-            .bands
-            .iter()
-            .zip(&self.bases)
-            .map(|(band, basis)| band.ordinates * (basis[term] / mixture_density(basis, &self.densities)).powi(2))
-            .sum();
-        // What the bounds would be if all other densities were known.
-        let scatter = NORMAL_975 / information.sqrt();
-        let upper = value + self.distance(term, 1.0, (density + scatter).sqrt() - value, f64::INFINITY);
-        let lower = if self.deviate(term, 0.0, &mut self.densities.clone()) < NORMAL_975 {
-            0.0
-        } else {
-            let first = if scatter < density { value - (density - scatter).sqrt() } else { value / 2.0 };
-            value - self.distance(term, -1.0, first, value)
+        let of_band = |(band, basis): (&SpectralBand, &Vec<f64>)| {
+            band.ordinates * (basis[term] / mixture_density(basis, &self.densities)).powi(2)
         };
-        (value, lower, upper)
-    }
-
-    /// How far from its value on this `side` the coefficient of a term has the deviate of a bound. The deviate is nearly linear in the
-    /// coefficient, so that the search goes by secants from the `first` distance on; it halves what is left where one leads out of it.
-    fn distance(&self, term: usize, side: f64, first: f64, most: f64) -> f64 {
-        let value = self.densities[term].sqrt();
-        let mut densities = self.densities.clone();
-        let (mut inside, mut outside) = (0.0, most);
-        let mut before = (0.0, -NORMAL_975);
-        let mut distance = first;
-        for _ in 0..MOST_STEPS {
-            let misfit = self.deviate(term, value + side * distance, &mut densities) - NORMAL_975;
-            if misfit.abs() < PRECISION * NORMAL_975 || !distance.is_finite() {
-                break;
-            }
-            *if misfit < 0.0 { &mut inside } else { &mut outside } = distance;
-            let secant = distance - misfit * (distance - before.0) / (misfit - before.1);
-            before = (distance, misfit);
-            let longest = LONGEST_STEP * distance;
-            distance = if inside < secant && secant < outside.min(longest) {
-                secant
-            } else if outside.is_finite() {
-                inside.midpoint(outside)
-            } else {
-                longest
-            };
-        }
-        distance
+        let information: f64 = self.bands.iter().zip(&self.bases).map(of_band).sum();
+        // Where the bounds would be if all other densities were known.
+        let scatter = NORMAL_975 / information.sqrt();
+        let (first_up, first_down) = ((density + scatter).sqrt(), (density - scatter).max(0.0).sqrt());
+        // The deviate is nearly linear in the coefficient.
+        let bound = |side: f64, first: f64, far: f64| {
+            let mut densities = self.densities.clone();
+            let deviate = |distance: f64| self.deviate(term, value + side * distance, &mut densities) / NORMAL_975;
+            value + side * reach((first - value).abs(), far, deviate)
+        };
+        (value, if value > 0.0 { bound(-1.0, first_down, value) } else { 0.0 }, bound(1.0, first_up, f64::INFINITY))
     }
 
     /// The normal deviate at which the likelihood, with this coefficient of a term, is below its maximum; the other `densities` become the

@@ -1,6 +1,6 @@
 //! How many values of its own clock a filter makes for each sample that is read: where a deviance is least, and where it is small.
 
-use crate::minimum::{end_of, golden_section};
+use crate::minimum;
 use allan_core::term::MovingAverageFilter;
 
 /// Decimations are tried in steps of this factor, a quarter of an octave: with the shape of the filter known, the curve of the
@@ -8,8 +8,8 @@ use allan_core::term::MovingAverageFilter;
 const STEP: f64 = 1.189_207_115_002_721;
 /// Least decimation that is told from 1 (every value read).
 const LEAST_DECIMATION: f64 = 1.02;
-/// Steps of a search by a golden section or by halves: two steps of the decimation shrink to `1e-6` of it, or far less.
-const SEARCH_STEPS: usize = 26;
+/// Accuracy of the likeliest decimation, as a part of it: the curve of a day at 204.8 Hz knows the length of a filter to some 10⁻⁴.
+const ACCURACY: f64 = 1e-5;
 
 /// The largest decimation at which a filter is tried: its length, beyond which no two samples are correlated.
 fn longest(filter: MovingAverageFilter) -> f64 {
@@ -33,18 +33,18 @@ pub(super) fn slowest(
     let tried = decimations(filter).map(|decimation| (decimation, at(decimation)));
     let (start, _) = tried.reduce(|best, next| if next.1 < best.1 { next } else { best })?;
     let range = ((start / STEP).max(LEAST_DECIMATION), (start * STEP).min(longest(filter)));
-    Some(least_within(filter, range, SEARCH_STEPS, deviance))
+    Some(least_within(filter, range, ACCURACY, deviance))
 }
 
-/// The filter read at the decimation within a range at which `deviance` is least, after so many steps.
+/// The filter read at the decimation within a range at which `deviance` is least, to such a part of it.
 pub(super) fn least_within(
     filter: MovingAverageFilter,
     (from, to): (f64, f64),
-    steps: usize,
+    accuracy: f64,
     mut deviance: impl FnMut(MovingAverageFilter) -> f64,
 ) -> MovingAverageFilter {
     let at = |log: f64| MovingAverageFilter { decimation: log.exp(), ..filter };
-    at(golden_section((from.ln(), to.ln()), steps, |log| deviance(at(log))))
+    at(minimum::least_within((from.ln(), to.ln()), accuracy, |log| deviance(at(log))))
 }
 
 /// The decimations of `filter`, from just above 1 to its length, between which the `deviance` is at most `limit`, around its own; its own
@@ -56,25 +56,24 @@ pub(super) fn allowed(
 ) -> (f64, f64) {
     match filter.decimation {
         1.0 => (1.0, 1.0),
-        own => {
-            allowed_within(filter, (LEAST_DECIMATION.min(own), longest(filter).max(own)), SEARCH_STEPS, limit, deviance)
-        }
+        own => allowed_within(filter, (LEAST_DECIMATION.min(own), longest(filter).max(own)), limit, deviance),
     }
 }
 
-/// The same within a range, by so many halves of it on either side.
+/// The same within a range.
 pub(super) fn allowed_within(
     filter: MovingAverageFilter,
     (from, to): (f64, f64),
-    steps: usize,
     limit: f64,
     mut deviance: impl FnMut(MovingAverageFilter) -> f64,
 ) -> (f64, f64) {
-    let mut is_allowed = |log: f64| deviance(MovingAverageFilter { decimation: log.exp(), ..filter }) <= limit;
-    let mut bound = |outside: f64| {
-        let end = end_of((filter.decimation.ln(), outside.ln()), steps, &mut is_allowed);
+    let own = filter.decimation.ln();
+    let rise = limit - deviance(filter);
+    let mut bound = |end: f64| {
+        let of = |log: f64| deviance(MovingAverageFilter { decimation: log.exp(), ..filter });
+        let risen = minimum::risen((own, end.ln()), rise, of);
         // The end of the range as it is.
-        if end == outside.ln() { outside } else { end.exp() }
+        if risen == end.ln() { end } else { risen.exp() }
     };
     (bound(from), bound(to))
 }

@@ -10,9 +10,8 @@ use crate::spectra::{SampleSpectrum, SpectrumBehindFilter};
 use allan_core::NoiseTerm;
 use allan_core::term::MovingAverageFilter;
 
-/// Steps of the search for the decimation within what the curves allow, and of that for its bounds: to one in a thousand of that range.
-const SEARCH_STEPS: usize = 14;
-const BOUND_STEPS: usize = 10;
+/// Accuracy of the likeliest decimation, as a part of the range that the curves allow.
+const ACCURACY: f64 = 1e-3;
 
 /// A filter that the curves allow, with a decimation between these.
 pub(super) type AllowedFilter = (MovingAverageFilter, (f64, f64));
@@ -89,7 +88,7 @@ fn likeliest(
     }
     let whole = (from.ceil() as u32..=to.floor() as u32).map(f64::from);
     let whole = whole.map(|decimation| MovingAverageFilter { decimation, ..filter });
-    let between = least_within(filter, (from, to), SEARCH_STEPS, &deviance);
+    let between = least_within(filter, (from, to), ACCURACY * (to / from).ln(), &deviance);
     whole.fold((deviance(between), between), |least, read| {
         let deviance = deviance(read);
         if deviance < least.0 { (deviance, read) } else { least }
@@ -121,7 +120,7 @@ impl JointSpectra<'_> {
         let own = self.channels.iter().map(|(of, dispersion)| of.least / dispersion);
         let rises: Vec<f64> = common.deviances.iter().zip(own).map(|(joint, own)| (joint - own).max(0.0)).collect();
         let limit = common.total() + rise * birge_ratio(&rises);
-        allowed_within(common.filter, self.allowed.1, BOUND_STEPS, limit, |read| self.deviances(read).iter().sum())
+        allowed_within(common.filter, self.allowed.1, limit, |read| self.deviances(read).iter().sum())
     }
 }
 

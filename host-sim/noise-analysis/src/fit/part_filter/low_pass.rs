@@ -4,7 +4,7 @@
 use super::channel_deviance::ChannelDeviance;
 use super::hypothesis::{BOUNDED, chi_squared_quantile};
 use crate::bounds::BoundedEstimate;
-use crate::minimum::{end_of, golden_section};
+use crate::minimum::{least_within, risen};
 use allan_core::NoiseTerm;
 use allan_core::term::{LowPass, MovingAverageFilter};
 
@@ -18,8 +18,8 @@ const DESIGNS: [Design; 2] = [LowPass::butterworth, LowPass::two_stages];
 const FREQUENCIES: (f64, f64) = (1.0 / 128.0, 1.0);
 /// Factor between two frequencies that are tried: the deviance has one minimum within two of them.
 const STEP: f64 = std::f64::consts::SQRT_2;
-/// Steps of the search between these, and of that for a bound: to less than a thousandth of a step.
-const SEARCH_STEPS: usize = 16;
+/// Accuracy of the likeliest frequency, as a part of it.
+const ACCURACY: f64 = 1e-4;
 
 /// The low-pass filter with which the deviances of the channels, with what their other terms cost, are less than with the `averages` by
 /// more than `required`; and the bounds of its frequency, Hz.
@@ -48,8 +48,7 @@ pub(super) fn in_place_of(
         let of = |(of, dispersion): (&mut ChannelDeviance, &f64)| of.cost_behind(behind).total() / dispersion;
         channels.iter_mut().zip(&dispersions).map(of).sum::<f64>()
     };
-    let limit = sum(at.ln()) + chi_squared_quantile(BOUNDED, 1.0);
-    let mut bound = |outside: f64| end_of((at.ln(), outside.ln()), SEARCH_STEPS, |log| sum(log) <= limit).exp();
+    let mut bound = |outside: f64| risen((at.ln(), outside.ln()), chi_squared_quantile(BOUNDED, 1.0), &mut sum).exp();
     let (low, high) = (bound(at / STEP), bound(at * STEP));
     Some((design(at), BoundedEstimate { value: at, low, high }))
 }
@@ -64,6 +63,6 @@ fn likeliest(design: Design, channels: &mut [ChannelDeviance], rate_hz: f64) -> 
     let tried = std::iter::successors(Some(from.ln()), |log| Some(log + STEP.ln())).take_while(|log| *log <= to.ln());
     let tried = tried.map(|log| (sum(log), log)).reduce(|best, next| if next.0 < best.0 { next } else { best });
     let start = tried.map_or(from.ln(), |(_, log)| log);
-    let at = golden_section((start - STEP.ln(), start + STEP.ln()), SEARCH_STEPS, &mut sum);
+    let at = least_within((start - STEP.ln(), start + STEP.ln()), ACCURACY, &mut sum);
     (sum(at), design, at.exp())
 }
