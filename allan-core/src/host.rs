@@ -6,7 +6,7 @@ use crate::coupling::Coupling;
 use crate::curve::{AllanPoint, Curve, CurveView};
 use crate::fit::{Baseline, FreeShapes, estimate, set_free_bounds};
 use crate::model::Model;
-use crate::term::{AllTerms, NoiseTerm};
+use crate::term::{AllTerms, MovingAverageFilter, NoiseTerm};
 
 /// Part of a measured variance that remains of it when rounding is taken off.
 const LEAST_LEFT: f64 = 0.01;
@@ -106,5 +106,15 @@ impl<'a> DevianceComparison<'a> {
     /// `Σ edf·(v/m − 1 − ln(v/m))` with the coefficients of `kinds` that make it least; infinite without terms.
     pub fn deviance(&mut self, kinds: &[NoiseTerm]) -> f64 {
         f64::from(self.0.deviance - self.0.fall(kinds))
+    }
+
+    /// The same where the Allan variance of the terms that pass the filter, or are behind it, is known for a coefficient of 1 by their
+    /// kind and the averaging factor: several channels behind one filter share it. `None` of what is not known.
+    pub fn deviance_with(&mut self, kinds: &[NoiseTerm], known: impl Fn(&NoiseTerm, u64) -> Option<f64>) -> f64 {
+        let period = self.0.sample_period();
+        let avar = |kind: &NoiseTerm, filter: Option<&MovingAverageFilter>, n: u64| {
+            known(kind, n).unwrap_or_else(|| kind.avar_behind(filter, n, period))
+        };
+        f64::from(self.0.deviance - self.0.fall_with(kinds, avar))
     }
 }

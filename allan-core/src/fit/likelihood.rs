@@ -13,7 +13,7 @@ use crate::model::{
     FittedTerm, FlickerCorrelations, MAX_TERMS, Model, degrees_of_freedom, filter_of, variance_fractions,
 };
 use crate::noise_type::VarianceFractions;
-use crate::term::{NoiseTerm, TermSet};
+use crate::term::{MovingAverageFilter, NoiseTerm, TermSet};
 use core::f32::consts::LN_2;
 use core::marker::PhantomData;
 use heapless::Vec;
@@ -147,6 +147,12 @@ impl<T: TermSet> Problem<T> {
     /// Sets the terms to the first [`MAX_TERMS`] of `kinds`. Terms that are unchanged keep their columns and amounts.
     #[inline(never)] // here and below: so that stack frames do not add up in the caller
     pub(super) fn set_terms(&mut self, points: &Points, kinds: &[NoiseTerm]) {
+        self.set_terms_by(points, kinds, &Self::set_column);
+    }
+
+    /// The same with another way to set the contributions of a term.
+    #[inline(always)]
+    fn set_terms_by(&mut self, points: &Points, kinds: &[NoiseTerm], set: &impl Fn(&mut Self, &Points, usize)) {
         let before = filter_of(&self.kinds);
         let mut is_known = [false; MAX_TERMS];
         let given = || kinds.iter().filter(|kind| T::contains(kind)).take(MAX_TERMS);
@@ -161,9 +167,21 @@ impl<T: TermSet> Problem<T> {
                 self.amounts[term] = 0.0;
             }
             if !is_known || (!is_same_filter && self.kinds[term].passes_filter()) {
-                self.set_column(points, term);
+                set(self, points, term);
             }
         }
+    }
+
+    /// The same with the Allan variance of a term, behind a filter or without one, at an averaging factor from elsewhere.
+    #[cfg(feature = "host")]
+    pub(super) fn set_terms_with(
+        &mut self,
+        points: &Points,
+        kinds: &[NoiseTerm],
+        avar: impl Fn(&NoiseTerm, Option<&MovingAverageFilter>, u64) -> f64,
+    ) {
+        let set = |own: &mut Self, points: &Points, term: usize| own.set_column_by(points, term, &avar);
+        self.set_terms_by(points, kinds, &set);
     }
 
     /// Sets the terms and the coefficients to those of a model, and the points' confidence to that under it.
@@ -225,10 +243,22 @@ impl<T: TermSet> Problem<T> {
     /// Sets the contributions of a term to the points; its coefficient stays.
     #[inline(never)]
     fn set_column(&mut self, points: &Points, term: usize) {
+        let period = points.curve.sample_period();
+        self.set_column_by(points, term, &|kind, filter, n| T::avar(kind, filter, n, period));
+    }
+
+    /// The same by the Allan variance of a term behind a filter at an averaging factor.
+    #[inline(always)]
+    fn set_column_by(
+        &mut self,
+        points: &Points,
+        term: usize,
+        avar: &impl Fn(&NoiseTerm, Option<&MovingAverageFilter>, u64) -> f64,
+    ) {
         let (kind, filter) = (self.kinds[term], filter_of(&self.kinds));
         let mut largest = 0.0_f64;
         for (known, point) in (0..MAX_POINTS).zip(points.all()) {
-            let share = T::avar(&kind, filter.as_ref(), point.n, points.curve.sample_period()) / point.avar;
+            let share = avar(&kind, filter.as_ref(), point.n) / point.avar;
             let column = &mut self.columns[term];
             if share > largest {
                 let shrink = (largest / share) as f32;

@@ -224,14 +224,16 @@ fn best_candidate(
     let ramp = blocks.ramp();
     // With the −2 ln likelihood by which they are compared.
     let mut rivals: Vec<(f64, Accepted)> = Vec::new();
-    let single = std::iter::once((Candidate::Ramp, &ramp))
-        .chain(regressors.iter().map(|(index, regressor)| (Candidate::Regressor(*index), regressor)));
+    let single =
+        || std::iter::once((None, &ramp)).chain(regressors.iter().map(|(index, regressor)| (Some(*index), regressor)));
     // Where the bias follows a slow temperature behind a lag, it resembles the temperature itself: not as much as it has to for its name.
     let mut resembles_temperature = false;
-    for (candidate, regressor) in single {
-        let estimate = regression.estimate_below(REFUTED, regressor);
+    let estimates =
+        regression.estimates_below(REFUTED, &single().map(|(_, regressor)| regressor.clone()).collect::<Vec<_>>());
+    for ((index, regressor), estimate) in single().zip(estimates) {
+        let candidate = index.map_or(Candidate::Ramp, Candidate::Regressor);
         let Some(RegressionEstimate { p_value, deviance, .. }) = estimate else { continue };
-        let is_temperature = |(index, _): &(usize, _)| matches!(candidate, Candidate::Regressor(of) if of == *index);
+        let is_temperature = |(of, _): &(usize, _)| index == Some(*of);
         resembles_temperature |= temperature.as_ref().is_some_and(is_temperature);
         if p_value < SIGNIFICANCE {
             rivals.push((deviance, Accepted { candidate, regressor: regressor.clone(), p_value }));
@@ -276,10 +278,11 @@ fn best_candidate(
         rivals.push((deviance + thermal_response::ADVANTAGE, accepted));
     }
     let is_shaken = accepted.iter().any(|accepted| matches!(accepted.candidate, Candidate::Vibration(_)));
-    for (at, vibration) in vibrations.iter().enumerate().filter(|_| !is_shaken) {
-        let regressor = vibration.regressor(blocks);
-        if let Some(RegressionEstimate { size, p_value, deviance, .. }) =
-            regression.estimate_below(SIGNIFICANCE, &regressor)
+    let vibrations: &[Vibration] = if is_shaken { &[] } else { vibrations };
+    let shaken: Vec<DVector<f64>> = vibrations.iter().map(|vibration| vibration.regressor(blocks)).collect();
+    let estimates = regression.estimates_below(SIGNIFICANCE, &shaken);
+    for (at, ((vibration, regressor), estimate)) in vibrations.iter().zip(shaken).zip(estimates).enumerate() {
+        if let Some(RegressionEstimate { size, p_value, deviance, .. }) = estimate
             && vibration.is_possible(size)
         {
             rivals.push((deviance, Accepted { candidate: Candidate::Vibration(at), regressor, p_value }));

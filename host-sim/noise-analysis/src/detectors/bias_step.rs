@@ -60,11 +60,10 @@ pub(super) fn find(
     known: &[DVector<f64>],
     regression: &GlsRegression<'_>,
 ) -> Option<BiasStep> {
-    let steps = regression.steps();
-    if !regression.any_may_be_below(SIGNIFICANCE, &steps) {
+    if !regression.any_step_may_be_below(SIGNIFICANCE) {
         return None;
     }
-    let scan = StepScan::new(regression, &steps)?;
+    let scan = StepScan::new(regression, &regression.steps())?;
     let p_value = scan.p_value_anywhere();
     if p_value >= SIGNIFICANCE {
         return None;

@@ -10,7 +10,7 @@
 use super::block_means::BlockMeans;
 use super::noise_grid::{NoiseCovariance, NoiseFamily, NoiseGrid};
 use crate::distributions::upper_tail;
-use nalgebra::{DMatrix, DMatrixView, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView};
 
 /// A regressor that keeps less than this fraction of its information when the others are fitted too is a combination of them.
 const COLLINEAR: f64 = 1e-6;
@@ -41,8 +41,6 @@ pub struct GlsRegression<'a> {
 /// The regression under the mixtures of one family.
 struct FamilyFits<'a> {
     family: &'a NoiseFamily,
-    /// Coordinates of the known regressors.
-    known: DMatrix<f64>,
     fits: Vec<GlsFit<'a>>,
 }
 
@@ -55,6 +53,8 @@ struct GlsFit<'a> {
     /// Inverse of the information on the known regressors, and their weighted products with the means.
     inverse: DMatrix<f64>,
     products: DVector<f64>,
+    /// The inverse times the products: the sizes of the known regressors.
+    known_sizes: DVector<f64>,
     /// Weighted sum of squares of the residuals.
     residual: f64,
     log_determinant: f64,
@@ -78,7 +78,7 @@ impl<'a> GlsRegression<'a> {
         let of_family = |family: &'a NoiseFamily| {
             let (means, known) = (family.coordinates(&blocks.means), family.coordinates_of_columns(&columns));
             let fits = family.mixtures.iter().filter_map(|noise| GlsFit::new(noise, &means, &known)).collect();
-            FamilyFits { family, known, fits }
+            FamilyFits { family, fits }
         };
         Self { blocks, known: known.len(), families: grid.iter().map(of_family).collect() }
     }
@@ -89,17 +89,29 @@ impl<'a> GlsRegression<'a> {
 
     /// Size of one more regressor; `None` if it is a combination of the known ones.
     pub fn estimate(&self, regressor: &DVector<f64>) -> Option<RegressionEstimate> {
-        self.average(&self.sizes(regressor)?)
+        self.estimates(std::slice::from_ref(regressor)).pop()?
     }
 
-    /// Size of one more regressor under every mixture; `None` if it is a combination of the known ones.
-    fn sizes(&self, regressor: &DVector<f64>) -> Option<Vec<SizeAndInformation>> {
-        let of_family = |FamilyFits { family, known, fits }: &FamilyFits<'a>| {
-            let regressor = family.coordinates(regressor);
-            fits.iter().map(|fit| fit.estimate(&regressor, known)).collect::<Option<Vec<SizeAndInformation>>>()
+    /// The same for each of `regressors`, every one by itself.
+    pub(super) fn estimates(&self, regressors: &[DVector<f64>]) -> Vec<Option<RegressionEstimate>> {
+        self.sizes(regressors).into_iter().map(|sizes| self.average(&sizes?)).collect()
+    }
+
+    /// Sizes of each of `regressors`, every one by itself, under every mixture; `None` for a combination of the known ones.
+    fn sizes(&self, regressors: &[DVector<f64>]) -> Vec<Option<Vec<SizeAndInformation>>> {
+        if regressors.is_empty() {
+            return Vec::new();
+        }
+        // One product of matrices for each family is faster than one of a matrix and a vector for each regressor.
+        let columns = DMatrix::from_columns(regressors);
+        let coordinates: Vec<DMatrix<f64>> =
+            self.families.iter().map(|of| of.family.coordinates_of_columns(&columns)).collect();
+        let of_regressor = |at: usize| {
+            let families = self.families.iter().zip(&coordinates);
+            let fits = families.flat_map(|(of, coordinates)| of.fits.iter().map(|fit| (fit, coordinates.column(at))));
+            fits.map(|(fit, regressor)| fit.estimate(regressor)).collect()
         };
-        let sizes: Option<Vec<Vec<SizeAndInformation>>> = self.families.iter().map(of_family).collect();
-        Some(sizes?.concat())
+        (0..regressors.len()).map(of_regressor).collect()
     }
 
     /// Sizes of a step at the beginning of each block, every one by itself, under every mixture; `None` where the step is a combination
@@ -111,22 +123,30 @@ impl<'a> GlsRegression<'a> {
         (0..self.blocks.means.len()).map(step).collect()
     }
 
-    /// Whether any of such steps may have a p-value below `limit`.
-    pub(super) fn any_may_be_below(&self, limit: f64, steps: &[Option<StepSizes>]) -> bool {
+    /// Whether any of these may have a p-value below `limit`.
+    pub(super) fn any_step_may_be_below(&self, limit: f64) -> bool {
         let least_part = self.least_part(limit);
-        steps.iter().flatten().any(|StepSizes(sizes)| self.reaches(least_part, sizes))
+        self.families.iter().any(|family| family.any_step_explains(least_part))
     }
 
     /// As [`estimate`](Self::estimate), if the p-value is below `limit`.
     pub(super) fn estimate_below(&self, limit: f64, regressor: &DVector<f64>) -> Option<RegressionEstimate> {
-        let sizes = self.sizes(regressor)?;
-        let may_be_below = self.reaches(self.least_part(limit), &sizes);
-        may_be_below.then(|| self.average(&sizes))?.filter(|estimate| estimate.p_value < limit)
+        self.estimates_below(limit, std::slice::from_ref(regressor)).pop()?
+    }
+
+    /// The same for each of `regressors`, every one by itself.
+    pub(super) fn estimates_below(&self, limit: f64, regressors: &[DVector<f64>]) -> Vec<Option<RegressionEstimate>> {
+        let least_part = self.least_part(limit);
+        let estimate = |sizes: Option<Vec<SizeAndInformation>>| {
+            let sizes = sizes.filter(|sizes| self.reaches(least_part, sizes))?;
+            self.average(&sizes).filter(|estimate| estimate.p_value < limit)
+        };
+        self.sizes(regressors).into_iter().map(estimate).collect()
     }
 
     /// Whether a regressor explains more than this part of the weighted sum of squares under any mixture.
     fn reaches(&self, part: f64, sizes: &[SizeAndInformation]) -> bool {
-        self.fits().zip(sizes).any(|(fit, at)| at.size * at.size * at.information > part * fit.residual)
+        self.fits().zip(sizes).any(|(fit, at)| fit.is_explained(part, *at))
     }
 
     /// The part of the weighted sum of squares that a regressor has to explain under one mixture at least for a p-value below
@@ -223,6 +243,28 @@ impl<'a> GlsRegression<'a> {
 impl FamilyFits<'_> {
     /// Under each mixture, the size of a step at the beginning of each block.
     fn estimate_steps(&self) -> Vec<Vec<Option<SizeAndInformation>>> {
+        let products = self.products_with_blocks();
+        let estimate = |(fit, products): (&GlsFit<'_>, &DMatrixView<'_, f64>)| {
+            let information = self.family.step_information(fit.noise);
+            let mut steps = vec![None; information.len()];
+            fit.estimate_steps(information, products).for_each(|(at, step)| steps[at] = step);
+            steps
+        };
+        self.fits.iter().zip(&self.of_fits(&products)).map(estimate).collect()
+    }
+
+    /// Whether a step explains more than this part of the weighted sum of squares under any mixture.
+    fn any_step_explains(&self, part: f64) -> bool {
+        let products = self.products_with_blocks();
+        let explains = |(fit, products): (&GlsFit<'_>, &DMatrixView<'_, f64>)| {
+            let mut steps = fit.estimate_steps(self.family.step_information(fit.noise), products);
+            steps.any(|(_, step)| step.is_some_and(|step| fit.is_explained(part, step)))
+        };
+        self.fits.iter().zip(&self.of_fits(&products)).any(explains)
+    }
+
+    /// The products of each block with the weighted means and with the weighted known regressors of each mixture, a row each.
+    fn products_with_blocks(&self) -> DMatrix<f64> {
         // One product of matrices is faster than one of a matrix and a vector for each mixture.
         let columns = self
             .fits
@@ -230,15 +272,15 @@ impl FamilyFits<'_> {
             .flat_map(|fit| std::iter::once(fit.weighted_means.column(0)).chain(fit.weighted_known.column_iter()));
         let columns: Vec<_> = columns.collect();
         if columns.is_empty() {
-            return Vec::new();
+            return DMatrix::zeros(0, 0);
         }
-        let products = self.family.products_with_blocks(&DMatrix::from_columns(&columns));
-        let of_fits = self.fits.iter().zip(0..);
-        let estimate = |(fit, at): (&GlsFit<'_>, usize)| {
-            let vectors = 1 + fit.weighted_known.ncols();
-            fit.estimate_steps(self.family.step_information(fit.noise), &products.rows(at * vectors, vectors))
-        };
-        of_fits.map(estimate).collect()
+        self.family.products_with_blocks(&DMatrix::from_columns(&columns))
+    }
+
+    /// The rows of each mixture.
+    fn of_fits<'p>(&self, products: &'p DMatrix<f64>) -> Vec<DMatrixView<'p, f64>> {
+        let vectors = |fit: &GlsFit<'_>| 1 + fit.weighted_known.ncols();
+        self.fits.iter().zip(0..).map(|(fit, at)| products.rows(at * vectors(fit), vectors(fit))).collect()
     }
 }
 
@@ -255,40 +297,51 @@ impl<'a> GlsFit<'a> {
         };
         let products = known.transpose() * &weighted_means;
         let total = means.dot(&weighted_means);
-        let residual = (total - products.dot(&(&inverse * &products))).max(f64::MIN_POSITIVE);
+        let known_sizes = &inverse * &products;
+        let residual = (total - products.dot(&known_sizes)).max(f64::MIN_POSITIVE);
         let log_determinant = noise.log_determinant + log_information;
-        Some(Self { noise, weighted_means, weighted_known, inverse, products, residual, log_determinant })
+        Some(Self { noise, weighted_means, weighted_known, inverse, products, known_sizes, residual, log_determinant })
     }
 
-    fn estimate(&self, regressor: &DVector<f64>, known: &DMatrix<f64>) -> Option<SizeAndInformation> {
-        let weighted = self.noise.weighted(regressor);
-        let with_known = known.transpose() * &weighted;
-        self.beside_known(regressor.dot(&weighted), regressor.dot(&self.weighted_means), &with_known)
+    /// Size of a regressor with these coordinates.
+    fn estimate(&self, regressor: DVectorView<'_, f64>) -> Option<SizeAndInformation> {
+        let with_known = |known: usize| self.weighted_known.column(known).dot(&regressor);
+        self.beside_known(self.noise.square(regressor), regressor.dot(&self.weighted_means), &with_known)
     }
 
     /// Of the information on each step, and the products of each block with the weighted means and with the weighted known regressors, a
-    /// row each.
-    fn estimate_steps(&self, information: &[f64], products: &DMatrixView<'_, f64>) -> Vec<Option<SizeAndInformation>> {
-        let mut steps = vec![None; information.len()];
-        let (mut with_means, mut with_known) = (0.0, DVector::zeros(products.nrows() - 1));
-        // A step before the first block would be the constant.
-        for at in (1..information.len()).rev() {
-            with_means += products[(0, at)];
-            with_known += products.column(at).rows(1, products.nrows() - 1);
-            steps[at] = self.beside_known(information[at], with_means, &with_known);
-        }
-        steps
+    /// row each: the steps before each block but the first, where one would be the constant; the last one first.
+    fn estimate_steps(
+        &self,
+        information: &[f64],
+        products: &DMatrixView<'_, f64>,
+    ) -> impl Iterator<Item = (usize, Option<SizeAndInformation>)> {
+        let mut sums = vec![0.0; products.nrows()];
+        (1..information.len()).rev().map(move |at| {
+            sums.iter_mut().zip(&products.column(at)).for_each(|(sum, product)| *sum += product);
+            (at, self.beside_known(information[at], sums[0], &|known| sums[1 + known]))
+        })
     }
 
-    /// Size of a regressor with this information, and these weighted products with the means and with the known regressors.
-    fn beside_known(&self, information: f64, with_means: f64, with_known: &DVector<f64>) -> Option<SizeAndInformation> {
-        if with_known.is_empty() {
-            return (information > 0.0).then(|| SizeAndInformation { size: with_means / information, information });
+    /// Size of a regressor with this information, and these weighted products with the means and with each known regressor.
+    fn beside_known(
+        &self,
+        information: f64,
+        with_means: f64,
+        with_known: &dyn Fn(usize) -> f64,
+    ) -> Option<SizeAndInformation> {
+        let (mut left, mut along) = (information, with_means);
+        for (row, size) in self.known_sizes.iter().enumerate() {
+            let of_row = with_known(row);
+            along -= of_row * size;
+            left -= (0..self.products.len()).map(|at| of_row * self.inverse[(row, at)] * with_known(at)).sum::<f64>();
         }
-        let along = &self.inverse * with_known;
-        let left = information - with_known.dot(&along);
-        (left > COLLINEAR * information)
-            .then(|| SizeAndInformation { size: (with_means - self.products.dot(&along)) / left, information: left })
+        (left > COLLINEAR * information).then(|| SizeAndInformation { size: along / left, information: left })
+    }
+
+    /// Whether a regressor of this size explains more than this part of the weighted sum of squares.
+    fn is_explained(&self, part: f64, SizeAndInformation { size, information }: SizeAndInformation) -> bool {
+        size * size * information > part * self.residual
     }
 }
 
@@ -379,7 +432,7 @@ mod tests {
             let steps = regression.steps();
             let p_values = steps.iter().flatten().filter_map(|step| Some(regression.estimate_step(step)?.p_value));
             let least = p_values.fold(1.0, f64::min);
-            assert!(regression.any_may_be_below(1.001 * least, &steps), "{run}: {least}");
+            assert!(regression.any_step_may_be_below(1.001 * least), "{run}: {least}");
         }
     }
 

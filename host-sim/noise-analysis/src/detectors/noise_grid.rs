@@ -9,7 +9,7 @@
 
 use super::block_means::{BLOCKS, BlockMeans};
 use crate::parallel::in_parallel;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 use std::f64::consts::{LN_2, PI};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -144,10 +144,9 @@ impl NoiseCovariance {
     }
 
     /// Weighted sum of the squares of values with these coordinates, of which the constant does not see anything.
-    fn square(&self, coordinates: &DVector<f64>) -> f64 {
-        let squares: f64 =
-            self.precisions.iter().zip(coordinates).map(|(precision, value)| precision * value * value).sum();
-        squares - self.along_constant.dot(coordinates).powi(2)
+    pub(super) fn square(&self, coordinates: DVectorView<'_, f64>) -> f64 {
+        let weighted = self.precisions.component_mul(&coordinates);
+        weighted.dot(&coordinates) - self.along_constant.dot(&coordinates).powi(2)
     }
 }
 
@@ -158,12 +157,12 @@ impl StepInformation {
         let mut step = family.constant.clone();
         let later = family.basis.column_iter().take(size - 1).map(|block| {
             step -= block;
-            mixture.square(&step)
+            mixture.square(step.column(0))
         });
         let of_size: Vec<f64> = std::iter::once(0.0).chain(later).collect();
         let between = |at: usize| {
             // Two neighbouring steps differ in one block.
-            let of_block = mixture.square(&family.basis.column(at).into_owned());
+            let of_block = mixture.square(family.basis.column(at));
             let shared = 0.5 * (of_size[at] + of_size[at + 1] - of_block);
             let correlation = shared / (of_size[at] * of_size[at + 1]).sqrt();
             if correlation.is_finite() { correlation.clamp(-1.0, 1.0).acos() / PI } else { 0.0 }

@@ -100,7 +100,10 @@ impl TemperatureCourse {
             return None;
         }
         let ratio = (longest / TIME_CONSTANTS_S.0).powf(1.0 / (TIME_CONSTANTS - 1) as f64);
-        let estimate = |time_constant: f64| regression.estimate(&self.lagged_regressor(time_constant, blocks));
+        let estimate = |time_constants: &[f64]| {
+            let regressors = time_constants.iter().map(|of| self.lagged_regressor(*of, blocks));
+            regression.estimates(&regressors.collect::<Vec<DVector<f64>>>())
+        };
         TimeConstant::likeliest((TIME_CONSTANTS_S.0, ratio, TIME_CONSTANTS), 1.0, estimate, estimate)
     }
 

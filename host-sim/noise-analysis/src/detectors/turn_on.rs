@@ -25,11 +25,14 @@ impl Transient {
     pub(super) fn likeliest(blocks: &BlockMeans, regression: &GlsRegression) -> Option<Self> {
         let longest = LONGEST_PART * (blocks.numbers.last()? + 1) as f64;
         let ratio = (longest / SHORTEST_BLOCKS).powf(1.0 / (TIME_CONSTANTS - 1) as f64);
+        let regressors = |time_constants: &[f64]| -> Vec<DVector<f64>> {
+            time_constants.iter().map(|of| regressor(*of, blocks)).collect()
+        };
         let found = TimeConstant::likeliest(
             (SHORTEST_BLOCKS, ratio, TIME_CONSTANTS),
             0.5,
-            |time_constant| regression.estimate_below(SIGNIFICANCE, &regressor(time_constant, blocks)),
-            |time_constant| regression.estimate(&regressor(time_constant, blocks)),
+            |time_constants| regression.estimates_below(SIGNIFICANCE, &regressors(time_constants)),
+            |time_constants| regression.estimates(&regressors(time_constants)),
         )?;
         // One that is likeliest with the longest time constant is slower still: a drift.
         (found.value < longest * (1.0 - 1e-9)).then_some(Self(found))

@@ -137,13 +137,15 @@ pub(crate) fn without_sines(mut series: UniformSeries) -> UniformSeries {
 fn sine_that_stands_out(series: &UniformSeries) -> Option<Sine> {
     let spectrum = Periodogram::new(series)?;
     let ordinates: Vec<f64> = spectrum.independent().collect();
-    let over_others = |at: usize| {
+    let others = |at: usize| {
         let around = at.saturating_sub(NEARBY).max(FEWEST_PERIODS)..(at + NEARBY + 1).min(ordinates.len());
-        let mut others: Vec<f64> = around.filter(|&of| of.abs_diff(at) > 1).map(|of| ordinates[of]).collect();
+        ordinates[around.start..around.start.max(at - 1)].iter().chain(&ordinates[at + 2..around.end])
+    };
+    // The median of an exponential variable is ln 2 times its mean.
+    let over_others = |at: usize| {
+        let mut others: Vec<f64> = others(at).copied().collect();
         let middle = others.len() / 2;
-        let (_, median, _) = others.select_nth_unstable_by(middle, f64::total_cmp);
-        // The median of an exponential variable is ln 2 times its mean.
-        ordinates[at] * LN_2 / *median
+        ordinates[at] * LN_2 / *others.select_nth_unstable_by(middle, f64::total_cmp).1
     };
     // Means hold little of what is faster than half of their rate.
     let searched = FEWEST_PERIODS..ordinates.len() / 2;
@@ -151,7 +153,14 @@ fn sine_that_stands_out(series: &UniformSeries) -> Option<Sine> {
         return None;
     }
     let limit = (searched.len() as f64 / SIGNIFICANCE).ln();
-    let (largest, ratio) = searched.map(|at| (at, over_others(at))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    // Whether more than half of the others are so low is counted far faster than their median is found.
+    let may_stand_out = |at: &usize| {
+        let low = ordinates[*at] * LN_2 / limit;
+        let (below, all) = others(*at).fold((0, 0), |(below, all), of| (below + usize::from(*of < low), all + 1));
+        below > all / 2
+    };
+    let large = searched.filter(may_stand_out).map(|at| (at, over_others(at)));
+    let (largest, ratio) = large.max_by(|a, b| a.1.total_cmp(&b.1))?;
     let at = (PADDING * largest - 1..=PADDING * largest + 1)
         .max_by(|&a, &b| spectrum.padded()[a].total_cmp(&spectrum.padded()[b]))?;
     let spacing = spectrum.resolution() / PADDING as f64;

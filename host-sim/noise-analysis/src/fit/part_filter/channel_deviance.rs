@@ -44,6 +44,32 @@ pub(super) fn without_rounding(channel: &FilteredChannel) -> Curve<OCTAVES> {
     curve
 }
 
+/// Allan variances behind a filter, which all channels share.
+pub(super) struct VariancesBehind {
+    filter: MovingAverageFilter,
+    /// Of each kind for a coefficient of 1, at averaging factors of 1, 2, 4 and so on.
+    kinds: [(NoiseTerm, Vec<f64>); 3],
+}
+
+impl VariancesBehind {
+    /// At so many octaves, of channels that are sampled every `period` seconds.
+    pub(super) fn new(filter: MovingAverageFilter, octaves: u32, period: f64) -> Self {
+        let filtered = FittedTerm::exact(NoiseTerm::Filtered(filter), 1.0);
+        let kinds = [filtered.kind, NoiseTerm::BiasInstability, NoiseTerm::RateRandomWalk];
+        let of_kind = |kind: NoiseTerm| {
+            let own = FittedTerm::exact(kind, 1.0);
+            let model = Model::new(period, [filtered, own]);
+            (kind, (0..octaves).map(|octave| model.part(&own, 1 << octave)).collect())
+        };
+        Self { filter, kinds: kinds.map(of_kind) }
+    }
+
+    fn avar(&self, kind: &NoiseTerm, n: u64) -> Option<f64> {
+        let (_, octaves) = self.kinds.iter().find(|(of, _)| of == kind)?;
+        n.is_power_of_two().then(|| octaves.get(n.trailing_zeros() as usize).copied())?
+    }
+}
+
 /// The deviance of a channel, and what it must exceed to be worth the terms that were added.
 pub(super) struct Cost {
     pub(super) deviance: f64,
@@ -119,6 +145,12 @@ impl<'a> ChannelDeviance<'a> {
 
     pub(super) fn deviance(&mut self, filter: MovingAverageFilter) -> f64 {
         self.comparison.deviance(&kinds(NoiseTerm::Filtered(filter), &self.others)) / self.dispersion
+    }
+
+    /// The same with the Allan variances behind the filter from elsewhere.
+    pub(super) fn deviance_behind(&mut self, behind: &VariancesBehind) -> f64 {
+        let kinds = kinds(NoiseTerm::Filtered(behind.filter), &self.others);
+        self.comparison.deviance_with(&kinds, |kind, n| behind.avar(kind, n)) / self.dispersion
     }
 
     /// With `filtered` in place of the white noise, and with the other terms of the channel, or without those of them that may stand in for

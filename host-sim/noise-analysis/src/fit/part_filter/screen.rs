@@ -3,7 +3,7 @@
 //! Most records of white noise show none. There, the deviances at few decimations of each filter spare the search for the best one and
 //! the dispersion of each channel, which needs that search too.
 
-use super::channel_deviance::{ChannelDeviance, FilteredChannel};
+use super::channel_deviance::{ChannelDeviance, FilteredChannel, VariancesBehind};
 use super::decimation::decimations;
 use crate::OCTAVES;
 use crate::parallel::in_parallel;
@@ -25,11 +25,24 @@ struct TriedFilters {
     slow: Vec<Vec<f64>>,
 }
 
+/// A filter at its own rate, and at each of the [`decimations`].
+struct Tried {
+    own_rate: VariancesBehind,
+    slow: Vec<VariancesBehind>,
+}
+
 /// The most by which the sum of the deviances of channels, each with its curve, falls with one of `filters`, whatever their
 /// dispersions are.
 pub(super) fn largest_fall(channels: &[(&FilteredChannel, &Curve<OCTAVES>)], filters: &[MovingAverageFilter]) -> f64 {
+    let Some((_, first)) = channels.first() else { return f64::NEG_INFINITY };
+    let octaves = channels.iter().map(|(_, curve)| curve.points().len()).max().unwrap_or(0) as u32;
+    let behind = in_parallel(filters, |&filter| {
+        let of = |filter| VariancesBehind::new(filter, octaves, first.sample_period());
+        let slow = decimations(filter).map(|decimation| of(MovingAverageFilter { decimation, ..filter }));
+        Tried { own_rate: of(filter), slow: slow.collect() }
+    });
     let of_channel = |(channel, curve): &(&FilteredChannel, &Curve<OCTAVES>)| {
-        TriedFilters::new(&mut ChannelDeviance::new(channel, curve), filters)
+        TriedFilters::new(&mut ChannelDeviance::new(channel, curve), &behind)
     };
     let tried = in_parallel(channels, of_channel);
     let fall =
@@ -53,15 +66,11 @@ fn between_steps(falls: &[f64], at: usize) -> f64 {
 }
 
 impl TriedFilters {
-    fn new(channel: &mut ChannelDeviance, filters: &[MovingAverageFilter]) -> Self {
+    fn new(channel: &mut ChannelDeviance, filters: &[Tried]) -> Self {
         let unfiltered = channel.unfiltered();
-        let own_rate: Vec<f64> = filters.iter().map(|&filter| channel.deviance(filter)).collect();
-        let mut at_decimations = |&filter: &MovingAverageFilter| {
-            decimations(filter)
-                .map(|decimation| channel.deviance(MovingAverageFilter { decimation, ..filter }))
-                .collect()
-        };
-        let slow = filters.iter().map(&mut at_decimations).collect();
+        let own_rate: Vec<f64> = filters.iter().map(|of| channel.deviance_behind(&of.own_rate)).collect();
+        let mut slowly = |of: &Tried| of.slow.iter().map(|behind| channel.deviance_behind(behind)).collect();
+        let slow = filters.iter().map(&mut slowly).collect();
         let least = own_rate.iter().copied().fold(unfiltered, f64::min);
         Self { unfiltered, most_dispersion: channel.dispersion_by(least), own_rate, slow }
     }
