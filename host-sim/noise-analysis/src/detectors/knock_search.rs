@@ -3,7 +3,7 @@
 //! ```text
 //! channels ─► long knocks ─► without them ─┬► single samples that stand out
 //!                                          ├► short knocks, found again without the single samples that chance puts into them
-//!                                          ├► disturbances that are no single sample
+//!                                          ├► disturbances that are no single sample, but for those in noise that is louder by itself
 //!                                          └► what single samples show of the knocks of other channels
 //! ```
 
@@ -23,18 +23,27 @@ pub(crate) struct SearchedChannel<'a> {
     pub can_show_spikes: bool,
 }
 
+/// Where one channel is loud.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct LoudStretches {
+    pub knocks: Vec<Knock>,
+    /// Sample periods in which the level of its noise, which moves by itself, is high: what stands out in them is no spike.
+    pub by_itself: Vec<Range<u64>>,
+}
+
 /// What stands out of the noise of one channel by single samples.
 struct StandingOut {
     rule: SpikeRule,
     disturbances: Vec<Disturbance>,
+    by_itself: Vec<Range<u64>>,
     singles: FoundSpikes,
     /// Samples that were looked at.
     samples: u64,
 }
 
-/// The knocks of each channel. Noise with a first Allan variance of at least `dithered_avar_counts2` dithers the rounding. Samples in the
+/// Where each channel is loud. Noise with a first Allan variance of at least `dithered_avar_counts2` dithers the rounding. Samples in the
 /// sample periods `repeated` are loud as their neighbours are, but make spikes of these.
-pub(crate) fn find(channels: &[SearchedChannel], repeated: &[u64], dithered_avar_counts2: f64) -> Vec<Vec<Knock>> {
+pub(crate) fn find(channels: &[SearchedChannel], repeated: &[u64], dithered_avar_counts2: f64) -> Vec<LoudStretches> {
     let rules = in_parallel(channels, |of| KnockRule::fit(of.fitted, dithered_avar_counts2));
     let parts = channels.first().map_or(0, |of| of.parts.len());
     let mut knocks: Vec<Vec<Knock>> = channels.iter().map(|_| Vec::new()).collect();
@@ -74,7 +83,8 @@ pub(crate) fn find(channels: &[SearchedChannel], repeated: &[u64], dithered_avar
     };
     let known = add_disturbances(&|found| found.disturbances.clone());
     add_disturbances(&|found| found.parts_of(&known));
-    knocks
+    let by_itself = standing_out.into_iter().map(|found| found.map(|of| of.by_itself).unwrap_or_default());
+    knocks.into_iter().zip(by_itself).map(|(knocks, by_itself)| LoudStretches { knocks, by_itself }).collect()
 }
 
 fn add(knocks: &mut [Vec<Knock>], found: Vec<Vec<Knock>>) {
@@ -90,15 +100,22 @@ pub(crate) fn slots_within(series: &Series, knocks: &[Knock]) -> Vec<u64> {
 impl StandingOut {
     /// By a rule in the parts of a channel, in the order of time. What `levels` explain by a level that moves by itself is no disturbance.
     fn find(rule: SpikeRule, levels: &KnockRule, parts: &[Series]) -> Self {
-        let (mut disturbances, mut singles, mut samples) = (Vec::new(), FoundSpikes::default(), 0);
+        let (mut disturbances, mut by_itself) = (Vec::new(), Vec::new());
+        let (mut singles, mut samples) = (FoundSpikes::default(), 0);
         for part in parts {
             let of_part = part.values.len() as u64;
             let (single, disturbed) = rule.separate(rule.find(part), of_part);
             singles.extend(single);
-            disturbances.extend(disturbed.into_iter().filter(|of| !levels.moves_by_itself(part, &of.certain)));
+            for disturbance in disturbed {
+                if levels.moves_by_itself(part, &disturbance.certain) {
+                    by_itself.push(disturbance.slots);
+                } else {
+                    disturbances.push(disturbance);
+                }
+            }
             samples += of_part;
         }
-        Self { rule, disturbances, singles, samples }
+        Self { rule, disturbances, by_itself, singles, samples }
     }
 
     /// Its single samples in a knock, if chance puts as many there.

@@ -86,6 +86,8 @@ struct Blocks {
     size: usize,
     /// For each doubling.
     freedoms: Vec<BlockFreedom>,
+    /// Whether levels of one of the lengths move by themselves, also without the loudest stretch, which may be a knock.
+    moves: bool,
 }
 
 /// Degrees of freedom of the level of a block, and of that of its neighbours, and how it moves by itself.
@@ -148,19 +150,27 @@ impl KnockRule {
             let of_half = scales.last().and_then(|half: &Scale| half.blocks[0].freedoms.last()?.wandering);
             let unknown = BlockFreedom { block: f64::INFINITY, neighbours: f64::INFINITY, wandering: of_half };
             let few_levels = differences.levels(FEW_DIFFERENCES, 0);
-            let few = Blocks::fit(&differences, &few_levels, series.period_s, (FEW_DIFFERENCES, few_noise), unknown);
-            let shorter = few.freedoms.last().map_or(unknown, |last| {
-                last.times(DIFFERENCES as f64 / (FEW_DIFFERENCES << (few.freedoms.len() - 1)) as f64)
-            });
             let levels = differences.levels(DIFFERENCES, 0);
-            let blocks = Blocks::fit(&differences, &levels, series.period_s, (DIFFERENCES, noise), shorter);
+            let fit = |moves: bool| {
+                let fit_to = |levels, of_noise, shorter| {
+                    Blocks::fit(&differences, (levels, moves), series.period_s, of_noise, shorter)
+                };
+                let few = fit_to(&few_levels, (FEW_DIFFERENCES, few_noise), unknown);
+                let shorter = few.freedoms.last().map_or(unknown, |last| {
+                    last.times(DIFFERENCES as f64 / (FEW_DIFFERENCES << (few.freedoms.len() - 1)) as f64)
+                });
+                [few, fit_to(&levels, (DIFFERENCES, noise), shorter)]
+            };
+            let blocks = fit(false);
+            // A level that moves at some length does so at shorter ones, whose noise may hide it.
+            let blocks = if blocks.iter().any(|of| of.moves) { fit(true) } else { blocks };
             let typical = median(levels.into_iter().flatten().collect()) / TRIMMED_MEAN;
             // The Allan variance is half the mean square of the differences.
             is_dithered |= 0.5 * typical > dithered_avar(dithered_avar_counts2, n as u64) * count;
-            if few.freedoms.is_empty() {
+            if blocks[0].freedoms.is_empty() {
                 break;
             }
-            scales.push(Scale { n, blocks: [few, blocks] });
+            scales.push(Scale { n, blocks });
         }
         let floor = if is_dithered { 0.0 } else { count };
         Self { scales, floor }
@@ -242,7 +252,7 @@ impl KnockRule {
     /// tested.
     fn loud_blocks(
         &self,
-        (scale, Blocks { size, freedoms }): (usize, &Blocks),
+        (scale, Blocks { size, freedoms, .. }): (usize, &Blocks),
         differences: &SquaredDifferences,
         from: usize,
         period_s: f64,
@@ -294,7 +304,7 @@ impl KnockRule {
     /// them, of all averaging times, one of its blocks has as much with a probability of at least [`SIGNIFICANCE`].
     pub(crate) fn moves_by_itself(&self, series: &Series, slots: &Range<u64>) -> bool {
         let of_scale = |scale: &Scale| {
-            let Blocks { size, freedoms } = &scale.blocks[0];
+            let Blocks { size, freedoms, .. } = &scale.blocks[0];
             let differences = SquaredDifferences::new(series, scale.n);
             let own = differences.number(slots.start)..differences.number(slots.end);
             let doublings = (own.len() / size).checked_ilog2().unwrap_or(0).min(freedoms.len().checked_sub(1)? as u32);
@@ -353,18 +363,19 @@ impl KnockRule {
 }
 
 impl Blocks {
-    /// `levels` are those of `size` differences, which have `noise` degrees of freedom in noise that does not change, and by shorter blocks at
+    /// `levels`, of which it may be known that they move by themselves, are those of `size` differences, which have `noise` degrees of freedom in noise that does not change, and by shorter blocks at
     /// most those of `shorter`.
     fn fit(
         differences: &SquaredDifferences,
-        levels: &[Option<f64>],
+        (levels, moves): (&[Option<f64>], bool),
         period_s: f64,
         (size, noise): (usize, f64),
         shorter: BlockFreedom,
     ) -> Self {
         let mut freedoms: Vec<BlockFreedom> = Vec::new();
+        let mut moves = moves;
         for doublings in doublings(differences, size, period_s) {
-            let longer = longer_levels(levels, doublings);
+            let mut longer = longer_levels(levels, doublings);
             let of_noise = noise * f64::from(1_u32 << doublings);
             // Levels that move at a short length, by themselves or together, do so at a longer one, which may have too few blocks to show it.
             let shorter = freedoms.last().map_or(shorter, |freedom| freedom.times(2.0));
@@ -372,10 +383,24 @@ impl Blocks {
             let by_scatter = scatter.as_ref().map_or(f64::INFINITY, LevelScatter::freedom);
             let block = of_noise.min(shorter.block).min(by_scatter);
             let neighbours = Neighbourhood::new(&longer).freedom(block).min(shorter.neighbours);
-            let wandering = scatter.and_then(|of| of.wandering(of_noise, shorter.wandering.is_some()));
+            let wandering = scatter.and_then(|of| of.wandering(of_noise, moves || shorter.wandering.is_some()));
+            if wandering.is_some() && !moves {
+                remove_loudest(&mut longer);
+                moves = LevelScatter::new(&longer).is_some_and(|rest| rest.wandering(of_noise, false).is_some());
+            }
             freedoms.push(BlockFreedom { block, neighbours, wandering: wandering.or(shorter.wandering) });
         }
-        Self { size, freedoms }
+        Self { size, freedoms, moves }
+    }
+}
+
+/// Takes out the levels of the loudest stretch that is as long as all knocks of a channel may be.
+fn remove_loudest(levels: &mut [Option<f64>]) {
+    let length = ((LARGEST_SHARE * levels.len() as f64).ceil() as usize).max(1);
+    let sum = |from: &usize| levels[*from..from + length].iter().flatten().sum::<f64>();
+    let loudest = (0..(levels.len() + 1).saturating_sub(length)).max_by(|a, b| sum(a).total_cmp(&sum(b)));
+    if let Some(from) = loudest {
+        levels[from..from + length].fill(None);
     }
 }
 

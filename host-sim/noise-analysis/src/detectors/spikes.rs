@@ -121,6 +121,11 @@ impl FoundSpikes {
         self.kept(|spike| slots.contains(&spike.slot))
     }
 
+    /// Those in none of these stretches.
+    fn outside(&self, stretches: &[Range<u64>]) -> Self {
+        self.kept(|spike| !stretches.iter().any(|of| of.contains(&spike.slot)))
+    }
+
     /// Sample periods of those in `slots`, if chance puts as many there or into another stretch of this length, of `samples` samples in all: by
     /// the rate of the events elsewhere, and one more, which is not known better. Each is of as many samples as those are.
     pub(crate) fn by_chance_within(&self, slots: &Range<u64>, samples: u64) -> Vec<u64> {
@@ -214,10 +219,10 @@ impl SpikeRule {
         Some(Self { interpolation, prediction, least, difference: typical_difference(series) })
     }
 
-    /// Sample periods of the spikes in a part of the same channel, in ascending order; none if jumps of the bias are at least
-    /// as frequent.
-    pub(crate) fn slots(&self, series: &Series) -> Vec<u64> {
-        let found = self.find_around(series, self.interpolation.mean).out_of_noise();
+    /// Sample periods of the spikes in a part of the same channel, but for those in `louder` noise, in ascending order; none if jumps of the bias
+    /// are at least as frequent.
+    pub(crate) fn slots(&self, series: &Series, louder: &[Range<u64>]) -> Vec<u64> {
+        let found = self.find_around(series, self.interpolation.mean).out_of_noise().outside(louder);
         if found.are_spikes() { found.slots().collect() } else { Vec::new() }
     }
 
@@ -358,12 +363,12 @@ impl Disturbance {
     }
 }
 
-/// Looks for spikes in one channel. `None` if there are none, or if jumps of the bias are at least as frequent.
+/// Looks for spikes in one channel, but for stretches in which its noise is `louder` by itself. `None` if there are none, or if jumps of the bias are at least as frequent.
 #[must_use]
-pub(crate) fn find(series: &Series) -> Option<Detection> {
+pub(crate) fn find(series: &Series, louder: &[Range<u64>]) -> Option<Detection> {
     let rule = SpikeRule::fit(series)?;
     let looked_at = (series.duration_s() / 3600.0, series.values.len() as u64);
-    rule.detection(&rule.find(series).out_of_noise(), looked_at, series.unit)
+    rule.detection(&rule.find(series).out_of_noise().outside(louder), looked_at, series.unit)
 }
 
 /// Probability that the next of so many independent events in `samples` samples follows within [`REACH`] sample periods.

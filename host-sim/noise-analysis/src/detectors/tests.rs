@@ -54,7 +54,7 @@ impl Case {
         let channels = Channel::INERTIAL.into_iter().flat_map(|channel| {
             let series = self.series(channel);
             let BiasChanges { step, ramp, .. } = bias_changes(&series);
-            [spikes::find(&series), step, ramp]
+            [spikes::find(&series, &[]), step, ramp]
         });
         let common = [
             sampling_faults::lost_samples_of(&self.measurement),
@@ -103,7 +103,7 @@ fn spikes_are_counted_measured_and_removed() {
     let case =
         Case::hiding(vec![InjectedEffect::Spikes { channel: SENSED_GYRO, rate_per_hour: 300.0, size }], 600.0, 2);
     let series = case.series(GYRO);
-    let detection = spikes::find(&series).unwrap();
+    let detection = spikes::find(&series, &[]).unwrap();
     assert_eq!(detection.effect.name(), "spikes");
     assert_covers(&detection, "rate", 300.0);
     assert_covers(&detection, "size", size);
@@ -113,8 +113,8 @@ fn spikes_are_counted_measured_and_removed() {
     let Some(Correction::Exclude(positions)) = &detection.correction else { panic!("{:?}", detection.correction) };
     assert_eq!(corrected.values.len(), series.values.len() - positions.len());
     assert_eq!(corrected.slots.last(), series.slots.last());
-    assert_eq!(spikes::find(&corrected), None);
-    assert_eq!(spikes::find(&case.series(Channel::GyroX)), None);
+    assert_eq!(spikes::find(&corrected, &[]), None);
+    assert_eq!(spikes::find(&case.series(Channel::GyroX), &[]), None);
     assert_eq!(bias_changes(&series).step, None);
 }
 
@@ -123,10 +123,10 @@ fn a_spike_of_1_7_sigma_is_found_in_filtered_noise() {
     // A disturbance after the filter, so it is added to the samples that were read.
     let case = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2: 3 }], 200.0, 3);
     let mut series = case.series(GYRO);
-    assert_eq!(spikes::find(&series), None);
+    assert_eq!(spikes::find(&series, &[]), None);
     // Two averages of 8 leave 0.29 of the white noise: 1.7 σ of the samples, but much more than the interpolation error.
     series.values_mut()[20_000] += 0.5 * white();
-    let detection = spikes::find(&series).unwrap();
+    let detection = spikes::find(&series, &[]).unwrap();
     assert_eq!(detection.correction, Some(Correction::Exclude(vec![20_000])));
 }
 
@@ -135,7 +135,7 @@ fn a_spike_of_1_7_sigma_is_found_in_filtered_noise() {
 fn spikes_before_the_filter_are_counted() {
     let spikes = InjectedEffect::Spikes { channel: SENSED_GYRO, rate_per_hour: 300.0, size: 25.0 * white() };
     let case = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2: 1 }, spikes], 600.0, 5);
-    assert_covers(&spikes::find(&case.series(GYRO)).expect("50 spikes"), "rate", 300.0);
+    assert_covers(&spikes::find(&case.series(GYRO), &[]).expect("50 spikes"), "rate", 300.0);
 }
 
 /// Behind two averages of two samples, nine times the deviation of the white noise in front of them: 4 standard deviations of an interpolation
@@ -144,13 +144,13 @@ fn spikes_before_the_filter_are_counted() {
 fn a_prediction_shows_spikes_that_an_interpolation_does_not() {
     let spikes = InjectedEffect::Spikes { channel: SENSED_GYRO, rate_per_hour: 300.0, size: 9.0 * white() };
     let case = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2: 1 }, spikes], 600.0, 7);
-    let detection = spikes::find(&case.series(GYRO)).expect("50 spikes");
+    let detection = spikes::find(&case.series(GYRO), &[]).expect("50 spikes");
     assert_covers(&detection, "rate", 300.0);
     // The first of the samples that it changes has a quarter of it.
     assert_covers(&detection, "size", 0.25 * 9.0 * white());
     for (taps_log2, seed) in (1..=3).flat_map(|taps_log2| (10..15).map(move |seed| (taps_log2, seed))) {
         let case = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2 }], 200.0, seed);
-        assert_eq!(spikes::find(&case.series(GYRO)), None);
+        assert_eq!(spikes::find(&case.series(GYRO), &[]), None);
     }
 }
 
@@ -186,10 +186,13 @@ fn loud_noise_has_no_spikes_and_spikes_stand_out_of_it() {
         level = kept * level + (1.0 - kept * kept).sqrt() * step;
         *value += white() * 2f64.powf(level) * normal;
     }
-    assert_eq!(spikes::find(&series), None);
+    assert_eq!(spikes::find(&series, &[]), None);
     let spikes = [10_000, 30_000, 50_000];
     spikes.iter().for_each(|&at| series.values_mut()[at] += 60.0 * white());
-    assert_eq!(spikes::find(&series).unwrap().correction, Some(Correction::Exclude(spikes.map(|at| at as u64).into())));
+    assert_eq!(
+        spikes::find(&series, &[]).unwrap().correction,
+        Some(Correction::Exclude(spikes.map(|at| at as u64).into()))
+    );
 }
 
 #[test]
@@ -201,7 +204,7 @@ fn a_step_is_located_measured_and_removed() {
     assert_covers(&detection, "time", 333.0);
     assert_covers(&detection, "size", -0.15);
     assert!((value_of(&detection, "size").value / -0.15 - 1.0).abs() < 0.2);
-    assert_eq!(spikes::find(&series), None);
+    assert_eq!(spikes::find(&series, &[]), None);
     assert_eq!(bias_changes(&series.corrected(detection.correction.as_ref().unwrap())).step, None);
     assert_eq!(bias_changes(&case.series(Channel::GyroZ)).step, None);
 }

@@ -7,7 +7,7 @@
 
 use crate::detectors::bias::{self, BiasChanges, BiasSensitivity};
 use crate::detectors::bias_response::BiasResponse;
-use crate::detectors::knock_search::{self, SearchedChannel, slots_within};
+use crate::detectors::knock_search::{self, LoudStretches, SearchedChannel, slots_within};
 use crate::detectors::knocks::Knock;
 use crate::detectors::noise_grid::NoiseGrids;
 use crate::detectors::output_range::find_noise_below_count;
@@ -185,10 +185,12 @@ impl ChannelPreprocessing {
     ) -> Self {
         let measurement = record.means.as_ref();
         let middle = measurement.middle();
-        let spikes = if record.channels[channel].can_show_spikes { spikes::find(&quiet[channel]) } else { None };
+        let louder = &knocks.by_whole[channel].by_itself;
+        let can_show_spikes = record.channels[channel].can_show_spikes;
+        let spikes = can_show_spikes.then(|| spikes::find(&quiet[channel], louder)).flatten();
         let exclusion = ChannelExclusion {
             spikes: spikes.as_ref().map(|found| found.excluded().to_vec()).unwrap_or_default(),
-            knocks: slots_within(&series[channel], &knocks.by_whole[channel]),
+            knocks: slots_within(&series[channel], &knocks.by_whole[channel].knocks),
             by_first_half: excluded_by_first_half(&series[channel], &knocks.by_first_half[channel], middle),
         };
         let regressors: Vec<ChannelId> =
@@ -224,8 +226,9 @@ impl ChannelPreprocessing {
         let own = quiet[channel].clone().without(&exclusion.spikes);
         let (by_whole, whole) = of_part(own, &others, &accelerations(measurement, series, channel));
         let (by_half, _) = {
-            let quiet =
-                |&of: &ChannelId| halves[of].clone().without(&slots_within(&halves[of], &knocks.by_first_half[of]));
+            let quiet = |&of: &ChannelId| {
+                halves[of].clone().without(&slots_within(&halves[of], &knocks.by_first_half[of].knocks))
+            };
             let others: Vec<Series> = regressors.iter().map(quiet).collect();
             let others: Vec<&Series> = others.iter().collect();
             let own = halves[channel].clone().without(&exclusion.by_first_half);
@@ -268,9 +271,9 @@ impl ChannelExclusion {
 
 /// The knocks in the inertial channels.
 struct KnocksInChannels {
-    by_whole: PerChannel<Vec<Knock>>,
+    by_whole: PerChannel<LoudStretches>,
     /// By the rules of the first half, in both halves.
-    by_first_half: PerChannel<Vec<Knock>>,
+    by_first_half: PerChannel<LoudStretches>,
 }
 
 impl KnocksInChannels {
@@ -279,20 +282,20 @@ impl KnocksInChannels {
         let second = series.map(|of| of.from(middle));
         let searches = [(series, vec![series]), (halves, vec![halves, &second])];
         let mut found = in_parallel(&searches, |(fitted, parts)| knocks_by(record, fitted, parts)).into_iter();
-        let mut next = || found.next().unwrap_or_else(|| series.map(|_| Vec::new()));
+        let mut next = || found.next().unwrap_or_else(|| series.map(|_| LoudStretches::default()));
         Self { by_whole: next(), by_first_half: next() }
     }
 
     /// The series of a channel without the knocks of the whole record.
     fn removed_from(&self, series: &Series, channel: ChannelId) -> Series {
-        let knocks = &self.by_whole[channel];
+        let knocks = &self.by_whole[channel].knocks;
         if knocks.is_empty() { series.clone() } else { series.clone().without(&slots_within(series, knocks)) }
     }
 
     /// The knocks of a channel as they are reported.
     fn detections(&self, measurement: &Measurement, series: &Series, channel: ChannelId) -> Vec<Detection> {
         let detection = |knock: &Knock| {
-            let shows = |others: &Vec<Knock>| others.iter().any(|other| other.overlaps(knock));
+            let shows = |others: &LoudStretches| others.knocks.iter().any(|other| other.overlaps(knock));
             let shown: Vec<&'static str> = self
                 .by_whole
                 .with_ids()
@@ -301,17 +304,17 @@ impl KnocksInChannels {
                 .collect();
             knock.detection(series, &shown)
         };
-        self.by_whole[channel].iter().map(detection).collect()
+        self.by_whole[channel].knocks.iter().map(detection).collect()
     }
 }
 
-/// The knocks in the `parts` of a record, in the order of time, by the rules of the series that are `fitted`; none in a channel that is not
+/// Where channels are loud in the `parts` of a record, in the order of time, by the rules of the series that are `fitted`; none in a channel that is not
 /// inertial.
 fn knocks_by(
     record: &CondensedRecord,
     fitted: &PerChannel<Series>,
     parts: &[&PerChannel<Series>],
-) -> PerChannel<Vec<Knock>> {
+) -> PerChannel<LoudStretches> {
     let measurement = record.means.as_ref();
     let inertial: Vec<ChannelId> = measurement.inertial().collect();
     let searched = |&of: &ChannelId| SearchedChannel {
@@ -321,9 +324,9 @@ fn knocks_by(
     };
     let searched: Vec<SearchedChannel> = inertial.iter().map(searched).collect();
     let found = knock_search::find(&searched, &record.repeated, measurement.profile.dithered_avar_counts2);
-    let mut knocks: PerChannel<Vec<Knock>> = fitted.map(|_| Vec::new());
-    inertial.iter().zip(found).for_each(|(&of, found)| knocks[of] = found);
-    knocks
+    let mut loud: PerChannel<LoudStretches> = fitted.map(|_| LoudStretches::default());
+    inertial.iter().zip(found).for_each(|(&of, found)| loud[of] = found);
+    loud
 }
 
 /// The accelerometers, of which these are the `series`, as what may shake `channel`.
@@ -355,11 +358,13 @@ fn without_lines(series: Series) -> Series {
 }
 
 /// Sample periods within `knocks`, and those of spikes by the rule of the samples before `middle`, in ascending order.
-fn excluded_by_first_half(series: &Series, knocks: &[Knock], middle: u64) -> Vec<u64> {
+fn excluded_by_first_half(series: &Series, loud: &LoudStretches, middle: u64) -> Vec<u64> {
+    let LoudStretches { knocks, by_itself } = loud;
     let loud = slots_within(series, knocks);
     let quiet = series.clone().without(&loud);
     let (first, second) = (quiet.before(middle), quiet.from(middle));
-    let spikes = SpikeRule::fit(&first).map(|rule| [rule.slots(&first), rule.slots(&second)].concat());
+    let spikes =
+        SpikeRule::fit(&first).map(|rule| [rule.slots(&first, by_itself), rule.slots(&second, by_itself)].concat());
     merged([&loud, &spikes.unwrap_or_default()])
 }
 
