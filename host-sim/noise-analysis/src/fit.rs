@@ -8,6 +8,7 @@ pub mod gauss_markov;
 pub(crate) mod noise_terms;
 pub(crate) mod octave_covariance;
 pub(crate) mod part_filter;
+pub(crate) mod quantized_after_filter;
 pub mod sample_coefficients;
 pub(crate) mod signal_share;
 pub(crate) mod traced_model;

@@ -23,7 +23,7 @@ use measurement::{ChannelId, SensorProfile};
 
 /// By how much the deviance may rise with the other channels' filter: a correct filter rises by more by chance once in 600
 /// times (χ² of one degree of freedom).
-const MAX_DEVIANCE_RISE: f64 = 10.0;
+pub(super) const MAX_DEVIANCE_RISE: f64 = 10.0;
 
 /// Least part that the lower bound of white noise behind a filter has of its value where no other term stands in for it.
 const KNOWN_WHITE: f64 = 0.5;

@@ -56,6 +56,18 @@ impl SamplesOfCurve<'_> {
     }
 }
 
+/// Twice the gain in ln likelihood of the samples of `curve` with `one` model over the `other` one, which has as many terms and the same lines;
+/// `None` where the spectrum of the samples is not known.
+pub(crate) fn gain_by_samples(
+    curve: &Curve<OCTAVES>,
+    [one, other]: [&Model; 2],
+    samples: SamplesOfCurve,
+) -> Option<f64> {
+    let lines = sinusoids(one.terms().iter().map(|term| &term.kind));
+    let spectrum = samples.spectrum(curve, &lines)?;
+    Some(spectrum.gain(one, other))
+}
+
 /// Probability that the spectrum of the `samples`, or that of their longest part without a long gap, contradicts as much the quantization of
 /// `model`; `None` where it has none, or too few samples tell its shape.
 pub(crate) fn quantization_p_value(curve: &Curve<OCTAVES>, model: &Model, samples: SamplesOfCurve) -> Option<f64> {

@@ -8,6 +8,7 @@ use crate::fit::channel_fit::ChannelFit;
 use crate::fit::contradiction::Contradiction;
 use crate::fit::covariates::CovariateFit;
 use crate::fit::part_filter::{self, FilteredChannel, PartFilter, Unidentified};
+use crate::fit::quantized_after_filter::quantized_after_filter;
 use crate::fit::sample_coefficients::SamplesOfCurve;
 use crate::fit::signal_share::SignalShare;
 use crate::parallel::{self, per_channel};
@@ -102,7 +103,11 @@ impl TracedPart {
             return Self { channels, filter: Err(Unidentified::NotSought) };
         }
         let filter = agree_on_filter(part, &mut channels);
-        parallel::for_each(channels.as_mut_slice(), |ChannelTrace { fit, slowest, lines, signals, .. }| {
+        parallel::for_each(channels.as_mut_slice(), |trace| {
+            let ChannelFit { curve, traced, .. } = &trace.fit;
+            let quantized = trace.samples_of_noise().and_then(|samples| quantized_after_filter(curve, traced, samples));
+            let ChannelTrace { fit, slowest, lines, signals, .. } = trace;
+            quantized.into_iter().for_each(|quantized| fit.traced = quantized);
             // Before the spectrum shows the same process.
             signals.iter().filter_map(Signal::decays).for_each(|decays| fit.add_shot_noise(decays));
             let frequencies = || lines.iter().map(|line| line.frequency.value);

@@ -117,6 +117,16 @@ impl SampleSpectrum {
         by_shape.into_iter().chain(by_size).reduce(f64::min)
     }
 
+    /// Twice what the logarithm of the likelihood, with the terms of `one` model and their likeliest coefficients, is above that with the terms
+    /// of the `other` one, which has as many.
+    pub(crate) fn gain(&self, one: &Model, other: &Model) -> f64 {
+        let objective = |model: &Model| {
+            let kinds: Vec<NoiseTerm> = model.terms().iter().map(|term| term.kind).collect();
+            Likelihood::new(self, &kinds).objective
+        };
+        2.0 * (objective(other) - objective(one))
+    }
+
     /// Its likelihood with the terms `kinds`, of which the first is noise behind a filter.
     pub(crate) fn behind(&self, kinds: &[NoiseTerm]) -> SpectrumBehindFilter<'_> {
         let as_measured = |band: &SpectralBand| band.ordinates * (band.density.max(f64::MIN_POSITIVE).ln() + 1.0);
