@@ -276,20 +276,11 @@ impl<'a> Baseline<'a> {
         self.deviance - self.tried.minimise(&self.points)
     }
 
-    /// [`fall`](Self::fall) with the Allan variance of a term, behind a filter or without one, at an averaging factor from elsewhere.
+    /// [`fall`](Self::fall) where the Allan variances of some terms at some averaging factors are known.
     #[cfg(feature = "host")]
-    pub(crate) fn fall_with(
-        &mut self,
-        kinds: &[NoiseTerm],
-        avar: impl Fn(&NoiseTerm, Option<&crate::term::MovingAverageFilter>, u64) -> f64,
-    ) -> f32 {
-        self.tried.set_terms_with(&self.points, kinds, avar);
+    pub(crate) fn fall_with(&mut self, kinds: &[NoiseTerm], known: impl Fn(&NoiseTerm, u64) -> Option<f64>) -> f32 {
+        self.tried.set_terms_with(&self.points, kinds, known);
         self.deviance - self.tried.minimise(&self.points)
-    }
-
-    #[cfg(feature = "host")]
-    pub(crate) fn sample_period(&self) -> f64 {
-        self.points.curve.sample_period()
     }
 
     /// Improvement by the terms `kinds` with their best coefficients and the best shapes of those that are `free`.

@@ -6,7 +6,7 @@ use crate::coupling::Coupling;
 use crate::curve::{AllanPoint, Curve, CurveView};
 use crate::fit::{Baseline, FreeShapes, estimate, set_free_bounds};
 use crate::model::Model;
-use crate::term::{AllTerms, MovingAverageFilter, NoiseTerm};
+use crate::term::{AllTerms, NoiseTerm};
 
 /// Part of a measured variance that remains of it when rounding is taken off.
 const LEAST_LEFT: f64 = 0.01;
@@ -108,13 +108,9 @@ impl<'a> DevianceComparison<'a> {
         f64::from(self.0.deviance - self.0.fall(kinds))
     }
 
-    /// The same where the Allan variance of the terms that pass the filter, or are behind it, is known for a coefficient of 1 by their
-    /// kind and the averaging factor: several channels behind one filter share it. `None` of what is not known.
+    /// The same where the Allan variances of some terms at some averaging factors, for a coefficient of 1 and behind the filter of `kinds`, are
+    /// known: several channels behind one filter share them.
     pub fn deviance_with(&mut self, kinds: &[NoiseTerm], known: impl Fn(&NoiseTerm, u64) -> Option<f64>) -> f64 {
-        let period = self.0.sample_period();
-        let avar = |kind: &NoiseTerm, filter: Option<&MovingAverageFilter>, n: u64| {
-            known(kind, n).unwrap_or_else(|| kind.avar_behind(filter, n, period))
-        };
-        f64::from(self.0.deviance - self.0.fall_with(kinds, avar))
+        f64::from(self.0.deviance - self.0.fall_with(kinds, known))
     }
 }

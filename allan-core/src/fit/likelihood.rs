@@ -172,16 +172,19 @@ impl<T: TermSet> Problem<T> {
         }
     }
 
-    /// The same with the Allan variance of a term, behind a filter or without one, at an averaging factor from elsewhere.
+    /// The same where the Allan variances of some terms, behind their filter, at some averaging factors are known.
     #[cfg(feature = "host")]
     pub(super) fn set_terms_with(
         &mut self,
         points: &Points,
         kinds: &[NoiseTerm],
-        avar: impl Fn(&NoiseTerm, Option<&MovingAverageFilter>, u64) -> f64,
+        known: impl Fn(&NoiseTerm, u64) -> Option<f64>,
     ) {
-        let set = |own: &mut Self, points: &Points, term: usize| own.set_column_by(points, term, &avar);
-        self.set_terms_by(points, kinds, &set);
+        let period = points.curve.sample_period();
+        let avar = |kind: &NoiseTerm, filter: Option<&MovingAverageFilter>, n: u64| {
+            known(kind, n).unwrap_or_else(|| T::avar(kind, filter, n, period))
+        };
+        self.set_terms_by(points, kinds, &|own, points, term| own.set_column_by(points, term, &avar));
     }
 
     /// Sets the terms and the coefficients to those of a model, and the points' confidence to that under it.
