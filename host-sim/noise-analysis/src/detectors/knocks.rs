@@ -78,6 +78,8 @@ struct Scale {
     n: usize,
     /// Of blocks of [`FEW_DIFFERENCES`] and of [`DIFFERENCES`].
     blocks: [Blocks; 2],
+    /// The same where levels of one length move by themselves, and those of the others are taken to move too.
+    moving: Option<[Blocks; 2]>,
 }
 
 /// Blocks of so many differences and of doublings of their length.
@@ -88,6 +90,15 @@ struct Blocks {
     freedoms: Vec<BlockFreedom>,
     /// Whether levels of one of the lengths move by themselves, also without the loudest stretch, which may be a knock.
     moves: bool,
+}
+
+/// Which levels are taken to move by themselves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Moving {
+    /// Those of a length that shows it, or of a longer one.
+    OwnLength,
+    /// All of an averaging time at which one length shows it: the noise of shorter ones may hide it.
+    AnyLength,
 }
 
 /// Degrees of freedom of the level of a block, and of that of its neighbours, and how it moves by itself.
@@ -125,7 +136,8 @@ pub(crate) enum BlockSize {
 /// Knocks in channels that were recorded together, by channel, in the order of time, by one rule a channel.
 pub(crate) fn find_by(rules: &[KnockRule], channels: &[Series], size: BlockSize) -> Vec<Vec<Knock>> {
     let pairs: Vec<(&KnockRule, &Series)> = rules.iter().zip(channels).collect();
-    let mut found: Vec<Vec<Knock>> = in_parallel(&pairs, |(rule, series)| rule.find(series, size));
+    let mut found: Vec<Vec<Knock>> = in_parallel(&pairs, |(rule, series)| rule.find(series, size, Moving::OwnLength));
+    leave_out_movements(&pairs, size, &mut found);
     let all: Vec<Knock> = found.iter().flatten().cloned().collect();
     for ((rule, series), own) in rules.iter().zip(channels).zip(&mut found) {
         for known in &all {
@@ -136,6 +148,23 @@ pub(crate) fn find_by(rules: &[KnockRule], channels: &[Series], size: BlockSize)
         own.sort_by_key(|knock| knock.slots.start);
     }
     found
+}
+
+/// Leaves out what one channel alone shows, where its level may move by itself in a way that other lengths of blocks show.
+fn leave_out_movements(channels: &[(&KnockRule, &Series)], size: BlockSize, found: &mut [Vec<Knock>]) {
+    let is_sought = |(rule, own): (&KnockRule, &[Knock])| !own.is_empty() && rule.moves_at_other_lengths();
+    let sought: Vec<_> = channels.iter().zip(found.iter()).collect();
+    let standing = in_parallel(&sought, |((rule, series), own)| {
+        is_sought((rule, own)).then(|| rule.find(series, size, Moving::AnyLength))
+    });
+    let all = found.to_vec();
+    for (at, (own, standing)) in found.iter_mut().zip(standing).enumerate() {
+        let Some(standing) = standing else { continue };
+        own.retain(|knock| {
+            let mut others = all.iter().enumerate().filter(|(other, _)| *other != at).flat_map(|(_, other)| other);
+            standing.iter().any(|of| of.overlaps(knock)) || others.any(|other| other.overlaps(knock))
+        });
+    }
 }
 
 impl KnockRule {
@@ -162,26 +191,30 @@ impl KnockRule {
                 [few, fit_to(&levels, (DIFFERENCES, noise), shorter)]
             };
             let blocks = fit(false);
-            // A level that moves at some length does so at shorter ones, whose noise may hide it.
-            let blocks = if blocks.iter().any(|of| of.moves) { fit(true) } else { blocks };
+            let moving = blocks.iter().any(|of| of.moves).then(|| fit(true));
             let typical = median(levels.into_iter().flatten().collect()) / TRIMMED_MEAN;
             // The Allan variance is half the mean square of the differences.
             is_dithered |= 0.5 * typical > dithered_avar(dithered_avar_counts2, n as u64) * count;
             if blocks[0].freedoms.is_empty() {
                 break;
             }
-            scales.push(Scale { n, blocks });
+            scales.push(Scale { n, blocks, moving });
         }
         let floor = if is_dithered { 0.0 } else { count };
         Self { scales, floor }
     }
 
+    /// Whether there is a difference between [`Moving::OwnLength`] and [`Moving::AnyLength`].
+    fn moves_at_other_lengths(&self) -> bool {
+        self.scales.iter().any(|scale| scale.moving.is_some())
+    }
+
     /// Knocks of a channel, in no order.
-    fn find(&self, series: &Series, size: BlockSize) -> Vec<Knock> {
+    fn find(&self, series: &Series, size: BlockSize, moving: Moving) -> Vec<Knock> {
         let mut rest = series.clone();
         let mut knocks: Vec<Knock> = Vec::new();
         for _ in 0..PASSES {
-            let next = self.loudest(&rest, size);
+            let next = self.loudest(&rest, size, moving);
             if next.is_empty() {
                 break;
             }
@@ -198,12 +231,12 @@ impl KnockRule {
     }
 
     /// The knocks around the loudest blocks of a series, by chance in half of [`SIGNIFICANCE`]; none overlaps another.
-    fn loudest(&self, series: &Series, size: BlockSize) -> Vec<Knock> {
+    fn loudest(&self, series: &Series, size: BlockSize, moving: Moving) -> Vec<Knock> {
         let scales: Vec<SquaredDifferences> =
             self.scales.iter().map(|scale| SquaredDifferences::new(series, scale.n)).collect();
         let (mut blocks, mut tests) = (Vec::<LoudBlock>::new(), 0_usize);
         for (scale, differences) in scales.iter().enumerate() {
-            let [few, many] = &self.scales[scale].blocks;
+            let [few, many] = self.scales[scale].blocks_by(moving);
             // A short knock may be in halves of two blocks.
             let (of_size, from) = match size {
                 BlockSize::Few => (few, [0, FEW_DIFFERENCES / 2].as_slice()),
@@ -359,6 +392,12 @@ impl KnockRule {
             })
         };
         self.scales.iter().filter_map(of_scale).min_by(|a, b| a.p_value.total_cmp(&b.p_value))
+    }
+}
+
+impl Scale {
+    fn blocks_by(&self, moving: Moving) -> &[Blocks; 2] {
+        self.moving.as_ref().filter(|_| moving == Moving::AnyLength).unwrap_or(&self.blocks)
     }
 }
 
