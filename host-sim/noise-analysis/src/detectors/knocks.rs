@@ -137,7 +137,6 @@ pub(crate) enum BlockSize {
 pub(crate) fn find_by(rules: &[KnockRule], channels: &[Series], size: BlockSize) -> Vec<Vec<Knock>> {
     let pairs: Vec<(&KnockRule, &Series)> = rules.iter().zip(channels).collect();
     let mut found: Vec<Vec<Knock>> = in_parallel(&pairs, |(rule, series)| rule.find(series, size, Moving::OwnLength));
-    leave_out_movements(&pairs, size, &mut found);
     let all: Vec<Knock> = found.iter().flatten().cloned().collect();
     for ((rule, series), own) in rules.iter().zip(channels).zip(&mut found) {
         for known in &all {
@@ -147,6 +146,7 @@ pub(crate) fn find_by(rules: &[KnockRule], channels: &[Series], size: BlockSize)
         }
         own.sort_by_key(|knock| knock.slots.start);
     }
+    leave_out_movements(&pairs, size, &mut found);
     found
 }
 
