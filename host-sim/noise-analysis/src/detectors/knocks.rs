@@ -152,10 +152,10 @@ pub(crate) fn find_by(rules: &[KnockRule], channels: &[Series], size: BlockSize)
 
 /// Leaves out what one channel alone shows, where its level may move by itself in a way that other lengths of blocks show.
 fn leave_out_movements(channels: &[(&KnockRule, &Series)], size: BlockSize, found: &mut [Vec<Knock>]) {
-    let is_sought = |(rule, own): (&KnockRule, &[Knock])| !own.is_empty() && rule.moves_at_other_lengths();
     let sought: Vec<_> = channels.iter().zip(found.iter()).collect();
     let standing = in_parallel(&sought, |((rule, series), own)| {
-        is_sought((rule, own)).then(|| rule.find(series, size, Moving::AnyLength))
+        let may_move = !own.is_empty() && rule.moves_at_other_lengths();
+        may_move.then(|| rule.find(series, size, Moving::AnyLength))
     });
     let all = found.to_vec();
     for (at, (own, standing)) in found.iter_mut().zip(standing).enumerate() {
@@ -402,17 +402,16 @@ impl Scale {
 }
 
 impl Blocks {
-    /// `levels`, of which it may be known that they move by themselves, are those of `size` differences, which have `noise` degrees of freedom in noise that does not change, and by shorter blocks at
-    /// most those of `shorter`.
+    /// `levels`, of which it may be known that they move by themselves, are those of `size` differences, which have `noise` degrees of
+    /// freedom in noise that does not change, and by shorter blocks at most those of `shorter`.
     fn fit(
         differences: &SquaredDifferences,
-        (levels, moves): (&[Option<f64>], bool),
+        (levels, mut moves): (&[Option<f64>], bool),
         period_s: f64,
         (size, noise): (usize, f64),
         shorter: BlockFreedom,
     ) -> Self {
         let mut freedoms: Vec<BlockFreedom> = Vec::new();
-        let mut moves = moves;
         for doublings in doublings(differences, size, period_s) {
             let mut longer = longer_levels(levels, doublings);
             let of_noise = noise * f64::from(1_u32 << doublings);

@@ -2,13 +2,12 @@
 //! around another one after it.
 
 use super::noise_levels::{DIFFERENCES, SquaredDifferences, TRIMMED_MEAN, exceedance, longer_levels};
-use super::telegraph_models::gauss_markov_log_likelihood;
+use super::telegraph_models::{gauss_markov_log_likelihood, independent_log_likelihood};
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, upper_tail};
 use crate::effects::LevelChange;
 use crate::effects::findings::{REFUTED, SIGNIFICANCE};
 use crate::samples::series::Series;
-use std::f64::consts::PI;
 
 /// Blocks of a record, at least.
 const LEAST_BLOCKS: usize = 64;
@@ -54,10 +53,9 @@ pub(crate) fn find(series: &Series) -> Option<LevelChange> {
     // Two means and a time, against the slope and the mean of a line: one parameter more.
     let over_line = 0.5 * (count * (around_line / two.squares).ln() - count.ln());
     // Their parameters are as many: a mean, a variance, a ratio of variances and a time.
-    let over_wandering = levels.log_likelihood(two.squares) - levels.wandering_log_likelihood();
+    let over_wandering = independent_log_likelihood(count, two.squares) - levels.wandering_log_likelihood();
     let gain = over_line.min(over_wandering);
-    let sides = levels.without_change(&two);
-    let sides = sides.map(Side::of);
+    let sides = levels.without_change(&two).map(Side::of);
     let [before, after] = sides.each_ref().map(|side| side.mean);
     let half = 0.5 * (after - before);
     let variance = two.squares / (count - 3.0).max(1.0);
@@ -130,13 +128,7 @@ impl Levels {
         groups.take(count - 1).filter(is_long).min_by(|a, b| a.squares.total_cmp(&b.squares))
     }
 
-    /// Of levels that scatter independently, with this sum of squares, around what is expected of them.
-    fn log_likelihood(&self, squares: f64) -> f64 {
-        let count = self.of_blocks.len() as f64;
-        -0.5 * count * ((2.0 * PI * squares / count).ln() + 1.0)
-    }
-
-    /// The highest of levels that are a Gaussian process with exponential autocorrelation, beside independent scatter.
+    /// The highest ln likelihood of levels that are a Gaussian process with exponential autocorrelation, beside independent scatter.
     fn wandering_log_likelihood(&self) -> f64 {
         let mean = self.of_blocks.iter().map(|(_, level)| level).sum::<f64>() / self.of_blocks.len() as f64;
         let first = self.of_blocks.first().map_or(0, |(number, _)| *number as usize);
@@ -235,11 +227,11 @@ mod tests {
                 let mut random = ChaCha8Rng::seed_from_u64(1_000 + seed);
                 let kept = (-1.0 / (part * SAMPLES as f64)).exp();
                 let mut level = 0.3 * random.sample::<f64, _>(StandardNormal);
-                let mut levels = (0..SAMPLES).map(|_| {
+                let next = |_| {
                     level = kept * level + 0.3 * (1.0 - kept * kept).sqrt() * random.sample::<f64, _>(StandardNormal);
                     level.exp()
-                });
-                let levels: Vec<f64> = levels.by_ref().collect();
+                };
+                let levels: Vec<f64> = (0..SAMPLES).map(next).collect();
                 find(&noise(seed, |time| levels[(time * SAMPLES as f64).round() as usize])).is_some()
             });
             let found = found.count();

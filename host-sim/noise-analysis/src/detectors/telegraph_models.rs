@@ -290,6 +290,11 @@ impl Moments {
 /// ln likelihood of white Gaussian noise of any mean and variance.
 pub(super) fn white_log_likelihood(values: &[f64]) -> f64 {
     let Moments { count, squares, .. } = Moments::of(values);
+    independent_log_likelihood(count, squares)
+}
+
+/// The same of so many independent Gaussian variables, by the sum of their squared distances from what is expected of each.
+pub(super) fn independent_log_likelihood(count: f64, squares: f64) -> f64 {
     -0.5 * count * ((2.0 * PI * squares / count).ln() + 1.0)
 }
 
@@ -339,5 +344,5 @@ fn kalman_log_likelihood(values: &[f64], time: f64, ratio: f64) -> f64 {
         state *= decay;
         variance = decay * decay * variance + drive;
     }
-    -0.5 * (count * ((2.0 * PI * squares / count).ln() + 1.0) + spreads.value())
+    independent_log_likelihood(count, squares) - 0.5 * spreads.value()
 }

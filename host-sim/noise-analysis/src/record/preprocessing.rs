@@ -281,7 +281,7 @@ impl KnocksInChannels {
         let middle = record.means.as_ref().middle();
         let second = series.map(|of| of.from(middle));
         let searches = [(series, vec![series]), (halves, vec![halves, &second])];
-        let mut found = in_parallel(&searches, |(fitted, parts)| knocks_by(record, fitted, parts)).into_iter();
+        let mut found = in_parallel(&searches, |(fitted, parts)| loud_stretches(record, fitted, parts)).into_iter();
         let mut next = || found.next().unwrap_or_else(|| series.map(|_| LoudStretches::default()));
         Self { by_whole: next(), by_first_half: next() }
     }
@@ -308,9 +308,9 @@ impl KnocksInChannels {
     }
 }
 
-/// Where channels are loud in the `parts` of a record, in the order of time, by the rules of the series that are `fitted`; none in a channel that is not
-/// inertial.
-fn knocks_by(
+/// Where channels are loud in the `parts` of a record, in the order of time, by the rules of the series that are `fitted`; nowhere in one that
+/// is not inertial.
+fn loud_stretches(
     record: &CondensedRecord,
     fitted: &PerChannel<Series>,
     parts: &[&PerChannel<Series>],
