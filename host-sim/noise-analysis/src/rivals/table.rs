@@ -3,7 +3,9 @@
 
 use crate::bounds::BoundedEstimate;
 use crate::detectors::random_telegraph::explains_spikes;
-use crate::effects::{CommonMode, Effect, MarkovProcess, Observation, Refutation, TelegraphNoise, Unexplained};
+use crate::effects::{
+    CommonMode, Effect, MarkovProcess, Observation, Refutation, TelegraphEvidence, TelegraphNoise, Unexplained,
+};
 use crate::fit::channel_fit::FREQUENCY_BY_OCTAVES;
 use crate::fit::noise_terms::{is_filter, is_line, is_same_time, line_frequency};
 use crate::rivals::cause::{Cause, Shown};
@@ -111,7 +113,7 @@ const fn row(
 
 /// The rows, in their order.
 #[rustfmt::skip]
-pub static RIVALRIES: [Rivalry; 47] = [
+pub static RIVALRIES: [Rivalry; 48] = [
     // Lines and signals of the spectrum.
     row("line above half the rate of the means", "line of the means", "at its alias, and as wide", "means sample it too slowly",
         Rule::Line(|of| of.faster.iter().any(|faster| is_alias(of.line, faster, of.period_s)))),
@@ -164,6 +166,13 @@ pub static RIVALRIES: [Rivalry; 47] = [
         "two neighbouring counts",
         Rule::Channel(|of| matches!((of.origin(), of.effect()), (Origin::Levels { .. }, Effect::TelegraphNoise(found))
             if !of.facts.is_dithered_at_once && found.amplitude.value < NEIGHBOURING_COUNTS * of.facts.resolution))),
+    row("telegraph noise of the samples", "shot noise",
+        "time constants within a factor of 4, and a gain in ln likelihood above half the square of the shot noise's sum",
+        "either says how much more likely it is than a Gaussian process",
+        Rule::Channel(|of| match of.origin() {
+            Origin::Signal(Signal::Decays(decays)) => of.levels().is_some_and(|levels| are_likelier(levels, decays)),
+            _ => false,
+        })),
     row("rounding to counts", "every term of the curve but a filter", "not dithered at any short averaging time",
         "without dither the rounding error is no white noise, and the curve shows its steps",
         Rule::Channel(|of| !of.facts.is_dithered && of.kind().is_some_and(|kind| !is_filter(&kind)))),
@@ -571,6 +580,13 @@ fn is_octave(effect: &Effect) -> bool {
 
 fn telegraph(effect: &Effect) -> Option<&TelegraphNoise> {
     if let Effect::TelegraphNoise(of) = effect { Some(of) } else { None }
+}
+
+/// Whether two levels explain more than disturbances that decay as slowly, each over a Gaussian process: a normal sum of `z` standard
+/// deviations has a ln likelihood ratio of z²/2.
+fn are_likelier(levels: &TelegraphNoise, decays: &DecayingDisturbances) -> bool {
+    let is_as_slow = is_same_time(levels.time_constant_s.value, decays.time_constant.value);
+    matches!(levels.evidence, TelegraphEvidence::Levels { gain, .. } if is_as_slow && gain > 0.5 * decays.sum.powi(2))
 }
 
 /// The end of an interval that is nearer to 0.

@@ -133,38 +133,46 @@ pub(crate) fn without_sines(mut series: UniformSeries) -> UniformSeries {
 }
 
 /// The sinusoid of the largest ordinate over those around it, if chance gives one as large in fewer than [`SIGNIFICANCE`] of all records:
-/// ordinates of noise over their mean are exponential variables.
+/// ordinates of noise over their mean are exponential variables. The noise around it is as strong at every frequency f, or falls with f
+/// or f² as that of telegraph noise beyond its corner: a sinusoid stands out either way.
 fn sine_that_stands_out(series: &UniformSeries) -> Option<Sine> {
     let spectrum = Periodogram::new(series)?;
     let ordinates: Vec<f64> = spectrum.independent().collect();
-    let others = |at: usize| {
-        let around = at.saturating_sub(NEARBY).max(FEWEST_PERIODS)..(at + NEARBY + 1).min(ordinates.len());
-        ordinates[around.start..around.start.max(at - 1)].iter().chain(&ordinates[at + 2..around.end])
-    };
-    // The median of an exponential variable is ln 2 times its mean.
-    let over_others = |at: usize| {
-        let mut others: Vec<f64> = others(at).copied().collect();
-        let middle = others.len() / 2;
-        ordinates[at] * LN_2 / *others.select_nth_unstable_by(middle, f64::total_cmp).1
-    };
+    let rising: Vec<f64> = ordinates.iter().enumerate().map(|(at, of)| of * (at as f64).powi(2)).collect();
     // Means hold little of what is faster than half of their rate.
     let searched = FEWEST_PERIODS..ordinates.len() / 2;
     if searched.len() <= 2 * NEARBY {
         return None;
     }
     let limit = (searched.len() as f64 / SIGNIFICANCE).ln();
-    // Whether more than half of the others are so low is counted far faster than their median is found.
-    let may_stand_out = |at: &usize| {
-        let low = ordinates[*at] * LN_2 / limit;
-        let (below, all) = others(*at).fold((0, 0), |(below, all), of| (below + usize::from(*of < low), all + 1));
-        below > all / 2
-    };
-    let large = searched.filter(may_stand_out).map(|at| (at, over_others(at)));
-    let (largest, ratio) = large.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let large = searched.filter(|at| exceeds_others(&ordinates, *at, limit) && exceeds_others(&rising, *at, limit));
+    let ratios = large.map(|at| (at, over_others(&ordinates, at).min(over_others(&rising, at))));
+    let (largest, ratio) = ratios.max_by(|a, b| a.1.total_cmp(&b.1))?;
     let at = (PADDING * largest - 1..=PADDING * largest + 1)
         .max_by(|&a, &b| spectrum.padded()[a].total_cmp(&spectrum.padded()[b]))?;
     let spacing = spectrum.resolution() / PADDING as f64;
     (ratio > limit).then(|| Sine::fit_near(series, at as f64 * spacing, spacing))
+}
+
+/// The ordinates on either side of one.
+fn others(ordinates: &[f64], at: usize) -> impl Iterator<Item = &f64> {
+    let around = at.saturating_sub(NEARBY).max(FEWEST_PERIODS)..(at + NEARBY + 1).min(ordinates.len());
+    ordinates[around.start..around.start.max(at - 1)].iter().chain(&ordinates[at + 2..around.end])
+}
+
+/// An ordinate over the mean of the others. The median of an exponential variable is ln 2 times its mean.
+fn over_others(ordinates: &[f64], at: usize) -> f64 {
+    let mut others: Vec<f64> = others(ordinates, at).copied().collect();
+    let middle = others.len() / 2;
+    ordinates[at] * LN_2 / *others.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Whether an ordinate may be `limit` times the mean of the others: whether more than half of them are so low is counted far faster than
+/// their median is found.
+fn exceeds_others(ordinates: &[f64], at: usize, limit: f64) -> bool {
+    let low = ordinates[at] * LN_2 / limit;
+    let (below, all) = others(ordinates, at).fold((0, 0), |(below, all), of| (below + usize::from(*of < low), all + 1));
+    below > all / 2
 }
 
 /// The sinusoids of [`without_slow_sines`], with time counted from the first sample of `series`.

@@ -79,7 +79,11 @@ fn markov(time_constant_s: f64) -> Effect {
 }
 
 fn levels(time_constant_s: f64, amplitude: f64) -> Effect {
-    let evidence = TelegraphEvidence::Levels { jumps: 50.0, gain: 20.0 };
+    likely_levels(time_constant_s, amplitude, 20.0)
+}
+
+fn likely_levels(time_constant_s: f64, amplitude: f64, gain: f64) -> Effect {
+    let evidence = TelegraphEvidence::Levels { jumps: 50.0, gain };
     TelegraphNoise { time_constant_s: known(time_constant_s), amplitude: size(amplitude), evidence }.into()
 }
 
@@ -318,6 +322,8 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
         (["chance", "line of the spectrum"],
             channel([of(sinusoid(10.0, BoundedEstimate::new(0.1, 0.0, 0.3)), OF_LINE)]), vec![]),
         (["rounding to counts", "telegraph noise of the samples"], later(levels(1.0, 1e-3), OF_LEVELS), vec![]),
+        (["telegraph noise of the samples", "shot noise"],
+            channel([of(likely_levels(5.0, 1.0, 33.0), OF_LEVELS), of_decays.clone()]), vec!["telegraph"]),
         (["rounding to counts", "every term of the curve but a filter"],
             Claims::Channel(ChannelFacts { is_dithered: false, ..DITHERED }, vec![of(drift(1.0), OF_RAMP)]), vec![]),
         (["line of the spectrum", "line of the curve"],
@@ -410,7 +416,8 @@ fn rows_do_not_reach_beyond_their_conditions() {
         [of(resonance(2.0), of_resonance(2.0)), periodic],
         [of(markov(5.0), of_markov(0, 5.0)), track.clone()],
         [of(resonance(12.0), of_resonance(12.0)), track],
-        [of(markov(50.0), of_markov(0, 50.0)), decays],
+        [of(markov(50.0), of_markov(0, 50.0)), decays.clone()],
+        [of(likely_levels(50.0, 1.0, 33.0), OF_LEVELS), decays],
         [of(drift(1.9), OF_RAMP), of(sinusoid(10.0, known(1.0)), OF_LINE)],
         [of(spikes(), Origin::Samples), of(levels(2.0, 1.0), OF_LEVELS)],
     ];
