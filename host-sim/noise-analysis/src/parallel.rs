@@ -6,7 +6,7 @@ use std::cell::Cell;
 use std::num::NonZero;
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{LazyLock, Mutex, PoisonError};
 
 thread_local! {
     static IS_ALONE: Cell<bool> = const { Cell::new(false) };
@@ -28,7 +28,9 @@ pub fn on_one_thread<R>(task: impl FnOnce() -> R) -> R {
 /// Threads that the analysis may use on this thread.
 #[must_use]
 pub fn threads() -> usize {
-    if IS_ALONE.get() { 1 } else { std::thread::available_parallelism().map_or(1, NonZero::get) }
+    /// Asked for once: the system answers out of several files.
+    static CORES: LazyLock<usize> = LazyLock::new(|| std::thread::available_parallelism().map_or(1, NonZero::get));
+    if IS_ALONE.get() { 1 } else { *CORES }
 }
 
 /// Runs `task` for each of `items`, on as many threads as there are cores, and returns the results in the order of `items`.

@@ -26,7 +26,7 @@ pub(super) enum Sign {
 }
 
 /// Rounds of the multiplicative fit, which bring the densities near enough for the scoring.
-const MULTIPLICATIVE_ROUNDS: usize = 8;
+const MULTIPLICATIVE_ROUNDS: usize = 4;
 /// Most rounds of the scoring, and the gain in ln likelihood of a round with which it ends: what is left to gain then is far less
 /// than 1/2, by which the likelihood falls at one standard deviation.
 const SCORING_ROUNDS: usize = 50;
@@ -74,13 +74,14 @@ pub(super) fn fit_mixture<R: AsRef<[f64]>>(
     let is_positive: Vec<bool> =
         (0..densities.len()).map(|term| bases.iter().all(|basis| basis.as_ref()[term] >= 0.0)).collect();
     let positive = is_positive.iter().filter(|is_positive| **is_positive).count() as f64;
-    for (term, density) in densities.iter_mut().enumerate() {
-        let shown = bands.iter().zip(bases).filter(|(_, basis)| is_positive[term] && basis.as_ref()[term] > 0.0);
-        let (sum, weight) = shown.fold((0.0, 0.0), |(sum, weight), (band, basis)| {
-            let alone = (band.density / basis.as_ref()[term]).max(f64::MIN_POSITIVE);
-            (sum + band.ordinates * alone.ln(), weight + band.ordinates)
-        });
-        *density = if weight > 0.0 { (sum / weight).exp() / positive } else { 0.0 };
+    let (mut total, mut parts) = (0.0, vec![0.0; densities.len()]);
+    for (band, basis) in bands.iter().zip(bases).filter(|(band, _)| band.density > 0.0) {
+        let weight = band.ordinates / band.density;
+        total += band.ordinates;
+        parts.iter_mut().zip(basis.as_ref()).for_each(|(part, shape)| *part += weight * shape);
+    }
+    for ((density, part), is_positive) in densities.iter_mut().zip(parts).zip(&is_positive) {
+        *density = if *is_positive && part > 0.0 { total / (part * positive) } else { 0.0 };
     }
     for _ in 0..MULTIPLICATIVE_ROUNDS {
         multiplicative_step(bands, bases, &is_positive, densities);
