@@ -54,7 +54,7 @@ impl FoundSines {
         let strongest =
             self.found.iter().filter(is_in_band).max_by(|a, b| a.line.statistic.total_cmp(&b.line.statistic))?.clone();
         let change = Modulation::find(&strongest.sine, series, strongest.density, |_| true)?;
-        if change.statistic < resonance.statistic {
+        if change.with_multiples < resonance.statistic {
             return None;
         }
         let mut left = series.clone();

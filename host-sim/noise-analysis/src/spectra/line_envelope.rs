@@ -56,6 +56,8 @@ pub struct Modulation {
     pub of_phase: bool,
     /// −2 log-likelihood ratio of the line without the change against the line with it.
     pub statistic: f64,
+    /// The same of the change and its multiples that stand out of the noise: a line that is switched on and off has those of a rectangle.
+    pub with_multiples: f64,
 }
 
 impl Modulation {
@@ -99,7 +101,9 @@ impl Modulation {
             let at = envelope.vertex(part, at);
             (over_wandering(&envelope, part, at, most, unit), part, at)
         };
-        let (ratio, part, at) = peaks.into_iter().map(over_level).max_by(|one, other| one.0.total_cmp(&other.0))?;
+        let found = peaks.into_iter().map(over_level);
+        let (OverLevel { ratio, multiples }, part, at) =
+            found.max_by(|(one, ..), (other, ..)| one.ratio.total_cmp(&other.ratio))?;
         let powers = envelope.powers(at);
         let (power, of_other) = (powers[part as usize], powers[1 - part as usize]);
         let frequency = at / (length as f64 * rest.sample_period());
@@ -114,6 +118,7 @@ impl Modulation {
             depth: MeasuredValue { value: depth, error: depth * relative },
             of_phase: matches!(part, Part::Quadrature),
             statistic: 2.0 * ratio,
+            with_multiples: 2.0 * (ratio + multiples),
         })
     }
 }
@@ -213,11 +218,14 @@ impl Envelope {
 ///
 /// What is beside the change is the noise and a random walk, whose density is known to one part in √m, `m` being the number of ordinates
 /// that show it: over it a power has Fisher's distribution of 2 and 2m degrees of freedom, whose tail is `(1 + r/m)^−m`.
-fn over_wandering(envelope: &Envelope, part: Part, periods: f64, most: usize, unit: f64) -> f64 {
+///
+/// Of the multiples of the change those count whose power chance gives at any of them with a probability of [`FALSE_ALARM`] or less.
+fn over_wandering(envelope: &Envelope, part: Part, periods: f64, most: usize, unit: f64) -> OverLevel {
     let rest = envelope.without(part, periods);
     let power = envelope.power(part, periods) / unit;
+    let highest = highest_multiple(power);
     let is_multiple = |at: f64| {
-        let multiple = (at / periods).round().clamp(1.0, highest_multiple(power));
+        let multiple = (at / periods).round().clamp(1.0, highest);
         (at - multiple * periods).abs() < OF_MULTIPLE
     };
     let band =
@@ -231,9 +239,23 @@ fn over_wandering(envelope: &Envelope, part: Part, periods: f64, most: usize, un
     let level = |periods: f64| noise + densities[1] / (periods * periods);
     let part_of_walk = |periods: f64| 1.0 - noise / level(periods);
     let shown: f64 = beside.iter().map(|band| part_of_walk(band.frequency).powi(2)).sum();
-    let ratio = power / level(periods);
-    let known_by = shown / part_of_walk(periods).powi(2);
-    if known_by.is_finite() { known_by * (ratio / known_by).ln_1p() } else { ratio }
+    let over_level = |periods: f64, power: f64| {
+        let ratio = power / level(periods);
+        let known_by = shown / part_of_walk(periods).powi(2);
+        if known_by.is_finite() { known_by * (ratio / known_by).ln_1p() } else { ratio }
+    };
+    let multiples =
+        (2..=highest as u32).map(|multiple| f64::from(multiple) * periods).take_while(|at| *at <= most as f64);
+    let of_multiples = multiples.map(|at| over_level(at, rest.power(part, at) / unit));
+    let multiples = of_multiples.filter(|ratio| highest * (-ratio).exp() <= FALSE_ALARM).sum();
+    OverLevel { ratio: over_level(periods, power), multiples }
+}
+
+/// A change and its multiples, in exponential variables of mean 1 that chance exceeds as often.
+struct OverLevel {
+    ratio: f64,
+    /// The sum of those of the multiples that are not chance.
+    multiples: f64,
 }
 
 /// Highest multiple of a change, whose power is `ratio` times the noise, with sidebands that are above the noise: those of a line that is
@@ -333,8 +355,9 @@ mod tests {
     #[test]
     fn lines_at_multiples_of_a_change_are_its_sidebands() {
         let change = |turns: f64| MeasuredValue { value: turns / 400.0, error: 0.01 / 400.0 };
+        let (frequency, depth) = (change(8.0), change(1.0));
         let found =
-            Modulation { frequency: change(8.0), of_line: 1.0, depth: change(1.0), of_phase: false, statistic: 100.0 };
+            Modulation { frequency, of_line: 1.0, depth, of_phase: false, statistic: 100.0, with_multiples: 100.0 };
         let is_sideband = |turns: f64| found.is_sideband(turns / 400.0, 400.0);
         assert!([8.0, -24.0, 40.5].into_iter().all(is_sideband));
         // The fifth has one part in 25 of 25 times the noise; that of eleven is above it where the first has 250 times the noise.

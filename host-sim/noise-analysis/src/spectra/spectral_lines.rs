@@ -191,6 +191,7 @@ fn sidebands(peaks: &[spectra::SpectralLine], deviation: f64, duration_s: f64) -
         depth: MeasuredValue { value: over_line * mean, error: 0.5 * over_line * error },
         of_phase: false,
         statistic: one.statistic + other.statistic,
+        with_multiples: one.statistic + other.statistic,
     })
 }
 

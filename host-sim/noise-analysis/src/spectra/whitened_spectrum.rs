@@ -231,7 +231,8 @@ impl<'a> WhitenedSpectrum<'a> {
             };
             let is_likelier = |lorentz: &Lorentz| {
                 let over_sine = lorentz.statistic - line.statistic;
-                over_sine > PREFERENCE && change().is_none_or(|change| over_sine > change.statistic - COST_OF_A_CHANGE)
+                over_sine > PREFERENCE
+                    && change().is_none_or(|change| over_sine > change.with_multiples - COST_OF_A_CHANGE)
             };
             return Some(match self.resonance(bin, widths).filter(is_likelier) {
                 Some(lorentz) => {
