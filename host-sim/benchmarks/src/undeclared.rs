@@ -39,9 +39,9 @@ pub use table::{Proportion, STRONG, ScoreTable};
 
 use crate::parallel;
 
-/// Offset of the sealed seeds from the open ones. The method has been changed after those at 2⁴⁰, 2⁴¹, … 2⁶¹ were run, and those at 2⁴⁰ and
+/// Offset of the sealed seeds from the open ones. The method has been changed after those at 2⁴⁰, 2⁴¹, … 2⁶² were run, and those at 2⁴⁰ and
 /// 2⁴¹ were recordings of the virtual sensor; so these are no longer used.
-const SEALED: u64 = 1 << 62;
+const SEALED: u64 = 1 << 63;
 /// Number of seeds that are reserved for each group of recordings.
 pub const SEEDS_PER_GROUP: u64 = 1 << 20;
 
