@@ -337,6 +337,7 @@ mod tests {
                     if is_up { 10.0 } else { 0.0 }
                 });
                 let found = telegraph_noise(&levels, "g", &[time_s]).expect("levels ten deviations apart");
+                // The interval holds half of what the jumps blur, several times the noise of a level, 0.1 % of the amplitude.
                 let amplitude = found.amplitude.estimate();
                 assert!((amplitude.low..=amplitude.high).contains(&10.0), "{time_s} {seed}: {found:?}");
             }

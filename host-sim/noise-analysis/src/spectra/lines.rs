@@ -133,8 +133,8 @@ pub(crate) fn without_sines(mut series: UniformSeries) -> UniformSeries {
 }
 
 /// The sinusoid of the largest ordinate over those around it, if chance gives one as large in fewer than [`SIGNIFICANCE`] of all records:
-/// ordinates of noise over their mean are exponential variables. The noise around it is as strong at every frequency f, or falls with f
-/// or f² as that of telegraph noise beyond its corner: a sinusoid stands out either way.
+/// ordinates of noise over their mean are exponential variables. The noise around it has one density, or one that falls with the square of
+/// the frequency, as that of telegraph noise beyond its corner: a sinusoid stands out of either.
 fn sine_that_stands_out(series: &UniformSeries) -> Option<Sine> {
     let spectrum = Periodogram::new(series)?;
     let ordinates: Vec<f64> = spectrum.independent().collect();
