@@ -209,7 +209,7 @@ fn telegraph_noise(chain: &TwoStateChain, gain: f64, part_s: f64, unit: &'static
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -217,10 +217,10 @@ mod tests {
     use std::f64::consts::TAU;
 
     const SAMPLES: usize = 40_000;
-    const PERIOD_S: f64 = 0.01;
+    pub(crate) const PERIOD_S: f64 = 0.01;
 
-    /// White noise of deviation 1 plus the values of `next`.
-    fn series(seed: u64, mut next: impl FnMut(&mut ChaCha8Rng, usize) -> f64) -> UniformSeries {
+    /// White noise of deviation 1 over 400 s plus the values of `next`.
+    pub(crate) fn series(seed: u64, mut next: impl FnMut(&mut ChaCha8Rng, usize) -> f64) -> UniformSeries {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let value = |at| next(&mut random, at) + random.sample::<f64, _>(StandardNormal);
         UniformSeries::new(PERIOD_S, (0..SAMPLES).map(value).collect())
@@ -237,7 +237,7 @@ mod tests {
     }
 
     /// Two levels at a distance of `amplitude`, with the correlation time `time_s`.
-    fn telegraph(amplitude: f64, time_s: f64) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
+    pub(crate) fn telegraph(amplitude: f64, time_s: f64) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
         let mut up = false;
         move |random, _| {
             up ^= random.random_bool(0.5 * PERIOD_S / time_s);

@@ -299,27 +299,15 @@ fn agree_on_filter(part: &PartData, channels: &mut PerChannel<ChannelTrace>) -> 
 #[cfg(test)]
 mod tests {
     use super::telegraph_noise;
-    use crate::samples::uniform_series::UniformSeries;
-    use rand::{Rng, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::StandardNormal;
+    use crate::detectors::random_telegraph::tests::{PERIOD_S, series, telegraph};
     use std::f64::consts::TAU;
-
-    const PERIOD_S: f64 = 0.01;
-
-    /// White noise of deviation 1 over 400 s, with the values of `next`.
-    fn series(seed: u64, mut next: impl FnMut(&mut ChaCha8Rng, u32) -> f64) -> UniformSeries {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let value = |at| next(&mut random, at) + random.sample::<f64, _>(StandardNormal);
-        UniformSeries::new(PERIOD_S, (0..40_000).map(value).collect())
-    }
 
     /// A sinusoid of 108 periods is hidden in the noise of each sample, and between its extremes in that of each part.
     #[test]
     fn a_weak_sinusoid_is_no_telegraph_noise() {
         for amplitude in [0.3, 0.5, 0.8] {
             for seed in 40..60 {
-                let sine = series(seed, |_, at| amplitude * (TAU * f64::from(at) * PERIOD_S / 3.7).sin());
+                let sine = series(seed, |_, at| amplitude * (TAU * at as f64 * PERIOD_S / 3.7).sin());
                 assert_eq!(telegraph_noise(&sine, "g", &[0.6]), None, "{amplitude} {seed}");
             }
         }
@@ -331,12 +319,8 @@ mod tests {
     fn the_slope_of_a_telegraph_spectrum_is_no_sinusoid() {
         for time_s in [6.0, 10.0] {
             for seed in 60..80 {
-                let mut is_up = false;
-                let levels = series(seed, |random, _| {
-                    is_up ^= random.random_bool(0.5 * PERIOD_S / time_s);
-                    if is_up { 10.0 } else { 0.0 }
-                });
-                let found = telegraph_noise(&levels, "g", &[time_s]).expect("levels ten deviations apart");
+                let found = telegraph_noise(&series(seed, telegraph(10.0, time_s)), "g", &[time_s])
+                    .expect("levels ten deviations apart");
                 // The interval holds half of what the jumps blur, several times the noise of a level, 0.1 % of the amplitude.
                 let amplitude = found.amplitude.estimate();
                 assert!((amplitude.low..=amplitude.high).contains(&10.0), "{time_s} {seed}: {found:?}");

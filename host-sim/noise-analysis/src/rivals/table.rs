@@ -166,13 +166,6 @@ pub static RIVALRIES: [Rivalry; 48] = [
         "two neighbouring counts",
         Rule::Channel(|of| matches!((of.origin(), of.effect()), (Origin::Levels { .. }, Effect::TelegraphNoise(found))
             if !of.facts.is_dithered_at_once && found.amplitude.value < NEIGHBOURING_COUNTS * of.facts.resolution))),
-    row("telegraph noise of the samples", "shot noise",
-        "time constants within a factor of 4, and a gain in ln likelihood above half the square of the shot noise's sum",
-        "either says how much more likely it is than a Gaussian process",
-        Rule::Channel(|of| match of.origin() {
-            Origin::Signal(Signal::Decays(decays)) => of.levels().is_some_and(|levels| are_likelier(levels, decays)),
-            _ => false,
-        })),
     row("rounding to counts", "every term of the curve but a filter", "not dithered at any short averaging time",
         "without dither the rounding error is no white noise, and the curve shows its steps",
         Rule::Channel(|of| !of.facts.is_dithered && of.kind().is_some_and(|kind| !is_filter(&kind)))),
@@ -196,6 +189,13 @@ pub static RIVALRIES: [Rivalry; 48] = [
         "the spectrum shows less of it, or has another shape where it has a tenth of the density or more: 2·10⁻⁴",
         "the density of quantization rises with the square of the frequency",
         Rule::Channel(|of| of.loses_to(|effect| matches!(refutation(effect), Some(Refutation::ShapeOfSpectrum { .. }))))),
+    row("telegraph noise of the samples", "shot noise",
+        "time constants within a factor of 4, and a gain in ln likelihood above half the square of the shot noise's sum",
+        "either says how much more likely it is than a Gaussian process",
+        Rule::Channel(|of| match of.origin() {
+            Origin::Signal(Signal::Decays(decays)) => of.levels().is_some_and(|levels| are_likelier(levels, decays)),
+            _ => false,
+        })),
     row("telegraph noise of the samples", "Markov process or ramp of the curve", "always",
         "the samples show the levels; the curve is that of a Markov process",
         Rule::Channel(|of| of.is_slow_term() && of.levels().is_some())),

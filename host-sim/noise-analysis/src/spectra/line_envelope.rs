@@ -86,14 +86,13 @@ impl Modulation {
         let periods = |ordinate: usize| ordinate as f64 / PADDING as f64;
         let ordinates = PADDING * FEWEST_PERIODS..=PADDING * most;
         let trials = 2.0 * ordinates.clone().count() as f64;
-        let is_seen = |ratio: f64| trials * (-ratio).exp() <= FALSE_ALARM;
         let powers: Vec<[f64; 2]> = (0..=PADDING * most + 1).map(|at| envelope.powers(periods(at))).collect();
         let mut peaks: Vec<(f64, Part, f64)> = Vec::new();
         for part in Part::BOTH {
             let power = |at: usize| powers[at][part as usize];
             let is_peak = |&at: &usize| power(at) >= power(at - 1) && power(at) >= power(at + 1);
             let seen = ordinates.clone().filter(is_peak).map(|at| (power(at) / unit, part, periods(at)));
-            peaks.extend(seen.filter(|(ratio, ..)| is_seen(*ratio)));
+            peaks.extend(seen.filter(|(ratio, ..)| is_seen(*ratio, trials)));
         }
         peaks.sort_by(|one, other| other.0.total_cmp(&one.0));
         peaks.truncate(MOST_PEAKS);
@@ -107,7 +106,7 @@ impl Modulation {
         let powers = envelope.powers(at);
         let (power, of_other) = (powers[part as usize], powers[1 - part as usize]);
         let frequency = at / (length as f64 * rest.sample_period());
-        if !is_seen(ratio) || (has_line(frequency) && of_other > LARGEST_OTHER * power) {
+        if !is_seen(ratio, trials) || (has_line(frequency) && of_other > LARGEST_OTHER * power) {
             return None;
         }
         let depth = 4.0 * power.sqrt() / (envelope.weight * sine.amplitude());
@@ -213,13 +212,18 @@ impl Envelope {
     }
 }
 
+/// Whether chance gives an exponential variable of mean 1 as large as this in so many trials with a probability of [`FALSE_ALARM`] or less.
+fn is_seen(ratio: f64, trials: f64) -> bool {
+    trials * (-ratio).exp() <= FALSE_ALARM
+}
+
 /// The exponential variable of mean 1 that chance exceeds as often as the power of a change of so many `periods` a record, where the part
 /// wanders as its ordinates up to `most` do. `unit` is the power of the noise around the line.
 ///
 /// What is beside the change is the noise and a random walk, whose density is known to one part in √m, `m` being the number of ordinates
 /// that show it: over it a power has Fisher's distribution of 2 and 2m degrees of freedom, whose tail is `(1 + r/m)^−m`.
 ///
-/// Of the multiples of the change those count whose power chance gives at any of them with a probability of [`FALSE_ALARM`] or less.
+/// Of the multiples of the change those count that are [seen](is_seen).
 fn over_wandering(envelope: &Envelope, part: Part, periods: f64, most: usize, unit: f64) -> OverLevel {
     let rest = envelope.without(part, periods);
     let power = envelope.power(part, periods) / unit;
@@ -239,16 +243,16 @@ fn over_wandering(envelope: &Envelope, part: Part, periods: f64, most: usize, un
     let level = |periods: f64| noise + densities[1] / (periods * periods);
     let part_of_walk = |periods: f64| 1.0 - noise / level(periods);
     let shown: f64 = beside.iter().map(|band| part_of_walk(band.frequency).powi(2)).sum();
-    let over_level = |periods: f64, power: f64| {
+    let by_chance = |periods: f64, power: f64| {
         let ratio = power / level(periods);
         let known_by = shown / part_of_walk(periods).powi(2);
         if known_by.is_finite() { known_by * (ratio / known_by).ln_1p() } else { ratio }
     };
     let multiples =
         (2..=highest as u32).map(|multiple| f64::from(multiple) * periods).take_while(|at| *at <= most as f64);
-    let of_multiples = multiples.map(|at| over_level(at, rest.power(part, at) / unit));
-    let multiples = of_multiples.filter(|ratio| highest * (-ratio).exp() <= FALSE_ALARM).sum();
-    OverLevel { ratio: over_level(periods, power), multiples }
+    let of_multiples = multiples.map(|at| by_chance(at, rest.power(part, at) / unit));
+    let multiples = of_multiples.filter(|ratio| is_seen(*ratio, highest)).sum();
+    OverLevel { ratio: by_chance(periods, power), multiples }
 }
 
 /// A change and its multiples, in exponential variables of mean 1 that chance exceeds as often.
