@@ -23,7 +23,7 @@ exec "$@" -C passes=sancov-module -C llvm-args=-sanitizer-coverage-level=3 -C ll
     -C llvm-args=-sanitizer-coverage-pc-table -C llvm-args=-sanitizer-coverage-trace-compares
 WRAPPER
 chmod +x "$TARGET/fuzz/rustc"
-RUSTC_WRAPPER='' RUSTC_WORKSPACE_WRAPPER=$TARGET/fuzz/rustc cargo build --locked --workspace --ignore-rust-version --example fuzz --features \
+RUSTC_WRAPPER='' RUSTC_WORKSPACE_WRAPPER=$TARGET/fuzz/rustc cargo build --locked --workspace --example fuzz --features \
     fuzz/libfuzzer,adis16405-driver/async,adis16405-driver/defmt,adis16405-driver/serde,allan-core/serde,allan-core/defmt
 cp "$TARGET/debug/examples/fuzz" "$TARGET/fuzz/fuzz"
 

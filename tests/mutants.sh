@@ -2,7 +2,7 @@
 # Changes single operators and values of what decodes, estimates and fits, and lists the changes that no test notices:
 # tests/mutants.sh [SEED [NUMBER [AREA...]]], without arguments by seed 1, 40 in each of the areas driver, cascade, gaps, fit and wire.
 #
-# Needs cargo-mutants (`cargo install cargo-mutants`). The tests are those of the changed crate: first the ones that are fast to compile, then,
+# Needs cargo-mutants (`cargo install cargo-mutants`). The tests are those of the changed crate: first those that are about the area, then,
 # for what they do not notice, all. Prints a line for each change that is left; `target/mutants/AREA` has the others. cargo-mutants tries the
 # deletions of fields in a chosen file whether they are chosen or not.
 set -euo pipefail
@@ -15,11 +15,11 @@ TARGET=$(realpath "${CARGO_TARGET_DIR:-target}")
 
 for area in "${areas[@]}"; do
     case $area in
-        driver) crate=adis16405-driver files=(adis16405-driver/src/{burst,channel,sample,validity}.rs) fast=(decoding validity) ;;
-        cascade) crate=allan-core files=(allan-core/src/cascade.rs allan-core/src/cascade/{block,checkpoint,snapshot}.rs) fast=(cascade range) ;;
-        gaps) crate=allan-core files=(allan-core/src/{cascade/gap,interpolation,time_stamps}.rs) fast=(cascade gaps) ;;
-        fit) crate=allan-core files=(allan-core/src/curve.rs allan-core/src/fit.rs "allan-core/src/fit/*.rs") fast=(cascade fit) ;;
-        wire) crate=link files=("firmware/link/src/*.rs") fast=(frames) ;;
+        driver) crate=adis16405-driver files=(adis16405-driver/src/{burst,channel,sample,validity}.rs) about=(decoding validity) ;;
+        cascade) crate=allan-core files=(allan-core/src/cascade.rs allan-core/src/cascade/{block,checkpoint,snapshot}.rs) about=(cascade range) ;;
+        gaps) crate=allan-core files=(allan-core/src/{cascade/gap,interpolation,time_stamps}.rs) about=(cascade gaps) ;;
+        fit) crate=allan-core files=(allan-core/src/curve.rs allan-core/src/fit.rs "allan-core/src/fit/*.rs") about=(cascade fit) ;;
+        wire) crate=link files=("firmware/link/src/*.rs") about=(frames) ;;
         *) echo "no area $area" >&2; exit 2 ;;
     esac
     case $crate in
@@ -44,7 +44,7 @@ print(*random.Random(int(sys.argv[1])).sample(lines, min(int(sys.argv[2]), len(l
             "${features[@]}" --cargo-arg=--locked -- "${@:3}" >"$out/$name.log" 2>&1 || status=$?
         [[ $status = [023] ]] || { tail "$out/$name.log"; exit 1; }
     }
-    try first "$out/drawn.txt" --lib "${fast[@]/#/--test=}"
+    try first "$out/drawn.txt" --test suite -- "${about[@]/%/::}"
     left=$out/first/mutants.out/missed.txt
     [ ! -s "$left" ] || { try second "$left" && left=$out/second/mutants.out/missed.txt; }
     count() { sort -u "$out"/*/mutants.out/"$1".txt | wc -l; }

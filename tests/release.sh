@@ -31,8 +31,8 @@ PATH=$python:$PATH run "$python/pip" wheel --quiet --disable-pip-version-check -
     --wheel-dir "$out" ./allan-core/python
 
 # The program, optimised over all crates, which the everyday build is not.
-run cargo build --locked --profile dist --package host-sim --target-dir "$target"
-cp "$target/dist/host-sim" "$out"
+run cargo build --locked --release --package host-sim --target-dir "$target"
+cp "$target/release/host-sim" "$out"
 
 # The images
 image() { # BOARD TARGET ENDING

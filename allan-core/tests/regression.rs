@@ -1,12 +1,10 @@
 //! Regression on covariates, on simulated channels with known sensitivities.
 
-#[path = "support/simulation.rs"]
-mod simulation;
 
 use allan_core::regression::{CovarianceCurve, Covariate, CovariateRegression, Sensitivity};
 use allan_core::term::{Markov, NoiseTerm};
 use allan_core::{Cascade, Coupling, Curve};
-use simulation::{Noise, PERIOD};
+use crate::simulation::{Noise, PERIOD};
 
 const OCTAVES: usize = 18;
 const SAMPLES: usize = 1 << 16;

@@ -1,11 +1,9 @@
 //! Every term: its Allan variance against the integral of its spectrum, its autocovariance and simulation.
 
-#[path = "support/simulation.rs"]
-mod simulation;
 
 use allan_core::term::{MovingAverageFilter, NoiseTerm, Resonance, Sinusoid};
 use allan_core::{Model, model::FittedTerm};
-use simulation::{
+use crate::simulation::{
     LOW_PASS, MARKOV, Noise, PERIOD, RESONANCE, autocovariance, curve, impulse_response, noises, stationary,
 };
 use std::f64::consts::PI;

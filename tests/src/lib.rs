@@ -2,9 +2,9 @@
 //!
 //! The tests of the noise observatory as a whole live in `tests/`.
 
-use std::fs::OpenOptions;
+use std::fs::{File, OpenOptions};
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// The path of a measured recording in the folder that `ADIS_RECORDINGS` names. If it is absent, the test is reported as
@@ -35,11 +35,82 @@ pub fn host_sim() -> PathBuf {
     if let Some(program) = std::env::var_os("HOST_SIM") {
         return program.into();
     }
-    let build = Command::new(env!("CARGO"))
-        .args(["build", "--quiet", "--locked", "--package", "host-sim", "--bin", "host-sim"])
-        .status()
-        .expect("cargo runs");
-    assert!(build.success(), "host-sim does not build");
+    let arguments = ["build", "--quiet", "--locked", "--package", "host-sim", "--bin", "host-sim"];
+    assert!(cargo().args(arguments).status().expect("cargo runs").success(), "host-sim does not build");
     let test = std::env::current_exe().expect("the path of this test");
     test.ancestors().nth(2).expect("target/debug").join("host-sim")
+}
+
+/// The path of a program of the workspace `tests/tools`, which is built if it is not there.
+pub fn tool(name: &str) -> PathBuf {
+    let target = target_folder().join("programs");
+    let mut build = cargo();
+    build.current_dir(workspace().join("tests/tools")).args(["programs", "--target-dir"]).arg(&target);
+    let status = build.status().expect("cargo runs");
+    assert!(status.success(), "{name} does not build");
+    target.join("release").join(name)
+}
+
+/// A program for a microcontroller.
+#[derive(Debug, Clone, Copy)]
+pub struct Image<'a> {
+    pub package: &'a str,
+    pub program: &'a str,
+    /// Rust's name of the target.
+    pub target: &'a str,
+    pub profile: &'a str,
+    /// Further arguments of cargo, such as features.
+    pub arguments: &'a [&'a str],
+    /// A variable of the environment and its value, which the program is compiled with.
+    pub variable: Option<(&'a str, &'a str)>,
+}
+
+impl Image<'_> {
+    /// Builds the program and returns the path of a copy of its ELF with the name `copy`: cargo overwrites a program when it builds it
+    /// with other features.
+    pub fn build(self, copy: &str) -> PathBuf {
+        let folder = image_folder();
+        std::fs::create_dir_all(&folder).expect("a folder");
+        // Another test, which is another process, may build the same program with other features.
+        let one_at_a_time = File::create(folder.join("building")).expect("a file");
+        one_at_a_time.lock().expect("a lock");
+        let status = cargo()
+            .args(["build", "--quiet", "--locked", "--package", self.package, "--bin", self.program])
+            .args(["--target", self.target, "--profile", self.profile])
+            .args(self.arguments)
+            .arg("--target-dir")
+            .arg(&folder)
+            .envs(self.variable)
+            .status()
+            .expect("cargo starts");
+        assert!(status.success(), "{self:?} does not build; its target comes with `rustup target add`");
+        let copy = folder.join(copy).with_extension("elf");
+        // Renamed when it is whole: another test may be reading the one before.
+        let partial = copy.with_extension(std::process::id().to_string());
+        std::fs::copy(folder.join(self.target).join(self.profile).join(self.program), &partial).expect("room");
+        std::fs::rename(partial, &copy).expect("the same folder");
+        copy
+    }
+}
+
+/// The folder of the workspace.
+pub fn workspace() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the tests are a folder of the workspace")
+}
+
+/// The target folder of the workspace.
+pub fn target_folder() -> PathBuf {
+    workspace().join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
+}
+
+/// The target folder of what is built for microcontrollers.
+pub fn image_folder() -> PathBuf {
+    target_folder().join("image")
+}
+
+/// The cargo that runs the tests, in the folder of the workspace.
+pub fn cargo() -> Command {
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.current_dir(workspace());
+    cargo
 }

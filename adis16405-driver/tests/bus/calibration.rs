@@ -3,7 +3,7 @@
 
 use adis16405_driver::{Config, Error, GyroBias, OnChipCompensation, Register};
 
-use crate::harness::{Frames, NONE, gyro_offsets, read, read_all, write};
+use super::harness::{Frames, NONE, gyro_offsets, read, read_all, write};
 
 /// The frames that set a register: a read, writes of both bytes, and a read back.
 fn set(address: u8, value: u16, width: u16) -> Frames {

@@ -8,7 +8,7 @@ use adis16405_driver::{
     Register, SamplePeriod, Sleep,
 };
 
-use crate::harness::{
+use super::harness::{
     Bench, Frames, NONE, SLOW_STALL_NS, Step, frame_with, gyro_offsets, init, read, read_all, slow, write,
 };
 

@@ -166,10 +166,10 @@ macro_rules! both {
         both!($config, with []; $frames; $pauses; |$imu| $call)
     };
     ($config:expr, with [$($change:tt)*]; $frames:expr; $pauses:expr; |$imu:ident| $call:expr) => {{
-        let frames: Vec<crate::harness::Step> = $frames.into_iter().flatten().collect();
+        let frames: Vec<crate::bus::harness::Step> = $frames.into_iter().flatten().collect();
         let pauses: Vec<u32> = $pauses.into_iter().collect();
 
-        let bench = crate::harness::Bench::new(frames.clone(), pauses.clone());
+        let bench = crate::bus::harness::Bench::new(frames.clone(), pauses.clone());
         #[allow(unused_mut)]
         let mut $imu = adis16405_driver::Adis16405::new(bench.clone(), bench.clone(), $config)$($change)*;
         let blocking = $call;
@@ -177,9 +177,9 @@ macro_rules! both {
 
         #[cfg(feature = "async")]
         {
-            let bench = crate::harness::Bench::new(frames, pauses);
+            let bench = crate::bus::harness::Bench::new(frames, pauses);
             let mut $imu = adis16405_driver::Adis16405::new_async(bench.clone(), bench.clone(), $config)$($change)*;
-            let asynchronous = crate::harness::block_on(async { $call.await });
+            let asynchronous = crate::bus::harness::block_on(async { $call.await });
             bench.done();
             assert_eq!(asynchronous, blocking, "the blocking and the asynchronous driver differ");
         }

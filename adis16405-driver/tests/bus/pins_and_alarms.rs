@@ -9,7 +9,7 @@ use adis16405_driver::{
     Polarity, Register,
 };
 
-use crate::harness::{Frames, NONE, read, read_all, write};
+use super::harness::{Frames, NONE, read, read_all, write};
 
 #[test]
 fn data_ready_is_set_by_line_and_polarity() {

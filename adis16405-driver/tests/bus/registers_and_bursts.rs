@@ -4,7 +4,7 @@ use adis16405_driver::{
     Access, Adis16405, Config, Error, GyroRange, Register, SamplePeriod, SelectDuringStall, Timing,
 };
 
-use crate::harness::{
+use super::harness::{
     BURST_STALL_NS, Bench, Frames, NONE, SLOW_STALL_NS, STALL_NS, Step, frame_with, read, read_all, write,
 };
 

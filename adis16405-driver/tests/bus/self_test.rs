@@ -3,7 +3,7 @@
 
 use adis16405_driver::{Config, Diagnosis, Error, FlashTest, Register, SelfTest, Stimulus};
 
-use crate::harness::{Frames, NONE, read, read_all, write};
+use super::harness::{Frames, NONE, read, read_all, write};
 
 #[test]
 fn a_self_test_is_polled_until_its_bit_clears() {

@@ -85,19 +85,22 @@ fn run(arguments: &[String]) -> Result<(), Box<dyn Error>> {
     };
     let board = BOARDS.iter().find(|board| board.name == name);
     let board = board.ok_or_else(|| format!("no board {name}: there are {names}"))?;
-    let elf = build(board)?;
-    let contents = (board.convert)(&fs::read(&elf).map_err(|error| format!("{}: {error}", elf.display()))?)?;
+    let contents = (board.convert)(&build(board)?)?;
     let out = out.unwrap_or_else(|| format!("observatory-{}.{}", board.name, board.extension).into());
     fs::write(&out, &contents).map_err(|error| format!("{}: {error}", out.display()))?;
     println!("{}, {} kB: {}", out.display(), contents.len() / 1024, board.load.replace("FILE", &out.to_string_lossy()));
     Ok(())
 }
 
-/// Builds the image and returns the path of its ELF.
-fn build(board: &Board) -> Result<PathBuf, Box<dyn Error>> {
+/// Builds the image and returns its ELF.
+fn build(board: &Board) -> Result<Vec<u8>, Box<dyn Error>> {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     // As in the tests: cargo, which runs this program, may hold the lock of its own folder.
     let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from).join("image");
+    fs::create_dir_all(&target).map_err(|error| format!("{}: {error}", target.display()))?;
+    // Cargo writes the images of a board into one file, whatever their features: the tests build others at the same time.
+    let one_at_a_time = fs::File::create(target.join("building"))?;
+    one_at_a_time.lock()?;
     let status = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(&workspace)
         .args(["build", "--package", "firmware", "--bin", board.program, "--features", board.features])
@@ -110,5 +113,6 @@ fn build(board: &Board) -> Result<PathBuf, Box<dyn Error>> {
             format!("the image does not build; its target comes with: rustup target add {}", board.target).into()
         );
     }
-    Ok(target.join(board.target).join("image").join(board.program))
+    let elf = target.join(board.target).join("image").join(board.program);
+    Ok(fs::read(&elf).map_err(|error| format!("{}: {error}", elf.display()))?)
 }

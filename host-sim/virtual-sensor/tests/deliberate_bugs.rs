@@ -8,8 +8,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The test programs of this crate in which the driver reads the part.
-const TESTS: [&str; 3] = ["driver", "procedures", "misbehaving_part"];
+/// The modules of these tests in which the driver reads the part.
+const TESTS: [&str; 3] = ["driver::", "procedures::", "misbehaving_part::"];
 
 /// A bug in a file of the driver: the text that is there, the one that takes its place, what that means, and a test that
 /// finds it.
@@ -220,14 +220,18 @@ impl Copy {
             .current_dir(&self.root)
             .args(["test", "--offline", "--quiet", "--no-fail-fast", "--package", "virtual-sensor", "--target-dir"])
             .arg(self.root.join("target"))
-            .args(TESTS.iter().flat_map(|name| ["--test", *name]))
-            .args(["--", "--format", "pretty"])
+            .args(["--test", "suite", "--", "--format", "pretty"])
+            .args(TESTS)
             .env_remove("CARGO_TARGET_DIR")
             .output()
             .expect("cargo starts");
         let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-        assert_eq!(out.matches("test result: ").count(), TESTS.len(), "the tests do not run:\n{out}\n{err}");
-        let failed = |line: &str| Some(line.strip_prefix("test ")?.strip_suffix(" ... FAILED")?.to_owned());
+        let ran = TESTS.iter().all(|module| out.contains(&format!("\ntest {module}")));
+        assert!(ran && out.contains("\ntest result: "), "the tests do not run:\n{out}\n{err}");
+        let failed = |line: &str| {
+            let name = line.strip_prefix("test ")?.strip_suffix(" ... FAILED")?;
+            Some(name.split_once("::").map_or(name, |(_, name)| name).to_owned())
+        };
         out.lines().filter_map(failed).collect()
     }
 }

@@ -3,9 +3,9 @@
 #![cfg(not(target_os = "none"))]
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
+use system_tests::Image;
 
 /// The target of a Cortex-M4F.
 pub const M4F: &str = "thumbv7em-none-eabihf";
@@ -19,30 +19,23 @@ pub fn build(target: &str, features: &str) -> PathBuf {
 
 /// As [`build`], with the call of allan-core that the feature `calls` links.
 fn build_with_call(target: &str, features: &str, call: &str) -> PathBuf {
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("this crate lies in tests/");
-    let directory = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from);
-    // Not the target folder of the tests, which the cargo that runs the tests may have locked.
-    let directory = workspace.join(directory).join("footprint");
-    let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-        .current_dir(workspace)
-        .args(["build", "--quiet", "--package", "driver-footprint", "--bin", "footprint", "--profile", "image"])
-        .args(["--locked", "--target", target, "--features", &format!("on-target,{features}"), "--target-dir"])
-        .arg(&directory)
-        .env("ALLAN_CALL", call)
-        .status()
-        .expect("cargo starts");
-    assert!(status.success(), "the image does not build; its target comes with `rustup target add {target}`");
-    directory.join(target).join("image").join("footprint")
+    let image = Image {
+        package: "driver-footprint",
+        program: "footprint",
+        target,
+        profile: "image",
+        arguments: &["--features", &format!("on-target,{features}")],
+        variable: Some(("ALLAN_CALL", call)),
+    };
+    image.build(&format!("footprint-{target}-{features}-{}", call.replace("::", "-")))
 }
 
-/// The image with these features, read before another one is built into the same file.
+/// The image with these features.
 pub fn built(target: &str, features: &str) -> Vec<u8> {
     built_with_call(target, features, "")
 }
 
 fn built_with_call(target: &str, features: &str, call: &str) -> Vec<u8> {
-    static BUILDING: Mutex<()> = Mutex::new(());
-    let _building = BUILDING.lock().unwrap_or_else(PoisonError::into_inner);
     std::fs::read(build_with_call(target, features, call)).expect("the image is readable")
 }
 

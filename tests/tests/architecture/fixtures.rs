@@ -1,7 +1,7 @@
 //! The checks, applied to small crates with and without what they must find.
 
-use crate::modules::Crate;
-use crate::{Package, circles, describe_circles, describe_dependencies, describe_double_names};
+use super::modules::Crate;
+use super::{Package, circles, describe_circles, describe_dependencies, describe_double_names};
 use std::path::Path;
 
 /// Writes a crate from pairs of a file's name in `src` and its text, and reads it.

@@ -39,7 +39,8 @@ const MAY_DEPEND_ON: &[(&str, &str)] = &[
     ("benchmarks", "adis16405-driver allan-core measurement noise-analysis recordings reports simulation virtual-sensor"),
     ("host-sim", "adis16405-driver link measurement noise-analysis recordings reports simulation"),
     ("system-tests", ""),
-    ("driver-footprint", "adis16405-driver allan-core"),
+    ("emulation", "virtual-sensor"),
+    ("driver-footprint", "adis16405-driver allan-core system-tests"),
     ("allan-core-c", "allan-core"),
     ("fuzz", "adis16405-driver allan-core allan-core-c firmware link measurement recordings reports simulation virtual-sensor"),
     ("instruction-counts", "adis16405-driver allan-core"),
@@ -185,6 +186,34 @@ fn describe_dependencies(packages: &[Package]) -> String {
         }
     }
     text
+}
+
+/// Files of a crate's folder `tests` that its one program of tests, `suite.rs`, does not name: their tests would not run.
+fn files_outside_of_the_suite(folder: &Path) -> Vec<PathBuf> {
+    let Ok(suite) = std::fs::read_to_string(folder.join("suite.rs")) else { return vec![] };
+    let entries = std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
+    let module = |path: &Path| {
+        let is_module = path.extension().is_some_and(|ending| ending == "rs") || path.join("main.rs").is_file();
+        is_module.then(|| path.file_stem().unwrap_or_default().to_string_lossy().into_owned())
+    };
+    let named = |name: &str| name == "suite" || suite.lines().any(|line| line == format!("mod {name};"));
+    entries.filter(|path| module(path).is_some_and(|name| !named(&name))).collect()
+}
+
+#[test]
+fn every_test_of_a_crate_is_in_its_suite() {
+    let manifests = packages().into_iter().filter_map(|package| package.roots.into_iter().next());
+    let folders: BTreeSet<PathBuf> =
+        manifests.flat_map(|root| root.ancestors().skip(1).take(3).map(|folder| folder.join("tests")).collect::<Vec<_>>()).collect();
+    assert!(folders.iter().filter(|folder| folder.join("suite.rs").is_file()).count() > 9);
+    let outside: Vec<PathBuf> = folders.iter().flat_map(|folder| files_outside_of_the_suite(folder)).collect();
+    assert_eq!(outside, [""; 0].map(PathBuf::from));
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("suite.rs"), "mod within;\n").expect("written");
+    for file in ["within.rs", "without.rs"] {
+        std::fs::write(folder.path().join(file), "").expect("written");
+    }
+    assert_eq!(files_outside_of_the_suite(folder.path()), [folder.path().join("without.rs")]);
 }
 
 #[test]

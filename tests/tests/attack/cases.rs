@@ -1,8 +1,8 @@
 //! The kinds of attack.
 
-use crate::program::{Program, Run};
-use crate::recordings::{FORMS, Noise, Recorded, TEXTS, zipped};
-use crate::report::{baseline_term, contradiction};
+use super::program::{Program, Run};
+use super::recordings::{FORMS, Noise, Recorded, TEXTS, zipped};
+use super::report::{baseline_term, contradiction};
 use flate2::Compression;
 use flate2::write::{GzEncoder, ZlibEncoder};
 use rand::seq::IndexedRandom;

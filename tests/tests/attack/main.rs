@@ -11,7 +11,7 @@ mod program;
 mod recordings;
 mod report;
 
-use crate::cases::Campaign;
+use self::cases::Campaign;
 use std::time::{Duration, Instant};
 
 /// Cases of the short form, four of each kind: about 30 s.

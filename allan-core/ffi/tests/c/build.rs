@@ -46,34 +46,33 @@ pub(crate) fn run(command: &mut Command) -> String {
 
 /// The header that cbindgen makes of the sources.
 pub(crate) fn header_text() -> String {
-    let config = cbindgen::Config::from_file(ours("cbindgen.toml")).expect("cbindgen.toml");
-    let mut builder = cbindgen::Builder::new().with_config(config);
     let folder = tempfile::tempdir().expect("a folder");
     let larger = std::fs::read_to_string(ours("src/cascade_24_8.rs")).expect("a source file");
     std::fs::write(folder.path().join("cascade_20_4.rs"), smaller::smaller(&larger)).expect("room");
+    let mut header = Command::new(system_tests::tool("c-header"));
+    header.arg(ours("."));
     for file in ["status", "storage", "cascade_24_8", "cascade_20_4", "quantizer", "curve", "model", "trace"] {
         let made = folder.path().join(format!("{file}.rs"));
-        builder = builder.with_src(if made.exists() { made } else { ours(&format!("src/{file}.rs")) });
+        header.arg(if made.exists() { made } else { ours(&format!("src/{file}.rs")) });
     }
-    let mut text = Vec::new();
-    builder.generate().expect("the header").write(&mut text);
-    String::from_utf8(text).expect("UTF-8")
+    run(&mut header)
 }
 
 /// The static library for a target, compiled for size, or for this machine.
 pub(crate) fn library(target: Option<&str>) -> PathBuf {
-    let workspace = ours("../..");
-    let folder = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from);
-    // Not the folder of the tests, which the cargo that runs the tests may have locked.
-    let folder = workspace.join(folder).join("ffi");
-    let profile = if target.is_some() { "image" } else { "release" };
-    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    cargo.current_dir(workspace).args(["build", "--package", "allan-core-ffi", "--locked", "--profile", profile]);
+    // For this machine as the tests are compiled: the assertions and the checks for overflow are on.
+    let (folder, profile) = match target {
+        Some(_) => (system_tests::image_folder(), "image"),
+        None => (system_tests::target_folder(), "dev"),
+    };
+    let mut cargo = system_tests::cargo();
+    cargo.args(["build", "--quiet", "--package", "allan-core-ffi", "--locked", "--profile", profile]);
     cargo.arg("--target-dir").arg(&folder);
     if let Some(target) = target {
         cargo.args(["--target", target]);
     }
     run(&mut cargo);
+    let profile = if profile == "dev" { "debug" } else { profile };
     folder.join(target.unwrap_or("")).join(profile).join("liballan_core.a")
 }
 

@@ -1,10 +1,8 @@
 //! The page in headless Chromium: what is drawn against the report, both colour schemes, two widths, the keyboard, and that nothing
 //! is requested. Where there is no Chromium the tests say so and pass.
 
-#[path = "../rendering/fixture.rs"]
-#[allow(dead_code)]
-mod fixture;
 
+use crate::fixture;
 use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::effects::{
     CurveEvidence, Effect, LevelStep, LineEvidence, LineSource, MarkovEvidence, MarkovProcess, SinusoidalLine,

@@ -1,9 +1,7 @@
 //! The live screen on a terminal in memory.
 
-#[path = "../rendering/fixture.rs"]
-#[allow(dead_code)]
-mod fixture;
 
+use crate::fixture;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::buffer::Buffer;

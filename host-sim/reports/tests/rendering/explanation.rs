@@ -1,7 +1,7 @@
 //! The long form of a report whose numbers are known.
 
-use super::fixture::report;
-use super::phrases::{documentation, phrases};
+use crate::fixture::report;
+use crate::phrases::{documentation, phrases};
 use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::effects::{Effect, LineEvidence, LineSource, ResonantLine, SpectrumEvidence};
 use noise_analysis::nonstationarity::{

@@ -1,10 +1,8 @@
 //! Terminal, figure and page of a report whose numbers are known.
 
 mod explanation;
-mod fixture;
-mod phrases;
 
-use fixture::{channel, empty, report};
+use crate::fixture::{self, channel, empty, report};
 use noise_analysis::report::{ChannelReport, ModelErrorReport, Report, SlopeMethodValue, TermReport};
 use reports::{figure, full_tables, page};
 use roxmltree::{Document, Node};

@@ -4,6 +4,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
+use system_tests::Image;
 
 /// A core, by the target that the image is compiled for and the board that it runs on.
 #[derive(Debug, Clone, Copy)]
@@ -93,19 +94,9 @@ impl Counts {
 }
 
 fn build(target: &str, image: &str) -> PathBuf {
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("this crate lies in tests/");
-    let directory = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from);
-    // Not the target folder of the tests, which the cargo that runs the tests may have locked.
-    let directory = workspace.join(directory).join("instructions");
-    let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-        .current_dir(workspace)
-        .args(["build", "--package", "instruction-counts", "--bin", image, "--features", "on-target"])
-        .args(["--profile", "counted", "--locked", "--target", target, "--target-dir"])
-        .arg(&directory)
-        .status()
-        .expect("cargo starts");
-    assert!(status.success(), "the image does not build; its target comes with `rustup target add {target}`");
-    directory.join(target).join("counted").join(image)
+    let arguments = &["--features", "on-target"];
+    let image = Image { package: "instruction-counts", program: image, target, profile: "counted", arguments, variable: None };
+    image.build(&format!("counted-{}-{target}", image.program))
 }
 
 /// Runs an image and returns its output. With `-icount shift=0` an instruction takes 1 ns of the board's time, whatever

@@ -1,13 +1,13 @@
 //! What the boards differ in, and what their documents demand: crystal, pins, the 5 V of the sensor, brown-out, log.
 
-use crate::bench::{
+use super::bench::{TARGET, feather_image, image, run};
+use super::costs::{Costs, Memory, assert_within_budget, counter};
+use super::decoded::Decoded;
+use super::images;
+use emulation::{
     DBGMCU_APB1_FZ, EXTI_FTSR, EXTI_IMR, EXTI_RTSR, FEATHER, FLASH_CR, FLASH_OPTCR, FLASH_SR, H405, Outcome, PUPDR,
-    SPI1_CR1, SYSCFG_EXTICR, Scenario, TARGET, feather_image, gpio, image, run,
+    SPI1_CR1, SYSCFG_EXTICR, Scenario, Sensor, gpio,
 };
-use crate::costs::{Costs, Memory, assert_within_budget, counter};
-use crate::decoded::Decoded;
-use crate::images;
-use crate::peripherals::Sensor;
 use link::{BootCause, ClockSource};
 
 /// Both boards boot, sample and report with their own crystal and pins. The LED changes its level twice a second.
@@ -15,11 +15,11 @@ use link::{BootCause, ClockSource};
 fn each_board_samples_with_its_crystal_and_pins() {
     for (name, image, wiring) in [("H405", image(), H405), ("Feather", feather_image(), FEATHER)] {
         let keys = vec![(0.1, b"i 0\r".to_vec()), (3.0, b"r".to_vec())];
-        let sensor = Some(Sensor::published(21));
+        let sensor = Some(Sensor::Published(21));
         let Outcome { sensor, received, diagnostics, led_changes, registers, .. } =
             run(image, Scenario { wiring, sensor, keys, seconds: 5.0, ..Scenario::default() });
         assert_eq!(diagnostics, [""; 0], "{name}");
-        assert_eq!(sensor.expect("a sensor").part.violations(), [], "{name}");
+        assert_eq!(sensor.expect("a sensor").violations, [""; 0], "{name}");
         let decoded = Decoded::decode(&received);
         let (hello, health) = (decoded.hellos()[0], decoded.healths()[0]);
         assert_eq!((hello.boot.clock, hello.boot.cause), (ClockSource::Crystal, BootCause::PowerOn), "{name}");
@@ -50,7 +50,7 @@ fn each_board_samples_with_its_crystal_and_pins() {
 #[test]
 fn the_brown_out_level_is_programmed_on_command() {
     let keys = vec![(0.1, b"i 0\r".to_vec()), (1.0, b"brownout\r".to_vec()), (1.5, b"brownout\r".to_vec())];
-    let sensor = Some(Sensor::published(27));
+    let sensor = Some(Sensor::Published(27));
     let Outcome { received, diagnostics, registers, .. } =
         run(image(), Scenario { sensor, keys, seconds: 2.0, ..Scenario::default() });
     assert_eq!(diagnostics, [""; 0]);
@@ -65,7 +65,7 @@ fn the_brown_out_level_is_programmed_on_command() {
 #[test]
 fn without_a_crystal_the_image_runs_from_the_internal_oscillator_and_says_so() {
     let keys = vec![(0.1, b"i 0\r".to_vec()), (2.0, b"r".to_vec()), (4.0, b"s".to_vec())];
-    let sensor = Some(Sensor::published(22));
+    let sensor = Some(Sensor::Published(22));
     let Outcome { received, led_changes, .. } =
         run(image(), Scenario { crystal_fails: true, sensor, keys, seconds: 4.5, ..Scenario::default() });
     let decoded = Decoded::decode(&received);
@@ -81,7 +81,7 @@ fn without_a_crystal_the_image_runs_from_the_internal_oscillator_and_says_so() {
 fn a_rate_of_low_power_mode_is_sampled_with_a_slower_serial_clock() {
     let keys = vec![(0.5, b"i 0\rf 102.4\r".to_vec()), (3.0, b"r".to_vec()), (5.5, b"f 204.8\r".to_vec())];
     let keys = keys.into_iter().chain([(7.0, b"r".to_vec())]).collect();
-    let sensor = Some(Sensor::published(23));
+    let sensor = Some(Sensor::Published(23));
     let Outcome { sensor, received, diagnostics, .. } =
         run(image(), Scenario { sensor, keys, seconds: 9.0, ..Scenario::default() });
     assert_eq!(diagnostics, [""; 0]);
@@ -93,7 +93,7 @@ fn a_rate_of_low_power_mode_is_sampled_with_a_slower_serial_clock() {
     }
     let clocks: Vec<_> = decoded.hellos().iter().map(|hello| (hello.sample_rate_hz, hello.spi_clock_hz)).collect();
     assert_eq!(clocks, [(102.4, 42_000_000_u32.div_ceil(256)), (204.8, 656_250)]);
-    assert_eq!(sensor.expect("a sensor").part.violations(), []);
+    assert_eq!(sensor.expect("a sensor").violations, [""; 0]);
 }
 
 /// As other drivers do, the board raises chip select between frames and keeps the stall then; in a burst it stays low. The
@@ -103,11 +103,11 @@ fn a_rate_of_low_power_mode_is_sampled_with_a_slower_serial_clock() {
 fn chip_select_is_high_for_the_stall_and_words_are_apart_as_set() {
     for (command, high_us, gap_us) in [("", 75, 0), ("careful 1\r", 100, 9)] {
         let keys = vec![(0.1, format!("{command}i 0\rf 819.2\r").into_bytes()), (2.0, b"r".to_vec())];
-        let sensor = Some(Sensor::published(24));
+        let sensor = Some(Sensor::Published(24));
         let Outcome { sensor, received, .. } =
             run(image(), Scenario { sensor, keys, seconds: 4.0, ..Scenario::default() });
         let sensor = sensor.expect("a sensor");
-        assert_eq!(sensor.part.violations(), []);
+        assert_eq!(sensor.violations, [""; 0]);
         println!("chip select high for {} ns, gap of {} ns", sensor.shortest_high_ns, sensor.shortest_gap_ns);
         // Data sheet Rev. B, Table 2: frames of low-power mode begin 150 us apart.
         assert!(sensor.shortest_read_ns >= 150_000, "{} ns", sensor.shortest_read_ns);
@@ -135,7 +135,7 @@ fn the_image_logs_its_start() {
 fn settings_that_the_flash_does_not_take_are_not_called_kept() {
     let keys = vec![(0.1, b"i 0\r".to_vec()), (1.5, b"persist\r".to_vec()), (2.5, b"forget\r".to_vec())];
     let keys = keys.into_iter().chain([(8.0, b"k".to_vec())]).collect();
-    let sensor = Some(Sensor::published(28));
+    let sensor = Some(Sensor::Published(28));
     let Outcome { received, diagnostics, registers, .. } =
         run(image(), Scenario { sensor, keys, seconds: 8.5, ..Scenario::default() });
     let lines = Decoded::decode(&received).lines;
@@ -167,7 +167,7 @@ fn each_board_is_within_its_budget() {
     ];
     for (board, image, wiring) in boards {
         let keys = vec![(0.1, b"i 0\rf 819.2\re 10\r".to_vec()), (8.0, b"k".to_vec()), (11.0, b"e 0\r".to_vec())];
-        let sensor = Some(Sensor::published(25));
+        let sensor = Some(Sensor::Published(25));
         let Outcome { received, diagnostics, .. } =
             run(image, Scenario { wiring, sensor, keys, seconds: 35.0, ..Scenario::default() });
         println!("{board}: {diagnostics:?}");

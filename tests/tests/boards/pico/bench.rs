@@ -1,6 +1,7 @@
 //! The image in rp2040js under Node.js, with the virtual sensor on its bus, in the emulator's time.
 
-use crate::images;
+use super::super::images;
+use system_tests::{image_folder, workspace};
 use adis16405_driver::BURST_BYTES;
 use image_file::uf2;
 use std::collections::VecDeque;
@@ -57,7 +58,7 @@ fn bench_without_usb() -> Bench {
 fn emulator() -> PathBuf {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     let install = || {
-        let folder = images::folder().join("rp2040js");
+        let folder = image_folder().join("rp2040js");
         // The last file that an installation writes.
         if !folder.join("node_modules/.package-lock.json").is_file() {
             std::fs::create_dir_all(&folder).expect("a folder");
@@ -200,7 +201,7 @@ fn run_image(
     let (mut stuck_at, mut edges_lost) = (None, false);
     let (mut announced, mut selected) = (0, false);
     let mut node = Command::new("node")
-        .arg(images::workspace().join("tests/tests/pico/emulator.mjs"))
+        .arg(workspace().join("tests/tests/boards/pico/emulator.mjs"))
         .args([emulator, uf2, elf])
         .arg(seconds.to_string())
         .args(board.arguments())

@@ -1,7 +1,7 @@
-//! The image for the STM32F405, as it is built to be flashed, run in an emulator against the virtual sensor.
+//! The images, as they are built to be flashed, run in emulators against the virtual sensor: those for the STM32F405 in a program of
+//! `tests/tools`, that for the Raspberry Pi Pico in rp2040js.
 
 mod bench;
-mod boards;
 mod compensation;
 mod costs;
 mod decoded;
@@ -9,30 +9,30 @@ mod epochs;
 mod faults;
 mod full_speed;
 mod images;
-mod microcontroller;
-mod peripherals;
+mod pico;
 mod probe;
 mod sampling_path;
+mod wiring;
 
 use adis16405_driver::GyroRange;
-use bench::{Outcome, Scenario, image, run};
-use decoded::{Decoded, on_host};
+use self::bench::{image, run};
+use self::decoded::{Decoded, on_host};
+use emulation::{Outcome, SCK_HZ, Scenario, Sensor};
 use firmware::CHANNELS;
 use link::{Boot, BootCause, DecoderCounters, Hello, Message};
-use peripherals::{SCK_HZ, Sensor};
 
 #[test]
 fn the_image_reports_what_the_host_computes_from_the_same_counts() {
     const REQUESTED_AT_S: f64 = 4.5;
     let keys = vec![(REQUESTED_AT_S, b"r".to_vec())];
-    let scenario = Scenario { sensor: Some(Sensor::published(1)), keys, seconds: 7.0, ..Scenario::default() };
+    let scenario = Scenario { sensor: Some(Sensor::Published(1)), keys, seconds: 7.0, ..Scenario::default() };
     let Outcome { sensor, received, diagnostics, .. } = run(image(), scenario);
     let sensor = sensor.expect("the sensor on the bus");
     assert_eq!(diagnostics, [""; 0], "neither resets nor accesses to unmapped addresses");
 
     // The bus keeps the timing of the data sheet. Eight periods of SCK take 12 190.5 ns; the processor may add 2 %
     // between bytes.
-    assert_eq!(sensor.part.violations(), []);
+    assert_eq!(sensor.violations, [""; 0]);
     assert_eq!(sensor.odd_words, 0);
     assert!(
         (12_184..=12_440).contains(&sensor.shortest_byte_ns),
@@ -43,7 +43,7 @@ fn the_image_reports_what_the_host_computes_from_the_same_counts() {
     // Every sample since the first burst was read once.
     let (first, last) = (sensor.bursts[0].0, sensor.bursts[sensor.bursts.len() - 1].0);
     assert!(sensor.bursts.iter().map(|&(sample, _)| sample).eq(first..=last));
-    assert!(sensor.part.samples() - last <= 1);
+    assert!(sensor.samples - last <= 1);
 
     let Decoded { messages, counters, .. } = Decoded::decode(&received);
     assert_eq!(counters, DecoderCounters { frames: messages.len() as u64, ..DecoderCounters::default() });

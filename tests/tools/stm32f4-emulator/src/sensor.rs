@@ -1,38 +1,19 @@
 //! The devices that are connected to the microcontroller: the virtual sensor at its chip select, and a terminal at the
 //! serial port, both in the emulator's time.
 
-use adis16405_driver::BURST_BYTES;
+use emulation::{BusRecord, SCK_HZ, SLOW_SCK_HZ};
 use rigless::chip::{Timeline, spi, uart};
 use rigless::snapshot::Store;
 use rigless::time::VirtualNanos;
 use std::collections::VecDeque;
-use virtual_sensor::{NoiseModel, VirtualAdis16405};
-
-/// Clock of the peripheral bus of the boards.
-const BUS_HZ: u32 = 42_000_000;
-/// The bus clock divided by the first power of two that brings it to 1 MHz or less, and to 300 kHz or less.
-pub(crate) const SCK_HZ: u32 = BUS_HZ / 64;
-const SLOW_SCK_HZ: u32 = BUS_HZ / 256;
+use virtual_sensor::VirtualAdis16405;
 
 #[derive(Debug, Clone)]
 pub(crate) struct Sensor {
     pub(crate) part: VirtualAdis16405,
-    /// The answer of the part to each burst, in order, with the number of its latest sample at that time.
-    pub(crate) bursts: Vec<(u64, [u8; BURST_BYTES])>,
-    /// Shortest time from one byte to the next within a frame, in ns.
-    pub(crate) shortest_byte_ns: u64,
-    /// Shortest time between the last SCK edge of a word of a burst and the first of the next, in ns.
-    pub(crate) shortest_gap_ns: u64,
-    /// Shortest time for which chip select was high between two frames, in ns.
-    pub(crate) shortest_high_ns: u64,
-    /// Shortest time from one falling edge of chip select to the next, in ns.
-    pub(crate) shortest_read_ns: u64,
-    /// Times for which chip select was low without a clock, in ns.
-    pub(crate) pulses_ns: Vec<u64>,
     /// Byte at which the data line to the processor is held.
     pub(crate) stuck_at: Option<u8>,
-    /// Words of another width than eight bits.
-    pub(crate) odd_words: u64,
+    record: BusRecord,
     byte_ns: u64,
     selected_at: u64,
     deselected_at: Option<u64>,
@@ -45,31 +26,32 @@ pub(crate) struct Sensor {
 impl Sensor {
     /// The emulator reports a byte at its end, while the part is told when it began: it is taken to have lasted eight
     /// periods of [`SCK_HZ`] or, by the time of the first byte of its frame, of [`SLOW_SCK_HZ`].
-    /// [`shortest_byte_ns`](Self::shortest_byte_ns) shows how long it really lasted.
+    /// [`BusRecord::shortest_byte_ns`] shows how long it really lasted.
     pub(crate) fn new(mut part: VirtualAdis16405) -> Self {
         part.set_sck_hz(Some(SCK_HZ));
         Self {
             part,
             byte_ns: byte_ns(SCK_HZ),
             selected_at: 0,
-            bursts: Vec::new(),
-            shortest_byte_ns: u64::MAX,
-            shortest_gap_ns: u64::MAX,
-            shortest_high_ns: u64::MAX,
-            shortest_read_ns: u64::MAX,
-            pulses_ns: Vec::new(),
             deselected_at: None,
             stuck_at: None,
-            odd_words: 0,
+            record: BusRecord {
+                shortest_byte_ns: u64::MAX,
+                shortest_gap_ns: u64::MAX,
+                shortest_high_ns: u64::MAX,
+                shortest_read_ns: u64::MAX,
+                ..BusRecord::default()
+            },
             frame: Vec::new(),
             last_byte: None,
             selected: false,
         }
     }
 
-    /// A sensor with the noise of the published characterisation.
-    pub(crate) fn published(seed: u64) -> Self {
-        Self::new(VirtualAdis16405::new(NoiseModel::paper(), seed))
+    /// What the sensor has seen until now.
+    pub(crate) fn record(&self) -> BusRecord {
+        let violations = self.part.violations().iter().map(ToString::to_string).collect();
+        BusRecord { samples: self.part.samples(), violations, ..self.record.clone() }
     }
 
     /// Advances the part to a time in ns. Within a frame it stays one byte behind, as a byte is reported at its end.
@@ -89,12 +71,12 @@ impl spi::Peer for Sensor {
     fn transfer(&mut self, mosi: u32, bits: u8, context: &mut Timeline<'_, '_>) -> u32 {
         let now = context.now().0;
         if let Some(last) = self.last_byte.replace(now) {
-            self.shortest_byte_ns = self.shortest_byte_ns.min(now - last);
+            self.record.shortest_byte_ns = self.record.shortest_byte_ns.min(now - last);
             if self.frame.len().is_multiple_of(2) {
-                self.shortest_gap_ns = self.shortest_gap_ns.min((now - last).saturating_sub(self.byte_ns));
+                self.record.shortest_gap_ns = self.record.shortest_gap_ns.min((now - last).saturating_sub(self.byte_ns));
             }
         }
-        self.odd_words += u64::from(bits != 8);
+        self.record.odd_words += u64::from(bits != 8);
         if self.frame.is_empty() {
             let sck_hz = if now - self.selected_at < byte_ns(SLOW_SCK_HZ) { SCK_HZ } else { SLOW_SCK_HZ };
             self.byte_ns = byte_ns(sck_hz);
@@ -113,8 +95,8 @@ impl spi::Peer for Sensor {
         self.selected = true;
         let selected_before = std::mem::replace(&mut self.selected_at, context.now().0);
         if let Some(deselected_at) = self.deselected_at {
-            self.shortest_read_ns = self.shortest_read_ns.min(self.selected_at - selected_before);
-            self.shortest_high_ns = self.shortest_high_ns.min(self.selected_at - deselected_at);
+            self.record.shortest_read_ns = self.record.shortest_read_ns.min(self.selected_at - selected_before);
+            self.record.shortest_high_ns = self.record.shortest_high_ns.min(self.selected_at - deselected_at);
         }
         self.frame.clear();
         self.last_byte = None;
@@ -126,12 +108,12 @@ impl spi::Peer for Sensor {
         self.selected = false;
         self.deselected_at = Some(context.now().0);
         if self.frame.is_empty() {
-            self.pulses_ns.push(context.now().0 - self.selected_at);
+            self.record.pulses_ns.push(context.now().0 - self.selected_at);
         }
         let burst_requested = self.frame.first().is_some_and(|&(mosi, _)| mosi == 0x3E);
         let answers: Vec<u8> = self.frame.iter().map(|&(_, miso)| miso).collect();
         if burst_requested && let Ok(burst) = answers.try_into() {
-            self.bursts.push((self.part.samples(), burst));
+            self.record.bursts.push((self.part.samples(), burst));
         }
     }
 }

@@ -2,26 +2,14 @@
 //! against the virtual sensor. Its core has no floating-point unit, and reports the same numbers.
 
 mod bench;
-#[path = "../image/costs.rs"]
-mod costs;
-#[allow(dead_code, reason = "the test of the other image uses the rest")]
-#[path = "../image/decoded.rs"]
-mod decoded;
-#[allow(dead_code, reason = "the test of the other image uses the rest")]
-#[path = "../image/epochs.rs"]
-mod epochs;
-#[allow(dead_code, reason = "the test of the other image uses the rest")]
-#[path = "../image/images.rs"]
-mod images;
 
 use adis16405_driver::Burst;
 use bench::{Event, Fault, Outcome, Pico, SOUND, run, run_example, run_to_measure};
-use costs::{Costs, Memory, assert_within_budget, counter};
-use decoded::{Decoded, on_host};
-use epochs::{EPOCH_S, SENTENCES, assert_told, four_effects, learned_on_device, learned_on_host, warming_part};
+use super::costs::{Costs, Memory, assert_within_budget, counter};
+use super::decoded::{Decoded, on_host};
+use super::epochs::{SENTENCES, assert_told, learned_on_device, learned_on_host};
+use emulation::{EPOCH_S, RATE_HZ, four_effects, warming_part};
 use virtual_sensor::{NoiseModel, VirtualAdis16405};
-
-const RATE_HZ: f64 = 204.8;
 
 fn sensor(seed: u64) -> VirtualAdis16405 {
     VirtualAdis16405::new(NoiseModel::paper(), seed)

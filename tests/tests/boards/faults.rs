@@ -1,15 +1,13 @@
 //! Faults of the sensor, the serial line and the processor: the device recovers from each, counts it, and reports the
 //! cause of a restart.
 
-use crate::bench::{Event, Outcome, Scenario, image, run};
-use crate::costs::counter;
-use crate::decoded::{Decoded, in_stretches};
-use crate::images;
-use crate::peripherals::Sensor;
+use super::bench::{image, run};
+use super::costs::counter;
+use super::decoded::{Decoded, in_stretches};
+use super::images;
+use emulation::{Event, Outcome, RATE_HZ, Scenario, Sensor};
 use link::{BootCause, Health, Hello, Message};
 
-/// Sample rate after a start.
-const RATE_HZ: f64 = 204.8;
 /// Upper bound on the time that a report takes.
 const REPORT_S: f64 = 2.5;
 /// The sample period that is programmed: 8 ticks of 1/1638.4 s in 1/256 us.
@@ -54,7 +52,7 @@ fn assert_recovers_from_every_fault(rate_hz: f64, seed: u64) {
         (15.7, Event::Unplugged(false)),
     ];
     let scenario =
-        Scenario { sensor: Some(Sensor::published(seed)), keys, events, seconds: 24.0, ..Scenario::default() };
+        Scenario { sensor: Some(Sensor::Published(seed)), keys, events, seconds: 24.0, ..Scenario::default() };
     let Outcome { sensor, received, diagnostics, .. } = run(image(), scenario);
     assert_eq!(diagnostics, [""; 0], "neither a reset nor an access to an unmapped address");
     let sensor = sensor.expect("a sensor");
@@ -109,7 +107,7 @@ fn a_reset_by_pin_costs_at_most_a_second_of_statistics() {
     const RESET_S: f64 = 4.0;
     let keys = vec![(0.5, b"i 0\re 3600\r".to_vec()), (3.9, b"r".to_vec()), (6.0, b"r".to_vec())];
     let events = vec![(RESET_S, Event::ResetPin)];
-    let scenario = Scenario { sensor: Some(Sensor::published(4)), keys, events, seconds: 8.0, ..Scenario::default() };
+    let scenario = Scenario { sensor: Some(Sensor::Published(4)), keys, events, seconds: 8.0, ..Scenario::default() };
     let Outcome { sensor, received, diagnostics, .. } = run(image(), scenario);
     assert!(diagnostics.iter().all(|diagnostic| diagnostic.starts_with("reset")), "{diagnostics:?}");
     let sensor = sensor.expect("a sensor");
@@ -139,7 +137,7 @@ fn a_reset_by_pin_costs_at_most_a_second_of_statistics() {
 fn report_after(event: Event, at_s: f64, seconds: f64) -> (Hello, Health) {
     let keys = vec![(0.1, b"i 0\r".to_vec()), (seconds - REPORT_S, b"\rr".to_vec())];
     let events = vec![(at_s, event)];
-    let scenario = Scenario { sensor: Some(Sensor::published(7)), keys, events, seconds, ..Scenario::default() };
+    let scenario = Scenario { sensor: Some(Sensor::Published(7)), keys, events, seconds, ..Scenario::default() };
     let Outcome { sensor, received, diagnostics, .. } = run(image(), scenario);
     let restarts = diagnostics.iter().filter(|diagnostic| diagnostic.starts_with("reset")).count();
     assert_eq!(restarts, 1, "{diagnostics:?}");
@@ -165,7 +163,7 @@ fn a_failed_transfer_costs_one_sample() {
     for (event, bus_errors, recoveries) in [(Event::StopReceiving, 1, 0), (Event::LoseBurstEnd, 0, 1)] {
         let keys = vec![(0.1, b"i 0\r".to_vec()), (4.0, b"r".to_vec())];
         let events = vec![(2.0, event)];
-        let sensor = Some(Sensor::published(11));
+        let sensor = Some(Sensor::Published(11));
         let Outcome { sensor, received, diagnostics, .. } =
             run(image(), Scenario { sensor, keys, events, seconds: 6.0, ..Scenario::default() });
         assert_eq!(diagnostics, [""; 0]);
@@ -176,7 +174,7 @@ fn a_failed_transfer_costs_one_sample() {
         assert_eq!((health.used, health.shifted, health.frozen), (health.bursts, 0, 0), "{health:?}");
         assert!(f64::from(health.lost_edges) < 0.4 * RATE_HZ * f64::from(recoveries) + 1.0, "{health:?}");
         assert!(f64::from(health.used) > 3.8 * RATE_HZ, "{health:?}");
-        assert_eq!(sensor.expect("a sensor").part.violations().len(), usize::from(recoveries == 0), "the short frame");
+        assert_eq!(sensor.expect("a sensor").violations.len(), usize::from(recoveries == 0), "the short frame");
     }
 }
 
@@ -225,7 +223,7 @@ fn after_a_brown_out_the_image_starts_afresh() {
 fn a_stack_overflow_faults_and_is_recorded() {
     let typed = |keys: &str| (1.5, keys.as_bytes().to_vec());
     let quiet = (0.1, b"i 0\r".to_vec());
-    let scenario = |keys| Scenario { sensor: Some(Sensor::published(5)), keys, seconds: 5.0, ..Scenario::default() };
+    let scenario = |keys| Scenario { sensor: Some(Sensor::Published(5)), keys, seconds: 5.0, ..Scenario::default() };
     let whole = run(image(), scenario(vec![quiet.clone(), typed("r")]));
     let used = Decoded::decode(&whole.received).healths()[0].stack_bytes;
 
@@ -242,7 +240,7 @@ fn a_stack_overflow_faults_and_is_recorded() {
     let counter = |name: &str| counter(&lines, name).unwrap_or(0);
     assert_eq!(counter("used"), counter("bursts"));
     assert!(counter("lost_edges") == 0 && counter("bursts") > 300, "{lines:?}");
-    assert!(sensor.is_some_and(|sensor| sensor.part.violations().is_empty()));
+    assert!(sensor.is_some_and(|sensor| sensor.violations.is_empty()));
 }
 
 /// A sensor that sleeps without end is woken by the pulse of the second step of recovery, which is as long as the data sheet
@@ -251,7 +249,7 @@ fn a_stack_overflow_faults_and_is_recorded() {
 fn a_sleeping_sensor_is_woken() {
     let keys = vec![(0.1, b"i 0\r".to_vec()), (6.0, b"r".to_vec())];
     let events = vec![(2.0, Event::SensorSleep)];
-    let sensor = Some(Sensor::published(26));
+    let sensor = Some(Sensor::Published(26));
     let Outcome { sensor, received, .. } =
         run(image(), Scenario { sensor, keys, events, seconds: 8.0, ..Scenario::default() });
     let (sensor, decoded) = (sensor.expect("a sensor"), Decoded::decode(&received));
@@ -268,7 +266,7 @@ fn a_sleeping_sensor_is_woken() {
 fn an_oscillating_data_ready_line_is_masked() {
     let keys = vec![(0.1, b"i 0\r".to_vec()), (5.0, b"r".to_vec())];
     let events = vec![(2.0, Event::Oscillate(50_000_000))];
-    let sensor = Some(Sensor::published(28));
+    let sensor = Some(Sensor::Published(28));
     let Outcome { received, diagnostics, .. } =
         run(image(), Scenario { sensor, keys, events, seconds: 7.0, ..Scenario::default() });
     assert_eq!(diagnostics, [""; 0], "no restart");

@@ -1,10 +1,12 @@
-//! The image on an emulated STM32F427, which has what the STM32F405 has and more, with a crystal, a sensor and a terminal.
+//! An emulated STM32F427, which has what the STM32F405 has and more, with a crystal, a sensor and a terminal.
 
-use crate::images;
 use crate::microcontroller::{Microcontroller, clear_bits, clear_in_memory, fill_memory_with_noise, read, write};
-use crate::peripherals::{Sensor, Terminal};
 use crate::probe::Probe;
-use link::Health;
+use crate::sensor::{Sensor, Terminal};
+use emulation::{
+    DBGMCU_APB1_FZ, EXTI_FTSR, EXTI_IMR, EXTI_RTSR, Event, FLASH_CR, FLASH_OPTCR, FLASH_SR, ODR, Outcome, PUPDR,
+    SPI1_CR1, SYSCFG_EXTICR, Scenario, Wiring, Work, gpio,
+};
 use rigless::cpu::armv7m as cpu;
 use rigless::device::Level;
 use rigless::emulator::{self, Driver, Host, Start, Stop};
@@ -19,8 +21,7 @@ use rigless::soc::stm32f427::peripherals::{gpio::Pin, spi::Select};
 use rigless::time::VirtualNanos;
 use std::collections::{BTreeMap, VecDeque};
 use std::num::{NonZeroU32, NonZeroU64};
-use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::path::Path;
 
 const CORE_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).unwrap();
 const SUPPLY_MV: u32 = 3300;
@@ -36,21 +37,6 @@ const DMA2_S0CR: u64 = 0x4002_6410;
 const TCIE: u64 = 1 << 4;
 /// Its bit that lets the stream run.
 const EN: u64 = 1;
-/// Status and control of the flash interface (RM0090 sections 3.9.6 and 3.9.8).
-pub(crate) const FLASH_SR: u64 = 0x4002_3C0C;
-pub(crate) const FLASH_CR: u64 = 0x4002_3C10;
-/// Option bytes (RM0090 section 3.9.10).
-pub(crate) const FLASH_OPTCR: u64 = 0x4002_3C14;
-/// Control register 1 of SPI1, whose bits 0 and 1 are CPHA and CPOL (RM0090 section 28.5.1).
-pub(crate) const SPI1_CR1: u64 = 0x4001_3000;
-/// Which port each of the lines 0 to 7 of the external interrupt controller is connected to (RM0090 section 9.2).
-pub(crate) const SYSCFG_EXTICR: [u64; 2] = [0x4001_3808, 0x4001_380C];
-/// Lines that raise an interrupt, and those whose rising and whose falling edges do (RM0090 section 12.3).
-pub(crate) const EXTI_IMR: u64 = 0x4001_3C00;
-pub(crate) const EXTI_RTSR: u64 = 0x4001_3C08;
-pub(crate) const EXTI_FTSR: u64 = 0x4001_3C0C;
-/// What stops while a debugger has halted the processor; bit 12 is the watchdog (RM0090 section 38.16.4).
-pub(crate) const DBGMCU_APB1_FZ: u64 = 0xE004_2008;
 /// Registers that a run returns beside the pulls.
 const CONFIGURATION: [u64; 10] = [
     FLASH_SR,
@@ -68,53 +54,6 @@ const CONFIGURATION: [u64; 10] = [
 const STRIDE_NS: u64 = 1_000_000;
 /// Length of the data-ready pulse.
 const PULSE_NS: u64 = 100_000;
-/// A board as its documents describe it: crystal, and what the image's pins are connected to.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Wiring {
-    crystal_hz: u64,
-    /// Port (0 for A) and pin of the data-ready line.
-    pub(crate) data_ready: (usize, u8),
-    /// Index of the USART that is connected to the host: 1 for USART2.
-    usart: usize,
-    /// Port and pin of the LED.
-    led: (usize, u8),
-}
-
-/// Olimex STM32-H405: 8 MHz, PB0, USART2, PC12.
-pub(crate) const H405: Wiring = Wiring { crystal_hz: 8_000_000, data_ready: (1, 0), usart: 1, led: (2, 12) };
-/// Adafruit Feather STM32F405 Express: 12 MHz, PC4 (A4), USART3 (TX, RX), PC1 (D13).
-pub(crate) const FEATHER: Wiring = Wiring { crystal_hz: 12_000_000, data_ready: (2, 4), usart: 2, led: (2, 1) };
-
-pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
-
-/// The image for the Olimex STM32-H405, built at most once a run; `OBSERVATORY_IMAGE` names another.
-pub(crate) fn image() -> &'static Path {
-    static IMAGE: OnceLock<PathBuf> = OnceLock::new();
-    let build = || images::build("h405", TARGET, &[]);
-    IMAGE.get_or_init(|| std::env::var_os("OBSERVATORY_IMAGE").map_or_else(build, PathBuf::from))
-}
-
-/// The image for the Adafruit Feather STM32F405, built at most once a run.
-pub(crate) fn feather_image() -> &'static Path {
-    static IMAGE: OnceLock<PathBuf> = OnceLock::new();
-    IMAGE.get_or_init(|| images::build("feather", TARGET, &[]))
-}
-
-/// Address of the register at `offset` of a GPIO port.
-pub(crate) const fn gpio(port: usize, offset: u64) -> u64 {
-    0x4002_0000 + 0x400 * port as u64 + offset
-}
-/// Offsets of GPIOx_PUPDR and GPIOx_ODR (RM0090 section 8.4).
-pub(crate) const PUPDR: u64 = 0x0C;
-const ODR: u64 = 0x14;
-
-/// Asserts that a quarter of the stack was never used, and prints the figure.
-pub(crate) fn assert_stack_suffices(health: &Health) {
-    let Health { stack_bytes, stack_size, .. } = *health;
-    let free_percent = 100 * (stack_size - stack_bytes) / stack_size;
-    println!("stack: {stack_bytes} of {stack_size} B used, {free_percent} % free");
-    assert!(free_percent >= 25, "{health:?}");
-}
 
 #[derive(Debug)]
 struct Bench {
@@ -172,39 +111,6 @@ impl Board for Bench {
     }
 }
 
-/// An event that happens to the device during a run.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Event {
-    /// The sensor resets itself, as after a dip of its supply.
-    SensorReset,
-    /// The sensor is put to sleep, without end.
-    SensorSleep,
-    /// Something else writes this frame to the sensor.
-    WriteRegister(u16),
-    /// The data line to the processor is held at this byte, or released.
-    Stuck(Option<u8>),
-    /// The data-ready line changes its level every 4 us for this time, in ns.
-    Oscillate(u64),
-    /// So many of the next data-ready edges do not reach the processor.
-    LoseEdges(u32),
-    /// The sensor is unplugged (no edges, and zeros on the data line), or plugged in again.
-    Unplugged(bool),
-    /// The reset pin is pulsed.
-    ResetPin,
-    /// The supply dips: memory loses its contents, and the microcontroller restarts.
-    BrownOut,
-    /// The end of the next burst raises no interrupt, as if a bit of the DMA's control register had flipped.
-    LoseBurstEnd,
-    /// The stream that receives the next burst stops within it, as after an error on the bus.
-    StopReceiving,
-    /// The microsecond counter stops.
-    StopCounter,
-    /// The next access to the timer is answered with a bus error.
-    BusError,
-    /// Every aligned word pair of memory that holds this value becomes 0.
-    ClearInMemory(u64),
-}
-
 /// Runs the emulator in stretches that end where the sensor's data-ready line changes, and carries out the events.
 struct Plant {
     end: u64,
@@ -225,15 +131,6 @@ struct Plant {
     probe: Option<Probe>,
     events: VecDeque<(u64, Event)>,
     work: Vec<Work>,
-}
-
-/// Instructions executed and samples taken up to a time.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Work {
-    /// In ns.
-    pub(crate) at: u64,
-    pub(crate) instructions: u64,
-    pub(crate) samples: u64,
 }
 
 impl Plant {
@@ -344,58 +241,13 @@ impl Driver<Bench> for Plant {
     }
 }
 
-/// What a run consists of.
-pub(crate) struct Scenario {
-    pub(crate) wiring: Wiring,
-    /// The crystal does not start.
-    pub(crate) crystal_fails: bool,
-    pub(crate) sensor: Option<Sensor>,
-    /// Keys sent over the serial port, by rising time in s.
-    pub(crate) keys: Vec<(f64, Vec<u8>)>,
-    /// By rising time in s.
-    pub(crate) events: Vec<(f64, Event)>,
-    pub(crate) seconds: f64,
-    /// A debug probe reads the log.
-    pub(crate) has_probe: bool,
-}
-
-impl Default for Scenario {
-    fn default() -> Self {
-        Self {
-            wiring: H405,
-            crystal_fails: false,
-            sensor: None,
-            keys: vec![],
-            events: vec![],
-            seconds: 0.0,
-            has_probe: false,
-        }
-    }
-}
-
-/// The results of a run.
-pub(crate) struct Outcome {
-    pub(crate) sensor: Option<Sensor>,
-    /// Bytes from the serial port, each with its time in ns.
-    pub(crate) received: Vec<(u64, u8)>,
-    /// Reports of the emulator: accesses to unmapped addresses, registers without a model, resets.
-    pub(crate) diagnostics: Vec<String>,
-    /// One value per virtual second, and one at the end.
-    pub(crate) work: Vec<Work>,
-    /// Changes of the LED's level.
-    pub(crate) led_changes: u32,
-    /// Registers at the end, by address: pulls of ports A to C, and those of [`CONFIGURATION`].
-    pub(crate) registers: BTreeMap<u64, u64>,
-    /// Bytes that a debug probe has read.
-    pub(crate) log: Vec<u8>,
-}
-
 /// Boots the image and runs it.
 pub(crate) fn run(image: &Path, scenario: Scenario) -> Outcome {
     let ns = |seconds: f64| (seconds * 1e9) as u64;
     let keys = scenario.keys.iter().flat_map(|(at, keys)| keys.iter().map(move |&key| (ns(*at), key)));
     let terminal = Terminal { keys: keys.collect(), ..Terminal::default() };
-    let mut bench = Bench::new(scenario.wiring, scenario.sensor, terminal).expect("the emulator knows the part");
+    let sensor = scenario.sensor.map(|sensor| Sensor::new(sensor.part()));
+    let mut bench = Bench::new(scenario.wiring, sensor, terminal).expect("the emulator knows the part");
     bench.microcontroller.crystal_fails = scenario.crystal_fails;
     let plant = Plant {
         end: ns(scenario.seconds),
@@ -416,13 +268,13 @@ pub(crate) fn run(image: &Path, scenario: Scenario) -> Outcome {
     let images = [Image::read(image, None).expect("the image is an ELF")];
     let finished = emulator::run(session, &Start::new(&images), plant).expect("the emulator runs to the end");
     let Plant { work, led_changes, registers, probe, .. } = finished.driver;
-    let log = probe.unwrap_or_default().bytes;
+    let log = probe.map_or_else(Vec::new, |probe| probe.lines(image));
     let mut session = finished.session;
     let diagnostics = diagnostics(&session);
     let part = &mut session.board_mut().microcontroller.part;
     let received =
         part.usart[scenario.wiring.usart].chip_mut::<Terminal>().map(|terminal| std::mem::take(&mut terminal.received));
-    let sensor = part.spi[SPI1].chip_mut::<Sensor>(0).cloned();
+    let sensor = part.spi[SPI1].chip_mut::<Sensor>(0).map(|sensor| sensor.record());
     Outcome { sensor, received: received.unwrap_or_default(), diagnostics, work, led_changes, registers, log }
 }
 

@@ -1,48 +1,25 @@
 //! The images: built as they are built to be flashed, their size, and a copy with a smaller stack.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
-use std::sync::Mutex;
+use system_tests::{Image, image_folder};
 
-pub(crate) fn workspace() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the tests are a folder of the workspace")
-}
-
-/// The target folder of the images. It is not that of the tests, which the cargo that runs the tests may have locked.
-pub(crate) fn folder() -> PathBuf {
-    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from);
-    workspace().join(target).join("image")
-}
-
-/// Builds the image `observatory-{board}` for a target, with further features, and returns the path of its ELF: a copy, since
-/// cargo overwrites the image when it builds it with other features.
+/// Builds the image `observatory-{board}` for a target, with further features, and returns the path of its ELF.
 pub(crate) fn build(board: &str, target: &str, further: &[&str]) -> PathBuf {
-    let (feature, bin) = (format!("board-{board}"), format!("observatory-{board}"));
-    let copy = [&[bin.as_str()], further].concat().join("-");
+    let (feature, program) = (format!("board-{board}"), format!("observatory-{board}"));
+    let copy = [&[program.as_str()], further].concat().join("-");
     let features = [&[feature.as_str()], further].concat().join(",");
-    build_package(("firmware", &bin), target, &["--features", &features], &copy)
+    build_package(("firmware", &program), target, &["--features", &features], &copy)
 }
 
 /// Builds the program of a package for a target, with further arguments of cargo, and returns the path of a copy of its ELF with the
 /// name `copy`.
-pub(crate) fn build_package((package, bin): (&str, &str), target: &str, further: &[&str], copy: &str) -> PathBuf {
-    static BUILD: Mutex<()> = Mutex::new(());
-    let _one_at_a_time = BUILD.lock();
-    let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-        .current_dir(workspace())
-        .args(["build", "--package", package, "--bin", bin, "--target", target])
-        .args(further)
-        .args(["--profile", "image", "--locked", "--target-dir"])
-        .arg(folder())
-        .status()
-        .expect("cargo starts");
-    assert!(status.success(), "the image does not build; its target comes with `rustup target add {target}`");
-    let copy = folder().join(copy).with_extension("elf");
-    // Renamed when it is whole: another run of the tests may be reading the one before.
-    let partial = copy.with_extension(std::process::id().to_string());
-    std::fs::copy(folder().join(target).join("image").join(bin), &partial).expect("room");
-    std::fs::rename(partial, &copy).expect("the same folder");
-    copy
+pub(crate) fn build_package(
+    (package, program): (&str, &str),
+    target: &str,
+    arguments: &[&str],
+    copy: &str,
+) -> PathBuf {
+    Image { package, program, target, profile: "image", arguments, variable: None }.build(copy)
 }
 
 /// Vector table of the STM32F405, and the start of its core-coupled memory, which is the stack (RM0090 section 2.3).
@@ -103,8 +80,7 @@ pub(crate) fn with_stack(image: &Path, bytes: u32) -> PathBuf {
     let vectors = headers.find(|&header| elf.word(header + 12) == FLASH_START && elf.word(header + 16) > 0);
     let at = elf.word(vectors.expect("a vector table") + 4) as usize;
     elf.0[at..at + 4].copy_from_slice(&(STACK_START + bytes).to_le_bytes());
-    std::fs::create_dir_all(folder()).expect("a folder");
-    let copy = folder().join(format!("observatory-h405-stack-{bytes}.elf"));
+    let copy = image_folder().join(format!("observatory-h405-stack-{bytes}.elf"));
     std::fs::write(&copy, elf.0).expect("room");
     copy
 }

@@ -1,7 +1,7 @@
 //! What the sampling path of each image can run into: the machine code that the two sampling interrupts and that of the estimators reach.
 
-use crate::bench::{TARGET, feather_image, image};
-use crate::images;
+use super::bench::{TARGET, feather_image, image};
+use super::images;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Command;

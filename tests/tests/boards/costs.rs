@@ -1,7 +1,8 @@
 //! What an image costs: one row a board, of which each test of a board prints all that are there.
 
-use crate::images;
+use super::images;
 use link::Health;
+use system_tests::image_folder;
 use std::path::Path;
 
 /// The sizes of a board's memory in bytes: flash, and RAM beside the stack.
@@ -41,7 +42,7 @@ pub(crate) fn assert_within_budget(costs: &Costs<'_>) {
         us(health.sampling_cycles),
         us(health.estimator_cycles),
     );
-    let rows = images::folder().join("costs");
+    let rows = image_folder().join("costs");
     std::fs::create_dir_all(&rows).expect("a folder");
     std::fs::write(rows.join(board), &row).expect("room");
     let mut files: Vec<_> =

@@ -1,9 +1,9 @@
 //! Full speed: 819.2 samples a second during the raw stream, reports, fits and key presses.
 
-use crate::bench::{Outcome, Scenario, Work, assert_stack_suffices, image, run};
-use crate::decoded::{Decoded, on_host};
-use crate::peripherals::Sensor;
+use super::bench::{assert_stack_suffices, image, run};
+use super::decoded::{Decoded, on_host};
 use adis16405_driver::{BURST_BYTES, BURST_REQUEST, Burst, GyroRange};
+use emulation::{Outcome, Scenario, Sensor, Work};
 use link::Message;
 use noise_analysis::analysis::analyze;
 use recordings::frame_log::{Frame, FrameLogWriter};
@@ -38,17 +38,17 @@ fn assert_no_sample_lost_in(seconds: f64) {
     keys.extend(times.zip(typed.iter().cycle()).map(|(at, keys)| (at, keys.to_vec())));
     keys.push((seconds - 3.5, b"w 0\r".to_vec()));
     keys.push((seconds - 3.0, b"r".to_vec()));
-    let scenario = Scenario { sensor: Some(Sensor::published(2)), keys, seconds, ..Scenario::default() };
+    let scenario = Scenario { sensor: Some(Sensor::Published(2)), keys, seconds, ..Scenario::default() };
     let Outcome { sensor, received, diagnostics, work, .. } = run(image(), scenario);
     let sensor = sensor.expect("the sensor on the bus");
     assert_eq!(diagnostics, [""; 0]);
-    assert_eq!(sensor.part.violations(), []);
+    assert_eq!(sensor.violations, [""; 0]);
 
     // Every sample since the rate was set was read once.
     let set = sensor.bursts.windows(2).rposition(|pair| pair[1].0 != pair[0].0 + 1).expect("the rate was set") + 1;
     let bursts = &sensor.bursts[set..];
     assert!(bursts.len() as f64 > (seconds - 1.1) * RATE_HZ - 100.0, "{} bursts", bursts.len());
-    assert!(sensor.part.samples() - bursts[bursts.len() - 1].0 <= 1);
+    assert!(sensor.samples - bursts[bursts.len() - 1].0 <= 1);
 
     // The raw stream is what the sensor sent, in order and complete.
     let decoded = Decoded::decode(&received);

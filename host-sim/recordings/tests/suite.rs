@@ -1,0 +1,7 @@
+//! Every test of this crate in one program, so that what it links is compiled and linked once.
+
+mod clocks;
+mod coarse_stamps;
+mod other_formats;
+mod serial;
+mod time_base;

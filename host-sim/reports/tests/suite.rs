@@ -1,0 +1,14 @@
+//! Every test of this crate in one program, so that what it links is compiled and linked once.
+
+#[path = "browser/main.rs"]
+mod browser;
+#[path = "rendering/fixture.rs"]
+mod fixture;
+#[path = "live/main.rs"]
+mod live;
+#[path = "rendering/phrases.rs"]
+mod phrases;
+#[path = "rendering/main.rs"]
+mod rendering;
+#[path = "screen/main.rs"]
+mod screen;

@@ -1,0 +1,11 @@
+//! Every test of this crate in one program, so that what it links is compiled and linked once.
+
+mod commands;
+mod device;
+mod effects;
+mod epochs;
+mod fault_grid;
+mod faults;
+mod refused_bursts;
+mod settling;
+mod week;

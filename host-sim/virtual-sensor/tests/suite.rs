@@ -1,0 +1,10 @@
+//! Every test of this crate in one program, so that what it links is compiled and linked once.
+
+mod deliberate_bugs;
+mod driver;
+mod faults;
+mod misbehaving_part;
+mod noise;
+mod other_drivers;
+mod procedures;
+mod registers;
