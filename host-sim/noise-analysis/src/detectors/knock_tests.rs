@@ -125,7 +125,7 @@ fn assert_quiet(name: &str, record: impl Fn(u64) -> Series + Sync) {
 fn find(channels: &[Series]) -> Vec<Vec<Knock>> {
     let searched = |series| SearchedChannel { fitted: series, parts: vec![series], can_show_spikes: true };
     let found = knock_search::find(&channels.iter().map(searched).collect::<Vec<SearchedChannel>>(), &[], DITHERED);
-    found.into_iter().map(|of| of.knocks).collect()
+    found.into_iter().flatten().map(|of| of.knocks).collect()
 }
 
 /// How many of 200.

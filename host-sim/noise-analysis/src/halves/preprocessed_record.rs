@@ -7,7 +7,7 @@ use crate::fit::noise_terms::filter_length_s;
 use crate::halves::traced_part::{BiasByBlocks, PartData, PartSamples, TracedPart};
 use crate::parallel::{in_parallel, per_channel};
 use crate::record::condensed_record::CondensedRecord;
-use crate::record::estimators::RecordEstimators;
+use crate::record::estimators::{HalfEstimators, RecordEstimators};
 use crate::record::preprocessing::Preprocessing;
 use crate::report::Stretch;
 use crate::rivals::motion::{self, PlatformMotion};
@@ -32,9 +32,20 @@ pub(crate) struct PreprocessedRecord<'a> {
 impl<'a> PreprocessedRecord<'a> {
     /// What the samples of `record` show.
     pub(crate) fn new(record: &'a CondensedRecord<'a>) -> Self {
-        let measurement = record.means.as_ref();
-        let preprocessing = Preprocessing::detect(record, &NoiseGrids::default());
+        let preprocessing = Preprocessing::detect(record, None, &NoiseGrids::default());
         let estimators = RecordEstimators::estimate(record, &preprocessing);
+        Self::with(record, preprocessing, estimators)
+    }
+
+    /// The same, and the estimators of both halves by what the `first_half` shows.
+    pub(crate) fn with_halves(record: &'a CondensedRecord<'a>, first_half: &CondensedRecord) -> (Self, HalfEstimators) {
+        let preprocessing = Preprocessing::detect(record, Some(first_half), &NoiseGrids::default());
+        let (estimators, halves) = RecordEstimators::estimate_with_halves(record, first_half, &preprocessing);
+        (Self::with(record, preprocessing, estimators), halves)
+    }
+
+    fn with(record: &'a CondensedRecord<'a>, preprocessing: Preprocessing, estimators: RecordEstimators) -> Self {
+        let measurement = record.means.as_ref();
         let motions = per_channel(measurement.ids(), |channel| {
             let find = || motion::find(&preprocessing.measured(measurement, channel), &measurement[channel].profile);
             record.is_traced(channel).then(find).flatten()

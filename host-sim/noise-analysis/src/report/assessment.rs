@@ -108,14 +108,13 @@ pub struct AssessedModels<'a> {
 }
 
 impl Assessment {
-    /// Assesses the models of the channel whose samples, or means of them, are `series`; of means `samples` has the spectrum of
-    /// the samples and the smallest distance of two of them.
+    /// Assesses the models of the channel whose samples, or means of them, are `series`; those of the second half with what the first half's
+    /// model foretells are `unseen`. Of means `samples` has the spectrum of the samples and the smallest distance of two of them.
     #[must_use]
-    pub fn new(series: &Series, samples: Option<(&Welch, f64)>, models: AssessedModels) -> Self {
+    pub fn new(series: &Series, unseen: &Series, samples: Option<(&Welch, f64)>, models: AssessedModels) -> Self {
         let AssessedModels { refitted, coefficients_from, uncompensated, of_first_half } = models;
         let whole = UniformSeries::from_series(series);
-        let halfway = whole.values().len() / 2;
-        let unseen = UniformSeries::new(whole.sample_period(), whole.values()[halfway..].to_vec());
+        let unseen = UniformSeries::from_series(unseen);
         let markov_time_by_autocorrelation = correlation_time(&whole, &sampled_every(refitted, whole.sample_period()))
             .map(|time| Parameter::new(time.value, time.low, time.high, "s"));
         if !is_known(refitted) {
