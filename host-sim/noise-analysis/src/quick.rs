@@ -74,12 +74,13 @@ impl CurveEstimators {
             let refused = channels[channel].refused.iter().map(|(&cause, &count)| (cause, count));
             let model = whole.channels[channel].fit.after();
             let has_samples = estimators.measured[channel].samples() > 0;
+            let resolution = estimators.both.resolution(channel);
             let data_sheet = figure_data::data_sheet(&estimators.both.channels[channel].data_sheet);
             done();
             ChannelReport {
                 samples: description.samples,
                 missing: missing(description, refused, estimators.both.replaced(channel)),
-                assessment: Assessment::of_model(model, &report.unit, duration_s, has_samples),
+                assessment: Assessment::of_model(model, (&report.unit, resolution), duration_s, has_samples),
                 figure_data: FigureData { data_sheet, ..FigureData::default() },
                 ..report
             }

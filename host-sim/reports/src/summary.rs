@@ -12,11 +12,11 @@ use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::distributions::quantile;
 use noise_analysis::effects::{Effect, Unexplained};
 use noise_analysis::nonstationarity::FittedPart;
-use noise_analysis::report::DataSheetReport;
 use noise_analysis::report::assessment::Innovations;
 use noise_analysis::report::{
     BiasOverTime, ChannelReport, Finding, ModelErrorReport, Parameter, PartNote, Report, Stretch,
 };
+use noise_analysis::report::{DataSheetReport, TermReport};
 use noise_analysis::units::conversions;
 
 /// Deviance a point on the unseen half above which a model is marked: a true model scores about 1, and what changes from one
@@ -194,14 +194,17 @@ pub fn sheet_coefficients(sheet: &DataSheetReport) -> [Option<f64>; 3] {
     ]
 }
 
-/// A coefficient of the model to use. N is that of all white noise, behind the part's filter and after it.
+/// A coefficient of the model to use. N is that of all white noise: after the part's filter, behind it, and below the corner of a process that
+/// stands in its place.
 #[must_use]
 pub fn coefficient(channel: &ChannelReport, kind: &str) -> Option<Parameter> {
-    let terms = channel.refitted.terms.iter().map(|term| {
-        let Parameter { value, low, high, unit } = term.coefficient();
-        (term.kind(), BoundedEstimate { value, low, high }, unit)
-    });
-    let (BoundedEstimate { value, low, high }, unit) = coefficients::coefficient(kind, terms)?;
+    let terms = || channel.refitted.terms.iter();
+    if kind != LETTERS[0].0 {
+        return terms().find(|term| term.kind() == kind).map(TermReport::coefficient);
+    }
+    let white = terms().filter_map(TermReport::angle_random_walk);
+    let white = white.map(|Parameter { value, low, high, unit }| (BoundedEstimate { value, low, high }, unit));
+    let (BoundedEstimate { value, low, high }, unit) = coefficients::white_noise(white)?;
     Some(Parameter::new(value, low, high, unit))
 }
 

@@ -124,7 +124,7 @@ impl FirstHalf {
         channel: ChannelId,
         has_rules: bool,
     ) -> ChannelReport {
-        let unit = estimators.both.channels[channel].unit;
+        let (unit, resolution) = (estimators.both.channels[channel].unit, estimators.both.resolution(channel));
         let fit = &whole.channels[channel].fit;
         let baseline = &self.part.channels[channel].fit.before;
         let curve = estimators.measured[channel].clone();
@@ -133,7 +133,7 @@ impl FirstHalf {
         let after = self.after((estimators, halves), channel, (&curve, &rounding), has_rules);
         // The model with the added terms, fitted to the whole record, with the errors of `after`.
         let refitted = ModelReport {
-            terms: term_reports(fit.after(), unit),
+            terms: term_reports(fit.after(), unit, resolution),
             adev: self.as_recorded((fit, &fit.signals), estimators, channel, (&curve, &rounding)),
             ..after.clone()
         };
@@ -181,7 +181,7 @@ impl FirstHalf {
         let with_rounding = |point: &AllanPoint| (model.avar(point.n) + rounding.correlated_avar(point.n)).sqrt();
         let error = |part: &RecordPart| ModelErrorReport::new(model, &part.curve_before_rounding(channel));
         ModelReport {
-            terms: term_reports(model, halves.recorded[0].channels[channel].unit),
+            terms: terms_of(model, &halves.recorded[0], channel),
             adev: whole.points().iter().map(with_rounding).collect(),
             fitted: error(&halves.recorded[0]),
             unseen: error(&halves.recorded[1]),
@@ -209,7 +209,7 @@ impl FirstHalf {
         let (fitted, of_fitted) = fit.fitted_curve();
         let none = EventShare::default();
         ModelReport {
-            terms: term_reports(model, estimators.both.channels[channel].unit),
+            terms: terms_of(model, &halves.foretold[0], channel),
             adev: self.as_recorded((fit, &of_both), estimators, channel, (whole, rounding)),
             fitted: ModelErrorReport::with_shares(model, (&of_fitted, &none), fitted),
             unseen: error(events, &halves.foretold[1]),
@@ -263,6 +263,11 @@ impl Epochs {
             nonstationarity::describe(&channels, traced.iter().position(|of| *of == channel)?)
         })
     }
+}
+
+/// The terms of a model of a channel of a part of the record.
+fn terms_of(model: &Model, part: &RecordPart, channel: ChannelId) -> Vec<TermReport> {
+    term_reports(model, part.channels[channel].unit, part.resolution(channel))
 }
 
 /// Allan deviations of the `second` half at the first averaging times of the `whole` record.

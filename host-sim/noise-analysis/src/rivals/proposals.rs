@@ -13,7 +13,7 @@ use crate::effects::{
     Unexplained, UnexplainedPlace,
 };
 use crate::fit::channel_fit::ChannelFit;
-use crate::fit::noise_terms::{is_white, line_frequency};
+use crate::fit::noise_terms::{MAX_LOW_PASS_SAMPLES, is_white, line_frequency};
 use crate::fit::traced_model::Addition;
 use crate::rivals::proposal::{ChannelFacts, Origin, Proposal};
 use crate::rivals::slow_drift::ChannelsInCommon;
@@ -35,8 +35,6 @@ use std::f64::consts::{PI, SQRT_2};
 /// Frequency of a line, in halves of the sample rate, above which it is one at half of the rate: the search ends one resolution below it.
 const NO_HIGHER: f64 = 1.0 - 1e-9;
 
-/// Longest time constant, in samples, of a Markov process that is named a low-pass filter.
-const MAX_LOW_PASS_SAMPLES: f64 = 64.0;
 /// Upper bound of the bandwidth of a resonance that the curve alone shows, in units of its frequency: a wider one is no band.
 const WIDEST_BAND: f64 = 2.0;
 /// Largest excess kurtosis of a telegraph signal that the curve alone shows, in units of that of two equally frequent levels. A
