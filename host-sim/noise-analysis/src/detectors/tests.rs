@@ -13,7 +13,7 @@ use adis16405_driver::Channel;
 use measurement::Measurement;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
+use rand_distr::{Exp1, StandardNormal, StudentT};
 use simulation::{HostClock, Simulation};
 use std::f64::consts::TAU;
 use virtual_sensor::{Environment, InjectedEffect, OutputRegister, SensorScenario, TemperatureProfile};
@@ -193,6 +193,40 @@ fn loud_noise_has_no_spikes_and_spikes_stand_out_of_it() {
         spikes::find(&series, &[]).unwrap().correction,
         Some(Correction::Exclude(spikes.map(|at| at as u64).into()))
     );
+}
+
+/// Independent samples of exponential noise, of Laplace's and of Student's with five degrees of freedom have no spikes; ten among them that are
+/// larger than any of 30,000 samples of exponential noise, which reaches 14 in one of 40 records, are told.
+#[test]
+fn noise_with_heavy_tails_has_no_spikes() {
+    let noise = |kind: &str, seed: u64| {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let student = StudentT::new(5.0).expect("degrees of freedom");
+        let values = (0..30_000).map(|_| match kind {
+            "exponential" => random.sample::<f64, _>(Exp1),
+            "Laplace" => random.sample::<f64, _>(Exp1) * if random.random() { 1.0 } else { -1.0 },
+            _ => random.sample(student),
+        });
+        let values: Vec<f64> = values.collect();
+        Series {
+            slots: (0..30_000).collect(),
+            values: values.into(),
+            span: 0..30_000,
+            period_s: 0.01,
+            resolution: 1e-5,
+            unit: "deg/s",
+        }
+    };
+    for kind in ["exponential", "Laplace", "Student"] {
+        let found = (0..20).filter(|seed| spikes::find(&noise(kind, *seed), &[]).is_some()).count();
+        // Such a tail is told from that of a power law, of which it has less and less: chance makes none of them one of a spike.
+        assert_eq!(found, 0, "{kind}");
+    }
+    let mut with_spikes = noise("exponential", 30);
+    (0..10).for_each(|number| with_spikes.values_mut()[1500 + 2500 * number] += 200.0);
+    let found = spikes::find(&with_spikes, &[]).expect("ten spikes");
+    assert_eq!(found.effect.parameters()["size"].value.round(), 200.0);
+    assert_eq!(found.excluded().len(), 10);
 }
 
 #[test]
