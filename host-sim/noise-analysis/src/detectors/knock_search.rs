@@ -7,7 +7,7 @@
 //!                                          └► what single samples show of the knocks of other channels
 //! ```
 
-use super::knocks::{BlockSize, Knock, KnockRule, find_by};
+use super::knocks::{BlockSize, Knock, KnockRule, find_by, join};
 use super::spikes::{Disturbance, FoundSpikes, SpikeRule};
 use crate::parallel::in_parallel;
 use crate::samples::series::Series;
@@ -103,7 +103,7 @@ fn find_in_part(
 }
 
 fn add(knocks: &mut [Vec<Knock>], found: Vec<Vec<Knock>>) {
-    knocks.iter_mut().zip(found).for_each(|(own, found)| own.extend(found));
+    knocks.iter_mut().zip(found).for_each(|(own, found)| found.into_iter().for_each(|knock| join(own, knock)));
 }
 
 /// Sample periods of the samples of a series within knocks, in ascending order.
