@@ -329,7 +329,7 @@ pub fn record_sentences_in_short(report: &Report) -> Vec<String> {
 }
 
 /// Where and by how much the data departs from every model, one text each. Channels that depart at the same place, to the same side,
-/// are told together.
+/// are told together, and what a channel shows twice at one place is told once.
 #[must_use]
 pub fn unexplained(report: &Report) -> Vec<String> {
     struct Departure<'a> {
@@ -356,6 +356,10 @@ pub fn unexplained(report: &Report) -> Vec<String> {
             (first, excess) => first.is_none() && excess.is_none(),
         };
         let is_same_place = |known: &Departure<'_>| departure(known.of, &[]) == departure(of, &[]);
+        let is_told = |of: &Departure<'_>| finding.channels.iter().all(|name| of.channels.contains(name));
+        if departures.iter().any(|of| is_same_place(of) && is_same_side(of) && is_told(of)) {
+            continue;
+        }
         let of_other_channels = |of: &Departure<'_>| finding.channels.iter().all(|name| !of.channels.contains(name));
         let known = departures.iter_mut().find(|of| is_same_place(of) && is_same_side(of) && of_other_channels(of));
         match known {

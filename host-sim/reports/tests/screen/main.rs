@@ -280,6 +280,9 @@ fn departures_at_one_place_are_told_together() {
     report.findings[2] = in_channel("gyro_z", 2.1);
     let told = reports::summary::unexplained(&report);
     assert_eq!(told[1..], ["gyro z: σ is 2.1 % above the model at averaging times around 1.2 ms"]);
+    // Two signs of one departure are told once.
+    report.findings = vec![in_channel("gyro_x", -3.6), in_channel("gyro_x", -3.7)];
+    assert_eq!(reports::summary::unexplained(&report).len(), 1);
 }
 
 /// What a record may not tell of the part's clock and filter.
