@@ -264,6 +264,35 @@ fn where_the_noise_is_below_a_count_neighbouring_counts_are_no_step() {
     assert!(found(&far, 0.0) && found(&far, 1.5));
 }
 
+/// Three regressors drift alike, each with a swing of its own, and the bias follows their sum: a ramp explains it best at first, and nothing of it
+/// beside all three.
+#[test]
+fn a_ramp_that_others_explain_is_none() {
+    const SAMPLES: usize = 60_000;
+    let series = |values: Vec<f64>| Series {
+        slots: (0..SAMPLES as u64).collect(),
+        values: values.into(),
+        span: 0..SAMPLES as u64,
+        period_s: 0.01,
+        resolution: 1e-6,
+        unit: "deg/s",
+    };
+    let time = |at: usize| at as f64 / SAMPLES as f64;
+    let drifting = |turns: f64| (0..SAMPLES).map(|at| time(at) + 0.03 * (TAU * turns * time(at)).sin()).collect();
+    let regressors: [Vec<f64>; 3] = [3.0, 5.0, 7.0].map(drifting);
+    let mut random = ChaCha8Rng::seed_from_u64(61);
+    let sum = |at: usize| regressors.iter().map(|of| of[at]).sum::<f64>();
+    let bias = series((0..SAMPLES).map(|at| sum(at) + 0.1 * random.sample::<f64, _>(StandardNormal)).collect());
+    let regressors = regressors.map(series);
+    let BiasChanges { ramp, sensitivities, .. } =
+        bias::find(&bias, &regressors.each_ref(), &[], &NoiseGrids::default(), &|| 0.0);
+    assert_eq!((ramp, sensitivities.len()), (None, 3));
+    for (_, of) in sensitivities {
+        // Four standard deviations.
+        assert!((of.sensitivity - 1.0).abs() < 4.0 * of.error, "{of:?}");
+    }
+}
+
 /// A step of five times the noise, and one of a third of it: alone, either is 40 standard deviations of the mean of a minute or more.
 #[test]
 fn a_small_step_hides_no_large_one() {
