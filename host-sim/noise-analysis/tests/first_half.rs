@@ -71,8 +71,11 @@ fn add_bursts(random: &mut ChaCha8Rng, values: &mut [f64], bursts: usize) {
     }
 }
 
-/// What happens in a second half, in the counts of two gyroscopes.
-const SECOND_HALVES: [(&str, fn(&mut [Vec<f64>; 2])); 9] = [
+/// Changes the counts of two gyroscopes in a second half.
+type Change = fn(&mut [Vec<f64>; 2]);
+
+/// What happens in a second half.
+const SECOND_HALVES: [(&str, Change); 9] = [
     ("steps", |gyros| change(gyros, |at, value| value + if at > 0.5 { 0.25 * NOISE } else { 0.0 })),
     ("ramps", |gyros| change(gyros, |at, value| value + 3.0 * NOISE * at)),
     ("slow lines", |gyros| change(gyros, |at, value| value + 0.5 * NOISE * (TAU * 40.0 * at).sin())),

@@ -171,6 +171,23 @@ fn a_fast_line_of_the_second_half_is_not_validated() {
     assert_eq!(line.expect("the line").validated, Validation::Untestable);
 }
 
+/// Ten seconds of noise that is five times as large, which the samples show in pieces and the means as one stretch.
+#[test]
+fn a_long_knock_is_one() {
+    let mut measurement = recorded();
+    measurement.channels.truncate(2);
+    for channel in measurement.channels.iter_mut() {
+        let loud =
+            channel.counts.iter_mut().zip(&measurement.slots).filter(|(_, slot)| (300_000..302_048).contains(*slot));
+        loud.for_each(|(count, _)| *count *= 5);
+    }
+    let report = condensed(&measurement, 1 << 14);
+    for name in ["gyro_x", "gyro_y"] {
+        let knocks = channel(&report, name).effects.iter().filter(|of| of.effect.name() == "knock");
+        assert_eq!(knocks.count(), 1, "{name}");
+    }
+}
+
 #[test]
 fn the_size_of_the_blocks_does_not_matter() {
     let mut measurement = recorded();

@@ -2,7 +2,7 @@
 
 use crate::detectors::level_change;
 use crate::detectors::noise_grid::NoiseGrids;
-use crate::effects::Effect;
+use crate::effects::{Effect, NoisyInterval};
 use crate::fit::noise_terms::filter_length_s;
 use crate::halves::traced_part::{BiasByBlocks, PartData, PartSamples, TracedPart};
 use crate::parallel::{in_parallel, per_channel};
@@ -114,8 +114,9 @@ impl<'a> PreprocessedRecord<'a> {
             let is_shared = others.any(|(_, other)| other.as_ref().is_some_and(|other| motion.is_shared_with(other)));
             Proposal::new(motion.effect, Origin::Motion { is_shared, is_sudden: motion.is_sudden })
         });
-        let of_samples = self.record.channels[channel].effects.iter().chain(self.preprocessing.effects(channel));
-        let of_samples = of_samples.map(|effect| Proposal::new(effect.clone(), Origin::Samples));
+        let of_samples =
+            with_knocks_joined(&self.record.channels[channel].effects, self.preprocessing.effects(channel));
+        let of_samples = of_samples.into_iter().map(|effect| Proposal::new(effect, Origin::Samples));
         let (of_model, facts) = whole.proposals(&measurement.profile, &self.estimators.both, channel, common);
         let of_signals = trace.signals.iter().map(|signal| signals::proposal(signal, own.unit));
         let temperature = measurement.of_quantity(Quantity::Temperature).next();
@@ -140,4 +141,26 @@ impl<'a> PreprocessedRecord<'a> {
         };
         in_parallel(&[Quantity::AngularRate, Quantity::SpecificForce], of_quantity).into_iter().flatten().collect()
     }
+}
+
+/// The effects that the samples of a channel show, and their means. Knocks that follow each other at less than the length of the shorter are
+/// one: of a condensed record the samples show a long one in pieces, and the means, which lack these, the rest.
+fn with_knocks_joined(of_samples: &[Effect], of_means: &[Effect]) -> Vec<Effect> {
+    let knock = |effect: &Effect| match effect {
+        Effect::NoisyInterval(knock) => Some(knock.clone()),
+        _ => None,
+    };
+    let mut pieces = of_samples.iter().filter_map(knock).peekable();
+    if pieces.peek().is_none() {
+        return of_samples.iter().chain(of_means).cloned().collect();
+    }
+    let mut knocks: Vec<NoisyInterval> = Vec::new();
+    for mut knock in of_means.iter().filter_map(knock).chain(pieces) {
+        while let Some(near) = knocks.iter().position(|of| of.is_near(&knock)) {
+            knock = knocks.remove(near).extended_by(&knock);
+        }
+        knocks.push(knock);
+    }
+    let others = of_samples.iter().chain(of_means).filter(|effect| knock(effect).is_none()).cloned();
+    others.chain(knocks.into_iter().map(Effect::from)).collect()
 }
