@@ -279,7 +279,9 @@ const QUICK: &str = "Quick report, of the curves alone: spectra, spikes, steps, 
 /// What is said where nothing was found.
 #[must_use]
 pub fn nothing_found(report: &Report) -> &'static str {
-    if is_short(report) {
+    if !contradictions(report).is_empty() {
+        "Nothing with a name, but N, B and K do not describe every channel."
+    } else if is_short(report) {
         "Nothing: a record as short as this one shows strong effects only."
     } else if report.quick {
         "Nothing in the curves: N, B and K describe those of every channel."
