@@ -42,19 +42,20 @@ fn filtered(seed: u64, a: f64) -> ChannelReport {
     analyze(&measurement).channels.remove(0)
 }
 
-/// At frequencies far below its corner the filter passes all: N is that of the noise before it. Below a corner of 0.8 Hz ten minutes have 960
-/// independent ordinates, which tell N to 1.6 %; a term that is fitted with it, such as B, may take several times that.
+/// At frequencies far below its corner the filter passes all: N is that of the noise before it. Below a corner of 0.16 Hz ten minutes have 190
+/// independent ordinates, which tell N to 3.6 %, and below one of 0.8 Hz 960, 1.6 %; a term that is fitted with it, such as B, may take several
+/// times that.
 #[test]
 fn n_is_the_density_below_the_corner() {
     let truth = LSB * NOISE / RATE_HZ.sqrt();
     let mut held = 0;
-    for (a, seeds) in [(0.5, 0..4), (0.1, 10..14), (0.05, 20..24)] {
+    for (a, seeds, within) in [(0.5, 0..3, 0.1), (0.1, 10..13, 0.1), (0.05, 20..23, 0.1), (0.01, 30..33, 0.25)] {
         for seed in seeds {
             let channel = filtered(seed, a);
             let terms = channel.refitted.terms.iter().filter_map(TermReport::angle_random_walk);
             let parts = terms.map(|of| BoundedEstimate { value: of.value, low: of.low, high: of.high });
             let n = sum_of_white_noise(&parts.collect::<Vec<_>>());
-            assert!((n.value / truth - 1.0).abs() < 0.1, "{a}, seed {seed}: {n:?}, true {truth}");
+            assert!((n.value / truth - 1.0).abs() < within, "{a}, seed {seed}: {n:?}, true {truth}");
             held += usize::from((n.low..=n.high).contains(&truth));
             let printed = &channel.assessment.coefficients[0];
             assert_eq!((printed.kind.as_str(), printed.value.value), ("angle_random_walk", n.value));

@@ -56,9 +56,9 @@ pub(crate) const MAX_LOW_PASS_SAMPLES: f64 = 64.0;
 /// does not.
 ///
 /// A sampled process of deviation `s` and correlation time `T` has there the two-sided density `s²·dt·coth(dt/2T)`, and
-/// `s²·dt·tanh(dt/2T)` at half the sample rate. It stands in the place of white noise if it is as fast as a filter, and the white noise of
-/// the model is known to be above it nowhere, or is no more than that of rounding. The density far above the corner, in proportion to `s²/T`, is
-/// known best, so that the errors of `s` and `T` have one sign: their lower bounds give that of N.
+/// `s²·dt·tanh(dt/2T)` at half the sample rate. It stands in the place of white noise if the white noise of the model is known to be above it
+/// nowhere, or if it is as fast as a filter and that noise is no more than that of rounding. The density far above the corner, in proportion to
+/// `s²/T`, is known best, so that the errors of `s` and `T` have one sign: their lower bounds give that of N.
 pub(crate) fn white_noise_of_process(model: &Model, term: &FittedTerm, resolution: f64) -> Option<BoundedEstimate> {
     let NoiseTerm::Markov(Markov { time_constant }) = term.kind else { return None };
     let period_s = model.sample_period();
@@ -66,9 +66,9 @@ pub(crate) fn white_noise_of_process(model: &Model, term: &FittedTerm, resolutio
     let at_half_the_rate = term.value * term.value * period_s * half_turn(time_constant);
     let white = model.terms().iter().filter(|term| is_white(&term.kind));
     let left: f64 = white.map(|term| term.low * term.low).sum();
-    let is_fast = time_constant < MAX_LOW_PASS_SAMPLES * period_s;
     let rounding = Rounding::white(resolution, period_s).variance() * period_s;
-    if !is_fast || left > at_half_the_rate.max(rounding) {
+    let is_filter = time_constant < MAX_LOW_PASS_SAMPLES * period_s && left <= rounding;
+    if left > at_half_the_rate && !is_filter {
         return None;
     }
     let below_corner = |deviation: f64, time_constant: f64| deviation * (period_s / half_turn(time_constant)).sqrt();
