@@ -2,6 +2,7 @@
 
 use crate::{ChannelProfile, MeasuredChannel, Measurement, SensorProfile};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// What is known of a recording before its samples are used.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,6 +58,15 @@ pub struct SampleBlock {
     pub slots: Vec<u64>,
     /// The channels, in the order of [`RecordingDescription::channels`]. Positions of refused samples are those in the block.
     pub channels: Vec<MeasuredChannel>,
+}
+
+impl SampleBlock {
+    /// Some of its samples.
+    #[must_use]
+    pub fn part(&self, positions: Range<usize>) -> Self {
+        let channels = self.channels.iter().map(|channel| channel.part(positions.clone())).collect();
+        Self { slots: self.slots[positions].to_vec(), channels }
+    }
 }
 
 impl Measurement {

@@ -18,6 +18,7 @@ use crate::halves::traced_part::{ChannelTrace, TracedPart};
 use crate::nonstationarity::CommonModeRegression;
 use crate::parallel::{self, per_channel};
 use crate::record::condensed_record::CondensedRecord;
+use crate::record::estimators::HalfEstimators;
 use crate::record::long_record;
 use crate::report::assessment::{AssessedModels, Assessment};
 use crate::report::figure_data;
@@ -97,11 +98,13 @@ pub fn analyze_samples(measurement: &Measurement) -> Report {
 pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Report {
     let CondensedRecord { description, means: measurement, .. } = record;
     watch(Stage::Preprocessing);
-    let whole = PreprocessedRecord::new(record);
+    let half = record.first_half();
+    let (whole, halves) = PreprocessedRecord::with_halves(record, &half);
     watch(Stage::Models);
     // Beside each other: where one waits for its slowest channel, the other goes on.
-    let ((first_half, epochs), mut models) = parallel::both(|| FirstHalf::fit(&whole), || whole.fit(None));
-    models.take_terms_that_held(&first_half.part, &whole.estimators.ruled[1]);
+    let ((first_half, epochs), mut models) =
+        parallel::both(|| FirstHalf::fit(&whole, &half, &halves), || whole.fit(None));
+    models.take_terms_that_held(&first_half.part, &whole.estimators.second);
     models.add_lines_of_spectrum();
     models.take_coefficients_of_samples();
     watch(Stage::Effects);
@@ -111,12 +114,11 @@ pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Rep
         if effects.iter().all(Vec::is_empty) {
             return effects.clone();
         }
-        let half = record.first_half();
         let half = PreprocessedRecord::new(&half);
         half.effects(&half.fit(Some(&first_half.part)))
     };
     let reports = || {
-        let channels = channel_reports((&whole, &models), &first_half, &epochs, &effects);
+        let channels = channel_reports((&whole, &models), (&first_half, &halves), &epochs, &effects);
         (common_mode_regression(measurement, &channels), channels)
     };
     let (effects_of_half, (common_mode, mut channels)) = parallel::both(of_half, reports);
@@ -126,7 +128,7 @@ pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Rep
     let findings = causes::find(&mut channels, &effects, &effects_of_half, &description.profile, duration_s);
     let part = part_report::report(record.first_samples(), &models.filter);
     // The samples are transformed once more for the figures: what is not needed then is released.
-    drop((whole, models, first_half, epochs));
+    drop((whole, models, first_half, epochs, half, halves));
     let mut report = Report {
         schema: SCHEMA,
         quick: false,
@@ -147,18 +149,19 @@ pub fn analyze_condensed(record: &CondensedRecord, watch: &dyn Fn(Stage)) -> Rep
 /// The report of every channel, without its `effects`.
 fn channel_reports(
     (whole, models): (&PreprocessedRecord, &TracedPart),
-    first_half: &FirstHalf,
+    (first_half, halves): (&FirstHalf, &HalfEstimators),
     epochs: &Epochs,
     effects: &PerChannel<Vec<Effect>>,
 ) -> Vec<ChannelReport> {
     let record = whole.record;
     let assessments = per_channel(record.channels.ids(), |channel| {
-        Assessed::new(whole, channel, (&models.channels[channel], &first_half.part.channels[channel]))
+        let traces = (&models.channels[channel], &first_half.part.channels[channel]);
+        Assessed::new(whole, channel, traces, epochs.series(channel))
     });
     let nonstationarities = epochs.nonstationarities(whole, first_half);
     let at_rest = whole.at_rest(effects);
     let report = |(channel, Assessed { assessment, by_spectrum })| {
-        let mut report = first_half.report(models, &whole.estimators, channel, whole.has_rules(channel));
+        let mut report = first_half.report(models, (&whole.estimators, halves), channel, whole.has_rules(channel));
         for point in &mut report.curve {
             point.adev_by_spectrum = by_spectrum.get(point.n.ilog2() as usize).copied().flatten();
         }
@@ -214,8 +217,13 @@ struct Assessed {
 }
 
 impl Assessed {
-    /// By the models of the whole record and of its first half.
-    fn new(whole: &PreprocessedRecord, channel: ChannelId, (trace, half): (&ChannelTrace, &ChannelTrace)) -> Self {
+    /// By the models of the whole record and of its first half, with the series `by_first_half` of both halves.
+    fn new(
+        whole: &PreprocessedRecord,
+        channel: ChannelId,
+        (trace, half): (&ChannelTrace, &ChannelTrace),
+        by_first_half: &Series,
+    ) -> Self {
         let recorded = Series::from_measurement(whole.measurement(), channel);
         let own = if whole.record.is_traced(channel) { &whole.series[channel] } else { &recorded };
         // Models that are assessed by samples that still have the share of the covariates.
@@ -234,6 +242,7 @@ impl Assessed {
         let samples = &whole.record.channels[channel].samples;
         let spectrum = samples.spectrum_within(0..u64::MAX);
         let spectrum = spectrum.as_ref().map(|spectrum| (spectrum, samples.resolution));
-        Self { assessment: Assessment::new(own, spectrum, models), by_spectrum }
+        let unseen = by_first_half.from(whole.measurement().middle());
+        Self { assessment: Assessment::new(own, &unseen, spectrum, models), by_spectrum }
     }
 }

@@ -17,7 +17,9 @@ pub(crate) fn least_within((mut low, mut high): (f64, f64), width: f64, mut of: 
     let least_step = 0.5 * width;
     loop {
         let (here, middle) = (best.0, low.midpoint(high));
-        if (here - middle).abs() + 0.5 * (high - low) <= width {
+        let left = (here - middle).abs() + 0.5 * (high - low);
+        // Between bounds that are no numbers nothing is less.
+        if left <= width || left.is_nan() {
             return here;
         }
         let vertex = vertex(best, second, third);

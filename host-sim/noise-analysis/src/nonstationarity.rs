@@ -131,10 +131,11 @@ impl ChannelEpochs {
     }
 }
 
-/// How the noise of the channel at position `of` changes; `None` where the record is too short for epochs.
+/// How the noise of the channel at position `of` changes; `None` where the record is too short for epochs, or the channel does not change for a
+/// whole epoch.
 pub(crate) fn describe<'a>(channels: &[TracedChannel<'a>], of: usize) -> Option<Nonstationarity> {
     let TracedChannel { series, epochs, baseline, model, .. } = channels[of];
-    let ChannelEpochs { curves, quarters, part } = epochs?;
+    let ChannelEpochs { curves, quarters, part } = epochs.filter(|of| of.curves.changes_in_second_half())?;
     let epochs = [&curves.fitted_epochs[..], &curves.unseen_epochs[..]];
     let (tracked_model, _) = TrackedModel::select_line(model.clone(), epochs[0]);
     let tracked = select_tracked(&tracked_model, epochs[0]);

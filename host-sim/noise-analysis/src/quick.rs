@@ -10,7 +10,7 @@ use crate::effects::Effect;
 use crate::halves::first_half::FirstHalf;
 use crate::halves::traced_part::{PartData, TracedPart};
 use crate::parallel::{self, per_channel};
-use crate::record::estimators::{RecordEstimators, RecordPart};
+use crate::record::estimators::{HalfEstimators, RecordEstimators, RecordPart};
 use crate::report::assessment::Assessment;
 use crate::report::figure_data;
 use crate::report::{ChannelReport, FigureData, PartNote, PartReport, Report, SCHEMA, by_cause};
@@ -54,10 +54,10 @@ impl CurveEstimators {
     pub fn report(&self, done: &(dyn Fn() + Sync)) -> Report {
         let Self { description, channels, .. } = self;
         let profile = &description.profile;
-        let estimators = record_estimators(description, channels);
+        let (estimators, halves) = record_estimators(description, channels);
         let mut whole = TracedPart::fit(&PartData { profile, curves: &estimators.both, samples: None });
-        let first_half = FirstHalf::fit_curves(profile, &estimators);
-        whole.take_terms_that_held(&first_half.part, &estimators.raw[1]);
+        let first_half = FirstHalf::fit_curves(profile, &halves);
+        whole.take_terms_that_held(&first_half.part, &estimators.second);
         let effects = |part: &TracedPart| -> Vec<Vec<Effect>> {
             let of = |channel: ChannelId| {
                 if !estimators.both.channels[channel].quantity.is_inertial() {
@@ -70,16 +70,17 @@ impl CurveEstimators {
         };
         let duration_s = description.periods as f64 * description.period_s();
         let report = |channel: ChannelId| {
-            let report = first_half.report(&whole, &estimators, channel, false);
+            let report = first_half.report(&whole, (&estimators, &halves), channel, false);
             let refused = channels[channel].refused.iter().map(|(&cause, &count)| (cause, count));
             let model = whole.channels[channel].fit.after();
             let has_samples = estimators.measured[channel].samples() > 0;
+            let resolution = estimators.both.resolution(channel);
             let data_sheet = figure_data::data_sheet(&estimators.both.channels[channel].data_sheet);
             done();
             ChannelReport {
                 samples: description.samples,
                 missing: missing(description, refused, estimators.both.replaced(channel)),
-                assessment: Assessment::of_model(model, &report.unit, duration_s, has_samples),
+                assessment: Assessment::of_model(model, (&report.unit, resolution), duration_s, has_samples),
                 figure_data: FigureData { data_sheet, ..FigureData::default() },
                 ..report
             }
@@ -107,7 +108,10 @@ impl CurveEstimators {
 }
 
 /// The curves of the halves and of both together; nothing is excluded.
-fn record_estimators(description: &RecordingDescription, channels: &PerChannel<StreamedCurves>) -> RecordEstimators {
+fn record_estimators(
+    description: &RecordingDescription,
+    channels: &PerChannel<StreamedCurves>,
+) -> (RecordEstimators, HalfEstimators) {
     let profiles: PerChannel<ChannelProfile> = description.channels.iter().copied().collect();
     let part = |cascades: Vec<GappedCascade>| RecordPart::new(profiles.clone(), cascades, description.period_s());
     let half = |number: usize| part(channels.iter().map(|curves| curves.part(number)).collect());
@@ -115,10 +119,10 @@ fn record_estimators(description: &RecordingDescription, channels: &PerChannel<S
     let measured = |(curves, profile): (&StreamedCurves, &ChannelProfile)| {
         curves.whole().curve(description.period_s()).scaled(profile.lsb)
     };
-    RecordEstimators {
+    let whole = RecordEstimators {
         measured: channels.iter().zip(&profiles).map(measured).collect(),
         both: halves[0].followed_by(&halves[1]),
-        raw: halves.clone(),
-        ruled: halves,
-    }
+        second: halves[1].clone(),
+    };
+    (whole, HalfEstimators { recorded: halves.clone(), foretold: halves.clone(), ruled: halves })
 }

@@ -15,6 +15,7 @@ pub use crate::effects::findings::{ChannelEffect, Finding, Validation};
 pub use crate::fit::contradiction::Contradiction;
 use crate::fit::event_share::EventShare;
 pub use crate::fit::event_share::EventsReport;
+use crate::fit::noise_terms::{is_white, white_noise_of_process};
 use crate::fit::signal_share::SignalShare;
 pub use crate::nonstationarity::{CommonModeRegression, Nonstationarity};
 use crate::report::assessment::Assessment;
@@ -297,6 +298,8 @@ pub struct ModelReport {
 pub struct TermReport {
     /// With the 95 % bounds of its coefficient and of its shape.
     pub term: FittedTerm,
+    /// N below the corner of a Markov process that stands in the place of white noise, which a filter has made of it; absent of other terms.
+    pub white_noise: Option<BoundedEstimate>,
     /// Unit of the channel.
     pub unit: String,
 }
@@ -403,7 +406,7 @@ impl TermReport {
     /// A term of a model of a channel in `unit`.
     #[must_use]
     pub fn new(term: &FittedTerm, unit: &str) -> Self {
-        Self { term: *term, unit: unit.to_owned() }
+        Self { term: *term, white_noise: None, unit: unit.to_owned() }
     }
 
     /// Name of the kind, such as `angle_random_walk`.
@@ -419,7 +422,18 @@ impl TermReport {
         Parameter::new(*value, *low, *high, coefficient_unit(kind, &self.unit))
     }
 
-    /// The parameters of its shape, and its coefficient, by name; N, B, K and Q call theirs `value`.
+    /// N of a term that is white noise, behind a filter or not; otherwise `None`.
+    #[must_use]
+    pub fn angle_random_walk(&self) -> Option<Parameter> {
+        if is_white(&self.term.kind) {
+            return Some(self.coefficient());
+        }
+        let BoundedEstimate { value, low, high } = self.white_noise?;
+        Some(Parameter::new(value, low, high, coefficient_unit(&NoiseTerm::AngleRandomWalk, &self.unit)))
+    }
+
+    /// The parameters of its shape, and its coefficient, by name; N, B, K and Q call theirs `value`. A Markov process in the place of white noise
+    /// has the `white_noise` below its corner.
     #[must_use]
     pub fn parameters(&self) -> BTreeMap<&'static str, Parameter> {
         let shape = |(name, value, (low, high)): (&'static str, f64, (f64, f64))| {
@@ -430,7 +444,9 @@ impl TermReport {
             };
             (name, Parameter::new(value, low, high, unit))
         };
-        self.term.shape_parameters().map(shape).chain([(self.term.kind.coefficient(), self.coefficient())]).collect()
+        let below_corner = self.white_noise.and_then(|_| Some(("white_noise", self.angle_random_walk()?)));
+        let coefficient = (self.term.kind.coefficient(), self.coefficient());
+        self.term.shape_parameters().map(shape).chain([coefficient]).chain(below_corner).collect()
     }
 }
 
@@ -443,11 +459,15 @@ impl Serialize for TermReport {
     }
 }
 
-/// The terms of a model of a channel in `unit`, without those of which the record says nothing, as of a channel that never
+/// The terms of a model of a channel in `unit`, whose values differ by `resolution` or more, without those of which the record says nothing, as of a channel that never
 /// changes: their upper bound is 0.
 #[must_use]
-pub fn term_reports(model: &Model, unit: &str) -> Vec<TermReport> {
-    model.terms().iter().filter(|term| term.high > 0.0).map(|term| TermReport::new(term, unit)).collect()
+pub fn term_reports(model: &Model, unit: &str, resolution: f64) -> Vec<TermReport> {
+    let report = |term: &FittedTerm| {
+        let white_noise = white_noise_of_process(model, term, resolution);
+        TermReport { white_noise, ..TermReport::new(term, unit) }
+    };
+    model.terms().iter().filter(|term| term.high > 0.0).map(report).collect()
 }
 
 impl ModelErrorReport {

@@ -155,6 +155,39 @@ fn a_fast_line_that_begins_later_is_found() {
     );
 }
 
+/// A fan that is switched on in the second half: the first half has no line of it to compare.
+#[test]
+fn a_fast_line_of_the_second_half_is_not_validated() {
+    let mut measurement = recorded();
+    measurement.channels.truncate(1);
+    let mut random = ChaCha8Rng::seed_from_u64(48);
+    for (count, &slot) in measurement.channels[0].counts.iter_mut().zip(&measurement.slots) {
+        let line = if slot < PERIODS / 2 { 0.0 } else { (TAU * FAST_LINE_HZ * slot as f64 / RATE_HZ).sin() };
+        *count += (line + random.random::<f64>()).floor() as i32;
+    }
+    let report = condensed(&measurement, 1 << 14);
+    let is_fast = |frequency_hz: f64| (frequency_hz - FAST_LINE_HZ).abs() < 0.1;
+    let line = report.findings.iter().find(|of| of.effect.frequency_hz().is_some_and(|of| is_fast(of.value)));
+    assert_eq!(line.expect("the line").validated, Validation::Untestable);
+}
+
+/// Ten seconds of noise that is five times as large, which the samples show in pieces and the means as one stretch.
+#[test]
+fn a_long_knock_is_one() {
+    let mut measurement = recorded();
+    measurement.channels.truncate(2);
+    for channel in measurement.channels.iter_mut() {
+        let loud =
+            channel.counts.iter_mut().zip(&measurement.slots).filter(|(_, slot)| (300_000..302_048).contains(*slot));
+        loud.for_each(|(count, _)| *count *= 5);
+    }
+    let report = condensed(&measurement, 1 << 14);
+    for name in ["gyro_x", "gyro_y"] {
+        let knocks = channel(&report, name).effects.iter().filter(|of| of.effect.name() == "knock");
+        assert_eq!(knocks.count(), 1, "{name}");
+    }
+}
+
 #[test]
 fn the_size_of_the_blocks_does_not_matter() {
     let mut measurement = recorded();

@@ -5,15 +5,9 @@ use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::report::assessment::sum_of_white_noise;
 use noise_analysis::report::{ChannelReport, Parameter, SlopeMethodValue, TermReport};
 
-/// The coefficient `kind` of a model with these terms: of each its kind, its `value` with bounds, and the unit. N is that of all white
-/// noise, behind the part's filter (`filter_bandwidth`, `low_pass`) and after it.
-pub(crate) fn coefficient<'a>(
-    kind: &str,
-    terms: impl Iterator<Item = (&'a str, BoundedEstimate, String)>,
-) -> Option<(BoundedEstimate, String)> {
-    let is_of = |of: &str| of == kind || (kind == SLOPES[0].0 && ["filter_bandwidth", "low_pass"].contains(&of));
-    let (estimates, units): (Vec<BoundedEstimate>, Vec<String>) =
-        terms.filter(|(of, ..)| is_of(of)).map(|(_, estimate, unit)| (estimate, unit)).unzip();
+/// N of a model: that of all its white noise together, as each term has it with its unit.
+pub(crate) fn white_noise(terms: impl Iterator<Item = (BoundedEstimate, String)>) -> Option<(BoundedEstimate, String)> {
+    let (estimates, units): (Vec<BoundedEstimate>, Vec<String>) = terms.unzip();
     Some((sum_of_white_noise(&estimates), units.into_iter().next()?))
 }
 

@@ -1,11 +1,14 @@
 //! The part of a report that other programs need: sample rate, and each channel's curve and final model. It is read from the
 //! JSON of schema 1 or taken from a report in memory.
 
-use crate::coefficients;
+use crate::coefficients::{self, SLOPES};
 use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::report::{ChannelReport, DataSheetReport, Parameter, Report, SCHEMA, TermReport};
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
+
+/// N below the corner of a process that stands in the place of white noise, as a parameter of its term.
+const BELOW_CORNER: &str = "white_noise";
 
 /// What a report says of the noise of a sensor.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -154,16 +157,32 @@ impl SavedReport {
 }
 
 impl SavedChannel {
-    /// The coefficient of the term `kind`. N is that of all white noise, behind a filter and after it.
+    /// The coefficient of the term `kind`. N is that of all white noise: after a filter, behind it, and below the corner of a process that
+    /// stands in its place.
     #[must_use]
     pub fn coefficient(&self, kind: &str) -> Option<SavedParameter> {
-        let terms = self.refitted.terms.iter().filter_map(|term| {
-            let SavedParameter { value, low, high, unit } = term.parameters.get("value")?;
-            let estimate = BoundedEstimate { value: *value, low: *low, high: *high };
-            Some((term.kind.as_str(), estimate, unit.clone()))
+        if kind != SLOPES[0].0 {
+            return self.refitted.terms.iter().find(|term| term.kind == kind)?.parameters.get("value").cloned();
+        }
+        let white = self.refitted.terms.iter().filter_map(SavedTerm::angle_random_walk);
+        let white = white.map(|SavedParameter { value, low, high, unit }| {
+            (BoundedEstimate { value: *value, low: *low, high: *high }, unit.clone())
         });
-        let (BoundedEstimate { value, low, high }, unit) = coefficients::coefficient(kind, terms)?;
+        let (BoundedEstimate { value, low, high }, unit) = coefficients::white_noise(white)?;
         Some(SavedParameter { value, low, high, unit })
+    }
+}
+
+impl SavedTerm {
+    /// N of a term that is white noise, behind a filter or not; otherwise `None`.
+    fn angle_random_walk(&self) -> Option<&SavedParameter> {
+        let is_white = ["angle_random_walk", "filter_bandwidth", "low_pass"].contains(&self.kind.as_str());
+        self.parameters.get(if is_white { "value" } else { BELOW_CORNER })
+    }
+
+    /// Whether it is a process that stands in the place of white noise.
+    pub(crate) fn is_in_place_of_white_noise(&self) -> bool {
+        self.parameters.contains_key(BELOW_CORNER)
     }
 }
 
@@ -219,6 +238,28 @@ mod tests {
             r#"{{"schema":1,"sample_rate_hz":100.0,"channels":[{{"name":"gyro_x","unit":"deg/s","curve":[{POINT}],
             "final":{{"terms":[{terms}],"adev":[0.4]}}}}]}}"#
         )
+    }
+
+    /// A process of 1 °/s behind whose corner the density is 0.3 °/√s, in white noise of 0.4 °/√s: N is the root of the sum of the squares.
+    #[test]
+    fn n_has_the_process_that_stands_in_the_place_of_white_noise() {
+        let parameter = |name: &str, value: f64, unit: &str| {
+            format!(r#""{name}":{{"value":{value},"low":{value},"high":{value},"unit":"{unit}"}}"#)
+        };
+        let term = |kind: &str, parameters: [String; 3]| {
+            let parameters = parameters.into_iter().filter(|of| !of.is_empty()).collect::<Vec<String>>().join(",");
+            format!(r#"{{"kind":"{kind}","parameters":{{{parameters}}}}}"#)
+        };
+        let white = term("angle_random_walk", [parameter("value", 0.4, "deg/sqrt(s)"), String::new(), String::new()]);
+        let process = |below_corner: String| {
+            term("markov", [parameter("deviation", 1.0, "deg/s"), parameter("time_constant", 0.045, "s"), below_corner])
+        };
+        let n = |process: String| {
+            let read = SavedReport::from_json(&report(&[white.clone(), process].join(","))).expect("complete");
+            read.channels[0].coefficient("angle_random_walk").map(|n| n.value)
+        };
+        assert_eq!(n(process(parameter("white_noise", 0.3, "deg/sqrt(s)"))), Some(0.5));
+        assert_eq!(n(process(String::new())), Some(0.4));
     }
 
     #[test]

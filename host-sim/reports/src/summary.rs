@@ -12,11 +12,11 @@ use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::distributions::quantile;
 use noise_analysis::effects::{Effect, Unexplained};
 use noise_analysis::nonstationarity::FittedPart;
-use noise_analysis::report::DataSheetReport;
 use noise_analysis::report::assessment::Innovations;
 use noise_analysis::report::{
     BiasOverTime, ChannelReport, Finding, ModelErrorReport, Parameter, PartNote, Report, Stretch,
 };
+use noise_analysis::report::{DataSheetReport, TermReport};
 use noise_analysis::units::conversions;
 
 /// Deviance a point on the unseen half above which a model is marked: a true model scores about 1, and what changes from one
@@ -194,14 +194,17 @@ pub fn sheet_coefficients(sheet: &DataSheetReport) -> [Option<f64>; 3] {
     ]
 }
 
-/// A coefficient of the model to use. N is that of all white noise, behind the part's filter and after it.
+/// A coefficient of the model to use. N is that of all white noise: after the part's filter, behind it, and below the corner of a process that
+/// stands in its place.
 #[must_use]
 pub fn coefficient(channel: &ChannelReport, kind: &str) -> Option<Parameter> {
-    let terms = channel.refitted.terms.iter().map(|term| {
-        let Parameter { value, low, high, unit } = term.coefficient();
-        (term.kind(), BoundedEstimate { value, low, high }, unit)
-    });
-    let (BoundedEstimate { value, low, high }, unit) = coefficients::coefficient(kind, terms)?;
+    let terms = || channel.refitted.terms.iter();
+    if kind != LETTERS[0].0 {
+        return terms().find(|term| term.kind() == kind).map(TermReport::coefficient);
+    }
+    let white = terms().filter_map(TermReport::angle_random_walk);
+    let white = white.map(|Parameter { value, low, high, unit }| (BoundedEstimate { value, low, high }, unit));
+    let (BoundedEstimate { value, low, high }, unit) = coefficients::white_noise(white)?;
     Some(Parameter::new(value, low, high, unit))
 }
 
@@ -276,7 +279,9 @@ const QUICK: &str = "Quick report, of the curves alone: spectra, spikes, steps, 
 /// What is said where nothing was found.
 #[must_use]
 pub fn nothing_found(report: &Report) -> &'static str {
-    if is_short(report) {
+    if !contradictions(report).is_empty() {
+        "Nothing with a name, but N, B and K do not describe every channel."
+    } else if is_short(report) {
         "Nothing: a record as short as this one shows strong effects only."
     } else if report.quick {
         "Nothing in the curves: N, B and K describe those of every channel."
@@ -326,7 +331,7 @@ pub fn record_sentences_in_short(report: &Report) -> Vec<String> {
 }
 
 /// Where and by how much the data departs from every model, one text each. Channels that depart at the same place, to the same side,
-/// are told together.
+/// are told together, and what a channel shows twice at one place is told once.
 #[must_use]
 pub fn unexplained(report: &Report) -> Vec<String> {
     struct Departure<'a> {
@@ -353,6 +358,10 @@ pub fn unexplained(report: &Report) -> Vec<String> {
             (first, excess) => first.is_none() && excess.is_none(),
         };
         let is_same_place = |known: &Departure<'_>| departure(known.of, &[]) == departure(of, &[]);
+        let is_told = |of: &Departure<'_>| finding.channels.iter().all(|name| of.channels.contains(name));
+        if departures.iter().any(|of| is_same_place(of) && is_same_side(of) && is_told(of)) {
+            continue;
+        }
         let of_other_channels = |of: &Departure<'_>| finding.channels.iter().all(|name| !of.channels.contains(name));
         let known = departures.iter_mut().find(|of| is_same_place(of) && is_same_side(of) && of_other_channels(of));
         match known {

@@ -145,6 +145,7 @@ fn find_on_common_samples(
     {
         accepted.push(next);
     }
+    drop_explained_by_others(&blocks, &grid, &mut accepted);
     accepted.extend(linear_part(&blocks, &grid, &covariates, &accepted));
     let mut changes = BiasChanges::default();
     let (mut linear, mut lagged, mut squared) = (None, None, None);
@@ -181,6 +182,22 @@ fn find_on_common_samples(
         changes.responses.extend(behind_lag.or(curved));
     }
     changes
+}
+
+/// Drops, the weakest first, what was accepted before others that explain it: beside them chance makes as good an explanation with [`REFUTED`] or
+/// more.
+fn drop_explained_by_others(blocks: &BlockMeans, grid: &NoiseGrid, accepted: &mut Vec<Accepted>) {
+    while accepted.len() > 1 {
+        let p_value = |at: usize| {
+            let others = accepted.iter().enumerate().filter(|(other, _)| *other != at);
+            let others: Vec<DVector<f64>> = others.map(|(_, other)| other.regressor.clone()).collect();
+            let estimate = GlsRegression::new(blocks, grid, &others).estimate(&accepted[at].regressor);
+            (at, estimate.map_or(1.0, |of| of.p_value))
+        };
+        let weakest = (0..accepted.len()).map(p_value).max_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((at, _)) = weakest.filter(|(_, p_value)| *p_value >= REFUTED) else { return };
+        accepted.remove(at);
+    }
 }
 
 /// The response to the temperature at its mean that belongs to an accepted curvature, be it significant or not: of a square about another

@@ -449,22 +449,13 @@ impl BlockFreedom {
     }
 }
 
-/// Adds a knock to `knocks`, or extends the one that it follows or precedes at less than the length of the shorter.
-fn join(knocks: &mut Vec<Knock>, knock: Knock) {
-    let length = |knock: &Knock| knock.slots.end - knock.slots.start;
-    let is_near = |other: &&mut Knock| {
-        let reach = length(other).min(length(&knock));
-        knock.slots.start <= other.slots.end.saturating_add(reach)
-            && other.slots.start <= knock.slots.end.saturating_add(reach)
-    };
-    let Some(other) = knocks.iter_mut().find(is_near) else { return knocks.push(knock) };
-    // The earlier one was the louder one, and keeps its level.
-    if knock.slots.start < other.slots.start {
-        (other.slots.start, other.from) = (knock.slots.start, knock.from);
+/// Adds a knock to `knocks`, or extends those that it follows or precedes at less than the length of the shorter to one.
+pub(super) fn join(knocks: &mut Vec<Knock>, mut knock: Knock) {
+    while let Some(near) = knocks.iter().position(|other| other.is_near(&knock)) {
+        // The one that was found first is the louder one, and keeps its level.
+        knock = knocks.remove(near).extended_by(&knock);
     }
-    if knock.slots.end > other.slots.end {
-        (other.slots.end, other.to) = (knock.slots.end, knock.to);
-    }
+    knocks.push(knock);
 }
 
 /// The likeliest stretch of a raised level around a block.
@@ -557,6 +548,25 @@ impl Knock {
             *knocks = with;
         }
         knocks.sort_by_key(|knock| knock.slots.start);
+    }
+
+    /// Whether it follows or precedes another one at less than the length of the shorter.
+    fn is_near(&self, other: &Self) -> bool {
+        let length = |knock: &Self| knock.slots.end - knock.slots.start;
+        let reach = length(self).min(length(other));
+        self.slots.start <= other.slots.end.saturating_add(reach)
+            && other.slots.start <= self.slots.end.saturating_add(reach)
+    }
+
+    /// This one, from the earlier start to the later end of both.
+    fn extended_by(mut self, other: &Self) -> Self {
+        if other.slots.start < self.slots.start {
+            (self.slots.start, self.from) = (other.slots.start, other.from);
+        }
+        if other.slots.end > self.slots.end {
+            (self.slots.end, self.to) = (other.slots.end, other.to);
+        }
+        self
     }
 
     /// Whether both have a sample period in common.

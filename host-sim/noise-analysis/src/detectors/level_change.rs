@@ -4,7 +4,7 @@
 use super::noise_levels::{DIFFERENCES, SquaredDifferences, TRIMMED_MEAN, exceedance, longer_levels};
 use super::telegraph_models::{gauss_markov_log_likelihood, independent_log_likelihood};
 use crate::bounds::BoundedEstimate;
-use crate::distributions::{NORMAL_975, upper_tail};
+use crate::distributions::{NORMAL_975, student_tail};
 use crate::effects::LevelChange;
 use crate::effects::findings::{REFUTED, SIGNIFICANCE};
 use crate::samples::series::Series;
@@ -61,7 +61,7 @@ pub(crate) fn find(series: &Series) -> Option<LevelChange> {
     let variance = two.squares / (count - 3.0).max(1.0);
     let error = 0.5 * (variance * (sides[0].count.recip() + sides[1].count.recip())).sqrt();
     // Any of the blocks may be the first one after the change.
-    let p_value = (2.0 * count * upper_tail(half.abs() / error)).min(1.0);
+    let p_value = (2.0 * count * student_tail(half.abs() / error, (count - 3.0).max(1.0))).min(1.0);
     let is_shown = explained > LEAST_EXPLAINED && p_value < SIGNIFICANCE && gain > TOLD_APART.ln();
     // A level that is higher and lower on one side alone is constant on none.
     if !is_shown || !Side::scatter_alike(&sides) || half.abs() < LEAST_CHANGE.ln_1p() {

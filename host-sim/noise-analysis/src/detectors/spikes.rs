@@ -2,14 +2,17 @@
 //!
 //! Each sample is compared with the best linear interpolation from its neighbours, which follows from the autocovariance of
 //! the data. In white noise that is their mean; in filtered noise, on a sinusoid or in drift it is far more precise. The
-//! interpolation error is normal, so the threshold for N samples comes from N times the normal tail. Behind a filter, which spreads a spike,
+//! interpolation error is normal, so the threshold for N samples comes from N times the normal tail; noise whose errors have a heavier tail
+//! [is no spike](Interpolation::least_beyond_tail). Behind a filter, which spreads a spike,
 //! each sample is compared with its [prediction](super::prediction) first. Where the noise is louder, as in a
 //! vibration whose level wanders, it is as many deviations of the errors around a sample.
 
 use super::noise_levels::{CLIP, clipped_deviation, median};
 use super::prediction::Prediction;
 use crate::bounds::BoundedEstimate;
-use crate::distributions::{NORMAL_975, density, poisson_bounds, poisson_tail, quantile, upper_tail};
+use crate::distributions::{
+    DESCRIBED, NORMAL_975, density, mean_ratio_tail, poisson_bounds, poisson_tail, quantile, upper_tail,
+};
 use crate::effects::Spikes;
 use crate::effects::findings::{Correction, Detection, REFUTED, SIGNIFICANCE};
 use crate::samples::interpolation::{
@@ -45,6 +48,9 @@ const LONGEST_DECAY: f64 = 4.0;
 
 /// Highest probability by which chance puts a spike into the time of a knock, where it is taken for a part of it.
 const COINCIDENCE: f64 = 0.05;
+
+/// Parts of normal errors beyond which the tail of the errors is looked at.
+const TAILS: [f64; 2] = [1e-2, 1e-3];
 
 /// Least fraction of the spikes that is assumed to exceed the threshold; bounds the rate that the detected ones imply.
 const LEAST_DETECTED: f64 = 0.05;
@@ -215,7 +221,7 @@ impl SpikeRule {
             return None;
         }
         let (interpolation, prediction) = Interpolation::fit(series)?;
-        let least = quantile(0.5 * REFUTED / samples as f64);
+        let least = interpolation.least_beyond_tail(series, samples);
         Some(Self { interpolation, prediction, least, difference: typical_difference(series) })
     }
 
@@ -411,6 +417,51 @@ impl Interpolation {
         Some((interpolation, prediction))
     }
 
+    /// By how many standard deviations the error of a spike in `samples` samples exceeds what chance makes of noise with a probability of
+    /// [`REFUTED`]: of normal noise, unless the errors of `series` have a heavier tail, such as those of exponential or Student's noise.
+    ///
+    /// Errors in noise that is louder for a while are taken by its level. A heavier tail is one of which more errors than normal ones are between
+    /// the last of 1,000 and the threshold. It falls at least as fast as
+    /// the power by which the errors beyond the last of 100 become those beyond the last of 1,000, because a tail that thins out does so faster
+    /// and faster in this scale, and the power law only in the same way. If this power law leaves as many errors beyond the threshold as there
+    /// are, they are that noise, and the threshold becomes that of the power law, or is below errors that [stand apart](standing_apart) from the
+    /// others. Spikes of one size are more than it leaves.
+    fn least_beyond_tail(&self, series: &Series, samples: u64) -> f64 {
+        let normal = quantile(0.5 * REFUTED / samples as f64);
+        let errors = self.errors(series, &series.values).into_iter().map(|of| of.abs() / self.deviation).collect();
+        let errors = against_louder_noise(errors, normal);
+        let stands_out: BTreeSet<usize> = (0..errors.len()).filter(|&at| errors[at] > normal).collect();
+        if stands_out.is_empty() {
+            return normal;
+        }
+        // What stands out is in the errors of its neighbours too.
+        let is_beside = |at: usize| {
+            let around = at.saturating_sub(REACH)..at + REACH + 1;
+            !stands_out.contains(&at) && has_any(&stands_out, around)
+        };
+        let looked_at: Vec<f64> = (0..errors.len()).filter(|&at| !is_beside(at)).map(|at| errors[at]).collect();
+        let beyond = |least: f64| looked_at.iter().filter(|error| **error > least).count() as f64;
+        let all = looked_at.len() as f64;
+        let [hundredth, thousandth] = TAILS.map(|part| quantile(0.5 * part));
+        let [of_hundredth, of_thousandth, found] = [hundredth, thousandth, normal].map(beyond);
+        let between = all * (TAILS[1] - 2.0 * upper_tail(normal));
+        if poisson_tail((of_thousandth - found) as u64, between) >= DESCRIBED {
+            return normal;
+        }
+        let error = (1.0 / of_thousandth - 1.0 / of_hundredth).max(0.0).sqrt();
+        let falls = (of_hundredth / of_thousandth).ln() - NORMAL_975 * error;
+        let power = falls.max(0.0) / (thousandth / hundredth).ln();
+        let expected = of_thousandth * (normal / thousandth).powf(-power);
+        if poisson_tail(found as u64, expected) < REFUTED {
+            return normal;
+        }
+        let in_all_samples = of_thousandth * samples as f64 / all;
+        let of_power_law = thousandth * (in_all_samples / REFUTED).powf(1.0 / power);
+        let mut sizes: Vec<f64> = looked_at.iter().copied().filter(|size| *size > thousandth).collect();
+        sizes.sort_by(|a, b| b.total_cmp(a));
+        normal.max(standing_apart(&sizes, found as usize).unwrap_or(f64::INFINITY).min(of_power_law))
+    }
+
     fn error(&self, values: &[f64], position: usize) -> f64 {
         let pairs = self
             .weights
@@ -572,6 +623,48 @@ impl Interpolation {
         }
         found
     }
+}
+
+/// A size between those of the largest of `sizes`, at most so `many`, and of the others, from which they stand apart; `None` where none do. The
+/// sizes are in descending order.
+///
+/// Of sizes `s₁ > s₂ > …` with the tail of a power law, `i·ln(sᵢ/sᵢ₊₁)` are independent exponential variables of one mean (A. Rényi, 1953), and of
+/// a tail that thins out faster the first ones are smaller. Their means are compared by Fisher's F distribution.
+fn standing_apart(sizes: &[f64], many: usize) -> Option<f64> {
+    let distance = |at: usize| (at + 1) as f64 * (sizes[at] / sizes[at + 1]).ln();
+    let count = sizes.len().checked_sub(1)?;
+    let all: f64 = (0..count).map(distance).sum();
+    let mut of_largest = 0.0;
+    let is_apart = |&at: &usize| {
+        of_largest += distance(at);
+        let (above, below) = ((at + 1) as f64, (count - at - 1) as f64);
+        let ratio = of_largest / above / ((all - of_largest) / below);
+        mean_ratio_tail(ratio, above, below) * (many as f64) < REFUTED
+    };
+    let apart = (0..many.min(count.saturating_sub(1))).filter(is_apart);
+    let widest = apart.max_by(|a, b| distance(*a).total_cmp(&distance(*b)))?;
+    Some((sizes[widest] * sizes[widest + 1]).sqrt())
+}
+
+/// The sizes of `errors`, each over how many times as loud as in the middle of all stretches the noise around it is, where it is louder. An error
+/// counts as `most` there at most.
+fn against_louder_noise(errors: Vec<f64>, most: f64) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0.0)];
+    for error in &errors {
+        let (squares, count) = sums[sums.len() - 1];
+        let is_known = f64::from(u8::from(*error != 0.0));
+        sums.push((squares + error.min(most).powi(2), count + is_known));
+    }
+    let within = |from: usize, to: usize| (sums[to].0 - sums[from].0, sums[to].1 - sums[from].1);
+    let level = |at: usize| {
+        let around = |reach: usize| within(at.saturating_sub(reach), (at + reach + 1).min(errors.len()));
+        let ((all, count), (nearest, near)) = (around(FARTHEST), around(REACH));
+        (all - nearest) / (count - near).max(1.0)
+    };
+    let levels: Vec<f64> = (0..errors.len()).map(level).collect();
+    let typical = median(levels.clone());
+    let louder = |level: f64| if level > typical { (level / typical).sqrt() } else { 1.0 };
+    errors.iter().zip(levels).map(|(error, level)| error / louder(level)).collect()
 }
 
 /// Positions less than `length` from one.

@@ -141,17 +141,24 @@ impl StuckScreen {
     }
 }
 
-/// A measurement in which the samples of stuck channels are refused, and the runs of each channel.
+/// A measurement in which the samples of stuck channels are refused, and the runs of each channel. Nothing of the second half decides what is
+/// refused in the first.
 pub(crate) fn screened(measurement: Cow<Measurement>) -> (Cow<Measurement>, Vec<StuckRuns>) {
-    let mut screen = StuckScreen::new(&measurement, measurement.len() as u64);
+    let middle = measurement.middle();
+    let mut screen = StuckScreen::new(&measurement.before(middle), measurement.len() as u64);
     let mut stuck: Vec<Vec<usize>> = vec![Vec::new(); measurement.channels.len()];
-    for (number, block) in measurement.blocks(TOGETHER).enumerate() {
-        if let Cow::Owned(screened) = screen.screen(&block) {
-            for (all, channel) in stuck.iter_mut().zip(&screened.channels) {
-                let positions = channel.refused.get(CAUSE).into_iter().flatten();
-                all.extend(positions.map(|position| number * TOGETHER + position));
+    let mut position_of_block = 0;
+    for block in measurement.blocks(TOGETHER) {
+        let of_first_half = block.slots.partition_point(|&slot| slot < middle);
+        for positions in [0..of_first_half, of_first_half..block.slots.len()] {
+            let from = position_of_block + positions.start;
+            if let Cow::Owned(screened) = screen.screen(&block.part(positions)) {
+                for (all, channel) in stuck.iter_mut().zip(&screened.channels) {
+                    all.extend(channel.refused.get(CAUSE).into_iter().flatten().map(|position| from + position));
+                }
             }
         }
+        position_of_block += block.slots.len();
     }
     let mut measurement = measurement;
     if stuck.iter().any(|stuck| !stuck.is_empty()) {

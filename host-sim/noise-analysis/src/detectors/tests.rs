@@ -13,7 +13,7 @@ use adis16405_driver::Channel;
 use measurement::Measurement;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
+use rand_distr::{Exp1, StandardNormal, StudentT};
 use simulation::{HostClock, Simulation};
 use std::f64::consts::TAU;
 use virtual_sensor::{Environment, InjectedEffect, OutputRegister, SensorScenario, TemperatureProfile};
@@ -195,6 +195,40 @@ fn loud_noise_has_no_spikes_and_spikes_stand_out_of_it() {
     );
 }
 
+/// Independent samples of exponential noise, of Laplace's and of Student's with five degrees of freedom have no spikes; ten among them that are
+/// larger than any of 30,000 samples of exponential noise, which reaches 14 in one of 40 records, are told.
+#[test]
+fn noise_with_heavy_tails_has_no_spikes() {
+    let noise = |kind: &str, seed: u64| {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let student = StudentT::new(5.0).expect("degrees of freedom");
+        let values = (0..30_000).map(|_| match kind {
+            "exponential" => random.sample::<f64, _>(Exp1),
+            "Laplace" => random.sample::<f64, _>(Exp1) * if random.random() { 1.0 } else { -1.0 },
+            _ => random.sample(student),
+        });
+        let values: Vec<f64> = values.collect();
+        Series {
+            slots: (0..30_000).collect(),
+            values: values.into(),
+            span: 0..30_000,
+            period_s: 0.01,
+            resolution: 1e-5,
+            unit: "deg/s",
+        }
+    };
+    for kind in ["exponential", "Laplace", "Student"] {
+        let found = (0..20).filter(|seed| spikes::find(&noise(kind, *seed), &[]).is_some()).count();
+        // Such a tail is told from that of a power law, of which it has less and less: chance makes none of them one of a spike.
+        assert_eq!(found, 0, "{kind}");
+    }
+    let mut with_spikes = noise("exponential", 30);
+    (0..10).for_each(|number| with_spikes.values_mut()[1500 + 2500 * number] += 200.0);
+    let found = spikes::find(&with_spikes, &[]).expect("ten spikes");
+    assert_eq!(found.effect.parameters()["size"].value.round(), 200.0);
+    assert_eq!(found.excluded().len(), 10);
+}
+
 #[test]
 fn a_step_is_located_measured_and_removed() {
     let step = InjectedEffect::BiasStep { channel: SENSED_GYRO, time_s: 333.0, size: -0.15 };
@@ -228,6 +262,35 @@ fn where_the_noise_is_below_a_count_neighbouring_counts_are_no_step() {
     let (near, far) = (series(0.4), series(3.0));
     assert!(found(&near, 0.0) && !found(&near, 1.5));
     assert!(found(&far, 0.0) && found(&far, 1.5));
+}
+
+/// Three regressors drift alike, each with a swing of its own, and the bias follows their sum: a ramp explains it best at first, and nothing of it
+/// beside all three.
+#[test]
+fn a_ramp_that_others_explain_is_none() {
+    const SAMPLES: usize = 60_000;
+    let series = |values: Vec<f64>| Series {
+        slots: (0..SAMPLES as u64).collect(),
+        values: values.into(),
+        span: 0..SAMPLES as u64,
+        period_s: 0.01,
+        resolution: 1e-6,
+        unit: "deg/s",
+    };
+    let time = |at: usize| at as f64 / SAMPLES as f64;
+    let drifting = |turns: f64| (0..SAMPLES).map(|at| time(at) + 0.03 * (TAU * turns * time(at)).sin()).collect();
+    let regressors: [Vec<f64>; 3] = [3.0, 5.0, 7.0].map(drifting);
+    let mut random = ChaCha8Rng::seed_from_u64(61);
+    let sum = |at: usize| regressors.iter().map(|of| of[at]).sum::<f64>();
+    let bias = series((0..SAMPLES).map(|at| sum(at) + 0.1 * random.sample::<f64, _>(StandardNormal)).collect());
+    let regressors = regressors.map(series);
+    let BiasChanges { ramp, sensitivities, .. } =
+        bias::find(&bias, &regressors.each_ref(), &[], &NoiseGrids::default(), &|| 0.0);
+    assert_eq!((ramp, sensitivities.len()), (None, 3));
+    for (_, of) in sensitivities {
+        // Four standard deviations.
+        assert!((of.sensitivity - 1.0).abs() < 4.0 * of.error, "{of:?}");
+    }
 }
 
 /// A step of five times the noise, and one of a third of it: alone, either is 40 standard deviations of the mean of a minute or more.

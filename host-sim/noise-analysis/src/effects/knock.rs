@@ -20,6 +20,28 @@ pub struct NoisyInterval {
     pub channels: Vec<&'static str>,
 }
 
+impl NoisyInterval {
+    /// Whether it follows or precedes another one at less than the length of the shorter.
+    pub(crate) fn is_near(&self, other: &Self) -> bool {
+        let length = |of: &Self| of.to_s.value - of.from_s.value;
+        let reach = length(self).min(length(other));
+        self.from_s.value <= other.to_s.value + reach && other.from_s.value <= self.to_s.value + reach
+    }
+
+    /// This one, with its level, from the earlier start to the later end of both.
+    pub(crate) fn extended_by(mut self, other: &Self) -> Self {
+        if other.from_s.value < self.from_s.value {
+            self.from_s = other.from_s;
+        }
+        if other.to_s.value > self.to_s.value {
+            self.to_s = other.to_s;
+        }
+        let others = other.channels.iter().filter(|name| !self.channels.contains(name));
+        self.channels = self.channels.iter().chain(others).copied().collect();
+        self
+    }
+}
+
 impl Kind for NoisyInterval {
     const NAME: &'static str = "knock";
 

@@ -177,11 +177,12 @@ impl CovariateFit {
     }
 }
 
-/// Subtracts `sensitivity` times the deviation of `covariate` from its mean; both have the same samples.
+/// Subtracts `sensitivity` times the change of `covariate` since its first sample; both have the same samples. No sample depends on a later one
+/// by this.
 fn subtract(series: &mut Series, sensitivity: f64, covariate: &Series) {
-    let mean = covariate.values.iter().sum::<f64>() / covariate.values.len() as f64;
+    let first = covariate.values.first().copied().unwrap_or(0.0);
     for (value, covariate) in series.values_mut().iter_mut().zip(covariate.values.iter()) {
-        *value -= sensitivity * (covariate - mean);
+        *value -= sensitivity * (covariate - first);
     }
 }
 

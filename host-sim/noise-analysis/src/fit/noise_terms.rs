@@ -1,5 +1,9 @@
 //! What the terms of a noise model are: white noise, filters, lines.
 
+use crate::bounds::BoundedEstimate;
+use crate::samples::rounding::Rounding;
+use allan_core::model::FittedTerm;
+use allan_core::term::Markov;
 use allan_core::{Model, NoiseTerm};
 use std::f64::consts::PI;
 
@@ -43,6 +47,34 @@ pub(crate) fn sinusoids<'a>(kinds: impl Iterator<Item = &'a NoiseTerm>) -> Vec<f
         _ => None,
     };
     kinds.filter_map(frequency).collect()
+}
+
+/// Longest correlation time, in samples, of a Markov process that is white noise behind a low-pass filter of the first order.
+pub(crate) const MAX_LOW_PASS_SAMPLES: f64 = 64.0;
+
+/// N below the corner of a Markov process that stands in the place of the white noise of a channel with this `resolution`; `None` of one that
+/// does not.
+///
+/// A sampled process of deviation `s` and correlation time `T` has there the two-sided density `s²·dt·coth(dt/2T)`, and
+/// `s²·dt·tanh(dt/2T)` at half the sample rate. It stands in the place of white noise if the white noise of the model is known to be above it
+/// nowhere, or if it is as fast as a filter and that noise is no more than that of rounding. The density far above the corner, in proportion to
+/// `s²/T`, is known best, so that the errors of `s` and `T` have one sign: their lower bounds give that of N.
+pub(crate) fn white_noise_of_process(model: &Model, term: &FittedTerm, resolution: f64) -> Option<BoundedEstimate> {
+    let NoiseTerm::Markov(Markov { time_constant }) = term.kind else { return None };
+    let period_s = model.sample_period();
+    let half_turn = |time_constant: f64| (0.5 * period_s / time_constant).tanh();
+    let at_half_the_rate = term.value * term.value * period_s * half_turn(time_constant);
+    let white = model.terms().iter().filter(|term| is_white(&term.kind));
+    let left: f64 = white.map(|term| term.low * term.low).sum();
+    let rounding = Rounding::white(resolution, period_s).variance() * period_s;
+    let is_filter = time_constant < MAX_LOW_PASS_SAMPLES * period_s && left <= rounding;
+    if left > at_half_the_rate && !is_filter {
+        return None;
+    }
+    let below_corner = |deviation: f64, time_constant: f64| deviation * (period_s / half_turn(time_constant)).sqrt();
+    let (_, _, (shortest, longest)) = term.shape_parameters().next()?;
+    let value = below_corner(term.value, time_constant);
+    Some(BoundedEstimate { value, low: below_corner(term.low, shortest), high: below_corner(term.high, longest) })
 }
 
 /// Length of the impulse response of the longest filter in a model, s.

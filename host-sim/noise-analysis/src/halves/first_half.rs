@@ -10,11 +10,12 @@ use crate::halves::preprocessed_record::PreprocessedRecord;
 use crate::halves::traced_part::{BiasByBlocks, PartData, PartSamples, TracedPart};
 use crate::nonstationarity::{self, ChannelEpochs, EpochCurves, Nonstationarity, TracedChannel};
 use crate::parallel::{self, per_channel};
-use crate::record::estimators::{RecordEstimators, RecordPart};
+use crate::record::condensed_record::CondensedRecord;
+use crate::record::estimators::{HalfEstimators, RecordEstimators, RecordPart};
 use crate::report::assessment::Assessment;
 use crate::report::{
     ChannelReport, CurvePoint, FigureData, MissingSamples, ModelErrorReport, ModelReport, SlopeMethodReport,
-    term_reports,
+    TermReport, term_reports,
 };
 use crate::samples::exclusion::Exclusion;
 use crate::samples::rounding::Rounding;
@@ -43,44 +44,43 @@ pub(crate) struct Epochs {
 }
 
 impl FirstHalf {
-    /// The models, and how the noise changes.
-    pub(crate) fn fit(record: &PreprocessedRecord) -> (Self, Epochs) {
-        let PreprocessedRecord { estimators, preprocessing, .. } = record;
-        let series = record.series_without(Exclusion::ByFirstHalf);
-        let middle = record.measurement().middle();
+    /// The models, and how the noise changes; `half` is the first half of the `whole` record, `estimators` are those of the halves.
+    pub(crate) fn fit(
+        whole: &PreprocessedRecord,
+        half: &CondensedRecord,
+        estimators: &HalfEstimators,
+    ) -> (Self, Epochs) {
+        let PreprocessedRecord { preprocessing, record, .. } = whole;
+        let series = whole.series_without(Exclusion::ByFirstHalf);
+        let middle = whole.measurement().middle();
         let halves = series.map(|series| series.before(middle));
         let biases = per_channel(series.ids(), |channel| BiasByBlocks {
             has_ramp: preprocessing.has_ramp(channel, Exclusion::ByFirstHalf),
             sensitivities: preprocessing.sensitivities(channel, Exclusion::ByFirstHalf).to_vec(),
         });
-        let samples = PartSamples {
-            record: record.record,
-            series: &halves,
-            biases: biases.clone(),
-            known: None,
-            seeks_levels: false,
-        };
-        let profile = &record.measurement().profile;
+        let samples =
+            PartSamples { record: half, series: &halves, biases: biases.clone(), known: None, seeks_levels: false };
+        let profile = &whole.measurement().profile;
         let data = PartData { profile, curves: &estimators.ruled[0], samples: Some(samples) };
         // The filter of the whole record is the one that is reported.
         let mut part = TracedPart::fit(&data);
         let events = per_channel(series.ids(), |channel| {
-            if !record.has_rules(channel) {
+            let (excluded, screened) =
+                (preprocessing.excluded_events(channel, middle), &half.channels[channel].screened);
+            if excluded.is_empty() && screened.is_empty() {
                 return EventShare::default();
             }
             let fit = &part.channels[channel].fit;
-            let with = fit.signals.left_of(&fit.covariates.compensated(&estimators.raw[0], channel));
-            let recorded = preprocessing.series(record.measurement(), channel, Exclusion::None).before(middle);
-            let excluded = preprocessing.excluded_events(channel, middle);
-            let screened = &record.record.channels[channel].screened;
-            EventShare::of_first_half((&recorded, &excluded), screened, (&with, &fit.curve))
+            let with = fit.signals.left_of(&fit.covariates.compensated(&estimators.foretold[0], channel));
+            let recorded = preprocessing.series(whole.measurement(), channel, Exclusion::BiasOfFirstHalf);
+            EventShare::of_first_half((&recorded.before(middle), &excluded), screened, (&with, &fit.curve))
         });
         let channels = per_channel(series.ids(), |channel| {
             let (fit, own) = (&part.channels[channel].fit, &series[channel]);
             let followed = fit.covariates.compensated_series(own, &series);
             let curves = || EpochCurves::from_series(followed.as_ref().unwrap_or(own), middle);
-            let curves = record.record.is_traced(channel).then(curves).flatten()?;
-            let curves = curves.in_samples(&record.record.channels[channel].samples).without(&fit.signals);
+            let curves = record.is_traced(channel).then(curves).flatten()?;
+            let curves = curves.in_samples(&record.channels[channel].samples).without(&fit.signals);
             Some(ChannelEpochs::compare(curves, fit.after()))
         });
         let of_channels: Vec<&Option<ChannelEpochs>> = channels.iter().collect();
@@ -93,19 +93,14 @@ impl FirstHalf {
             }
         });
         part.take_coefficients_of_samples();
-        let has_rules = series.ids().any(|of| record.has_rules(of));
         let raw = per_channel(series.ids(), |channel| {
-            if !has_rules {
-                return part.channels[channel].fit.before.clone();
-            }
-            let bias = &biases[channel];
-            let curves = &estimators.raw[0];
+            let (bias, curves) = (&biases[channel], &estimators.recorded[0]);
             let covariates = CovariateFit::estimate(curves, channel, bias.has_ramp, |to| bias.sensitivity(to));
-            let own = preprocessing.series(record.measurement(), channel, Exclusion::None).before(middle);
+            let own = preprocessing.series(whole.measurement(), channel, Exclusion::Nothing).before(middle);
             let rest = covariates.compensated_series(&own, &halves).unwrap_or(own);
             let ChannelFit { covariates, before, .. } = ChannelFit::fit_baseline(covariates);
-            let is_screened = record.record.channels[channel].samples.is_screened;
-            let spectrum = record.record.spectrum_within(channel, 0..middle).filter(|_| !is_screened);
+            let is_screened = half.channels[channel].samples.is_screened;
+            let spectrum = half.spectrum_within(channel, 0..middle).filter(|_| !is_screened);
             let rest = UniformSeries::from_series(&rest).with_rounding(covariates.rounding().clone());
             let samples = SamplesOfCurve { rest: &rest, spectrum: spectrum.as_ref() };
             by_samples(&covariates.curve, &before, samples).unwrap_or(before)
@@ -114,7 +109,7 @@ impl FirstHalf {
     }
 
     /// The models by the curves of the halves alone.
-    pub(crate) fn fit_curves(profile: &SensorProfile, estimators: &RecordEstimators) -> Self {
+    pub(crate) fn fit_curves(profile: &SensorProfile, estimators: &HalfEstimators) -> Self {
         let part = TracedPart::fit(&PartData { profile, curves: &estimators.ruled[0], samples: None });
         let raw = part.channels.map(|trace| trace.fit.before.clone());
         Self { raw, events: part.channels.map(|_| EventShare::default()), part }
@@ -125,20 +120,20 @@ impl FirstHalf {
     pub(crate) fn report(
         &self,
         whole: &TracedPart,
-        estimators: &RecordEstimators,
+        (estimators, halves): (&RecordEstimators, &HalfEstimators),
         channel: ChannelId,
         has_rules: bool,
     ) -> ChannelReport {
-        let unit = estimators.both.channels[channel].unit;
+        let (unit, resolution) = (estimators.both.channels[channel].unit, estimators.both.resolution(channel));
         let fit = &whole.channels[channel].fit;
         let baseline = &self.part.channels[channel].fit.before;
         let curve = estimators.measured[channel].clone();
         let curve = curve.with_confidence(|point| baseline.variance_fractions(point.n));
         let rounding = estimators.both.rounding(channel);
-        let after = self.after(estimators, channel, (&curve, &rounding), has_rules);
+        let after = self.after((estimators, halves), channel, (&curve, &rounding), has_rules);
         // The model with the added terms, fitted to the whole record, with the errors of `after`.
         let refitted = ModelReport {
-            terms: term_reports(fit.after(), unit),
+            terms: term_reports(fit.after(), unit, resolution),
             adev: self.as_recorded((fit, &fit.signals), estimators, channel, (&curve, &rounding)),
             ..after.clone()
         };
@@ -152,11 +147,11 @@ impl FirstHalf {
             samples: curve.samples(),
             missing: MissingSamples::default(),
             curve: curve.points().iter().map(point).collect(),
-            unseen_adev: unseen_adev(&curve, &estimators.raw[1].curve(channel)),
+            unseen_adev: unseen_adev(&curve, &halves.recorded[1].curve(channel)),
             read_off: SlopeMethodReport::from_curve(&curve, unit),
-            before: self.before(estimators, channel, (&curve, &rounding), has_rules),
+            before: self.before(halves, channel, (&curve, &rounding), has_rules),
             effects: Vec::new(),
-            first_half_curve: self.curve_error(estimators, channel),
+            first_half_curve: self.curve_error(halves, channel),
             after,
             refitted,
             nonstationarity: None,
@@ -166,17 +161,18 @@ impl FirstHalf {
         }
     }
 
-    /// The error on the second half of the curve of the first half itself, both as they were recorded.
-    fn curve_error(&self, estimators: &RecordEstimators, channel: ChannelId) -> ModelErrorReport {
+    /// The error on the second half of the curve of the first half itself, both as they were recorded but for the bias that the first half
+    /// foretells.
+    fn curve_error(&self, halves: &HalfEstimators, channel: ChannelId) -> ModelErrorReport {
         let fit = &self.part.channels[channel].fit;
-        let [first, second] = [0, 1].map(|half| fit.covariates.compensated(&estimators.raw[half], channel));
+        let [first, second] = [0, 1].map(|half| fit.covariates.compensated(&halves.foretold[half], channel));
         ModelErrorReport::of_curve(&first, &second, fit.after(), &self.events[channel])
     }
 
     /// The baseline model of the first half as it was recorded, at the points of the curve of the `whole` record.
     fn before(
         &self,
-        estimators: &RecordEstimators,
+        halves: &HalfEstimators,
         channel: ChannelId,
         (whole, rounding): (&Curve<OCTAVES>, &Rounding),
         has_rules: bool,
@@ -185,11 +181,11 @@ impl FirstHalf {
         let with_rounding = |point: &AllanPoint| (model.avar(point.n) + rounding.correlated_avar(point.n)).sqrt();
         let error = |part: &RecordPart| ModelErrorReport::new(model, &part.curve_before_rounding(channel));
         ModelReport {
-            terms: term_reports(model, estimators.both.channels[channel].unit),
+            terms: terms_of(model, &halves.recorded[0], channel),
             adev: whole.points().iter().map(with_rounding).collect(),
-            fitted: error(&estimators.raw[0]),
-            unseen: error(&estimators.raw[1]),
-            unseen_excluding: has_rules.then(|| error(&estimators.ruled[1])),
+            fitted: error(&halves.recorded[0]),
+            unseen: error(&halves.recorded[1]),
+            unseen_excluding: has_rules.then(|| error(&halves.ruled[1])),
             events: None,
         }
     }
@@ -197,7 +193,7 @@ impl FirstHalf {
     /// The same of the model with the added terms.
     fn after(
         &self,
-        estimators: &RecordEstimators,
+        (estimators, halves): (&RecordEstimators, &HalfEstimators),
         channel: ChannelId,
         (whole, rounding): (&Curve<OCTAVES>, &Rounding),
         has_rules: bool,
@@ -213,11 +209,11 @@ impl FirstHalf {
         let (fitted, of_fitted) = fit.fitted_curve();
         let none = EventShare::default();
         ModelReport {
-            terms: term_reports(model, estimators.both.channels[channel].unit),
+            terms: terms_of(model, &halves.foretold[0], channel),
             adev: self.as_recorded((fit, &of_both), estimators, channel, (whole, rounding)),
             fitted: ModelErrorReport::with_shares(model, (&of_fitted, &none), fitted),
-            unseen: error(events, &estimators.raw[1]),
-            unseen_excluding: has_rules.then(|| error(&none, &estimators.ruled[1])),
+            unseen: error(events, &halves.foretold[1]),
+            unseen_excluding: has_rules.then(|| error(&none, &halves.ruled[1])),
             events: events.report(whole.points().iter().map(|point| point.n)),
         }
     }
@@ -239,6 +235,11 @@ impl FirstHalf {
 }
 
 impl Epochs {
+    /// The series of a channel in both halves, by what the first half shows.
+    pub(crate) fn series(&self, channel: ChannelId) -> &Series {
+        &self.series[channel]
+    }
+
     /// How the noise of each traced channel changes.
     pub(crate) fn nonstationarities(
         &self,
@@ -262,6 +263,11 @@ impl Epochs {
             nonstationarity::describe(&channels, traced.iter().position(|of| *of == channel)?)
         })
     }
+}
+
+/// The terms of a model of a channel of a part of the record.
+fn terms_of(model: &Model, part: &RecordPart, channel: ChannelId) -> Vec<TermReport> {
+    term_reports(model, part.channels[channel].unit, part.resolution(channel))
 }
 
 /// Allan deviations of the `second` half at the first averaging times of the `whole` record.

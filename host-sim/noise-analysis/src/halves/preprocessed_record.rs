@@ -2,12 +2,12 @@
 
 use crate::detectors::level_change;
 use crate::detectors::noise_grid::NoiseGrids;
-use crate::effects::Effect;
+use crate::effects::{Effect, NoisyInterval};
 use crate::fit::noise_terms::filter_length_s;
 use crate::halves::traced_part::{BiasByBlocks, PartData, PartSamples, TracedPart};
 use crate::parallel::{in_parallel, per_channel};
 use crate::record::condensed_record::CondensedRecord;
-use crate::record::estimators::RecordEstimators;
+use crate::record::estimators::{HalfEstimators, RecordEstimators};
 use crate::record::preprocessing::Preprocessing;
 use crate::report::Stretch;
 use crate::rivals::motion::{self, PlatformMotion};
@@ -32,9 +32,20 @@ pub(crate) struct PreprocessedRecord<'a> {
 impl<'a> PreprocessedRecord<'a> {
     /// What the samples of `record` show.
     pub(crate) fn new(record: &'a CondensedRecord<'a>) -> Self {
-        let measurement = record.means.as_ref();
-        let preprocessing = Preprocessing::detect(record, &NoiseGrids::default());
+        let preprocessing = Preprocessing::detect(record, None, &NoiseGrids::default());
         let estimators = RecordEstimators::estimate(record, &preprocessing);
+        Self::with(record, preprocessing, estimators)
+    }
+
+    /// The same, and the estimators of both halves by what the `first_half` shows.
+    pub(crate) fn with_halves(record: &'a CondensedRecord<'a>, first_half: &CondensedRecord) -> (Self, HalfEstimators) {
+        let preprocessing = Preprocessing::detect(record, Some(first_half), &NoiseGrids::default());
+        let (estimators, halves) = RecordEstimators::estimate_with_halves(record, first_half, &preprocessing);
+        (Self::with(record, preprocessing, estimators), halves)
+    }
+
+    fn with(record: &'a CondensedRecord<'a>, preprocessing: Preprocessing, estimators: RecordEstimators) -> Self {
+        let measurement = record.means.as_ref();
         let motions = per_channel(measurement.ids(), |channel| {
             let find = || motion::find(&preprocessing.measured(measurement, channel), &measurement[channel].profile);
             record.is_traced(channel).then(find).flatten()
@@ -103,8 +114,9 @@ impl<'a> PreprocessedRecord<'a> {
             let is_shared = others.any(|(_, other)| other.as_ref().is_some_and(|other| motion.is_shared_with(other)));
             Proposal::new(motion.effect, Origin::Motion { is_shared, is_sudden: motion.is_sudden })
         });
-        let of_samples = self.record.channels[channel].effects.iter().chain(self.preprocessing.effects(channel));
-        let of_samples = of_samples.map(|effect| Proposal::new(effect.clone(), Origin::Samples));
+        let of_samples =
+            with_knocks_joined(&self.record.channels[channel].effects, self.preprocessing.effects(channel));
+        let of_samples = of_samples.into_iter().map(|effect| Proposal::new(effect, Origin::Samples));
         let (of_model, facts) = whole.proposals(&measurement.profile, &self.estimators.both, channel, common);
         let of_signals = trace.signals.iter().map(|signal| signals::proposal(signal, own.unit));
         let temperature = measurement.of_quantity(Quantity::Temperature).next();
@@ -129,4 +141,26 @@ impl<'a> PreprocessedRecord<'a> {
         };
         in_parallel(&[Quantity::AngularRate, Quantity::SpecificForce], of_quantity).into_iter().flatten().collect()
     }
+}
+
+/// The effects that the samples of a channel show, and their means. Knocks that follow each other at less than the length of the shorter are
+/// one: of a condensed record the samples show a long one in pieces, and the means, which lack these, the rest.
+fn with_knocks_joined(of_samples: &[Effect], of_means: &[Effect]) -> Vec<Effect> {
+    let knock = |effect: &Effect| match effect {
+        Effect::NoisyInterval(knock) => Some(knock.clone()),
+        _ => None,
+    };
+    let mut pieces = of_samples.iter().filter_map(knock).peekable();
+    if pieces.peek().is_none() {
+        return of_samples.iter().chain(of_means).cloned().collect();
+    }
+    let mut knocks: Vec<NoisyInterval> = Vec::new();
+    for mut knock in of_means.iter().filter_map(knock).chain(pieces) {
+        while let Some(near) = knocks.iter().position(|of| of.is_near(&knock)) {
+            knock = knocks.remove(near).extended_by(&knock);
+        }
+        knocks.push(knock);
+    }
+    let others = of_samples.iter().chain(of_means).filter(|effect| knock(effect).is_none()).cloned();
+    others.chain(knocks.into_iter().map(Effect::from)).collect()
 }

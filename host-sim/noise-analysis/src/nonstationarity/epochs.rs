@@ -46,7 +46,7 @@ pub(crate) struct EpochCurves {
 
 impl EpochCurves {
     /// Curves of a series whose second half begins with the sample period `middle`, of at least 24,576 sample periods (two halves
-    /// of twelve shortest epochs). `None` of a shorter one, and where the channel does not change for a whole epoch.
+    /// of twelve shortest epochs). `None` of a shorter one, and where the channel does not change for a whole epoch of the first half.
     #[must_use]
     pub(crate) fn from_series(series: &Series, middle: u64) -> Option<Self> {
         let to = series.span.end;
@@ -61,8 +61,12 @@ impl EpochCurves {
             unseen_epochs: curves(&ranges[1]),
             ranges,
         };
-        let mut parts = curves.quarters.iter().chain(&curves.fitted_epochs).chain(&curves.unseen_epochs);
-        parts.all(|part| part.points().iter().any(|point| point.avar > 0.0)).then_some(curves)
+        curves.quarters.iter().chain(&curves.fitted_epochs).all(changes).then_some(curves)
+    }
+
+    /// Whether the channel changes in every epoch of the second half.
+    pub(crate) fn changes_in_second_half(&self) -> bool {
+        self.unseen_epochs.iter().all(changes)
     }
 
     /// The same curves of a channel by averaging factors in samples, where the series has means, with those of the samples at `shorter`
@@ -142,6 +146,11 @@ impl EpochCurves {
         curve.replace_avar(|point| median_avar(self.latest_epochs(), point.n).unwrap_or(point.avar));
         curve
     }
+}
+
+/// Whether a channel changes in the stretch of this curve.
+fn changes(curve: &Curve<OCTAVES>) -> bool {
+    curve.points().iter().any(|point| point.avar > 0.0)
 }
 
 /// The curves of the two quarters up to the sample period `middle`.

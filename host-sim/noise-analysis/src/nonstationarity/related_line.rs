@@ -82,13 +82,15 @@ impl RelatedLine {
         let tried = candidates.iter().filter_map(|&(channel, ratio)| {
             let near = mean * f64::from(ratio.0) / f64::from(ratio.1);
             let related = frequencies(channel, near, fitted)?;
-            let (correlation, chance) = correlation(&changes(&line), &changes(&related))?;
+            // A line that moves the other way is not related, and hides none that is.
+            let (correlation, chance) =
+                correlation(&changes(&line), &changes(&related)).filter(|(correlation, _)| *correlation >= 0.0)?;
             let p_value = (chance * candidates.len() as f64).min(1.0);
             Some((channel, ratio, correlation, p_value, related, near))
         });
         let (channel, ratio, correlation, p_value, related_fitted_hz, near) =
             tried.min_by(|a, b| a.3.total_cmp(&b.3))?;
-        if p_value > SIGNIFICANCE || correlation < 0.0 {
+        if p_value > SIGNIFICANCE {
             return None;
         }
         let related_unseen_hz = frequencies(channel, near, unseen)?;

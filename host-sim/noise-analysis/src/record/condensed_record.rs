@@ -42,6 +42,8 @@ pub(crate) struct CondensedChannel {
     /// noise around which a sample could be a spike.
     pub can_show_spikes: bool,
     pub faster_lines: FasterLines,
+    /// Those of the first half alone.
+    pub faster_lines_of_first_half: FasterLines,
     /// What only the samples themselves show, in an inertial channel.
     pub effects: Vec<Effect>,
     /// The same of the first half of the recording, as far as it is known.
@@ -73,6 +75,7 @@ impl<'a> CondensedRecord<'a> {
                 counts_per_step,
                 can_show_spikes: channel.profile.quantity.is_inertial() && !shown.is_saturated(id),
                 faster_lines: faster_lines(Vec::new),
+                faster_lines_of_first_half: faster_lines(Vec::new),
                 effects: shown.of(id).cloned().chain(stuck[id.position()].effect(samples, period_s)).collect(),
                 effects_of_first_half: Vec::new(),
                 screened: Vec::new(),
@@ -89,7 +92,7 @@ impl<'a> CondensedRecord<'a> {
         }
     }
 
-    /// The record as it would be had it ended in its middle.
+    /// The record as it would be had it ended in its middle: nothing of the second half decides what is in it.
     pub(crate) fn first_half(&self) -> CondensedRecord<'static> {
         let half = self.means.before(self.means.middle());
         if self.samples_per_mean == 1 {
@@ -97,6 +100,7 @@ impl<'a> CondensedRecord<'a> {
         }
         let channel = |of: &CondensedChannel| CondensedChannel {
             samples: of.samples.of_first_half(),
+            faster_lines: Arc::clone(&of.faster_lines_of_first_half),
             effects: of.effects_of_first_half.clone(),
             ..of.clone()
         };

@@ -114,75 +114,181 @@ pub(crate) struct RecordPart {
     period_s: f64,
     /// Samples of a mean, where the estimators have means; otherwise 1.
     samples_per_mean: u64,
-    /// Averaging factor from which on the estimators are used, samples.
+    /// Least averaging factor of the covariances, samples.
     until: u64,
-    /// The curves at shorter averaging times, with the samples that were replaced.
-    shorter: PerChannel<(Curve<OCTAVES>, u64)>,
+    /// What is known of the samples beside the estimators.
+    samples: PerChannel<CurveOfSamples>,
 }
 
-/// The curves of the recording as measured, and the estimators of its halves.
+/// The curve of the samples of a channel whose estimators have means of them.
+#[derive(Clone)]
+struct CurveOfSamples {
+    curve: Curve<OCTAVES>,
+    /// Samples that were replaced because they are missing.
+    replaced: u64,
+    /// Averaging factor from which on the curve is that of the means, samples; `None` where that of the samples is complete.
+    means_from: Option<u64>,
+    /// What the knocks and spikes that are left out of the means add to it, by averaging factor in samples.
+    events: Vec<(u64, f64)>,
+}
+
+impl CurveOfSamples {
+    /// Where the estimators have all samples.
+    const fn none() -> Self {
+        Self { curve: Curve::empty(), replaced: 0, means_from: Some(1), events: Vec::new() }
+    }
+
+    /// The curve, continued by that of the means.
+    fn continued(&self, means: &Curve<OCTAVES>, samples_per_mean: u64) -> Curve<OCTAVES> {
+        let Some(means_from) = self.means_from else { return self.curve.clone() };
+        let mut curve = self.curve.clone().continued_by_means(means, samples_per_mean, means_from);
+        if !self.events.is_empty() {
+            let added = |n: u64| self.events.iter().find(|(of, _)| *of == n).map_or(0.0, |(_, avar)| *avar);
+            curve.replace_avar(|point| point.avar + added(point.n));
+        }
+        curve
+    }
+}
+
+/// The curves of the recording as measured, and its estimators without what the whole record shows.
 pub(crate) struct RecordEstimators {
     /// Of the recording as measured, without preprocessing.
     pub measured: PerChannel<Curve<OCTAVES>>,
-    /// The halves with spikes and knocks.
-    pub raw: [RecordPart; 2],
-    /// The halves without what the rules of the first half exclude.
-    pub ruled: [RecordPart; 2],
-    /// Both halves, with a gap between them, without what the whole record shows.
+    /// Both halves, with a gap between them.
     pub both: RecordPart,
+    /// The second half alone.
+    pub second: RecordPart,
+}
+
+/// The estimators of the two halves without what the first half shows: nothing of the second half decides what is left of either.
+pub(crate) struct HalfEstimators {
+    /// As they were recorded.
+    pub recorded: [RecordPart; 2],
+    /// With the bias that the first half foretells subtracted.
+    pub foretold: [RecordPart; 2],
+    /// The same without knocks and spikes by the rules of the first half.
+    pub ruled: [RecordPart; 2],
 }
 
 impl RecordEstimators {
     /// Estimates from the means of `record`, and from the curves of its samples at shorter averaging times.
     pub(crate) fn estimate(record: &CondensedRecord, preprocessing: &Preprocessing) -> Self {
-        let alike = AlikeExclusions::new(record.means.as_ref(), preprocessing);
-        let work: Vec<(usize, Half)> =
-            (0..EXCLUSIONS.len()).flat_map(|of| [Half::First, Half::Second].map(|half| (of, half))).collect();
-        let own =
-            in_parallel(&work, |&(of, half)| own_estimators(record.means.as_ref(), preprocessing, (&alike, of), half));
-        let [raw, ruled, [first, second]] = std::array::from_fn(|of| {
-            [0, 1].map(|half| RecordPart::of_means(record, alike.estimators(of, |of| &own[2 * of + half])))
-        });
-        let both = first.followed_by(&second);
-        let halves = |parts: [RecordPart; 2], exclusion: Exclusion| {
-            let [first, second] = parts;
-            [(0, first), (1, second)]
-                .map(|(half, part)| part.with_shorter(record, exclusion, |of| of.half(half, exclusion)))
+        let [halves] = half_parts(record, record, preprocessing, [Exclusion::ByWhole]);
+        Self::new(record, halves)
+    }
+
+    /// The same, and the halves by what the `first_half` shows.
+    pub(crate) fn estimate_with_halves(
+        record: &CondensedRecord,
+        first_half: &CondensedRecord,
+        preprocessing: &Preprocessing,
+    ) -> (Self, HalfEstimators) {
+        let [recorded, foretold, ruled, whole] = half_parts(record, first_half, preprocessing, EXCLUSIONS);
+        let with_samples = |halves: [RecordPart; 2], exclusion: Exclusion| {
+            let [first, second] = halves;
+            [(0, first), (1, second)].map(|(half, part)| {
+                let samples = |channel: ChannelId| {
+                    let of = &record.channels[channel].samples;
+                    of_half(of, half, exclusion, preprocessing.corrects(channel, exclusion))
+                };
+                part.with_samples(record, samples)
+            })
         };
+        let halves = HalfEstimators {
+            recorded: with_samples(recorded, Exclusion::Nothing),
+            foretold: with_samples(foretold, Exclusion::BiasOfFirstHalf),
+            ruled: with_samples(ruled, Exclusion::ByFirstHalf),
+        };
+        (Self::new(record, whole), halves)
+    }
+
+    /// From the halves without what the whole record shows.
+    fn new(record: &CondensedRecord, [first, second]: [RecordPart; 2]) -> Self {
+        let both = first.followed_by(&second);
+        let of_both = |channel: ChannelId| {
+            let of = &record.channels[channel].samples;
+            let replaced = of.replaced(Exclusion::ByWhole);
+            CurveOfSamples {
+                curve: of.both(Exclusion::ByWhole),
+                replaced,
+                means_from: Some(of.until()),
+                events: Vec::new(),
+            }
+        };
+        let of_second = |channel: ChannelId| of_half(&record.channels[channel].samples, 1, Exclusion::ByWhole, false);
         Self {
             measured: record.channels.map(|channel| channel.samples.measured.clone()),
-            raw: halves(raw, Exclusion::None),
-            ruled: halves(ruled, Exclusion::ByFirstHalf),
-            both: both.with_shorter(record, Exclusion::ByWhole, |of| of.both(Exclusion::ByWhole)),
+            both: both.with_samples(record, of_both),
+            second: second.with_samples(record, of_second),
         }
     }
 }
 
-/// What may be left out of a recording.
-const EXCLUSIONS: [Exclusion; 3] = [Exclusion::None, Exclusion::ByFirstHalf, Exclusion::ByWhole];
+/// What the `samples` of a half show; the means lack the knocks and spikes, and something may be subtracted from them.
+fn of_half(samples: &SampleCurves, half: usize, exclusion: Exclusion, is_corrected: bool) -> CurveOfSamples {
+    let (curve, replaced, means_from) = (samples.half(half, exclusion), samples.replaced(exclusion), samples.until());
+    let lacks_events = exclusion.keeps_events() && samples.samples_per_mean > 1;
+    if lacks_events && !is_corrected {
+        return CurveOfSamples { curve, replaced, means_from: None, events: Vec::new() };
+    }
+    let mut events = Vec::new();
+    if lacks_events && samples.is_screened {
+        let without = samples.half(half, Exclusion::ByWhole);
+        let pairs = curve.points().iter().zip(without.points()).filter(|(with, _)| with.n >= means_from);
+        events = pairs.map(|(with, without)| (with.n, (with.avar - without.avar).max(0.0))).collect();
+    }
+    CurveOfSamples { curve, replaced, means_from: Some(means_from), events }
+}
 
-/// Which of the [`EXCLUSIONS`] leave a channel the same samples: nothing is estimated twice.
-struct AlikeExclusions {
+/// What may be left out of a recording and subtracted from it.
+const EXCLUSIONS: [Exclusion; 4] =
+    [Exclusion::Nothing, Exclusion::BiasOfFirstHalf, Exclusion::ByFirstHalf, Exclusion::ByWhole];
+
+/// The halves of a record for each of these exclusions, by its means alone. The resolution of the channels, unless it is by the whole record, is
+/// that of the `first_half`.
+fn half_parts<const COUNT: usize>(
+    record: &CondensedRecord,
+    first_half: &CondensedRecord,
+    preprocessing: &Preprocessing,
+    exclusions: [Exclusion; COUNT],
+) -> [[RecordPart; 2]; COUNT] {
+    let measurement = record.means.as_ref();
+    let alike = AlikeExclusions::new(measurement, preprocessing, exclusions);
+    let work: Vec<(usize, Half)> =
+        (0..COUNT).flat_map(|of| [Half::First, Half::Second].map(|half| (of, half))).collect();
+    let own = in_parallel(&work, |&(of, half)| own_estimators(measurement, preprocessing, (&alike, of), half));
+    std::array::from_fn(|of| {
+        let shows_resolution = if exclusions[of] == Exclusion::ByWhole { record } else { first_half };
+        [0, 1].map(|half| {
+            let estimators = alike.estimators(of, |of| &own[2 * of + half]);
+            RecordPart::of_means(record, shows_resolution, estimators)
+        })
+    })
+}
+
+/// Which exclusions leave a channel the same samples: nothing is estimated twice.
+struct AlikeExclusions<const COUNT: usize> {
+    exclusions: [Exclusion; COUNT],
     /// For each exclusion and channel, the number of the first exclusion that does.
-    first: [Vec<usize>; EXCLUSIONS.len()],
+    first: [Vec<usize>; COUNT],
     /// Pairs of channels whose covariance is asked for.
     coupled: Vec<[usize; 2]>,
 }
 
-impl AlikeExclusions {
-    fn new(measurement: &Measurement, preprocessing: &Preprocessing) -> Self {
+impl<const COUNT: usize> AlikeExclusions<COUNT> {
+    fn new(measurement: &Measurement, preprocessing: &Preprocessing, exclusions: [Exclusion; COUNT]) -> Self {
         let quantity = |channel: ChannelId| measurement[channel].profile.quantity;
         let is_coupled = |of: Quantity| of.is_inertial() || of.is_environment();
         let coupled: Vec<ChannelId> = measurement.ids().filter(|&channel| is_coupled(quantity(channel))).collect();
         // No rate is a covariate of another one.
         let is_rate = |channel: &ChannelId| quantity(*channel) == Quantity::AngularRate;
         let coupled = pairs(&coupled).filter(|pair| !pair.iter().all(is_rate));
-        let first = EXCLUSIONS.map(|of| {
+        let first = exclusions.map(|of| {
             let is_alike = |channel, other: &Exclusion| preprocessing.leaves_the_same(channel, *other, of);
-            let first = |channel| EXCLUSIONS.iter().position(|other| is_alike(channel, other)).unwrap_or(0);
+            let first = |channel| exclusions.iter().position(|other| is_alike(channel, other)).unwrap_or(0);
             measurement.ids().map(first).collect()
         });
-        Self { first, coupled: coupled.map(|pair| pair.map(ChannelId::position)).collect() }
+        Self { exclusions, first, coupled: coupled.map(|pair| pair.map(ChannelId::position)).collect() }
     }
 
     /// The number of the first exclusion that leaves both channels the same samples as the one of this number.
@@ -212,13 +318,13 @@ impl AlikeExclusions {
 }
 
 /// The estimators of a half of a recording, by time, of the channels and the pairs that are an exclusion's own.
-fn own_estimators(
+fn own_estimators<const COUNT: usize>(
     measurement: &Measurement,
     preprocessing: &Preprocessing,
-    (alike, of): (&AlikeExclusions, usize),
+    (alike, of): (&AlikeExclusions<COUNT>, usize),
     half: Half,
 ) -> CoupledEstimators {
-    let exclusion = EXCLUSIONS[of];
+    let exclusion = alike.exclusions[of];
     let mut estimators = CoupledEstimators::of_pairs(measurement.channels.len(), alike.own_pairs(of));
     let is_own = |channel: usize| {
         alike.first[of][channel] == of || estimators.couplings.iter().any(|pair| pair.channels.contains(&channel))
@@ -302,17 +408,17 @@ fn positions(measurement: &Measurement, channel: &MeasuredChannel, excluded: &[u
 }
 
 impl RecordPart {
-    /// With these estimators of the means of `record`.
-    fn of_means(record: &CondensedRecord, estimators: CoupledEstimators) -> Self {
+    /// With these estimators of the means of `record`; the resolution of each channel is that which `shows_resolution` has.
+    fn of_means(record: &CondensedRecord, shows_resolution: &CondensedRecord, estimators: CoupledEstimators) -> Self {
         let measurement = record.means.as_ref();
         Self {
             channels: measurement.profiles().collect(),
             estimators,
-            resolutions: record.channels.map(|of| of.samples.resolution),
+            resolutions: shows_resolution.channels.map(|of| of.samples.resolution),
             period_s: measurement.period_s(),
             samples_per_mean: record.samples_per_mean,
             until: 1,
-            shorter: measurement.ids().map(|_| (Curve::empty(), 0)).collect(),
+            samples: measurement.ids().map(|_| CurveOfSamples::none()).collect(),
         }
     }
 
@@ -325,7 +431,7 @@ impl RecordPart {
     pub(crate) fn new(channels: PerChannel<ChannelProfile>, cascades: Vec<GappedCascade>, period_s: f64) -> Self {
         Self {
             resolutions: channels.map(|channel| channel.lsb),
-            shorter: channels.map(|_| (Curve::empty(), 0)),
+            samples: channels.map(|_| CurveOfSamples::none()),
             channels,
             estimators: CoupledEstimators { cascades, couplings: Vec::new(), newest: Vec::new() },
             period_s,
@@ -334,16 +440,10 @@ impl RecordPart {
         }
     }
 
-    /// The part with the curves of the samples of `record` at averaging times that are too short for its means.
-    fn with_shorter(
-        self,
-        record: &CondensedRecord,
-        exclusion: Exclusion,
-        curve: impl Fn(&SampleCurves) -> Curve<OCTAVES>,
-    ) -> Self {
+    /// The part with what is known of the samples of `record` beside its means.
+    fn with_samples(self, record: &CondensedRecord, samples: impl Fn(ChannelId) -> CurveOfSamples) -> Self {
         let until = record.channels.iter().map(|of| of.samples.until()).max().unwrap_or(1);
-        let shorter = record.channels.map(|of| (curve(&of.samples), of.samples.replaced(exclusion)));
-        Self { until, shorter, ..self }
+        Self { until, samples: record.channels.ids().map(samples).collect(), ..self }
     }
 
     /// Seconds between samples.
@@ -369,7 +469,7 @@ impl RecordPart {
     /// Allan variances of a channel, in its unit squared.
     pub(crate) fn curve(&self, channel: ChannelId) -> Curve<OCTAVES> {
         let own = self.estimators.cascade(channel.position()).curve(self.period_s).scaled(self.step_size(channel));
-        self.shorter[channel].0.clone().continued_by_means(&own, self.samples_per_mean, self.until)
+        self.samples[channel].continued(&own, self.samples_per_mean)
     }
 
     /// The rounding errors of a channel; white where its noise is not traced, as it is of a gyro or accelerometer alone.
@@ -390,7 +490,7 @@ impl RecordPart {
     pub(crate) fn replaced(&self, channel: ChannelId) -> u64 {
         match self.samples_per_mean {
             1 => self.estimators.cascade(channel.position()).cascade().replaced(),
-            _ => self.shorter[channel].1,
+            _ => self.samples[channel].replaced,
         }
     }
 

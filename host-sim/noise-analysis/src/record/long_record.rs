@@ -70,14 +70,24 @@ pub struct LongRecordReader {
     /// First sample period of the second half.
     middle: u64,
     stuck: StuckScreen,
-    /// What is stuck in the first half.
-    stuck_in_first_half: Option<Vec<StuckRuns>>,
+    /// What is known at the end of the first half.
+    first_half: Option<FirstHalfFindings>,
     recorded: Vec<RecordedChannel>,
     screen: SampleScreen,
     screened: Vec<ScreenedChannel>,
     fast: Vec<FastFindings>,
     last: Option<u64>,
     gaps: usize,
+}
+
+/// What is known of the channels when the first half was read.
+#[derive(Default)]
+struct FirstHalfFindings {
+    stuck: Vec<StuckRuns>,
+    /// The spectra of the inertial channels.
+    stacked: Vec<Option<StackedSpectrum>>,
+    /// Whether the screen leaves out a sample.
+    is_screened: Vec<bool>,
 }
 
 /// What the samples of a channel at the start of the recording show.
@@ -144,15 +154,16 @@ impl ScreenedChannel {
     }
 }
 
-/// The lines of a spectrum of samples that are too fast for their means.
+/// The lines of a spectrum of samples, of the first `periods` sample periods, that are too fast for their means.
 fn lines_above_means(
     stacked: StackedSpectrum,
     description: &RecordingDescription,
+    periods: u64,
     samples_per_mean: u64,
 ) -> impl FnOnce() -> Vec<MergedLine> + Send + 'static {
     let (period_s, rate_error) = (description.period_s(), description.profile.sample_rate_error);
     let highest_hz = description.sample_rate_hz / samples_per_mean as f64 / MEANS_PER_PERIOD;
-    let [resolved_s, duration_s] = [STRETCH_PERIODS, description.periods].map(|periods| periods as f64 * period_s);
+    let [resolved_s, duration_s] = [STRETCH_PERIODS, periods].map(|periods| periods as f64 * period_s);
     move || {
         let lines = spectral_lines::merged(stacked.lines(), resolved_s, duration_s, rate_error);
         lines.into_iter().filter(|line| line.frequency.value > highest_hz).collect()
@@ -180,7 +191,7 @@ impl LongRecordReader {
         let first = stuck_output::screened(Cow::Owned(first)).0.into_owned();
         let samples_per_mean = description.periods.div_ceil(MOST_MEANS).next_power_of_two();
         let means = description.periods / samples_per_mean;
-        let halves = [means / 2 / 2, means / 2].map(|start| start * samples_per_mean);
+        let middle = means / 2 * samples_per_mean;
         let epochs: Vec<u64> = epoch_starts(means).map(|start| start * samples_per_mean).collect();
         // The same channels, of which the size of a count may be another one.
         let of_first: Vec<Option<ChannelId>> = description.channels.iter().map(|of| first.named(of.name)).collect();
@@ -208,7 +219,7 @@ impl LongRecordReader {
             epochs: EpochSpectra::new(period_s, &epochs),
         };
         let recorded = |_: &ChannelProfile| RecordedChannel {
-            curves: StreamedCurves::new(&halves),
+            curves: StreamedCurves::new(&[middle]),
             values: ValueCounts::default(),
         };
         let recorded = description.channels.iter().map(recorded).collect();
@@ -222,20 +233,18 @@ impl LongRecordReader {
             }
         };
         let screened = description.channels.iter().zip(&fast).zip(&of_first).map(screened).collect();
-        let [_, middle] = halves;
-        let (stuck_in_first_half, last) = (None, None);
         Self {
             description,
             first,
             samples_per_mean,
             middle,
             stuck,
-            stuck_in_first_half,
+            first_half: None,
             recorded,
             screen,
             screened,
             fast,
-            last,
+            last: None,
             gaps: 0,
         }
     }
@@ -246,9 +255,18 @@ impl LongRecordReader {
             self.gaps += usize::from(self.last.is_some_and(|last| slot > last + 1));
             self.last = Some(slot);
         }
-        if block.slots.last().is_some_and(|&last| last >= self.middle) {
-            self.stuck_in_first_half.get_or_insert_with(|| self.stuck.found());
+        let of_first_half = block.slots.partition_point(|&slot| slot < self.middle);
+        if self.first_half.is_some() || of_first_half == block.slots.len() {
+            self.push_to_half(block);
+            return;
         }
+        self.push_to_half(&block.part(0..of_first_half));
+        self.end_first_half();
+        self.push_to_half(&block.part(of_first_half..block.slots.len()));
+    }
+
+    /// Takes samples of one half.
+    fn push_to_half(&mut self, block: &SampleBlock) {
         let block = self.stuck.screen(block);
         let Self { recorded, screen, screened, .. } = self;
         let as_recorded = || {
@@ -260,12 +278,31 @@ impl LongRecordReader {
         parallel::both(as_recorded, || screen.push(&block, |block| push_screened(screened, block)));
     }
 
+    /// Ends the first half: nothing that follows decides what is known of it.
+    fn end_first_half(&mut self) {
+        let Self { stuck, recorded, screen, screened, .. } = self;
+        push_screened(screened, &screen.finish_part());
+        let stacked = |of: &ScreenedChannel| of.spectra.as_ref().map(|of| of.stacked.clone());
+        let is_screened = |(recorded, screened): (&RecordedChannel, &ScreenedChannel)| {
+            screened.curves.refused != recorded.curves.refused
+        };
+        self.first_half = Some(FirstHalfFindings {
+            stuck: stuck.found(),
+            stacked: screened.iter().map(stacked).collect(),
+            is_screened: recorded.iter().zip(&*screened).map(is_screened).collect(),
+        });
+    }
+
     /// The recording, all of which was read.
     #[must_use]
     pub fn finish(mut self) -> CondensedRecord<'static> {
-        push_screened(&mut self.screened, &self.screen.finish());
+        if self.first_half.is_none() {
+            self.end_first_half();
+        }
+        push_screened(&mut self.screened, &self.screen.finish_part());
         let found = self.stuck.found();
-        let of_first_half = self.stuck_in_first_half.unwrap_or_else(|| found.clone());
+        let FirstHalfFindings { stuck: of_first_half, stacked: stacked_in_first_half, is_screened } =
+            self.first_half.take().unwrap_or_default();
         let Self { description, first, samples_per_mean, middle, recorded, screen, screened, fast, gaps, .. } = self;
         let lost = sampling_faults::lost_samples(description.samples, &description.dropped, gaps);
         let period_s = description.period_s();
@@ -282,8 +319,11 @@ impl LongRecordReader {
         let mut condensed = Vec::new();
         let events = events.zip(events_of_half).zip(left_out);
         let channels = recorded.into_iter().zip(screened).zip(fast).zip(&description.channels);
-        for ((((recorded, screened), fast), profile), ((events, events_of_first_half), left_out)) in
-            channels.zip(events)
+        let in_first_half = stacked_in_first_half.into_iter().zip(is_screened);
+        for (
+            ((((recorded, screened), fast), profile), ((events, events_of_first_half), left_out)),
+            (stacked_in_first_half, is_first_half_screened),
+        ) in channels.zip(events).zip(in_first_half)
         {
             let is_inertial = profile.quantity.is_inertial();
             let shows_codes = |effect: &Effect| !matches!(effect, Effect::NoiseBelowCount(_) | Effect::EffectiveLsb(_));
@@ -295,12 +335,13 @@ impl LongRecordReader {
             let found = lost.iter().cloned().map(|found| found.effect).chain(fast.effects);
             let found = found.chain(range.map(|found| found.effect)).chain(events);
             let parts = |curves: &StreamedCurves| curves.parts().map(|(start, part)| (start, part.clone())).collect();
-            let (faster_lines, spectra) = match screened.spectra {
-                Some(SampleSpectra { stacked, epochs }) => (
-                    faster_lines(lines_above_means(stacked, &description, samples_per_mean)),
-                    epochs.finish(description.periods),
-                ),
-                None => (faster_lines(Vec::new), PartSpectra::default()),
+            let lines_of = |stacked: Option<StackedSpectrum>, periods: u64| match stacked {
+                Some(stacked) => faster_lines(lines_above_means(stacked, &description, periods, samples_per_mean)),
+                None => faster_lines(Vec::new),
+            };
+            let (stacked, spectra) = match screened.spectra {
+                Some(SampleSpectra { stacked, epochs }) => (Some(stacked), epochs.finish(description.periods)),
+                None => (None, PartSpectra::default()),
             };
             condensed.push(CondensedChannel {
                 samples: SampleCurves {
@@ -312,12 +353,14 @@ impl LongRecordReader {
                     middle,
                     spectra,
                     is_screened: screened.curves.refused != recorded.curves.refused,
+                    is_first_half_screened,
                     period_s,
                     lsb: profile.lsb,
                 },
                 counts_per_step: 1,
                 can_show_spikes: false,
-                faster_lines,
+                faster_lines: lines_of(stacked, description.periods),
+                faster_lines_of_first_half: lines_of(stacked_in_first_half, middle),
                 effects: found.filter(|_| is_inertial).collect(),
                 effects_of_first_half: events_of_first_half,
                 screened: left_out,

@@ -15,7 +15,7 @@ use crate::detectors::spikes::{self, SpikeRule};
 use crate::detectors::vibration_rectification::{Acceleration, largest_sensitivity};
 use crate::effects::Effect;
 use crate::effects::findings::{Correction, Detection};
-use crate::parallel::{in_parallel, per_channel};
+use crate::parallel::{self, per_channel};
 use crate::record::condensed_record::CondensedRecord;
 use crate::samples::exclusion::Exclusion;
 use crate::samples::rounding::NEIGHBOURING_COUNTS;
@@ -27,40 +27,39 @@ use measurement::{ChannelId, Measurement, PerChannel, Quantity};
 use std::cell::LazyCell;
 use std::sync::Arc;
 
-/// Sample periods that one channel does not use, in ascending order.
-#[derive(Default)]
-struct ChannelExclusion {
-    knocks: Vec<u64>,
-    spikes: Vec<u64>,
-    /// Both, by the rules of the first half.
-    by_first_half: Vec<u64>,
-}
-
 /// Effects in the samples, and the corrections that remove them.
 pub(crate) struct Preprocessing {
     /// Sample periods of all samples.
     slots: Arc<[u64]>,
+    by_whole: Shown,
+    /// What the first half shows, applied to both halves; `None` where that was not asked for.
+    by_first_half: Option<Shown>,
+    effects: PerChannel<Vec<Effect>>,
+}
+
+/// What the samples of a part of the recording show.
+struct Shown {
     /// How many counts the smallest step of the values of each channel has.
     counts_per_step: PerChannel<u32>,
     /// Sample periods that no channel uses: their sample equals the one before in all channels.
     repeated: Vec<u64>,
-    channels: PerChannel<ChannelPreprocessing>,
+    channels: PerChannel<ShownInChannel>,
 }
 
-/// What was found in the samples of one channel; nothing in one that is not inertial.
+/// What the samples of one channel show; nothing in one that is not inertial.
 #[derive(Default)]
-struct ChannelPreprocessing {
-    effects: Vec<Effect>,
-    exclusion: ChannelExclusion,
-    /// As the first half and as the whole record show it.
-    bias: [ChannelBias; 2],
+struct ShownInChannel {
+    /// Sample periods that the channel does not use, in ascending order.
+    knocks: Vec<u64>,
+    spikes: Vec<u64>,
+    bias: ChannelBias,
 }
 
-/// What changes the bias of a channel, as a part of the recording shows it.
+/// What changes the bias of a channel.
 #[derive(Default, PartialEq)]
 struct ChannelBias {
-    /// The first sample periods from which on offsets are subtracted, and the offsets in the channel's unit.
-    offsets: Vec<(u64, f64)>,
+    /// The first sample period from which on an offset is subtracted, and the offset in the channel's unit.
+    offset: Option<(u64, f64)>,
     has_ramp: bool,
     /// Responses to temperature and vibration that are subtracted.
     responses: Vec<BiasResponse>,
@@ -69,186 +68,265 @@ struct ChannelBias {
 }
 
 impl Preprocessing {
-    /// Looks for knocks, spikes, steps, ramps and sensitivities in the inertial channels.
-    pub(crate) fn detect(record: &CondensedRecord, noise_grids: &NoiseGrids) -> Self {
+    /// Looks for knocks, spikes, steps, ramps and sensitivities in the inertial channels of a record, and in its `first_half` alone. Nothing
+    /// of the second half decides what the first one shows.
+    pub(crate) fn detect(
+        record: &CondensedRecord,
+        first_half: Option<&CondensedRecord>,
+        noise_grids: &NoiseGrids,
+    ) -> Self {
         let measurement = record.means.as_ref();
-        let slots = measurement.slots.as_slice().into();
-        let channels = measurement.ids().map(|_| ChannelPreprocessing::default()).collect();
-        let counts_per_step = record.channels.map(|of| of.counts_per_step);
-        let preprocessing = Self { slots, counts_per_step, repeated: record.repeated.clone(), channels };
-        let series = per_channel(measurement.ids(), |channel| preprocessing.measured(measurement, channel));
-        let middle = measurement.middle();
-        let halves = series.map(|of| of.before(middle));
-        let knocks = KnocksInChannels::find(record, &series, &halves);
-        let once = |series: PerChannel<Series>| series.map(|of| of.clone().without(&record.repeated));
-        let (series, halves) = (once(series), once(halves));
-        // What a channel may depend on, without its own knocks.
-        let quiet: PerChannel<Series> =
-            series.with_ids().map(|(channel, series)| knocks.removed_from(series, channel)).collect();
-        let found = per_channel(measurement.ids(), |channel| {
-            if !record.is_traced(channel) {
-                return ChannelPreprocessing::default();
-            }
-            ChannelPreprocessing::detect(record, channel, (&series, &halves), (&quiet, &knocks), noise_grids)
-        });
-        Self { channels: found, ..preprocessing }
+        let slots: Arc<[u64]> = measurement.slots.as_slice().into();
+        let by_first_half = || {
+            first_half.map(|half| {
+                let middle = measurement.middle();
+                // What is read twice in the second half is no sample of it, whatever the first half shows.
+                let repeated = record.repeated.iter().copied().filter(|slot| *slot >= middle);
+                let repeated = half.repeated.iter().copied().chain(repeated).collect();
+                Shown::by_first_half(record, half, &slots, repeated, noise_grids)
+            })
+        };
+        let by_whole = || Shown::by_whole(record, &slots, noise_grids);
+        let (by_first_half, (by_whole, effects)) = parallel::both(by_first_half, by_whole);
+        Self { slots, by_whole, by_first_half, effects }
+    }
+
+    /// What a part of the record shows; `None` where nothing of it is used, or it was not asked for.
+    fn shown(&self, exclusion: Exclusion) -> Option<&Shown> {
+        if exclusion == Exclusion::ByWhole { Some(&self.by_whole) } else { self.by_first_half.as_ref() }
+    }
+
+    /// What changes the bias of a channel and is subtracted.
+    fn bias(&self, channel: ChannelId, exclusion: Exclusion) -> Option<&ChannelBias> {
+        if exclusion == Exclusion::Nothing { None } else { Some(&self.shown(exclusion)?.channels[channel].bias) }
     }
 
     /// Whether `exclusion` leaves out a sample of a channel, beyond those that were read twice.
     pub(crate) fn excludes(&self, channel: ChannelId, exclusion: Exclusion) -> bool {
-        !self.channels[channel].exclusion.slots(exclusion).is_empty()
+        !self.events(channel, exclusion).is_empty()
+    }
+
+    /// Sample periods of the knocks and spikes that are left out of a channel.
+    fn events(&self, channel: ChannelId, exclusion: Exclusion) -> Vec<u64> {
+        let shown = self.shown(exclusion).filter(|_| !exclusion.keeps_events());
+        shown.map(|shown| shown.channels[channel].events()).unwrap_or_default()
     }
 
     /// Whether the series of a channel is the same for two exclusions.
     pub(crate) fn leaves_the_same(&self, channel: ChannelId, one: Exclusion, other: Exclusion) -> bool {
-        let bias = |exclusion| self.channels[channel].bias(exclusion);
-        let is_same = bias(one).offsets == bias(other).offsets && bias(one).responses == bias(other).responses;
-        is_same && self.excluded(channel, one) == self.excluded(channel, other)
+        let subtracted = |exclusion| {
+            let bias = self.bias(channel, exclusion);
+            (bias.and_then(|of| of.offset), bias.map_or(&[][..], |of| &of.responses))
+        };
+        let is_same = subtracted(one) == subtracted(other);
+        is_same
+            && self.counts_per_step(channel, one) == self.counts_per_step(channel, other)
+            && self.excluded(channel, one) == self.excluded(channel, other)
     }
 
     /// Sample periods that a channel does not use, in ascending order.
     pub(crate) fn excluded(&self, channel: ChannelId, exclusion: Exclusion) -> Vec<u64> {
-        merged([&self.repeated, &self.channels[channel].exclusion.slots(exclusion)])
+        let repeated = self.shown(exclusion).map_or(&[][..], |shown| &shown.repeated);
+        merged([repeated, &self.events(channel, exclusion)])
     }
 
     /// Sample periods of the spikes and knocks of a channel before that of the `middle`, by the rules of the first half.
     pub(crate) fn excluded_events(&self, channel: ChannelId, middle: u64) -> Vec<u64> {
-        let mut slots = self.channels[channel].exclusion.slots(Exclusion::ByFirstHalf);
+        let mut slots = self.events(channel, Exclusion::ByFirstHalf);
         slots.truncate(slots.partition_point(|&slot| slot < middle));
         slots
     }
 
     /// Samples of a channel that arrived and are not used, by cause.
     pub(crate) fn refused(&self, channel: ChannelId) -> impl Iterator<Item = (&'static str, u64)> {
-        let own = &self.channels[channel].exclusion;
-        let causes = [("repeated", &self.repeated), ("knock", &own.knocks), ("spikes", &own.spikes)];
+        let Shown { repeated, channels, .. } = &self.by_whole;
+        let own = &channels[channel];
+        let causes = [("repeated", repeated), ("knock", &own.knocks), ("spikes", &own.spikes)];
         causes.map(|(cause, slots)| (cause, slots.len() as u64)).into_iter().filter(|(_, count)| *count > 0)
     }
 
     /// Whether anything is subtracted from samples of a channel.
     pub(crate) fn corrects(&self, channel: ChannelId, exclusion: Exclusion) -> bool {
-        let bias = self.channels[channel].bias(exclusion);
-        !bias.offsets.is_empty() || !bias.responses.is_empty()
+        self.bias(channel, exclusion).is_some_and(|bias| bias.offset.is_some() || !bias.responses.is_empty())
     }
 
     /// What is subtracted from the sample of the sample period `slot`, in the channel's unit.
     pub(crate) fn offset(&self, channel: ChannelId, exclusion: Exclusion, slot: u64) -> f64 {
-        let bias = self.channels[channel].bias(exclusion);
-        let steps = bias.offsets.iter().filter(|(from, _)| slot >= *from).map(|(_, size)| *size);
-        steps.chain(bias.responses.iter().map(|response| response.bias(slot))).sum()
+        let Some(ChannelBias { offset, responses, .. }) = self.bias(channel, exclusion) else { return 0.0 };
+        let step = offset.iter().filter(|(from, _)| slot >= *from).map(|(_, size)| *size);
+        step.chain(responses.iter().map(|response| response.bias(slot))).sum()
+    }
+
+    /// How many counts the smallest step of the values of a channel has.
+    fn counts_per_step(&self, channel: ChannelId, exclusion: Exclusion) -> u32 {
+        self.shown(exclusion).map_or(1, |shown| shown.counts_per_step[channel])
     }
 
     /// A channel's series as measured, with its resolution.
     pub(crate) fn measured(&self, measurement: &Measurement, channel: ChannelId) -> Series {
-        let series = Series::with_shared_slots(measurement, channel, || Arc::clone(&self.slots));
-        series.with_counts_per_step(self.counts_per_step[channel])
+        measured(measurement, channel, &self.slots, self.by_whole.counts_per_step[channel])
     }
 
     /// A channel's series after preprocessing.
     pub(crate) fn series(&self, measurement: &Measurement, channel: ChannelId, exclusion: Exclusion) -> Series {
-        let mut series = self.measured(measurement, channel);
-        let bias = self.channels[channel].bias(exclusion);
-        for &(from, size) in &bias.offsets {
-            series = series.lowered_from(from, size);
-        }
-        for response in &bias.responses {
-            let values = Arc::make_mut(&mut series.values);
-            values.iter_mut().zip(series.slots.iter()).for_each(|(value, slot)| *value -= response.bias(*slot));
+        let mut series = measured(measurement, channel, &self.slots, self.counts_per_step(channel, exclusion));
+        if let Some(ChannelBias { offset, responses, .. }) = self.bias(channel, exclusion) {
+            if let Some((from, size)) = *offset {
+                series = series.lowered_from(from, size);
+            }
+            for response in responses {
+                let values = Arc::make_mut(&mut series.values);
+                values.iter_mut().zip(series.slots.iter()).for_each(|(value, slot)| *value -= response.bias(*slot));
+            }
         }
         series.without(&self.excluded(channel, exclusion))
     }
 
     /// Whether a ramp was found in a channel, by the first half or by the whole record.
     pub(crate) fn has_ramp(&self, channel: ChannelId, exclusion: Exclusion) -> bool {
-        self.channels[channel].bias(exclusion).has_ramp
+        self.bias(channel, exclusion).is_some_and(|bias| bias.has_ramp)
     }
 
     /// The temperature and supply that a channel depends on, and how much, by the first half or by the whole record.
     pub(crate) fn sensitivities(&self, channel: ChannelId, exclusion: Exclusion) -> &[(ChannelId, BiasSensitivity)] {
-        &self.channels[channel].bias(exclusion).sensitivities
+        self.bias(channel, exclusion).map_or(&[], |bias| &bias.sensitivities)
     }
 
     /// The effects of a channel.
     pub(crate) fn effects(&self, channel: ChannelId) -> &[Effect] {
-        &self.channels[channel].effects
+        &self.effects[channel]
     }
 }
 
-impl ChannelPreprocessing {
-    /// What the samples of `channel` show. `series` and their first `halves` are those of all channels, `quiet` without `knocks`.
-    fn detect(
+/// A channel's series as measured, whose smallest step has so many counts.
+fn measured(measurement: &Measurement, channel: ChannelId, slots: &Arc<[u64]>, counts_per_step: u32) -> Series {
+    let series = Series::with_shared_slots(measurement, channel, || Arc::clone(slots));
+    series.with_counts_per_step(counts_per_step)
+}
+
+/// The series of all channels as measured.
+fn all_measured(
+    measurement: &Measurement,
+    slots: &Arc<[u64]>,
+    counts_per_step: &PerChannel<u32>,
+) -> PerChannel<Series> {
+    per_channel(measurement.ids(), |channel| measured(measurement, channel, slots, counts_per_step[channel]))
+}
+
+impl Shown {
+    /// What the whole record shows, and the effects of each channel.
+    fn by_whole(
         record: &CondensedRecord,
-        channel: ChannelId,
-        (series, halves): (&PerChannel<Series>, &PerChannel<Series>),
-        (quiet, knocks): (&PerChannel<Series>, &KnocksInChannels),
+        slots: &Arc<[u64]>,
+        noise_grids: &NoiseGrids,
+    ) -> (Self, PerChannel<Vec<Effect>>) {
+        let measurement = record.means.as_ref();
+        let counts_per_step = record.channels.map(|of| of.counts_per_step);
+        let series = all_measured(measurement, slots, &counts_per_step);
+        let [loud] = loud_stretches(record, &record.repeated, [&series]);
+        let once = series.map(|of| of.clone().without(&record.repeated));
+        // What a channel may depend on, without its own knocks.
+        let quiet = without_knocks(&once, &loud);
+        let of_channel = |channel: ChannelId| {
+            if !record.is_traced(channel) {
+                return (ShownInChannel::default(), Vec::new());
+            }
+            let LoudStretches { knocks, by_itself } = &loud[channel];
+            let can_show_spikes = record.channels[channel].can_show_spikes;
+            let spikes = can_show_spikes.then(|| spikes::find(&quiet[channel], by_itself)).flatten();
+            let excluded = spikes.as_ref().map(|found| found.excluded().to_vec()).unwrap_or_default();
+            let (bias, found) = bias_of(measurement, channel, (&once, &quiet), &excluded, noise_grids);
+            let BiasChanges { step, ramp, responses, .. } = found;
+            let events = knock_detections(measurement, &loud, &once[channel], channel).into_iter().chain(spikes);
+            let events = events.chain(step).chain(ramp).map(|detection| detection.effect);
+            let effects = responses.iter().map(|of| of.effect.clone()).chain(events).collect();
+            (ShownInChannel { knocks: slots_within(&once[channel], knocks), spikes: excluded, bias }, effects)
+        };
+        let (channels, effects): (Vec<_>, Vec<_>) = per_channel(measurement.ids(), of_channel).into_iter().unzip();
+        let shown = Self { counts_per_step, repeated: record.repeated.clone(), channels: channels.into() };
+        (shown, effects.into())
+    }
+
+    /// What the `first_half` of a record shows, with the knocks and spikes of both halves by its rules, without the samples `repeated`.
+    fn by_first_half(
+        record: &CondensedRecord,
+        first_half: &CondensedRecord,
+        slots: &Arc<[u64]>,
+        repeated: Vec<u64>,
         noise_grids: &NoiseGrids,
     ) -> Self {
         let measurement = record.means.as_ref();
         let middle = measurement.middle();
-        let louder = &knocks.by_whole[channel].by_itself;
-        let can_show_spikes = record.channels[channel].can_show_spikes;
-        let spikes = can_show_spikes.then(|| spikes::find(&quiet[channel], louder)).flatten();
-        let exclusion = ChannelExclusion {
-            spikes: spikes.as_ref().map(|found| found.excluded().to_vec()).unwrap_or_default(),
-            knocks: slots_within(&series[channel], &knocks.by_whole[channel].knocks),
-            by_first_half: excluded_by_first_half(&series[channel], &knocks.by_first_half[channel], middle),
-        };
-        let regressors: Vec<ChannelId> =
-            measurement.ids().filter(|&regressor| may_depend(measurement, channel, regressor)).collect();
-        let others: Vec<&Series> = regressors.iter().map(|&regressor| &quiet[regressor]).collect();
-        // That rounding cannot make of a slow change: any step, where the noise reaches from one count to the next.
-        let smallest_step = LazyCell::new(|| {
-            find_noise_below_count(&series[channel], measurement.profile.dithered_avar_counts2)
-                .map_or(0.0, |_| NEIGHBOURING_COUNTS * series[channel].resolution)
-        });
-        let least_step = || *smallest_step;
-        let forces: Vec<usize> = (0..regressors.len())
-            .filter(|&at| measurement[regressors[at]].profile.quantity == Quantity::SpecificForce)
-            .collect();
-        // The differences, or what follows the force at each frequency, measure a sensitivity to motion better; the slow part of an
-        // accelerometer's signal is its own drift.
-        let is_slow = |regressor: ChannelId| measurement[regressor].profile.quantity.is_environment();
-        let of_part = |own: Series, others: &[&Series], accelerations: &[Acceleration]| {
-            let found = bias::find(&without_lines(own.clone()), others, accelerations, noise_grids, &least_step);
-            let own = offset(&found).into_iter().fold(own, |own, (from, size)| own.lowered_from(from, size));
-            let of_forces: Vec<&Series> = forces.iter().map(|&at| others[at]).collect();
-            let by_force = force_sensitivities(&own, &of_forces);
-            let slow = found.sensitivities.iter().filter(|(at, _)| is_slow(regressors[*at])).copied();
-            let sensitivities = slow.chain(by_force.into_iter().map(|(place, of)| (forces[place], of)));
-            let bias = ChannelBias {
-                offsets: offset(&found).into_iter().collect(),
-                has_ramp: found.ramp.is_some(),
-                responses: found.responses.clone(),
-                sensitivities: sensitivities.map(|(at, of)| (regressors[at], of)).collect(),
+        let counts_per_step = first_half.channels.map(|of| of.counts_per_step);
+        let series = all_measured(measurement, slots, &counts_per_step);
+        let halves = [series.map(|of| of.before(middle)), series.map(|of| of.from(middle))];
+        let loud = loud_stretches(first_half, &repeated, halves.each_ref());
+        let once = halves.map(|half| half.map(|of| of.clone().without(&repeated)));
+        let [quiet, quiet_second] = [0, 1].map(|half| without_knocks(&once[half], &loud[half]));
+        let of_channel = |channel: ChannelId| {
+            if !record.is_traced(channel) {
+                return ShownInChannel::default();
+            }
+            let rule = SpikeRule::fit(&quiet[channel]);
+            let spikes = |series: &Series, loud: &LoudStretches| {
+                rule.as_ref().map(|rule| rule.slots(series, &loud.by_itself)).unwrap_or_default()
             };
-            (bias, found)
+            let of_first = spikes(&quiet[channel], &loud[0][channel]);
+            let (bias, _) = bias_of(measurement, channel, (&once[0], &quiet), &of_first, noise_grids);
+            let knocks = [0, 1].map(|half| slots_within(&once[half][channel], &loud[half][channel].knocks)).concat();
+            let of_second = spikes(&quiet_second[channel], &loud[1][channel]);
+            ShownInChannel { knocks, spikes: [of_first, of_second].concat(), bias }
         };
-        let own = quiet[channel].clone().without(&exclusion.spikes);
-        let (by_whole, whole) = of_part(own, &others, &accelerations(measurement, series, channel));
-        let (by_half, _) = {
-            let quiet = |&of: &ChannelId| {
-                halves[of].clone().without(&slots_within(&halves[of], &knocks.by_first_half[of].knocks))
-            };
-            let others: Vec<Series> = regressors.iter().map(quiet).collect();
-            let others: Vec<&Series> = others.iter().collect();
-            let own = halves[channel].clone().without(&exclusion.by_first_half);
-            of_part(own, &others, &accelerations(measurement, halves, channel))
-        };
-        let mut bias = [by_half, by_whole];
-        // What the second half is compared with has no step that happens in it.
-        bias[0].offsets.extend(offset(&whole).filter(|(from, _)| *from >= middle));
-        let BiasChanges { step, ramp, responses, .. } = whole;
-        let found = knocks.detections(measurement, &series[channel], channel).into_iter();
-        let found = found.chain(spikes).chain(step).chain(ramp).map(|detection| detection.effect);
-        let effects = responses.iter().map(|of| of.effect.clone()).chain(found).collect();
-        Self { effects, exclusion, bias }
+        let channels = per_channel(measurement.ids(), of_channel);
+        Self { counts_per_step, repeated, channels }
     }
+}
 
-    /// What changes the bias, by the whole record or else by its first half.
-    fn bias(&self, exclusion: Exclusion) -> &ChannelBias {
-        let [first_half, whole] = &self.bias;
-        if exclusion == Exclusion::ByWhole { whole } else { first_half }
+impl ShownInChannel {
+    /// Sample periods of its knocks and spikes.
+    fn events(&self) -> Vec<u64> {
+        merged([&self.knocks, &self.spikes])
     }
+}
+
+/// What changes the bias of `channel` in a part of the record, without its spikes: `series` are those of all channels, `quiet` without their
+/// knocks.
+fn bias_of(
+    measurement: &Measurement,
+    channel: ChannelId,
+    (series, quiet): (&PerChannel<Series>, &PerChannel<Series>),
+    spikes: &[u64],
+    noise_grids: &NoiseGrids,
+) -> (ChannelBias, BiasChanges) {
+    let regressors: Vec<ChannelId> =
+        measurement.ids().filter(|&regressor| may_depend(measurement, channel, regressor)).collect();
+    let others: Vec<&Series> = regressors.iter().map(|&regressor| &quiet[regressor]).collect();
+    // That rounding cannot make of a slow change: any step, where the noise reaches from one count to the next.
+    let smallest_step = LazyCell::new(|| {
+        find_noise_below_count(&series[channel], measurement.profile.dithered_avar_counts2)
+            .map_or(0.0, |_| NEIGHBOURING_COUNTS * series[channel].resolution)
+    });
+    let least_step = || *smallest_step;
+    let own = quiet[channel].clone().without(spikes);
+    let accelerations = accelerations(measurement, series, channel);
+    let found = bias::find(&without_lines(own.clone()), &others, &accelerations, noise_grids, &least_step);
+    let own = offset(&found).into_iter().fold(own, |own, (from, size)| own.lowered_from(from, size));
+    // The differences, or what follows the force at each frequency, measure a sensitivity to motion better; the slow part of an
+    // accelerometer's signal is its own drift.
+    let is_force = |at: &usize| measurement[regressors[*at]].profile.quantity == Quantity::SpecificForce;
+    let is_slow = |regressor: ChannelId| measurement[regressor].profile.quantity.is_environment();
+    let forces: Vec<usize> = (0..regressors.len()).filter(is_force).collect();
+    let of_forces: Vec<&Series> = forces.iter().map(|&at| others[at]).collect();
+    let by_force = force_sensitivities(&own, &of_forces);
+    let slow = found.sensitivities.iter().filter(|(at, _)| is_slow(regressors[*at])).copied();
+    let sensitivities = slow.chain(by_force.into_iter().map(|(place, of)| (forces[place], of)));
+    let bias = ChannelBias {
+        offset: offset(&found),
+        has_ramp: found.ramp.is_some(),
+        responses: found.responses.clone(),
+        sensitivities: sensitivities.map(|(at, of)| (regressors[at], of)).collect(),
+    };
+    (bias, found)
 }
 
 /// The first sample period behind a step, and its size.
@@ -259,74 +337,53 @@ fn offset(found: &BiasChanges) -> Option<(u64, f64)> {
     }
 }
 
-impl ChannelExclusion {
-    fn slots(&self, exclusion: Exclusion) -> Vec<u64> {
-        match exclusion {
-            Exclusion::None => Vec::new(),
-            Exclusion::ByFirstHalf => self.by_first_half.clone(),
-            Exclusion::ByWhole => merged([&self.knocks, &self.spikes]),
-        }
-    }
-}
-
-/// The knocks in the inertial channels.
-struct KnocksInChannels {
-    by_whole: PerChannel<LoudStretches>,
-    /// By the rules of the first half, in both halves.
-    by_first_half: PerChannel<LoudStretches>,
-}
-
-impl KnocksInChannels {
-    fn find(record: &CondensedRecord, series: &PerChannel<Series>, halves: &PerChannel<Series>) -> Self {
-        let middle = record.means.as_ref().middle();
-        let second = series.map(|of| of.from(middle));
-        let searches = [(series, vec![series]), (halves, vec![halves, &second])];
-        let mut found = in_parallel(&searches, |(fitted, parts)| loud_stretches(record, fitted, parts)).into_iter();
-        let mut next = || found.next().unwrap_or_else(|| series.map(|_| LoudStretches::default()));
-        Self { by_whole: next(), by_first_half: next() }
-    }
-
-    /// The series of a channel without the knocks of the whole record.
-    fn removed_from(&self, series: &Series, channel: ChannelId) -> Series {
-        let knocks = &self.by_whole[channel].knocks;
+/// The series without the knocks of each channel.
+fn without_knocks(series: &PerChannel<Series>, loud: &PerChannel<LoudStretches>) -> PerChannel<Series> {
+    let of = |(channel, series): (ChannelId, &Series)| {
+        let knocks = &loud[channel].knocks;
         if knocks.is_empty() { series.clone() } else { series.clone().without(&slots_within(series, knocks)) }
-    }
-
-    /// The knocks of a channel as they are reported.
-    fn detections(&self, measurement: &Measurement, series: &Series, channel: ChannelId) -> Vec<Detection> {
-        let detection = |knock: &Knock| {
-            let shows = |others: &LoudStretches| others.knocks.iter().any(|other| other.overlaps(knock));
-            let shown: Vec<&'static str> = self
-                .by_whole
-                .with_ids()
-                .filter(|(_, others)| shows(others))
-                .map(|(of, _)| measurement[of].profile.name)
-                .collect();
-            knock.detection(series, &shown)
-        };
-        self.by_whole[channel].knocks.iter().map(detection).collect()
-    }
+    };
+    series.with_ids().map(of).collect()
 }
 
-/// Where channels are loud in the `parts` of a record, in the order of time, by the rules of the series that are `fitted`; nowhere in one that
-/// is not inertial.
-fn loud_stretches(
+/// The knocks of a channel as they are reported.
+fn knock_detections(
+    measurement: &Measurement,
+    loud: &PerChannel<LoudStretches>,
+    series: &Series,
+    channel: ChannelId,
+) -> Vec<Detection> {
+    let detection = |knock: &Knock| {
+        let shows = |others: &LoudStretches| others.knocks.iter().any(|other| other.overlaps(knock));
+        let shown = loud.with_ids().filter(|(_, others)| shows(others));
+        let shown: Vec<&'static str> = shown.map(|(of, _)| measurement[of].profile.name).collect();
+        knock.detection(series, &shown)
+    };
+    loud[channel].knocks.iter().map(detection).collect()
+}
+
+/// Where channels are loud in each of the `parts` of a record, in the order of time, by the rules of the first part, of which `record` has what
+/// else is known; nowhere in one that is not inertial.
+fn loud_stretches<const PARTS: usize>(
     record: &CondensedRecord,
-    fitted: &PerChannel<Series>,
-    parts: &[&PerChannel<Series>],
-) -> PerChannel<LoudStretches> {
+    repeated: &[u64],
+    parts: [&PerChannel<Series>; PARTS],
+) -> [PerChannel<LoudStretches>; PARTS] {
     let measurement = record.means.as_ref();
     let inertial: Vec<ChannelId> = measurement.inertial().collect();
     let searched = |&of: &ChannelId| SearchedChannel {
-        fitted: &fitted[of],
+        fitted: &parts[0][of],
         parts: parts.iter().map(|part| &part[of]).collect(),
         can_show_spikes: record.channels[of].can_show_spikes,
     };
     let searched: Vec<SearchedChannel> = inertial.iter().map(searched).collect();
-    let found = knock_search::find(&searched, &record.repeated, measurement.profile.dithered_avar_counts2);
-    let mut loud: PerChannel<LoudStretches> = fitted.map(|_| LoudStretches::default());
-    inertial.iter().zip(found).for_each(|(&of, found)| loud[of] = found);
-    loud
+    let found = knock_search::find(&searched, repeated, measurement.profile.dithered_avar_counts2);
+    let mut found = found.into_iter();
+    parts.map(|part| {
+        let mut loud: PerChannel<LoudStretches> = part.map(|_| LoudStretches::default());
+        inertial.iter().zip(found.next().unwrap_or_default()).for_each(|(&of, found)| loud[of] = found);
+        loud
+    })
 }
 
 /// The accelerometers, of which these are the `series`, as what may shake `channel`.
@@ -355,17 +412,6 @@ fn without_lines(series: Series) -> Series {
     let value = |slot: &u64| without.values()[(slot - series.span.start) as usize];
     let values = series.slots.iter().map(value).collect();
     Series { values, ..series }
-}
-
-/// Sample periods within `knocks`, and those of spikes by the rule of the samples before `middle`, in ascending order.
-fn excluded_by_first_half(series: &Series, loud: &LoudStretches, middle: u64) -> Vec<u64> {
-    let LoudStretches { knocks, by_itself } = loud;
-    let loud = slots_within(series, knocks);
-    let quiet = series.clone().without(&loud);
-    let (first, second) = (quiet.before(middle), quiet.from(middle));
-    let spikes =
-        SpikeRule::fit(&first).map(|rule| [rule.slots(&first, by_itself), rule.slots(&second, by_itself)].concat());
-    merged([&loud, &spikes.unwrap_or_default()])
 }
 
 /// Both lists in ascending order, without duplicates.

@@ -33,8 +33,9 @@ pub(crate) struct SampleCurves {
     pub middle: u64,
     /// Spectra of the samples in the parts of `screened`.
     pub spectra: PartSpectra,
-    /// Whether the screen leaves out a sample.
+    /// Whether the screen leaves out a sample, of the whole record and of its first half.
     pub is_screened: bool,
+    pub is_first_half_screened: bool,
     pub period_s: f64,
     /// Size of a count, in the channel's unit.
     pub lsb: f64,
@@ -54,6 +55,7 @@ impl SampleCurves {
             middle: measurement.middle(),
             spectra: PartSpectra::default(),
             is_screened: false,
+            is_first_half_screened: false,
             period_s,
             lsb,
         }
@@ -63,7 +65,13 @@ impl SampleCurves {
     pub(crate) fn of_first_half(&self) -> Self {
         let first = |parts: &Parts| parts.iter().filter(|(start, _)| *start < self.middle).cloned().collect();
         let middle = self.slots_of(0..self.middle / self.samples_per_mean / 2).end;
-        Self { recorded: first(&self.recorded), screened: first(&self.screened), middle, ..self.clone() }
+        Self {
+            recorded: first(&self.recorded),
+            screened: first(&self.screened),
+            is_screened: self.is_first_half_screened,
+            middle,
+            ..self.clone()
+        }
     }
 
     /// Sample periods of some means.
@@ -117,7 +125,7 @@ impl SampleCurves {
     }
 
     fn parts(&self, exclusion: Exclusion) -> &Parts {
-        if exclusion == Exclusion::None { &self.recorded } else { &self.screened }
+        if exclusion.keeps_events() { &self.recorded } else { &self.screened }
     }
 
     fn curve<'p>(&self, parts: impl IntoIterator<Item = &'p (u64, GappedCascade)>) -> Curve<OCTAVES> {

@@ -39,20 +39,24 @@ impl SampleScreen {
         let mut from = 0;
         while from < block.slots.len() {
             let to = (from + TOGETHER - self.held.slots.len()).min(block.slots.len());
-            append(&mut self.held, part(block, from..to));
+            append(&mut self.held, block.part(from..to));
             from = to;
             if self.held.slots.len() == TOGETHER {
                 pass(&self.settle(TOGETHER - REACH));
                 let kept = TOGETHER - 2 * REACH;
-                self.held = part(&self.held, kept..TOGETHER);
+                self.held = self.held.part(kept..TOGETHER);
                 self.settled = REACH;
             }
         }
     }
 
-    /// The samples that are left at the end.
-    pub(crate) fn finish(&mut self) -> SampleBlock {
-        self.settle(self.held.slots.len())
+    /// The samples that are left at the end of a part of the record. What follows has no part in what stands out of them.
+    pub(crate) fn finish_part(&mut self) -> SampleBlock {
+        let end = self.held.slots.len();
+        let settled = self.settle(end);
+        self.held = self.held.part(end..end);
+        self.settled = 0;
+        settled
     }
 
     /// The spikes and knocks of each channel in the first `periods` sample periods of `period_s` s each.
@@ -87,7 +91,7 @@ impl SampleScreen {
 
     /// The samples up to `end` that were not passed on, with those refused that are spikes, of a knock, or repeated.
     fn settle(&mut self, end: usize) -> SampleBlock {
-        let mut settled = part(&self.held, self.settled..end);
+        let mut settled = self.held.part(self.settled..end);
         let numbered: Vec<usize> = (0..self.rules.len()).collect();
         let spikes = in_parallel(&numbered, |&at| {
             let rule = self.rules[at].as_ref()?;
@@ -119,12 +123,6 @@ impl SampleScreen {
         }
         settled
     }
-}
-
-/// Some samples of a block.
-fn part(block: &SampleBlock, positions: Range<usize>) -> SampleBlock {
-    let channels = block.channels.iter().map(|channel| channel.part(positions.clone())).collect();
-    SampleBlock { slots: block.slots[positions].to_vec(), channels }
 }
 
 /// Adds the samples that follow.

@@ -10,14 +10,14 @@ mod spectral_white_noise;
 pub use innovations::Innovations;
 
 use crate::bounds::{BoundedEstimate, Parameter};
-use crate::fit::noise_terms::{is_filter, is_white};
+use crate::fit::noise_terms::{is_filter, is_white, white_noise_of_process};
 pub use crate::fit::sample_coefficients::CoefficientsFrom;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::{Welch, correlation_time};
 use crate::units::{Conversion, GRAVITY, conversions};
 use allan_core::model::FittedTerm;
-use allan_core::term::{MovingAverageFilter, Resonance, Sinusoid};
+use allan_core::term::{MovingAverageFilter, Resonance, Shape, Sinusoid};
 use allan_core::{Model, NoiseTerm};
 use innovations::filter_innovations;
 use navigation::{CALIBRATION_S, IntegratedError, integrated_errors};
@@ -108,14 +108,13 @@ pub struct AssessedModels<'a> {
 }
 
 impl Assessment {
-    /// Assesses the models of the channel whose samples, or means of them, are `series`; of means `samples` has the spectrum of
-    /// the samples and the smallest distance of two of them.
+    /// Assesses the models of the channel whose samples, or means of them, are `series`; those of the second half with what the first half's
+    /// model foretells are `unseen`. Of means `samples` has the spectrum of the samples and the smallest distance of two of them.
     #[must_use]
-    pub fn new(series: &Series, samples: Option<(&Welch, f64)>, models: AssessedModels) -> Self {
+    pub fn new(series: &Series, unseen: &Series, samples: Option<(&Welch, f64)>, models: AssessedModels) -> Self {
         let AssessedModels { refitted, coefficients_from, uncompensated, of_first_half } = models;
         let whole = UniformSeries::from_series(series);
-        let halfway = whole.values().len() / 2;
-        let unseen = UniformSeries::new(whole.sample_period(), whole.values()[halfway..].to_vec());
+        let unseen = UniformSeries::from_series(unseen);
         let markov_time_by_autocorrelation = correlation_time(&whole, &sampled_every(refitted, whole.sample_period()))
             .map(|time| Parameter::new(time.value, time.low, time.high, "s"));
         if !is_known(refitted) {
@@ -130,7 +129,7 @@ impl Assessment {
             }
         };
         Self {
-            coefficients: coefficients(refitted, series.unit),
+            coefficients: coefficients(refitted, series.unit, series.resolution),
             coefficients_note: None,
             coefficients_from,
             drift: drift(&of_series(uncompensated), series.unit, &unseen),
@@ -144,14 +143,19 @@ impl Assessment {
 }
 
 impl Assessment {
-    /// What the model `refitted` of a channel in `unit` says of it, which was fitted to a record of `duration_s` seconds, without the
+    /// What the model `refitted` of a channel in `unit`, with this resolution, says of it, which was fitted to a record of `duration_s` seconds, without the
     /// samples; whether there are any.
-    pub(crate) fn of_model(refitted: &Model, unit: &str, duration_s: f64, has_samples: bool) -> Self {
+    pub(crate) fn of_model(
+        refitted: &Model,
+        (unit, resolution): (&str, f64),
+        duration_s: f64,
+        has_samples: bool,
+    ) -> Self {
         if !is_known(refitted) {
             return Self::unknown(has_samples);
         }
         Self {
-            coefficients: coefficients(refitted, unit),
+            coefficients: coefficients(refitted, unit, resolution),
             record: record_lengths(refitted, duration_s),
             ..Self::default()
         }
@@ -215,15 +219,16 @@ fn is_known(model: &Model) -> bool {
 }
 
 /// The terms of a model with the white noise as one: what passed the filter and what entered after it add up at averaging
-/// times longer than the filter, and their sum is N.
-fn terms_with_one_white_noise(model: &Model) -> Vec<FittedTerm> {
+/// times longer than the filter, and their sum is N; so does a process that stands in the place of white noise in a channel with this `resolution`.
+fn terms_with_one_white_noise(model: &Model, resolution: f64) -> Vec<FittedTerm> {
     let (white, others): (Vec<FittedTerm>, Vec<FittedTerm>) =
         model.terms().iter().copied().partition(|term| is_white(&term.kind));
-    let Some(first) = white.first().copied() else { return others };
-    let parts: Vec<BoundedEstimate> =
-        white.iter().map(|&FittedTerm { value, low, high, .. }| BoundedEstimate { value, low, high }).collect();
+    let of_white = white.iter().map(|&FittedTerm { value, low, high, .. }| BoundedEstimate { value, low, high });
+    let of_processes = others.iter().filter_map(|term| white_noise_of_process(model, term, resolution));
+    let parts: Vec<BoundedEstimate> = of_white.chain(of_processes).collect();
     let BoundedEstimate { value, low, high } = sum_of_white_noise(&parts);
-    std::iter::once(FittedTerm { value, low, high, ..first }).chain(others).collect()
+    let one = FittedTerm { kind: NoiseTerm::AngleRandomWalk, value, low, high, shape: Shape::PowerLaw };
+    (!parts.is_empty()).then_some(one).into_iter().chain(others).collect()
 }
 
 /// N of several white noises that add up, such as what passed a filter and what entered after it: the root of the sum of their
@@ -248,7 +253,7 @@ fn name(kind: &NoiseTerm) -> &'static str {
     }
 }
 
-fn coefficients(model: &Model, unit: &str) -> Vec<Coefficient> {
+fn coefficients(model: &Model, unit: &str, resolution: f64) -> Vec<Coefficient> {
     let rate_hz = 1.0 / model.sample_period();
     let of = |term: &FittedTerm| {
         let (kind, value, low, high) = (name(&term.kind), term.value, term.low, term.high);
@@ -259,7 +264,7 @@ fn coefficients(model: &Model, unit: &str) -> Vec<Coefficient> {
         };
         conversions(kind, unit, rate_hz).into_iter().map(converted)
     };
-    terms_with_one_white_noise(model).iter().flat_map(of).collect()
+    terms_with_one_white_noise(model, resolution).iter().flat_map(of).collect()
 }
 
 fn drift(model: &Model, unit: &str, unseen: &UniformSeries) -> Vec<NavigationDrift> {

@@ -13,10 +13,11 @@ use crate::effects::{
     Unexplained, UnexplainedPlace,
 };
 use crate::fit::channel_fit::ChannelFit;
-use crate::fit::noise_terms::{is_white, line_frequency};
+use crate::fit::noise_terms::{MAX_LOW_PASS_SAMPLES, is_white, line_frequency};
 use crate::fit::traced_model::Addition;
 use crate::rivals::proposal::{ChannelFacts, Origin, Proposal};
 use crate::rivals::slow_drift::ChannelsInCommon;
+use crate::rivals::unexplained::MIN_EXCESS;
 use crate::samples::gapped_cascade::GappedCascade;
 use crate::samples::rounding::{DITHERED_OCTAVES, Rounding};
 use crate::samples::streamed_curves::STEPS_PER_COUNT;
@@ -35,8 +36,6 @@ use std::f64::consts::{PI, SQRT_2};
 /// Frequency of a line, in halves of the sample rate, above which it is one at half of the rate: the search ends one resolution below it.
 const NO_HIGHER: f64 = 1.0 - 1e-9;
 
-/// Longest time constant, in samples, of a Markov process that is named a low-pass filter.
-const MAX_LOW_PASS_SAMPLES: f64 = 64.0;
 /// Upper bound of the bandwidth of a resonance that the curve alone shows, in units of its frequency: a wider one is no band.
 const WIDEST_BAND: f64 = 2.0;
 /// Largest excess kurtosis of a telegraph signal that the curve alone shows, in units of that of two equally frequent levels. A
@@ -87,9 +86,10 @@ pub(crate) fn propose(profile: &SensorProfile, findings: &ChannelFindings) -> (V
     proposals.extend(findings.telegraph.map(of_levels));
     let in_common = |common| Proposal::new(common_mode_effect(common, channel, unit), Origin::CrossSpectra);
     proposals.extend(findings.common.map(in_common));
-    let of_line =
-        |line: &MergedLine| Proposal::new(line_effect(line, fit, unit), Origin::Line { is_slow: line.is_slow() });
-    proposals.extend(lines.unwrap_or_default().iter().map(of_line));
+    let of_line = |line: &MergedLine| {
+        Some(Proposal::new(line_effect(line, fit, unit)?, Origin::Line { is_slow: line.is_slow() }))
+    };
+    proposals.extend(lines.unwrap_or_default().iter().filter_map(of_line));
     (proposals, facts)
 }
 
@@ -412,8 +412,9 @@ fn shared_drift_effect(
     .into()
 }
 
-/// A line of the spectrum beside what `fit` has.
-fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &'static str) -> Effect {
+/// A line of the spectrum beside what `fit` has; `None` of a band without a name by which the deviation changes less than the tolerance of a
+/// scale factor.
+fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &'static str) -> Option<Effect> {
     let model = fit.after();
     if line.shape_p_value < REFUTED {
         return unexplained_band(line, model, BandMismatch::Shape { p_value: line.shape_p_value });
@@ -422,7 +423,7 @@ fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &'static str) -> Effec
         return unexplained_band(line, model, BandMismatch::Curve);
     }
     if let Some(modulation) = &line.modulation {
-        return modulated_line(line, modulation, unit);
+        return Some(modulated_line(line, modulation, unit));
     }
     let frequency_hz = line.frequency.bounds();
     let evidence = |has_width: bool| LineEvidence {
@@ -439,11 +440,11 @@ fn line_effect(line: &MergedLine, fit: &ChannelFit, unit: &'static str) -> Effec
     if matches!(line.kind(), NoiseTerm::Resonance(_)) || line.is_band() {
         let deviation = line.deviation.bounds().in_unit(unit);
         let bandwidth_hz = line.width.bounds();
-        return ResonantLine { frequency_hz, bandwidth_hz, deviation, multiples: None, evidence: evidence(true) }
-            .into();
+        let evidence = evidence(true);
+        return Some(ResonantLine { frequency_hz, bandwidth_hz, deviation, multiples: None, evidence }.into());
     }
     let amplitude = line.deviation.bounds().scaled(SQRT_2).in_unit(unit);
-    SinusoidalLine { frequency_hz, amplitude, multiples: None, evidence: evidence(false) }.into()
+    Some(SinusoidalLine { frequency_hz, amplitude, multiples: None, evidence: evidence(false) }.into())
 }
 
 /// A line whose amplitude or phase changes.
@@ -460,7 +461,7 @@ fn modulated_line(line: &MergedLine, modulation: &Modulation, unit: &'static str
 }
 
 /// A band of the spectrum that stands out of the noise and is no resonance.
-fn unexplained_band(line: &MergedLine, model: &Model, mismatch: BandMismatch) -> Effect {
+fn unexplained_band(line: &MergedLine, model: &Model, mismatch: BandMismatch) -> Option<Effect> {
     let (centre, half) = (line.frequency.value, 0.5 * line.width.value);
     let is_noise = |kind: &NoiseTerm| !matches!(kind, NoiseTerm::Resonance(_) | NoiseTerm::Sinusoid(_));
     let noise = Model::new(model.sample_period(), model.terms().iter().copied().filter(|term| is_noise(&term.kind)));
@@ -469,15 +470,18 @@ fn unexplained_band(line: &MergedLine, model: &Model, mismatch: BandMismatch) ->
     let excess = |times: f64| 100.0 * ((1.0 + times * density / (2.0 * noise.density(centre))).sqrt() - 1.0);
     let relative = NORMAL_975 * 2.0 * line.deviation.error / line.deviation.value;
     let percent = BoundedEstimate::new(excess(1.0), excess((1.0 - relative).max(0.0)), excess(1.0 + relative));
+    if percent.high < 100.0 * MIN_EXCESS {
+        return None;
+    }
     // An interval wider than the share says nothing of it.
     let is_known = percent.high - percent.low <= percent.value;
     let frequency_hz = BoundedEstimate::new(centre, (centre - half).max(0.0), centre + half);
-    Unexplained {
+    let band = Unexplained {
         place: UnexplainedPlace::Frequency(frequency_hz),
         excess_percent: is_known.then_some(percent),
         observation: Observation::Band { width_hz: line.width.value, sigmas: line.statistic.sqrt(), mismatch },
-    }
-    .into()
+    };
+    Some(band.into())
 }
 
 /// Drift that `channel` has in common with others.

@@ -2,7 +2,7 @@
 //! the temperature.
 
 use crate::bounds::BoundedEstimate;
-use crate::distributions::{NORMAL_975, ROUNDING, quantile, upper_tail};
+use crate::distributions::{NORMAL_975, ROUNDING, student_tail, upper_tail};
 use crate::effects::findings::REFUTED;
 use crate::effects::{Observation, Unexplained, UnexplainedPlace};
 use crate::fit::channel_fit::ChannelFit;
@@ -14,7 +14,7 @@ use statrs::function::gamma::{gamma_lr, gamma_ur};
 
 /// Smallest deviation of the Allan deviation that is reported, as a part of it: a sensor's scale factor, in which every
 /// figure is given, has a tolerance of 1 % by the data sheet.
-const MIN_EXCESS: f64 = 0.01;
+pub(super) const MIN_EXCESS: f64 = 0.01;
 /// Degrees of freedom from which the χ² distribution is taken for that of the cube of a normal variable (E. Wilson and M.
 /// Hilferty, PNAS 17, 1931), which is then exact to 10⁻³ of the tail beyond five standard deviations.
 const MANY: f64 = 1e4;
@@ -121,7 +121,7 @@ pub(crate) fn level_by_temperature(series: &Series, temperature: &Series) -> Opt
     // The deviation has half the logarithm of the variance.
     let percent = |slope: f64| 100.0 * (0.5 * slope * (warmest - coldest)).exp_m1();
     let error = ((yy / xx) * (1.0 - explained) / (count - 2.0)).sqrt();
-    let is_shown = explained > LEAST_EXPLAINED && slope.abs() > quantile(0.5 * REFUTED) * error;
+    let is_shown = explained > LEAST_EXPLAINED && 2.0 * student_tail(slope.abs() / error, count - 2.0) < REFUTED;
     if !is_shown || percent(slope.abs()) < LEAST_CHANGE {
         return None;
     }

@@ -1,12 +1,22 @@
-//! Which samples of a recording are left out.
+//! Which samples of a recording are left out, and what is subtracted from the others.
 
-/// Which of the samples that the detectors found are left out. Samples that were read twice always are.
+/// What of a recording is left out and subtracted. Samples that were read twice are always left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Exclusion {
-    /// None.
-    None,
-    /// Knocks and spikes by rules that were fitted to the first half of the record, in both halves.
+    /// Nothing: the recording as it was made.
+    Nothing,
+    /// The steps and responses that the first half shows are subtracted, in both halves; knocks and spikes stay.
+    BiasOfFirstHalf,
+    /// As [`BiasOfFirstHalf`](Self::BiasOfFirstHalf), without the knocks and spikes by rules that were fitted to the first half, in both
+    /// halves.
     ByFirstHalf,
-    /// The knocks and spikes of the whole record.
+    /// What the whole record shows.
     ByWhole,
+}
+
+impl Exclusion {
+    /// Whether knocks and spikes stay.
+    pub(crate) fn keeps_events(self) -> bool {
+        matches!(self, Self::Nothing | Self::BiasOfFirstHalf)
+    }
 }

@@ -24,6 +24,10 @@ const FEWEST_BANDS: usize = 16;
 /// Time constants that are tried: the shortest in blocks, the longest as a fraction of the record.
 const SHORTEST: f64 = 4.0;
 const LONGEST: f64 = 0.5;
+/// Most channels of which all sets with all signs are tried: 36 ways.
+const MOST_TOGETHER: usize = 4;
+/// Ways in which three channels can share a process.
+const WAYS_OF_THREE: f64 = 10.0;
 /// The test whether anything is shared tries only every third time constant.
 const COARSE: usize = 3;
 
@@ -54,22 +58,55 @@ impl CrossSpectra {
         })
     }
 
-    /// The set of two or more channels for which a shared process gains most ln likelihood: its members, and the gain.
+    /// The set of two or more channels for which a shared process gains most ln likelihood: its members, and the gain, less the logarithm of how
+    /// many times as many ways of sharing it were tried as three channels have. Of more than [`MOST_TOGETHER`] channels, the likeliest pair
+    /// grows by the member with which it gains most.
     #[must_use]
     pub(crate) fn most_likely_set(&self) -> Option<(Vec<usize>, f64)> {
-        let sets = (1..1usize << self.channels.len()).filter(|set| set.count_ones() > 1);
-        let gain = |set: usize| {
-            let members: Vec<usize> = (0..self.channels.len()).filter(|member| set >> member & 1 == 1).collect();
+        let count = self.channels.len();
+        let mut tried = 0;
+        let mut gain = |members: Vec<usize>| {
+            tried += signs(&members);
             self.likeliest_signs(&members).map(|(gain, _)| (members, gain))
         };
-        sets.filter_map(gain).max_by(|(_, a), (_, b)| a.total_cmp(b))
+        let mut likeliest =
+            |sets: Vec<Vec<usize>>| sets.into_iter().filter_map(&mut gain).max_by(|(_, a), (_, b)| a.total_cmp(b));
+        let best = if count <= MOST_TOGETHER {
+            let members = |set: usize| (0..count).filter(|member| set >> member & 1 == 1).collect();
+            likeliest((1..1usize << count).filter(|set| set.count_ones() > 1).map(members).collect())
+        } else {
+            let pairs = (0..count).flat_map(|a| (a + 1..count).map(move |b| vec![a, b]));
+            let mut best = likeliest(pairs.collect());
+            while let Some((members, gain)) = &best {
+                let others = (0..count).filter(|other| !members.contains(other));
+                let with = |other: usize| [&members[..], &[other]].concat();
+                let larger = likeliest(others.map(with).collect()).filter(|(_, of)| of > gain);
+                if larger.is_none() {
+                    break;
+                }
+                best = larger;
+            }
+            best
+        };
+        let (mut members, gain) = best?;
+        members.sort_unstable();
+        Some((members, gain - (tried as f64 / WAYS_OF_THREE).max(1.0).ln()))
     }
 
     /// The gain of `members` under the likeliest signs of the shared process, and their bands. The sign of the first member
-    /// is positive.
+    /// is positive. Of more than [`MOST_TOGETHER`] members, each has the sign that is likelier for it and the first one alone.
     fn likeliest_signs(&self, members: &[usize]) -> Option<(f64, Vec<SpectralBand>)> {
-        let signs = (0..1usize << members.len().saturating_sub(1)).map(|negative| negative << 1);
-        let bands = signs.filter_map(|negative| self.bands(members, negative));
+        let of_pair = |(at, &member): (usize, &usize)| {
+            let pair = [members[0], member];
+            let gain = |negative| self.bands(&pair, negative).map_or(f64::NEG_INFINITY, |bands| self.gain(&bands));
+            if gain(2) > gain(0) { 1 << at } else { 0 }
+        };
+        let signs: Vec<usize> = if members.len() <= MOST_TOGETHER {
+            (0..signs(members)).map(|negative| negative << 1).collect()
+        } else {
+            vec![members.iter().enumerate().skip(1).map(of_pair).sum()]
+        };
+        let bands = signs.into_iter().filter_map(|negative| self.bands(members, negative));
         bands.map(|bands| (self.gain(&bands), bands)).max_by(|(a, _), (b, _)| a.total_cmp(b))
     }
 
@@ -131,17 +168,25 @@ impl CrossSpectra {
         time_constants(shortest, LONGEST * self.duration)
     }
 
-    /// Fits N, B, K and processes with this time constant to the bands of the mean followed by those of the differences.
+    /// Fits N, B, K, white noise that the members share, and processes with this time constant to the bands of the mean followed by those of the differences.
     fn fit(&self, bands: &[SpectralBand], time: f64, processes: Processes) -> MarkovFit {
         let basis = |(at, band): (usize, &SpectralBand)| {
             let [white, flicker, walk, process] = shapes(band.frequency, self.period, time);
             let own = if processes.own { process } else { 0.0 };
-            let shared = if processes.shared && at < bands.len() / 2 { process } else { 0.0 };
-            [white, flicker, walk, own, shared]
+            let is_of_mean = at < bands.len() / 2;
+            let shared = if processes.shared && is_of_mean { process } else { 0.0 };
+            // Shared white noise is no drift.
+            let shared_white = if is_of_mean { white } else { 0.0 };
+            [white, flicker, walk, own, shared, shared_white]
         };
         let bases: Vec<[f64; TERMS]> = bands.iter().enumerate().map(basis).collect();
         MarkovFit::new(bands, &bases, time, if processes.shared { SHARED } else { OWN })
     }
+}
+
+/// Signs that a shared process may have in `members`, the first of which has the positive one, as far as they are tried.
+fn signs(members: &[usize]) -> usize {
+    if members.len() <= MOST_TOGETHER { 1 << members.len().saturating_sub(1) } else { 1 }
 }
 
 /// Which Markov processes a fit has.
@@ -199,6 +244,28 @@ mod tests {
         assert!(inside >= 12, "{inside}");
     }
 
+    /// All sets with all signs of twelve channels would be 266,000.
+    #[test]
+    fn many_channels_share_a_process() {
+        let mut random = ChaCha8Rng::seed_from_u64(7);
+        let kept = (-0.1f64 / 20.0).exp();
+        let (mut process, mut channels) = (0.0, [const { Vec::new() }; 12]);
+        for _ in 0..8_000 {
+            let mut normal = || random.sample::<f64, _>(StandardNormal);
+            process = kept * process + 0.4 * (1.0 - kept * kept).sqrt() * normal();
+            for (number, channel) in channels.iter_mut().enumerate() {
+                // Every third channel has nothing of it, and the others with changing signs.
+                let weight = [1.0, -1.0, 0.0][number % 3];
+                channel.push(weight * process + normal());
+            }
+        }
+        let spectra = CrossSpectra::new(&channels.map(|values| UniformSeries::new(0.1, values)), 0.0).unwrap();
+        let (members, gain) = spectra.most_likely_set().unwrap();
+        // The last one adds little to what the others show.
+        assert!(members.iter().all(|member| member % 3 < 2) && members.len() >= 6, "{members:?}");
+        assert!(gain > 50.0, "{gain}");
+    }
+
     #[test]
     fn finds_the_channels_that_share_a_process() {
         let transforms = |seed: u64, weights: [f64; 3]| {
@@ -218,6 +285,20 @@ mod tests {
         assert!(members == [0, 1, 2] && gain > 20.0, "{members:?} {gain}");
         let (members, gain) = transforms(2, [1.0, 0.0, 1.0]).most_likely_set().unwrap();
         assert!(members == [0, 2] && gain > 15.0, "{members:?} {gain}");
+        // White noise that all three have is no drift.
+        for seed in 10..20 {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let mut channels = [const { Vec::new() }; 3];
+            for _ in 0..8_000 {
+                let mut normal = || random.sample::<f64, _>(StandardNormal);
+                let shared = normal();
+                channels.iter_mut().for_each(|channel| channel.push(shared + normal()));
+            }
+            let spectra = CrossSpectra::new(&channels.map(|values| UniformSeries::new(0.1, values)), 0.0).unwrap();
+            let gain = spectra.most_likely_set().unwrap().1;
+            // That of chance, by which a drift is told in one of 5,000.
+            assert!(gain < 11.3, "{seed}: {gain}");
+        }
         // Without a process, and with one in a single channel.
         for (seed, weights) in [(3, [0.0; 3]), (4, [5.0, 0.0, 0.0])] {
             let gain = transforms(seed, weights).most_likely_set().unwrap().1;

@@ -104,7 +104,7 @@ impl CosineSpectrum {
         let fit = |process: Option<&MarkovShape>| {
             let basis = |&place: &usize| {
                 let [white, flicker, walk] = noise[place];
-                [white, flicker, walk, process.map_or(0.0, |process| process.expected[place]), 0.0]
+                [white, flicker, walk, process.map_or(0.0, |process| process.expected[place]), 0.0, 0.0]
             };
             let bases: Vec<[f64; TERMS]> = places.iter().map(basis).collect();
             MarkovFit::new(&shown, &bases, process.map_or(0.0, |process| process.time * self.block_s), OWN)

@@ -166,7 +166,8 @@ impl Spectrogram {
             }
             let levels = levels_of_neighbours(row);
             for (power, level) in row.iter_mut().zip(levels) {
-                *power = if level > 0.0 { (f64::from(*power) / level).min(LARGEST) as f32 } else { 0.0 };
+                // A segment without samples says nothing: each ordinate is what noise has on average.
+                *power = if level > 0.0 { (f64::from(*power) / level).min(LARGEST) as f32 } else { 1.0 };
             }
         }
         Some(Self { rows, means: by_column, size, spacing: 1.0 / ((PADDING * size) as f64 * series.sample_period()) })
@@ -314,6 +315,17 @@ mod tests {
                 assert!((found_hz - expected).abs() < 0.5, "{found:?}");
             }
             assert!(found.passes(0.5 * (frequencies[0] + frequencies[1])) && !found.passes(90.0));
+        }
+    }
+
+    /// A gap of a sixteenth of the record covers segments of every length.
+    #[test]
+    fn a_gap_hides_no_running_frequency() {
+        let mut values = series(4, 0.1, [5.0, 15.0]).values().to_vec();
+        values[SAMPLES / 4..SAMPLES / 4 + SAMPLES / 16].fill(f64::NAN);
+        let found = FrequencyTrack::find(&UniformSeries::new(1.0 / RATE_HZ, values)).expect("clear");
+        for (found_hz, expected) in found.frequencies.into_iter().zip([5.0, 15.0]) {
+            assert!((found_hz - expected).abs() < 0.5, "{found:?}");
         }
     }
 

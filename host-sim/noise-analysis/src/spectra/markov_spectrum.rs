@@ -5,8 +5,8 @@ use super::whittle::{Sign, SpectralBand, fit_mixture, mixture_density};
 use crate::bounds::BoundedEstimate;
 use crate::distributions::NORMAL_975;
 
-/// White, flicker and random-walk noise, a Markov process of each channel's own, and a shared one.
-pub(super) const TERMS: usize = 5;
+/// White, flicker and random-walk noise, a Markov process of each channel's own, a shared one, and shared white noise.
+pub(super) const TERMS: usize = 6;
 pub(super) const OWN: usize = 3;
 pub(super) const SHARED: usize = 4;
 /// Factor from one time constant that is tried to the next.

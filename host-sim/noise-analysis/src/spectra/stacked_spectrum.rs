@@ -13,6 +13,7 @@ use crate::samples::rounding::Rounding;
 use crate::samples::uniform_series::UniformSeries;
 
 /// The mean of the spectra of stretches of equal length.
+#[derive(Clone)]
 pub(crate) struct StackedSpectrum {
     sample_period: f64,
     /// Smallest distance of two values, in the channel's unit.

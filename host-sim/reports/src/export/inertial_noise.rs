@@ -1,7 +1,7 @@
 //! The noise of gyroscopes and accelerometers in SI units, axis by axis.
 
 use super::exported_file::{AxisChoice, ExportError};
-use crate::saved_report::{SavedChannel, SavedParameter, SavedPoint, SavedReport};
+use crate::saved_report::{SavedChannel, SavedParameter, SavedPoint, SavedReport, SavedTerm};
 use allan_core::model::FittedTerm;
 use allan_core::term::Markov;
 use allan_core::{Model, NoiseTerm};
@@ -118,14 +118,15 @@ pub(super) fn gauss_markov(axes: &[AxisNoise<'_>], report: &SavedReport) -> Opti
     gauss_markov::fit(&slow, period)
 }
 
-/// B, K and the Markov process of an axis beside its whole model.
+/// B, K and the Markov process of an axis, unless it stands in the place of white noise, beside its whole model.
 fn slow_noise(axis: &AxisNoise<'_>, period: f64) -> SlowNoise {
     let AxisNoise { channel, to_si, bias_instability, walk, .. } = axis;
     let mut terms = Vec::new();
     for (kind, of) in [(NoiseTerm::BiasInstability, bias_instability), (NoiseTerm::RateRandomWalk, walk)] {
         terms.extend(of.map(|of| FittedTerm::exact(kind, of.estimate)));
     }
-    for term in channel.refitted.terms.iter().filter(|term| term.kind == "markov") {
+    let is_slow = |term: &&SavedTerm| term.kind == "markov" && !term.is_in_place_of_white_noise();
+    for term in channel.refitted.terms.iter().filter(is_slow) {
         if let (Some(deviation), Some(time)) = (term.parameters.get("deviation"), term.parameters.get("time_constant"))
         {
             let kind = NoiseTerm::Markov(Markov { time_constant: time.value });

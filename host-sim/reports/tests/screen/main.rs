@@ -276,6 +276,9 @@ fn departures_at_one_place_are_told_together() {
     report.findings[2] = in_channel("gyro_z", 2.1);
     let told = reports::summary::unexplained(&report);
     assert_eq!(told[1..], ["gyro z: σ is 2.1 % above the model at averaging times around 1.2 ms"]);
+    // Two signs of one departure are told once.
+    report.findings = vec![in_channel("gyro_x", -3.6), in_channel("gyro_x", -3.7)];
+    assert_eq!(reports::summary::unexplained(&report).len(), 1);
 }
 
 /// What a record may not tell of the part's clock and filter.
@@ -391,6 +394,11 @@ fn a_record_too_short_for_a_model_says_what_it_is_good_for() {
     );
     assert!(told(&short([[0.0; 3]; 2])).ends_with("5.0 s: too short for N, B, K and a filter."));
     assert!(reports::summary::nothing_found(&rough).contains("strong effects only"));
+    // What a model contradicts is not nothing.
+    let mut contradicted = rough.clone();
+    let error = &mut contradicted.channels[0].after.unseen;
+    (error.worst_sigma, error.worst_tau_s, error.worst_ratio) = (Some(46.0), Some(0.01), Some(1.3));
+    assert!(reports::summary::nothing_found(&contradicted).contains("do not describe every channel"));
     assert_eq!(reports::summary::next_steps(&rough), ["For a filter: record at rest for hours."]);
 }
 
