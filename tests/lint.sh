@@ -1,7 +1,8 @@
-#!/bin/sh
+#!/usr/bin/env bash
 # Cargo calls this in the place of rustc for the crates of the workspace (RUSTC_WORKSPACE_WRAPPER): clippy reads the crate first, and only what
 # it has nothing to say about is compiled. So the dependencies are compiled once for lints and tests, and clippy, which switches off
 # optimisations of its own process, does not make the program.
+# In bash: dash drops variables such as CARGO_BIN_EXE_host-sim.
 set -eu
 rustc=$1
 shift

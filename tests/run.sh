@@ -164,8 +164,8 @@ recordings() {
 }
 
 clock() { printf '%02d:%02d' $((SECONDS / 60)) $((SECONDS % 60)); }
-# Seconds of the processor of all processes that have ended, in user and in system mode.
-processor() { times | awk 'NR == 2 { split($0, part, /[ms ]+/); printf "%.0f", 60 * (part[1] + part[3]) + part[2] + part[4] }'; }
+# Seconds of the processor, in user and in system mode, of all processes that have ended (proc(5): cutime, cstime).
+processor() { awk -v hz="$(getconf CLK_TCK)" '{ sub(/.*\) /, ""); printf "%.0f", ($14 + $15) / hz }' "/proc/$$/stat"; }
 row() { table+=$(printf '%6d s %6d s  %s' $((SECONDS - began)) $(($(processor) - worked)) "$title$1")$'\n'; }
 # Prints the seconds of each step, the skipped tests, and the totals of all test runs.
 conclude() {

@@ -1,10 +1,9 @@
 //! Regression on covariates, on simulated channels with known sensitivities.
 
-
+use crate::simulation::{Noise, PERIOD};
 use allan_core::regression::{CovarianceCurve, Covariate, CovariateRegression, Sensitivity};
 use allan_core::term::{Markov, NoiseTerm};
 use allan_core::{Cascade, Coupling, Curve};
-use crate::simulation::{Noise, PERIOD};
 
 const OCTAVES: usize = 18;
 const SAMPLES: usize = 1 << 16;

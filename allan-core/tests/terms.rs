@@ -1,11 +1,10 @@
 //! Every term: its Allan variance against the integral of its spectrum, its autocovariance and simulation.
 
-
-use allan_core::term::{MovingAverageFilter, NoiseTerm, Resonance, Sinusoid};
-use allan_core::{Model, model::FittedTerm};
 use crate::simulation::{
     LOW_PASS, MARKOV, Noise, PERIOD, RESONANCE, autocovariance, curve, impulse_response, noises, stationary,
 };
+use allan_core::term::{MovingAverageFilter, NoiseTerm, Resonance, Sinusoid};
+use allan_core::{Model, model::FittedTerm};
 use std::f64::consts::PI;
 
 const FACTORS: [u64; 8] = [1, 2, 3, 4, 8, 33, 128, 1024];

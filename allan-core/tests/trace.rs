@@ -1,13 +1,12 @@
 //! The trace on simulated noise of known composition: no term is added to complete models, and missing terms are added with
 //! the correct name and size.
 
-
+use crate::simulation::{Noise, curve, impulse_response, telegraph_signal};
 use allan_core::fit::fit_shapes;
 use allan_core::model::FittedTerm;
 use allan_core::term::{Markov, MovingAverageFilter, NoiseTerm, Resonance, Shape, Sinusoid};
 use allan_core::trace::{LineCandidates, Trace, trace};
 use allan_core::{Model, telegraph};
-use crate::simulation::{Noise, curve, impulse_response, telegraph_signal};
 
 const SAMPLES: usize = 1 << 17;
 /// Starting shapes of a sensor with Bartlett windows of 2 to 64 taps, or with one of 8 taps that is read at a lower rate.

@@ -5,9 +5,7 @@
 
 mod sensors;
 
-pub use sensors::{
-    EPOCH_S, LINE_HZ, RATE_HZ, SENSITIVITY, STEP_G, Sensor, four_effects, warming_part,
-};
+pub use sensors::{EPOCH_S, LINE_HZ, RATE_HZ, SENSITIVITY, STEP_G, Sensor, four_effects, warming_part};
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -67,4 +67,3 @@ pub fn four_effects() -> Vec<InjectedEffect> {
         step(1.5 * EPOCH_S),
     ]
 }
-

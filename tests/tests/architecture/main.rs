@@ -203,8 +203,9 @@ fn files_outside_of_the_suite(folder: &Path) -> Vec<PathBuf> {
 #[test]
 fn every_test_of_a_crate_is_in_its_suite() {
     let manifests = packages().into_iter().filter_map(|package| package.roots.into_iter().next());
-    let folders: BTreeSet<PathBuf> =
-        manifests.flat_map(|root| root.ancestors().skip(1).take(3).map(|folder| folder.join("tests")).collect::<Vec<_>>()).collect();
+    let folders: BTreeSet<PathBuf> = manifests
+        .flat_map(|root| root.ancestors().skip(1).take(3).map(|folder| folder.join("tests")).collect::<Vec<_>>())
+        .collect();
     assert!(folders.iter().filter(|folder| folder.join("suite.rs").is_file()).count() > 9);
     let outside: Vec<PathBuf> = folders.iter().flat_map(|folder| files_outside_of_the_suite(folder)).collect();
     assert_eq!(outside, [""; 0].map(PathBuf::from));

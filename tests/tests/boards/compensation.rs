@@ -5,7 +5,9 @@ use super::bench::{assert_stack_suffices, feather_image, image, run};
 use super::decoded::Decoded;
 use super::epochs::{SENTENCES, assert_told, learned_on_device, learned_on_host};
 use adis16405_driver::Channel;
-use emulation::{EPOCH_S, Event, FEATHER, H405, LINE_HZ, Outcome, RATE_HZ, SENSITIVITY, STEP_G, Scenario, Sensor, Wiring};
+use emulation::{
+    EPOCH_S, Event, FEATHER, H405, LINE_HZ, Outcome, RATE_HZ, SENSITIVITY, STEP_G, Scenario, Sensor, Wiring,
+};
 use firmware::CHANNELS;
 use link::{
     Decoder, LearnedMessage, Message, Received, ReportedDeviations, ReportedParameter, ReportedTerm, ValidationMessage,

@@ -2,8 +2,8 @@
 
 use super::images;
 use link::Health;
-use system_tests::image_folder;
 use std::path::Path;
+use system_tests::image_folder;
 
 /// The sizes of a board's memory in bytes: flash, and RAM beside the stack.
 #[derive(Debug, Clone, Copy)]

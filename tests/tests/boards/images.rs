@@ -13,12 +13,7 @@ pub(crate) fn build(board: &str, target: &str, further: &[&str]) -> PathBuf {
 
 /// Builds the program of a package for a target, with further arguments of cargo, and returns the path of a copy of its ELF with the
 /// name `copy`.
-pub(crate) fn build_package(
-    (package, program): (&str, &str),
-    target: &str,
-    arguments: &[&str],
-    copy: &str,
-) -> PathBuf {
+pub(crate) fn build_package((package, program): (&str, &str), target: &str, arguments: &[&str], copy: &str) -> PathBuf {
     Image { package, program, target, profile: "image", arguments, variable: None }.build(copy)
 }
 

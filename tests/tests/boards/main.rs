@@ -14,9 +14,9 @@ mod probe;
 mod sampling_path;
 mod wiring;
 
-use adis16405_driver::GyroRange;
 use self::bench::{image, run};
 use self::decoded::{Decoded, on_host};
+use adis16405_driver::GyroRange;
 use emulation::{Outcome, SCK_HZ, Scenario, Sensor};
 use firmware::CHANNELS;
 use link::{Boot, BootCause, DecoderCounters, Hello, Message};

@@ -3,11 +3,11 @@
 
 mod bench;
 
-use adis16405_driver::Burst;
-use bench::{Event, Fault, Outcome, Pico, SOUND, run, run_example, run_to_measure};
 use super::costs::{Costs, Memory, assert_within_budget, counter};
 use super::decoded::{Decoded, on_host};
 use super::epochs::{SENTENCES, assert_told, learned_on_device, learned_on_host};
+use adis16405_driver::Burst;
+use bench::{Event, Fault, Outcome, Pico, SOUND, run, run_example, run_to_measure};
 use emulation::{EPOCH_S, RATE_HZ, four_effects, warming_part};
 use virtual_sensor::{NoiseModel, VirtualAdis16405};
 

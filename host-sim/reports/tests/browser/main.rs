@@ -1,7 +1,6 @@
 //! The page in headless Chromium: what is drawn against the report, both colour schemes, two widths, the keyboard, and that nothing
 //! is requested. Where there is no Chromium the tests say so and pass.
 
-
 use crate::fixture;
 use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::effects::{

@@ -1,6 +1,5 @@
 //! The live screen on a terminal in memory.
 
-
 use crate::fixture;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;

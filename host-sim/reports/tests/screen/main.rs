@@ -1,8 +1,8 @@
 //! The screen of a report whose numbers are known, against the files beside this one. After a change that is meant, delete the file,
 //! run the test, and read what it wrote.
 
-
 use crate::fixture;
+use crate::phrases::{documentation, phrases};
 use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::effects::{
     CurveEvidence, Effect, LineEvidence, LineSource, MotionInterval, MotionScale, NoisyInterval, Observation,
@@ -10,7 +10,6 @@ use noise_analysis::effects::{
 };
 use noise_analysis::report::assessment::RecordLength;
 use noise_analysis::report::{BiasOverTime, ChannelReport, Finding, PartNote, Report, Stretch, Validation};
-use crate::phrases::{documentation, phrases};
 use reports::terminal::{MOST_LINES, Screen};
 use std::collections::BTreeMap;
 use std::path::Path;

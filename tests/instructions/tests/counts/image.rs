@@ -95,7 +95,8 @@ impl Counts {
 
 fn build(target: &str, image: &str) -> PathBuf {
     let arguments = &["--features", "on-target"];
-    let image = Image { package: "instruction-counts", program: image, target, profile: "counted", arguments, variable: None };
+    let image =
+        Image { package: "instruction-counts", program: image, target, profile: "counted", arguments, variable: None };
     image.build(&format!("counted-{}-{target}", image.program))
 }
 

@@ -1,7 +1,6 @@
 //! The image in rp2040js under Node.js, with the virtual sensor on its bus, in the emulator's time.
 
 use super::super::images;
-use system_tests::{image_folder, workspace};
 use adis16405_driver::BURST_BYTES;
 use image_file::uf2;
 use std::collections::VecDeque;
@@ -9,6 +8,7 @@ use std::io::{Read, Write};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
+use system_tests::{image_folder, workspace};
 use virtual_sensor::VirtualAdis16405;
 
 /// Paths of rp2040js and of the image, as ELF and as UF2.

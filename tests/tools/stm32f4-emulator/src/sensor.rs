@@ -73,7 +73,8 @@ impl spi::Peer for Sensor {
         if let Some(last) = self.last_byte.replace(now) {
             self.record.shortest_byte_ns = self.record.shortest_byte_ns.min(now - last);
             if self.frame.len().is_multiple_of(2) {
-                self.record.shortest_gap_ns = self.record.shortest_gap_ns.min((now - last).saturating_sub(self.byte_ns));
+                self.record.shortest_gap_ns =
+                    self.record.shortest_gap_ns.min((now - last).saturating_sub(self.byte_ns));
             }
         }
         self.record.odd_words += u64::from(bits != 8);
