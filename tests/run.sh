@@ -19,8 +19,6 @@ mkdir -p "${CARGO_TARGET_DIR:-target}"
 TARGET=$(realpath "${CARGO_TARGET_DIR:-target}")
 WITHOUT_RECORDINGS=$TARGET/tests-without-recordings # names of tests, one a line
 WORKSPACES=(. tests/tools adis16405-driver/examples-stm32f405 allan-core/examples-cortex-m)
-# The crates whose documentation has tests.
-LIBRARIES=(--package adis16405-driver --package allan-core)
 STEPS=(
     "tools:install what is missing"
     "format:formatting"
@@ -135,8 +133,8 @@ examples() { # two workspaces with the same frameworks, which are compiled once
     done
 }
 documentation() {
-    RUSTDOCFLAGS="-D warnings" run cargo doc --no-deps "${FEATURES[@]/--workspace/--quiet}" "${LIBRARIES[@]}"
-    run cargo test --doc "${FEATURES[@]/--workspace/--quiet}" "${LIBRARIES[@]}" 2>&1 | tee -a "$log"
+    RUSTDOCFLAGS="-D warnings" run cargo doc --quiet --locked --no-deps --package adis16405-driver --package allan-core --all-features
+    run cargo test --quiet --doc "${FEATURES[@]}" 2>&1 | tee -a "$log"
 }
 dependencies() {
     local workspace
