@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -80,11 +81,18 @@ def test_ctrl_c_ends_a_push_and_nothing_is_added(ctrl_c: Callable[[], None]) -> 
     cascade = allan_core.Cascade()
     cascade.push([1, 2, 3])
     long = np.broadcast_to(np.int32(5), (1 << 32,))  # no memory, some ten seconds
-    timer = threading.Timer(0.3, ctrl_c)
-    timer.start()
+    main = threading.get_ident()
+
+    def interrupt() -> None:
+        while sys._current_frames()[main].f_code.co_name != "_push":
+            time.sleep(1e-3)
+        ctrl_c()
+
+    thread = threading.Thread(target=interrupt, daemon=True)
+    thread.start()
     with pytest.raises(KeyboardInterrupt):
         cascade.push(long)
-    timer.join()
+    thread.join()
     assert len(cascade) == 3
 
 

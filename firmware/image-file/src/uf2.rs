@@ -107,10 +107,8 @@ mod tests {
 
     #[test]
     fn segments_that_overlap_or_do_not_fit_are_refused_at_once() {
-        let began = std::time::Instant::now();
-        assert_eq!(from_elf(&repeated(2000, 0x1000_0000, 4 << 20)), Err(ImageError::Overlap(0x1000_0000)));
-        // Copying 8 GB byte by byte takes a minute.
-        assert!(began.elapsed().as_secs() < 10, "{:?}", began.elapsed());
+        // Copying 250 GB byte by byte would take half an hour.
+        assert_eq!(from_elf(&repeated(60_000, 0x1000_0000, 4 << 20)), Err(ImageError::Overlap(0x1000_0000)));
         assert_eq!(from_elf(&elf(0x10FF_FFFE, &[1, 2, 3])), Err(ImageError::BeyondFlash(0x10FF_FFFE)));
         assert!(from_elf(&elf(0x10FF_FFFD, &[1, 2, 3])).is_ok());
     }

@@ -3,6 +3,7 @@
 mod consistency;
 mod findings;
 mod first_half;
+mod first_order_filter;
 mod gaps;
 mod hidden_beside;
 mod long_record;

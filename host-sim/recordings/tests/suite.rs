@@ -3,5 +3,7 @@
 mod clocks;
 mod coarse_stamps;
 mod other_formats;
+#[path = "reading/main.rs"]
+mod reading;
 mod serial;
 mod time_base;

@@ -2,6 +2,8 @@
 
 #[path = "browser/main.rs"]
 mod browser;
+#[path = "exports/main.rs"]
+mod exports;
 #[path = "rendering/fixture.rs"]
 mod fixture;
 #[path = "live/main.rs"]

@@ -7,5 +7,6 @@ mod epochs;
 mod fault_grid;
 mod faults;
 mod refused_bursts;
+mod replayed_files;
 mod settling;
 mod week;

@@ -1,4 +1,4 @@
-//! `simulate` and `convert`: what is described is in the file, and another format has the same samples.
+//! `simulate`, `convert` and `export`: what is described is in the file, and another format has the same samples.
 
 use crate::program::{host_sim, json_of};
 use serde_json::Value;
@@ -98,71 +98,42 @@ fn every_format_has_the_same_samples() {
     );
 }
 
-/// The format of NumPy: magic, version, length of the header, header, doubles in the order of the rows.
+/// A part that is converted is the table of its rows; of an array, the names of the columns are told.
 #[test]
-fn an_array_is_in_si_units() {
+fn a_part_is_converted_and_an_array_says_its_columns() {
     let dir = tempdir().expect("a folder");
-    let [table, array] = ["a.csv", "a.npy"].map(|name| path(&dir, name));
-    run(&["simulate", &table, "--seconds", "2"]);
+    let [table, part, array] = ["rows.csv", "part.csv", "part.npy"].map(|name| path(&dir, name));
+    let rows: String = (0..3000).map(|row| format!("{}.{:02},{}\n", row / 100, row % 100, row * 7919 % 41)).collect();
+    std::fs::write(&table, format!("time_s,gyro_x [dps]\n{rows}")).expect("written");
+    run(&["convert", &table, &part, "--from", "5", "--to", "10", "--format", "table"]);
+    let expected: Vec<String> = (500..1000).map(|row| (row * 7919 % 41).to_string()).collect();
+    assert_eq!(counts(Path::new(&part)), expected);
     let notes = run(&["convert", &table, &array]);
-    assert!(notes.contains("time_s, supply_V, gyro_x_rad_s, "), "{notes}");
-    let bytes = std::fs::read(&array).expect("an array");
-    assert_eq!(&bytes[..6], b"\x93NUMPY");
-    let header = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    let text = String::from_utf8_lossy(&bytes[10..header]).into_owned();
-    assert!(text.contains("'<f8'") && text.contains("(410, 13"), "{text}");
-    let value = |row: usize, column: usize| {
-        let at = header + 8 * (13 * row + column);
-        f64::from_le_bytes(bytes[at..at + 8].try_into().expect("eight bytes"))
-    };
-    for (row, line) in counts(Path::new(&table)).iter().enumerate() {
-        let gyro_x: f64 = line.split(',').nth(1).and_then(|word| word.parse().ok()).expect("a count");
-        assert!((value(row, 2) - (gyro_x * 0.05).to_radians()).abs() < 1e-12, "row {row}");
-    }
+    assert!(notes.contains("time_s, gyro_x_rad_s"), "{notes}");
+    assert!(std::fs::read(&array).expect("an array").starts_with(b"\x93NUMPY"));
 }
 
+/// The noise of a report, whether the analysis writes it or `export`; what the format wants and the report lacks is told.
 #[test]
-fn what_cannot_be_simulated_or_converted_is_refused_before_anything_is_written() {
+fn a_report_is_exported() {
     let dir = tempdir().expect("a folder");
-    let out = path(&dir, "x.csv");
-    for (arguments, expected) in [
-        (&["--effect", "hum:gyro_x:amplitude=1"][..], "--effect: `hum` is none of"),
-        (&["--gyro", "1,2"], "gyro: `1,2` is not N,B,K"),
-        (&["--taps", "3"], "taps: `3` is not 1, 2, 4"),
-        (&["--range", "75", "--taps", "1"], "configuration refused"),
-        (&["--seconds", "0"], "duration must be positive"),
-        (&["--rate", "nan"], "configuration refused"),
-        (&["--fault", "stale:from=1"], "--fault: stale needs bursts"),
-    ] {
-        let output = host_sim(&[&["simulate", &out], arguments].concat());
-        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(!output.status.success() && errors.contains(expected), "{arguments:?}: {errors}");
-        assert!(!Path::new(&out).exists());
-    }
-    std::fs::write(&out, "gyro_x_counts\n1\n2\n").expect("written");
-    let output = host_sim(&["convert", &out, &path(&dir, "y.csv"), "--format", "frames"]);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("sample 0 has no time"));
-    let output = host_sim(&["convert", &out, &out]);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("it would be overwritten"));
+    let [report, first, second, never] = ["report.json", "a.yaml", "b.yaml", "never"].map(|name| path(&dir, name));
+    let table = crate::program::counts(&dir);
+    let table = table.to_str().expect("UTF-8");
+    let lacks = "no accelerometer_random_walk: the report has no channel with it";
+    let notes = run(&["analyze", table, "--quiet", "--json", &report, "--export", &format!("kalibr={first}")]);
+    assert!(notes.contains(lacks), "{notes}");
+    let notes = run(&["export", "--format", "kalibr", &report, &second]);
+    assert!(notes.contains(lacks), "{notes}");
+    let [first, second] = [first, second].map(|file| std::fs::read_to_string(file).expect("a file"));
+    assert_eq!(first, second);
+    let output = host_sim(&["export", "--format", "gtsam", &report, &never]);
+    let error = crate::program::error_line(&output);
+    assert!(error.contains("gyro_y is not in the report") && !Path::new(&never).exists(), "{error}");
 }
 
 #[test]
-fn options_are_those_that_a_subcommand_uses() {
-    for arguments in [
-        &["monitor", "p", "--page", "d"][..],
-        &["replay", "a", "--sensor", "generic"],
-        &["replay", "a", "--columns", "gyro_x=0"],
-        &["replay", "a", "--topic", "t"],
-        &["compare", "a", "b", "--page", "d"],
-    ] {
-        let output = host_sim(arguments);
-        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.code() == Some(2) && errors.contains("unexpected argument"), "{arguments:?}: {errors}");
-    }
-    let output = host_sim(&["convert", "a", "b", "--rate", "100"]);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("--rate says where --from and --to are"));
-    let output = host_sim(&["--seed", "3", "analyze", "x.csv"]);
-    assert_eq!(output.status.code(), Some(2), "options of the simulation before a subcommand would be ignored");
+fn completions_know_the_subcommands() {
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
         let output = host_sim(&["completions", shell]);
         assert!(output.status.success() && String::from_utf8_lossy(&output.stdout).contains("simulate"), "{shell}");

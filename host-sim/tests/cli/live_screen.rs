@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 /// The sequences by which a terminal enters and leaves its alternate screen.
 const ENTER: &str = "\u{1b}[?1049h";
 const LEAVE: &str = "\u{1b}[?1049l";
-/// The longest that a test waits for something to appear.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// Bound of a test that hangs; no result depends on it.
+const PATIENCE: Duration = Duration::from_secs(120);
 
 /// White noise of 30 s at 100 Hz in three gyros, made by a linear congruential generator with a fixed seed.
 fn table() -> Vec<u8> {
@@ -71,12 +71,17 @@ impl Session {
         Self { near, far, program, seen: String::new(), before }
     }
 
-    fn read(&mut self) {
+    /// Reads what there is; whether anything was.
+    fn read(&mut self) -> bool {
         let mut bytes = [0; 4096];
         match self.near.read(&mut bytes) {
             Ok(count) => self.seen += &String::from_utf8_lossy(&bytes[..count]),
-            Err(error) => assert_eq!(error.kind(), ErrorKind::TimedOut),
+            Err(error) => {
+                assert_eq!(error.kind(), ErrorKind::TimedOut);
+                return false;
+            }
         }
+        true
     }
 
     /// Waits for a text of the screen, or for a control sequence.
@@ -102,7 +107,8 @@ impl Session {
             }
             assert!(begun.elapsed() < PATIENCE, "no end: {:?}", self.seen);
         };
-        self.read();
+        // A program that has ended sends nothing more.
+        while self.read() {}
         let restored = settings(&self.far.name().expect("a name")) == self.before && self.seen.contains(LEAVE);
         (status, restored, std::mem::take(&mut self.seen))
     }
@@ -197,14 +203,4 @@ fn over_a_pipe_a_replay_prints_lines() {
         assert!(lines[0].contains("gyro x, N ") && lines[0].contains("°/√h"), "{}", lines[0]);
     }
     assert!(text.contains("What was found"), "{text}");
-}
-
-#[test]
-fn a_speed_that_is_none_is_refused() {
-    for speed in ["0", "-1", "inf", "fast"] {
-        let output = host_sim(&["monitor", "still.csv", &format!("--speed={speed}")]);
-        assert!(!output.status.success());
-        let error = String::from_utf8_lossy(&output.stderr);
-        assert!(error.contains("neither a positive number nor max"), "{error}");
-    }
 }

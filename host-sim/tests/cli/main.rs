@@ -1,20 +1,17 @@
-//! The command `host-sim`: its help, input errors, what is in a file, damaged input, equal reports of the ways to read a recording, simulated and measured recordings,
-//! exports, conversions, the live screen, quick reports, reports of many files, and a device on a serial port.
+//! The command `host-sim`: its help, exit codes, streams and signals, the files that it writes, the live screen, and a device on a serial port;
+//! each verb once. What is read of a file is tested in `recordings`, what a report says in `reports`.
 
 mod analyze_and_replay;
 mod convert_and_simulate;
-mod damaged_input;
 mod documented_options;
-mod exports;
-mod formats;
+mod exit_codes;
 mod help;
-mod input_errors;
 mod inspection;
 mod live_screen;
 mod many_and_interrupted;
 mod measured_recordings;
-mod other_recordings;
 mod outputs;
+mod pipes;
 mod program;
 mod quick_report;
 mod reading_limits;
@@ -24,6 +21,4 @@ mod serial_device;
 mod serial_faults;
 mod several_recordings;
 mod simulated_sensor;
-mod stretches;
-mod text_formats;
 mod walkthrough;

@@ -1,13 +1,11 @@
 //! `analyze --reports` of many files, and the interruption of the reading.
 
-use crate::program::{host_sim, json_of, write};
+use crate::program::{host_sim, json_of, signal, wait_until, write};
 use serde_json::Value;
-use std::fs::{File, OpenOptions};
-use std::io::Write;
+use std::fs::{self, File, OpenOptions};
+use std::io::{Read, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::thread;
-use std::time::Duration;
 use tempfile::tempdir;
 
 /// White noise of 50 s at 100 Hz in one gyro, made by a linear congruential generator.
@@ -68,12 +66,13 @@ fn reports_of_one_name_are_refused_before_any_work() {
     assert!(String::from_utf8_lossy(&output.stderr).contains("--reports"));
 }
 
-/// The program with a named pipe as its recording, and the open end of the pipe to write to.
-fn reading(pipe: &Path, arguments: &[&str]) -> (Child, File) {
+/// The program with a named pipe as its recording, which it copies into the folder `copies`, and the open end of the pipe to write to.
+fn reading(pipe: &Path, copies: &Path, arguments: &[&str]) -> (Child, File) {
     assert!(Command::new("mkfifo").arg(pipe).status().expect("mkfifo starts").success());
     let program = Command::new(env!("CARGO_BIN_EXE_host-sim"))
         .args(["analyze", text(pipe), "--rate", "100"])
         .args(arguments)
+        .env("TMPDIR", copies)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -83,21 +82,22 @@ fn reading(pipe: &Path, arguments: &[&str]) -> (Child, File) {
     (program, OpenOptions::new().write(true).open(pipe).expect("the pipe"))
 }
 
-fn interrupt(program: &Child) {
-    assert!(Command::new("kill").args(["-INT", &program.id().to_string()]).status().expect("kill starts").success());
-}
-
 #[test]
 fn an_interrupt_while_a_pipe_is_read_gives_the_report_of_what_came() {
     for (number, quick) in [&["--json", "-"][..], &["--json", "-", "--quick"]].into_iter().enumerate() {
         let dir = tempdir().expect("a folder");
-        let (program, mut pipe) = reading(&dir.path().join(format!("pipe{number}")), quick);
+        let copies = dir.path().join("copies");
+        fs::create_dir(&copies).expect("a folder");
+        let (program, mut pipe) = reading(&dir.path().join(format!("pipe{number}")), &copies, quick);
         // Ten times what a pipe holds, and a row that is not complete.
         let table = table(3, 200_000);
         pipe.write_all(table.as_bytes()).and_then(|()| pipe.write_all(b"1")).expect("the program reads");
-        // Until the program has taken the rest from the pipe.
-        thread::sleep(Duration::from_millis(500));
-        interrupt(&program);
+        let copied = || {
+            let files = fs::read_dir(&copies).expect("the folder").filter_map(|file| file.ok()?.metadata().ok());
+            files.map(|file| file.len()).sum::<u64>()
+        };
+        wait_until("the program has all of the pipe", || copied() == table.len() as u64 + 1);
+        signal(&program, "INT");
         let output = program.wait_with_output().expect("the program ends");
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.success(), "{errors}");
@@ -111,10 +111,10 @@ fn an_interrupt_while_a_pipe_is_read_gives_the_report_of_what_came() {
 #[test]
 fn a_second_interrupt_ends_the_program() {
     let dir = tempdir().expect("a folder");
-    let (program, pipe) = reading(&dir.path().join("pipe"), &["--quiet"]);
+    let (program, pipe) = reading(&dir.path().join("pipe"), dir.path(), &["--quiet"]);
     // Nothing was read when the first one comes, so that the program ends by itself with an error, or by the second one.
-    interrupt(&program);
-    interrupt(&program);
+    signal(&program, "INT");
+    signal(&program, "INT");
     let output = program.wait_with_output().expect("the program ends");
     assert!(!output.status.success() && output.stdout.is_empty());
     drop(pipe);
@@ -126,7 +126,7 @@ fn a_terminal_shows_how_far_the_reading_is() {
     let pipe = dir.path().join("pipe");
     assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo starts").success());
     let command = format!("{} analyze {} --rate 100 --quick --quiet", env!("CARGO_BIN_EXE_host-sim"), pipe.display());
-    let program = Command::new("script")
+    let mut program = Command::new("script")
         .args(["--quiet", "--return", "--command", &command, "/dev/null"])
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
@@ -134,9 +134,14 @@ fn a_terminal_shows_how_far_the_reading_is() {
         .expect("script starts");
     let mut input = OpenOptions::new().write(true).open(&pipe).expect("the pipe");
     input.write_all(table(4, 5000).as_bytes()).expect("the program reads");
-    thread::sleep(Duration::from_millis(700));
+    // The pipe ends when the bar was seen.
+    let (mut screen, mut shown, mut bytes) = (program.stdout.take().expect("a pipe"), String::new(), [0; 1024]);
+    while !(shown.contains("reading") && shown.contains("KiB")) {
+        let count = screen.read(&mut bytes).expect("the terminal");
+        assert!(count > 0, "the program ends: {shown}");
+        shown += &String::from_utf8_lossy(&bytes[..count]);
+    }
     drop(input);
-    let output = program.wait_with_output().expect("the program ends");
-    let shown = String::from_utf8_lossy(&output.stdout);
-    assert!(output.status.success() && shown.contains("reading") && shown.contains("KiB"), "{shown}");
+    screen.read_to_string(&mut shown).expect("the terminal");
+    assert!(program.wait().expect("an end").success(), "{shown}");
 }

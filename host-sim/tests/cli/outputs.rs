@@ -1,22 +1,16 @@
 //! Files that the program writes: none is a file that it reads, under whatever name, and each is complete or as it was.
 
-use crate::program::{host_sim, with_default_signals, write};
+use crate::program::{counts as table, error_line, host_sim, signal, wait_until, with_default_signals, write};
+use recordings::frame_log::FrameLogReader;
 use std::fs::{self, File};
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
-use std::thread;
-use std::time::{Duration, Instant};
-use tempfile::{TempDir, tempdir};
+use std::process::{Child, Command, Output, Stdio};
+use tempfile::tempdir;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_host-sim");
 
 fn name(file: &Path) -> &str {
     file.to_str().expect("UTF-8")
-}
-
-fn table(dir: &TempDir) -> std::path::PathBuf {
-    let rows: String = (0..2000).map(|at| format!("{},{}\n", f64::from(at) / 100.0, at * 7919 % 41)).collect();
-    write(dir, "rows.csv", format!("time_s,gyro_x_counts\n{rows}").as_bytes())
 }
 
 fn is_refused(output: &Output) {
@@ -112,7 +106,7 @@ fn names(folder: &Path) -> Vec<String> {
 
 #[test]
 fn a_signal_leaves_the_old_file_and_nothing_beside_it() {
-    for signal in ["-TERM", "-HUP", "-INT"] {
+    for name_of_signal in ["TERM", "HUP", "INT"] {
         let dir = tempdir().expect("a folder");
         let log = write(&dir, "log.csv", b"an old log\n");
         let mut program = with_default_signals()
@@ -121,17 +115,20 @@ fn a_signal_leaves_the_old_file_and_nothing_beside_it() {
             .stderr(Stdio::null())
             .spawn()
             .expect("the program starts");
-        let started = Instant::now();
-        while names(dir.path()).len() < 2 && started.elapsed() < Duration::from_secs(30) {
-            thread::sleep(Duration::from_millis(20));
-        }
-        assert_eq!(names(dir.path()).len(), 2, "a file beside the old one");
-        assert!(Command::new("kill").args([signal, &program.id().to_string()]).status().expect("kill").success());
+        wait_until("a file beside the old one", || names(dir.path()).len() == 2);
+        signal(&program, name_of_signal);
         let status = program.wait().expect("an end");
-        assert!(!status.success(), "{signal}");
-        assert_eq!(fs::read(&log).expect("the old log"), b"an old log\n", "{signal}");
-        assert_eq!(names(dir.path()), ["log.csv"], "{signal}");
+        assert!(!status.success(), "{name_of_signal}");
+        assert_eq!(fs::read(&log).expect("the old log"), b"an old log\n", "{name_of_signal}");
+        assert_eq!(names(dir.path()), ["log.csv"], "{name_of_signal}");
     }
+}
+
+/// The signals of a process that are ignored or caught, where bit 0 is a hang-up.
+fn signals(program: &Child, kind: &str) -> u64 {
+    let status = fs::read_to_string(format!("/proc/{}/status", program.id())).expect("a process");
+    let mask = status.lines().find_map(|line| line.strip_prefix(kind)).expect(kind);
+    u64::from_str_radix(mask.trim_start_matches(':').trim(), 16).expect("a mask")
 }
 
 #[test]
@@ -144,16 +141,117 @@ fn a_hang_up_that_is_ignored_ends_nothing() {
         .stderr(Stdio::null())
         .spawn()
         .expect("a shell");
-    let started = Instant::now();
-    while names(dir.path()).is_empty() {
-        assert!(started.elapsed() < Duration::from_secs(30), "no log is begun");
-        thread::sleep(Duration::from_millis(20));
-    }
-    assert!(Command::new("kill").args(["-HUP", &program.id().to_string()]).status().expect("kill").success());
-    thread::sleep(Duration::from_millis(500));
+    let written = || {
+        let files = fs::read_dir(dir.path()).expect("the folder").filter_map(|file| file.ok()?.metadata().ok());
+        files.map(|file| file.len()).sum::<u64>()
+    };
+    wait_until("a log is begun", || written() > 0);
+    assert_eq!((signals(&program, "SigIgn") & 1, signals(&program, "SigCgt") & 1), (1, 0), "still ignored");
+    signal(&program, "HUP");
+    let before = written();
+    wait_until("the log grows", || written() > before);
     assert!(program.try_wait().expect("a status").is_none(), "it goes on");
     program.kill().expect("an end");
     program.wait().expect("an end");
+}
+
+/// The bursts of a log up to its end, or to the line that a kill has torn, and the error about that.
+fn bursts(log: &Path) -> (u32, Option<String>) {
+    let mut reader = match FrameLogReader::open(log) {
+        Ok(reader) => reader,
+        Err(error) => return (0, Some(error.to_string())),
+    };
+    let mut bursts = 0;
+    loop {
+        match reader.next() {
+            Ok(Some(frame)) => bursts += u32::from(frame.mosi.len() == 26),
+            Ok(None) => return (bursts, None),
+            Err(error) => return (bursts, Some(error.to_string())),
+        }
+    }
+}
+
+/// A long simulation that is interrupted, hung up or killed leaves a log whose bursts can be read up to then, plain or gzip.
+#[test]
+fn an_interrupted_simulation_leaves_a_log_that_can_be_read() {
+    let dir = tempdir().expect("a folder");
+    for (name_of_signal, file) in [("INT", "a.csv.gz"), ("HUP", "b.csv.gz"), ("KILL", "c.csv")] {
+        let log = dir.path().join(file);
+        let mut record = with_default_signals()
+            .args(["record", name(&log), "--seconds", "50000"])
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the program starts");
+        wait_until("bursts are in the log", || bursts(&log).0 > 100);
+        signal(&record, name_of_signal);
+        assert!(!record.wait().expect("an end").success(), "{name_of_signal}: it ended by itself");
+        let (bursts, torn) = bursts(&log);
+        assert!(bursts > 100, "{name_of_signal}: {bursts} bursts");
+        if let Some(error) = torn {
+            // A kill may end the program within a write to the disk, so that its last line is torn.
+            let last = fs::read_to_string(&log).map_or(0, |text| text.lines().count());
+            let is_last = name_of_signal == "KILL" && error.contains(&format!("line {last}"));
+            assert!(is_last, "{name_of_signal}: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_full_disk_is_named() {
+    for arguments in [
+        &["record", "/dev/full", "--seconds", "5"][..],
+        &["simulate", "/dev/full", "--seconds", "5"],
+        &["simulate", "/dev/full", "--seconds", "5", "--format", "frames"],
+    ] {
+        let line = error_line(&host_sim(arguments));
+        assert!(line.contains("/dev/full") && line.contains("No space left"), "{arguments:?}: {line}");
+    }
+    // The report is printed all the same.
+    let output = host_sim(&["record", "/dev/null", "--seconds", "2", "--export", "csv=/dev/full"]);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(1) && error.contains("No space left"), "{error}");
+    assert!(String::from_utf8_lossy(&output.stdout).contains("angle random walk"));
+}
+
+/// A simulation of hours is not begun: its log is not there.
+#[test]
+fn outputs_are_checked_before_the_work_and_never_overwrite_the_input() {
+    let dir = tempdir().expect("a folder");
+    let file = table(&dir);
+    let rows = fs::read(&file).expect("rows");
+    let [link, log, blocked] = ["link.csv", "log.csv", "blocked"].map(|name| dir.path().join(name));
+    std::os::unix::fs::symlink(&file, &link).expect("a link");
+    let nowhere = dir.path().join("missing").join("out");
+    // Folders whose files cannot be written: a file is in the way, or a folder of the name of the page or of the figure.
+    for inside in ["index.html", "overview.svg"] {
+        fs::create_dir_all(blocked.join(inside)).expect("a folder");
+    }
+    for (option, prefix) in [("--json", ""), ("--export", "kalibr=")] {
+        let value = |file: &Path| format!("{prefix}{}", name(file));
+        for same in [&file, &link] {
+            is_refused(&host_sim(&["analyze", name(&file), option, &value(same)]));
+        }
+        let line = error_line(&host_sim(&["record", name(&log), "--seconds", "20000", option, &value(&nowhere)]));
+        assert!(line.contains("No such file") && !log.exists(), "{line}");
+    }
+    for (option, folder) in [("--page", &file), ("--pictures", &file), ("--page", &blocked), ("--pictures", &blocked)] {
+        let line = error_line(&host_sim(&["record", name(&log), "--seconds", "20000", option, name(folder)]));
+        assert!(line.contains(name(folder)) && !log.exists(), "{option}: {line}");
+    }
+    let twice = dir.path().join("twice");
+    let export = format!("csv={}", name(&twice));
+    let line = error_line(&host_sim(&["analyze", name(&file), "--json", name(&twice), "--export", &export]));
+    assert!(line.contains("named twice"), "{line}");
+    for command in [
+        &["compare", name(&file), "--data-sheet", "--json", name(&file)][..],
+        &["compare", name(&file), name(&file), "--json", name(&file)],
+        &["convert", name(&file), name(&link)],
+        &["export", "--format", "kalibr", name(&file), name(&link)],
+    ] {
+        is_refused(&host_sim(command));
+    }
+    assert!(fs::read(&file).expect("the input") == rows);
 }
 
 #[test]

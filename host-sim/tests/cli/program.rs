@@ -4,7 +4,9 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use std::io::Write;
 use std::path::PathBuf;
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output};
+use std::thread;
+use std::time::Duration;
 use tempfile::TempDir;
 
 /// Runs the program.
@@ -41,4 +43,39 @@ pub(crate) fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
     encoder.write_all(bytes).expect("memory");
     encoder.finish().expect("memory")
+}
+
+/// Waits until a condition is met. The bound ends a test that hangs; no result depends on it.
+pub(crate) fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
+    const PATIENCE: Duration = Duration::from_secs(120);
+    const LOOK: Duration = Duration::from_millis(5);
+    let looks = PATIENCE.as_millis() / LOOK.as_millis();
+    for _ in 0..looks {
+        if condition() {
+            return;
+        }
+        thread::sleep(LOOK);
+    }
+    panic!("never: {what}");
+}
+
+/// Sends a signal, such as `INT`, to a program.
+pub(crate) fn signal(program: &Child, name: &str) {
+    let sent = Command::new("kill").args([&format!("-{name}"), &program.id().to_string()]).status();
+    assert!(sent.expect("kill starts").success(), "{name}");
+}
+
+/// The error of a command that fails with one line: `error: ` and the reason, without a report and without a character that a terminal obeys.
+pub(crate) fn error_line(output: &Output) -> String {
+    let error = String::from_utf8(output.stderr.clone()).expect("UTF-8");
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    let is_line = error.starts_with("error: ") && error.lines().count() == 1 && !error.contains('\u{1b}');
+    assert!(is_line && output.stdout.is_empty(), "{error:?}");
+    error
+}
+
+/// A table of one gyro's counts at 100 Hz with time stamps.
+pub(crate) fn counts(dir: &TempDir) -> PathBuf {
+    let rows: String = (0..2000).map(|at| format!("{},{}\n", f64::from(at) / 100.0, at * 7919 % 41)).collect();
+    write(dir, "rows.csv", format!("time_s,gyro_x_counts\n{rows}").as_bytes())
 }

@@ -1,59 +1,124 @@
 //! The command on a serial port: a pseudo-terminal that the firmware's application serves.
 
 use crate::program::host_sim;
+use ::host_sim::monitor;
+use recordings::serial::SerialLink;
 use serialport::{SerialPort, TTYPort};
 use simulation::Device;
-use std::io::{ErrorKind, Read, Write};
-use std::process::Output;
+use std::collections::VecDeque;
+use std::io::{self, ErrorKind, Read, Write};
+use std::process::{Command, Output, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::thread;
 use std::time::Duration;
 use virtual_sensor::{NoiseModel, VirtualAdis16405};
 
-/// Runs `host-sim` with these arguments, `PORT` replaced by the port of a simulated device. The device runs faster than real
-/// time and sends bytes that are no message once a second of its time.
-fn with_device(arguments: &[&str]) -> Output {
+/// A simulated device, which runs faster than real time and sends bytes that are no message once a second of its time.
+struct NoisyDevice {
+    device: Device,
+    now_us: u64,
+}
+
+impl NoisyDevice {
+    fn new() -> Self {
+        let sensor = VirtualAdis16405::new(NoiseModel::paper(), 5);
+        Self { device: Device::new(sensor, Device::blank_memory()), now_us: 0 }
+    }
+
+    /// What it sends in its next 10 ms.
+    fn next(&mut self) -> Vec<u8> {
+        self.now_us += 10_000;
+        let mut sent = self.device.run_until(self.now_us);
+        if self.now_us.is_multiple_of(1_000_000) {
+            sent.extend(b"\xFFnoise\xFE\0");
+        }
+        sent
+    }
+}
+
+/// Runs `host-sim` with these arguments, `PORT` replaced by the port of a simulated device, until it has printed all of `expected`, or to
+/// its end where that is empty.
+fn with_device(arguments: &[&str], expected: &[&str]) -> Output {
     let (mut near, far) = TTYPort::pair().expect("a pseudo-terminal");
     let port = far.name().expect("a name");
     near.set_timeout(Duration::from_millis(1)).expect("a timeout");
     let over = Arc::new(AtomicBool::new(false));
     let done = Arc::clone(&over);
+    let mut program = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+        .args(arguments.iter().map(|&argument| if argument == "PORT" { &port } else { argument }))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
     let device = thread::spawn(move || {
-        let mut device = Device::new(VirtualAdis16405::new(NoiseModel::paper(), 5), Device::blank_memory());
-        let (mut now_us, mut keys) = (0, [0; 64]);
+        let (mut device, mut keys) = (NoisyDevice::new(), [0; 64]);
         while !done.load(Relaxed) {
             match near.read(&mut keys) {
-                Ok(count) => device.press(&keys[..count]),
+                Ok(count) => device.device.press(&keys[..count]),
                 Err(error) => assert_eq!(error.kind(), ErrorKind::TimedOut),
             }
-            now_us += 10_000;
-            let mut sent = device.run_until(now_us);
-            if now_us % 1_000_000 == 0 {
-                sent.extend(b"\xFFnoise\xFE\0");
-            }
             // The program may have closed the port.
-            let _ = near.write_all(&sent);
+            let _ = near.write_all(&device.next());
         }
     });
-    let with_port = |&argument: &&str| if argument == "PORT" { port.clone() } else { argument.to_owned() };
-    let arguments: Vec<String> = arguments.iter().map(with_port).collect();
-    let output = host_sim(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+    if !expected.is_empty() {
+        let (mut printed, mut text, mut bytes) = (program.stdout.take().expect("a pipe"), String::new(), [0; 4096]);
+        while !expected.iter().all(|words| text.contains(words)) {
+            let count = printed.read(&mut bytes).expect("a pipe");
+            assert!(count > 0, "the program ends: {text}");
+            text += &String::from_utf8_lossy(&bytes[..count]);
+        }
+        program.kill().expect("an end");
+    }
+    let output = program.wait_with_output().expect("an end");
     over.store(true, Relaxed);
     device.join().expect("the device did not panic");
     drop(far);
     output
 }
 
+/// A port whose device hangs up after 3 s of its time.
+struct Port {
+    device: NoisyDevice,
+    sent: VecDeque<u8>,
+}
+
+impl Read for Port {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.device.now_us >= 3_000_000 {
+            return Err(ErrorKind::BrokenPipe.into());
+        }
+        self.sent.extend(self.device.next());
+        let count = self.sent.read(buffer)?;
+        if count > 0 { Ok(count) } else { Err(ErrorKind::TimedOut.into()) }
+    }
+}
+
+impl Write for Port {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.device.device.press(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
 #[test]
 fn the_monitor_shows_reports_and_counts_damaged_messages() {
-    let output = with_device(&["monitor", "PORT", "--seconds", "3", "--send", "i 2", "--send", "?"]);
-    let text = String::from_utf8(output.stdout).expect("text");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    for expected in
-        ["-- firmware", "ADIS16405, sampled", "gyro_x: ", "accl_z: ", "bursts used", "this list", "reports every 2 s"]
-    {
-        assert!(text.contains(expected), "{expected}: {text}");
+    let expected =
+        ["-- firmware", "ADIS16405, sampled", "gyro_x: ", "accl_z: ", "bursts used", "this list", "reports every 2 s"];
+    with_device(&["monitor", "PORT", "--send", "i 2", "--send", "?"], &expected);
+    // The same until the device hangs up, with the summary.
+    let mut link = SerialLink::new(Port { device: NoisyDevice::new(), sent: VecDeque::new() });
+    link.send_command("i 2").and_then(|()| link.send_command("?")).expect("a port");
+    let mut text = Vec::new();
+    monitor::show(&mut link, None, &mut text).expect("memory");
+    let text = String::from_utf8(text).expect("text");
+    for words in expected {
+        assert!(text.contains(words), "{words}: {text}");
     }
     let summary = text.lines().last().expect("a summary");
     assert!(summary.contains(" 0 missing by their numbers") && !summary.contains(" 0 damaged"), "{summary}");
@@ -64,7 +129,7 @@ fn a_recording_of_a_device_and_its_replay_have_the_same_report() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("a name").to_owned();
     let (log, first, second) = (path("device.csv.gz"), path("first.json"), path("second.json"));
-    let output = with_device(&["record", &log, "--port", "PORT", "--seconds", "20", "--json", &first]);
+    let output = with_device(&["record", &log, "--port", "PORT", "--seconds", "20", "--json", &first], &[]);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{errors}");
     assert!(errors.contains(" 0 missing between them") && errors.contains(" 0 missing by their numbers"), "{errors}");

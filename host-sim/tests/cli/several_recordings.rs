@@ -72,11 +72,31 @@ fn wrong_sets_of_recordings_and_reports_are_refused() {
         (&["analyze", &one, &two][..], "recordings are compared at one rate"),
         (&["analyze", &one, &one, "--export", "kalibr=x", "--page", &path("p")], "leave out --page, --export"),
         (&["analyze", &one, &two, "--json", &two], "it would be overwritten"),
-        (&["compare", &one, &two], "no JSON report"),
     ] {
         let output = host_sim(arguments);
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(!output.status.success() && errors.contains(expected), "{arguments:?}: {errors}");
     }
-    assert_eq!(host_sim(&["compare", "a.json"]).status.code(), Some(2));
+}
+
+/// Sensors of one file, whose rows have a label each, are analysed as several recordings are, or have a report each.
+#[test]
+fn each_sensor_of_a_file_is_a_recording() {
+    let dir = tempdir().expect("a folder");
+    let row = |row: i32| {
+        let [x, y] = [7919, 104_729].map(|factor| f64::from(row * factor % 1009) / 1000.0);
+        format!("left,{},{x},{y},{x}\nright,{},{y},{x},{y}\n", 10 * row, 10 * row + 3)
+    };
+    let rows = (0..2000).map(row).collect::<String>();
+    let file = crate::program::write(&dir, "kinds.txt", rows.as_bytes());
+    let columns = ["--columns", "time=1,gyro_x=2,gyro_y=3,gyro_z=4", "--units", "ms,rad/s"];
+    let analyze = [&["analyze", file.to_str().expect("UTF-8"), "--each-sensor"], &columns[..]].concat();
+    let several: Value = serde_json::from_slice(&json_of(&dir, &analyze)).expect("JSON");
+    assert_eq!(several["agreement"]["samples"], Value::from(vec![2000, 2000]));
+    let reports = dir.path().join("reports");
+    assert!(host_sim(&[&analyze[..], &["--reports", reports.to_str().expect("UTF-8")]].concat()).status.success());
+    assert_eq!(std::fs::read_dir(&reports).expect("a folder").count(), 2);
+    let inspected = text(&["inspect", file.to_str().expect("UTF-8")]);
+    assert!(inspected.contains("--topic left") && inspected.contains("--topic right"), "{inspected}");
+    assert!(inspected.contains("--each-sensor"), "{inspected}");
 }

@@ -1,11 +1,12 @@
-//! `export`: the numbers of a report in the units of other programs, read back by their own parsers.
+//! The numbers of a report in the units of other programs, read back by their own parsers.
 
-use crate::program::{host_sim, write};
+use clap::ValueEnum;
+use reports::export::{AxisChoice, Export, ExportFormat, export};
+use reports::saved_report::SavedReport;
 use serde_json::{Value, json};
 use std::f64::consts::{LN_2, PI};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
-use tempfile::{TempDir, tempdir};
 
 const RATE_HZ: f64 = 100.0;
 /// N, B and K of the axes x, y and z: deg/√s, deg/s, deg/s/√s.
@@ -61,18 +62,20 @@ fn worst(values: [f64; 3]) -> f64 {
     values.into_iter().fold(0.0, f64::max)
 }
 
-/// The file that `export` writes.
-fn exported(dir: &TempDir, report: &Value, arguments: &[&str]) -> PathBuf {
-    let (from, out) = (write(dir, "report.json", report.to_string().as_bytes()), dir.path().join("out.txt"));
-    let files = [from.to_str().expect("UTF-8"), out.to_str().expect("UTF-8")];
-    let output = host_sim(&[&["export", "--format"], arguments, &files].concat());
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    out
+/// A report in the format of this name, or why there is none.
+fn written(report: &Value, format: &str, axis: AxisChoice) -> Result<Export, String> {
+    let report = SavedReport::from_json(&report.to_string()).map_err(|error| error.to_string())?;
+    let format = ExportFormat::from_str(format, false).expect(format);
+    export(&report, format, axis).map_err(|error| error.to_string())
+}
+
+/// The file that a report becomes.
+fn exported(report: &Value, format: &str) -> String {
+    written(report, format, AxisChoice::Rms).unwrap_or_else(|error| panic!("{format}: {error}")).text
 }
 
 /// Every number of a file with its key; an array gives its first number under the key itself.
-fn numbers(file: &Path) -> Vec<(String, Vec<f64>)> {
-    let text = std::fs::read_to_string(file).expect("a file");
+fn numbers(text: &str) -> Vec<(String, Vec<f64>)> {
     let line = |line: &str| {
         let (key, rest) = line.split_once([':', '='])?;
         let rest = rest.split('#').next()?.replace(['[', ']', ','], " ").replace("np.array(", "").replace(')', "");
@@ -90,7 +93,7 @@ fn assert_close(found: &[f64], expected: &[f64], what: &str) {
     }
 }
 
-fn assert_number(file: &Path, key: &str, expected: &[f64]) {
+fn assert_number(file: &str, key: &str, expected: &[f64]) {
     let all = numbers(file);
     let found = all.iter().find(|(name, _)| name == key).unwrap_or_else(|| panic!("{key} in {all:?}"));
     assert_close(&found.1, expected, key);
@@ -133,10 +136,9 @@ fn one_number_a_sensor(of: fn([f64; 3]) -> f64) -> [(&'static str, Vec<(&'static
 
 #[test]
 fn one_number_a_sensor_is_the_root_mean_square_or_the_worst_axis() {
-    let dir = tempdir().expect("a folder");
-    for (axis, of) in [("rms", rms as fn([f64; 3]) -> f64), ("worst", worst)] {
+    for (axis, of) in [(AxisChoice::Rms, rms as fn([f64; 3]) -> f64), (AxisChoice::Worst, worst)] {
         for (format, expected) in one_number_a_sensor(of) {
-            let file = exported(&dir, &report(), &[format, "--axis", axis]);
+            let file = written(&report(), format, axis).expect(format).text;
             for (key, value) in expected {
                 assert_number(&file, key, &[value]);
             }
@@ -160,17 +162,15 @@ fn gtsam() -> [(&'static str, &'static str, [f64; 3]); 4] {
 
 #[test]
 fn formats_with_a_number_for_each_axis_have_their_units() {
-    let dir = tempdir().expect("a folder");
-    let file = exported(&dir, &report(), &["kf-gins"]);
+    let file = exported(&report(), "kf-gins");
     for (key, expected) in kf_gins() {
         assert_number(&file, key, &expected);
     }
-    let file = exported(&dir, &report(), &["gtsam"]);
+    let file = exported(&report(), "gtsam");
     for (key, _, expected) in gtsam() {
         assert_number(&file, key, &expected);
     }
-    let basalt = std::fs::read(exported(&dir, &report(), &["basalt"])).expect("a file");
-    let basalt: Value = serde_json::from_slice(&basalt).expect("JSON");
+    let basalt: Value = serde_json::from_str(&exported(&report(), "basalt")).expect("JSON");
     // Basalt's `Calibration` calls all four continuous and multiplies the first two by sqrt(imu_update_rate).
     for (key, expected) in [
         ("accel_noise_std", si(ACCL, 0)),
@@ -184,7 +184,7 @@ fn formats_with_a_number_for_each_axis_have_their_units() {
     assert_eq!(basalt["value0"]["imu_update_rate"], RATE_HZ);
     let comment = basalt["value0"]["comment"].as_str().expect("a text");
     assert!(comment.starts_with("continuous") && comment.contains("gyro_y") && comment.contains("bound"), "{comment}");
-    let matlab = std::fs::read_to_string(exported(&dir, &report(), &["matlab"])).expect("a file");
+    let matlab = exported(&report(), "matlab");
     for (sensor, class) in [(GYRO, "gyroparams"), (ACCL, "accelparams")] {
         let block = matlab.split_once(class).expect(class).1;
         for (index, property) in ["NoiseDensity", "BiasInstability", "RandomWalk"].into_iter().enumerate() {
@@ -201,7 +201,7 @@ fn formats_with_a_number_for_each_axis_have_their_units() {
             }
         }
     }
-    let csv = std::fs::read_to_string(exported(&dir, &report(), &["csv"])).expect("a file");
+    let csv = exported(&report(), "csv");
     let row = csv.lines().find(|line| line.starts_with("gyro_y,rate_random_walk,value,")).expect("a row");
     let bounds: Vec<f64> = row.split(',').skip(3).take(3).map(|word| word.parse().expect("a number")).collect();
     assert_eq!(bounds, [0.0, 0.0, GYRO_Y_BOUND]);
@@ -230,8 +230,7 @@ fn a_gauss_markov_process_is_exported_as_it_is() {
             (0..16).map(|octave| (white * white / tau(1 << octave) + gauss_markov(tau(1 << octave))).sqrt()).collect();
         channel["final"] = json!({"terms": terms, "adev": adev});
     }
-    let dir = tempdir().expect("a folder");
-    let found = numbers(&exported(&dir, &report, &["kf-gins"]));
+    let found = numbers(&exported(&report, "kf-gins"));
     let of = |key: &str| found.iter().find(|(name, _)| name == key).expect(key).1.clone();
     for (key, expected) in [
         ("gbstd", vec![deviation * 3600.0; 3]),
@@ -243,7 +242,7 @@ fn a_gauss_markov_process_is_exported_as_it_is() {
             assert!((found / expected - 1.0).abs() < 5e-3, "{key}: {found}, not {expected}");
         }
     }
-    let sdf = std::fs::read_to_string(exported(&dir, &report, &["gazebo"])).expect("a file");
+    let sdf = exported(&report, "gazebo");
     let first = |element: &str| -> f64 {
         let start = format!("<{element}>");
         sdf.split_once(&start).and_then(|(_, rest)| rest.split_once('<')?.0.parse().ok()).expect(element)
@@ -260,11 +259,12 @@ fn the_parsers_of_the_programs_read_the_same_numbers() {
         let reason = "ADIS_PYTHON names no Python with PyYAML, OpenCV and GTSAM";
         return system_tests::note_skipped("the_parsers_of_the_programs_read_the_same_numbers", reason);
     };
-    let dir = tempdir().expect("a folder");
-    let loader = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/cli/load_export.py");
+    let folder = tempfile::tempdir().expect("a folder");
+    let loader = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/exports/load_export.py");
     let load = |format: &str| -> Value {
-        let file = exported(&dir, &report(), &[format]);
-        let output = Command::new(&python).arg(loader).arg(format).arg(file).output().expect("Python starts");
+        let file = folder.path().join("out.txt");
+        std::fs::write(&file, exported(&report(), format)).expect("written");
+        let output = Command::new(&python).arg(&loader).arg(format).arg(file).output().expect("Python starts");
         assert!(output.status.success(), "{format}: {}", String::from_utf8_lossy(&output.stderr));
         serde_json::from_slice(&output.stdout).expect("JSON")
     };
@@ -293,15 +293,7 @@ fn the_parsers_of_the_programs_read_the_same_numbers() {
 
 #[test]
 fn what_a_format_lacks_is_named() {
-    let dir = tempdir().expect("a folder");
-    let error = |report: &Value, format: &str| {
-        let from = write(&dir, "bad.json", report.to_string().as_bytes());
-        let out = dir.path().join("never");
-        let output =
-            host_sim(&["export", "--format", format, from.to_str().expect("UTF-8"), out.to_str().expect("UTF-8")]);
-        assert!(!output.status.success() && !out.exists(), "{format}");
-        String::from_utf8_lossy(&output.stderr).into_owned()
-    };
+    let error = |report: &Value, format: &str| written(report, format, AxisChoice::Rms).expect_err(format);
     let mut partial = report();
     partial["channels"].as_array_mut().expect("channels").remove(1);
     assert!(error(&partial, "gtsam").contains("gyro_y is not in the report"));
@@ -311,16 +303,8 @@ fn what_a_format_lacks_is_named() {
     assert!(error(&partial, "kalibr").contains("channels[0]: missing field `unit`"));
     partial["schema"] = json!(7);
     assert!(error(&partial, "kalibr").contains("schema 7"));
-    let same = write(&dir, "same.json", report().to_string().as_bytes());
-    let same = same.to_str().expect("UTF-8");
-    let output = host_sim(&["export", "--format", "kalibr", same, same]);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("it would be overwritten"));
     let mut gyros = report();
     gyros["channels"].as_array_mut().expect("channels").truncate(3);
-    let from = write(&dir, "gyros.json", gyros.to_string().as_bytes());
-    let out = dir.path().join("imu.yaml");
-    let output =
-        host_sim(&["export", "--format", "kalibr", from.to_str().expect("UTF-8"), out.to_str().expect("UTF-8")]);
-    let notes = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success() && notes.contains("no accelerometer_random_walk"), "{notes}");
+    let missing = written(&gyros, "kalibr", AxisChoice::Rms).expect("gyros").missing;
+    assert!(missing.iter().any(|field| field == "accelerometer_random_walk"), "{missing:?}");
 }

@@ -1,0 +1,162 @@
+//! Files of every format that other programs wrote, with known noise, rate and losses (`make_samples.py`).
+
+use super::harness::{python, read, read_file, rows};
+use recordings::file_format::{FileFormat, InputFile};
+use recordings::sample_stream::StreamError;
+use serde_json::Value;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+/// A file, and what is known of it.
+pub(crate) struct Sample {
+    pub(crate) name: String,
+    pub(crate) file: PathBuf,
+    pub(crate) options: Vec<String>,
+    truth: Value,
+}
+
+/// The files that `make_samples.py` has written, once for all tests; `None`, with a note, without Python.
+pub(crate) fn samples(test: &str) -> Option<&'static [Sample]> {
+    static SAMPLES: OnceLock<Option<Vec<Sample>>> = OnceLock::new();
+    let samples = SAMPLES.get_or_init(|| {
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/make_samples.py");
+        let script = std::fs::read(script).expect("the script");
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("samples");
+        // Each test is a process: the first one writes the files, for as long as the script is the same.
+        let one_at_a_time = File::create(folder.with_extension("lock")).expect("a file");
+        one_at_a_time.lock().expect("a lock");
+        let written_by = folder.join("written-by.py");
+        if std::fs::read(&written_by).ok().as_ref() != Some(&script) {
+            // The writers of bags refuse a file that exists.
+            let _ = std::fs::remove_dir_all(&folder);
+            python(test, "make_samples.py", &[folder.to_str().expect("UTF-8")])?;
+            std::fs::write(written_by, script).expect("room");
+        }
+        let text = std::fs::read(folder.join("truth.json")).expect("written");
+        let truth: Vec<Value> = serde_json::from_slice(&text).expect("a list in JSON");
+        assert!(truth.len() >= 20, "{} samples", truth.len());
+        let sample = |truth: Value| {
+            let name = truth["file"].as_str().expect("a name").to_owned();
+            let options = truth["arguments"].as_array().expect("a list").iter();
+            let options = options.map(|text| text.as_str().expect("text").to_owned()).collect();
+            Sample { file: folder.join(&name), name, options, truth }
+        };
+        Some(truth.into_iter().map(sample).collect())
+    });
+    if samples.is_none() {
+        python(test, "make_samples.py", &[]);
+    }
+    samples.as_deref()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
+/// Rows and losses to a sample; the rate within 20 ppm, which is the jitter of the stamps (uniform in 2 % of a period, 0.6 % standard
+/// deviation) over √n and the length of the record with room.
+///
+/// The Allan deviation of neighbours is that which numpy computes from the samples as they were written. The counts that
+/// stand for floats add noise of at most a = 10⁻² of its deviation: a²/2 to the deviation, and by chance a/√n (1 σ).
+#[test]
+fn samples_of_other_programs_have_their_rate_losses_and_numbers() {
+    let Some(samples) = samples("samples_of_other_programs_have_their_rate_losses_and_numbers") else { return };
+    for Sample { name, file, options, truth } in samples {
+        let read = read_file(file, options).unwrap_or_else(|error| panic!("{name} {options:?}: {error}"));
+        assert_eq!(read.samples.len() as u64, truth["rows"], "{name}: samples");
+        assert_eq!(read.missing(), truth["missing"], "{name}: missing samples");
+        let rate = read.rate_hz() / number(&truth["rate_hz"]);
+        assert!((rate - 1.0).abs() < 20e-6, "{name}: {rate} of the rate");
+        let tolerance = 0.5e-4 + 5.0 * 1e-2 / number(&truth["rows"]).sqrt();
+        for (channel, expected) in truth["neighbours"].as_object().expect("channels") {
+            let ratio = read.neighbours(channel) / number(expected);
+            assert!((ratio - 1.0).abs() < tolerance, "{name}: {channel}: {ratio} of the deviation of neighbours");
+        }
+    }
+}
+
+/// The rows of a file of any format as a table; and by way of an array and of a table to the rounding of its floats.
+#[test]
+fn every_format_is_converted() {
+    let Some(samples) = samples("every_format_is_converted") else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let [table, array, back] = ["table.csv", "back.npy", "back.csv"].map(|name| folder.path().join(name));
+    for Sample { name, file, options, truth } in samples {
+        // A log of the bus has no columns.
+        if InputFile::open(file).expect(name).format() == FileFormat::SpiExport {
+            continue;
+        }
+        rows(file, options).expect(name).write_table(&table).expect("a disk");
+        let lines = std::fs::read_to_string(&table).expect("a table").lines().count();
+        assert_eq!(lines as u64 - 1, truth["rows"], "{name}");
+    }
+    let bag = &samples.iter().find(|sample| sample.name == "one.bag").expect("a bag").file;
+    let columns = rows(bag, &[""; 0]).expect("a bag").write_array(&array).expect("a disk");
+    assert_eq!(columns[..5], ["time_s", "gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s", "accl_x_m_s2"]);
+    let columns = "time=0,gyro_x=1,gyro_y=2,gyro_z=3,accl_x=4,accl_y=5,accl_z=6";
+    rows(&array, &["--columns", columns, "--units", "s,rad/s,m/s^2"])
+        .expect("an array")
+        .write_table(&back)
+        .expect("a disk");
+    let [direct, converted] = [bag, &back].map(|file| read_file(file, &[""; 0]).expect("samples"));
+    assert_eq!(direct.samples.slots, converted.samples.slots);
+    for channel in ["gyro_x", "gyro_y", "gyro_z", "accl_x", "accl_y", "accl_z"] {
+        // Counts are rounded anew in each unit: 5·√2·10⁻²/√5956.
+        let ratio = direct.neighbours(channel) / converted.neighbours(channel);
+        assert!((ratio - 1.0).abs() < 1e-3, "{channel}: {ratio}");
+    }
+}
+
+/// Structures of a `.mat`, topics of a bag and publishers of a log are several sensors; one that is recorded by several messages is not.
+#[test]
+fn several_sensors_of_a_file_have_a_name_each() {
+    let Some(samples) = samples("several_sensors_of_a_file_have_a_name_each") else { return };
+    let folder = samples[0].file.parent().expect("a folder");
+    for (file, expected) in [
+        ("two_structures.mat", &["first", "second"][..]),
+        ("two.bag", &["/imu/data", "/imu/other"]),
+        ("instances.ulg", &["sensor_gyro", "sensor_gyro:1"]),
+        ("structure.mat", &[]),
+        ("one.bag", &[]),
+        ("single.ulg", &[]),
+        ("imu.bin", &[]),
+        ("attributes.h5", &[]),
+        ("units.csv", &[]),
+    ] {
+        let input = InputFile::open(&folder.join(file)).expect(file);
+        assert_eq!(input.sensors().expect(file), expected, "{file}");
+        let topics = input.contents().expect(file);
+        for name in expected {
+            assert!(topics.iter().any(|topic| topic.sensors.iter().any(|sensor| sensor == name)), "{file}: {name}");
+        }
+        if let [first, second] = expected {
+            let error = match read_file(&folder.join(file), &[""; 0]) {
+                // The usual one of several messages of a log is read.
+                Ok(_) => continue,
+                Err(StreamError::Input(error)) => error.to_string(),
+                Err(error) => panic!("{file}: {error}"),
+            };
+            assert!(error.contains(first) && error.contains(second), "{file}: {error}");
+        }
+    }
+    let topics = InputFile::open(&folder.join("attributes.h5")).expect("HDF5").contents().expect("HDF5");
+    let acc = topics.iter().find(|topic| topic.name == "run 1/imu/acc").expect("a dataset");
+    assert_eq!(acc.columns[2], ("run 1/imu/acc.2".to_owned(), Some("m/s^2")));
+}
+
+/// A ULog with an array without an element: a field without a number, which is no reason to refuse the others.
+#[test]
+fn a_field_without_a_number_leaves_the_others() {
+    let record =
+        |kind: u8, body: &[u8]| [&u16::try_from(body.len()).expect("short").to_le_bytes()[..], &[kind], body].concat();
+    let mut log = [&b"ULog\x01\x12\x35\x01"[..], &[0; 8]].concat();
+    log.extend(record(b'F', b"sensor_gyro:uint64_t timestamp;float[0] w;float x;float y;float z;"));
+    log.extend(record(b'A', &[&[0, 0, 0][..], b"sensor_gyro"].concat()));
+    for row in 0..100u64 {
+        let values = [0.1f32, 0.2, 0.3].map(|value| value * ((row * 7919) % 13) as f32).map(f32::to_le_bytes).concat();
+        log.extend(record(b'D', &[&[0, 0][..], &(row * 10_000).to_le_bytes(), &values].concat()));
+    }
+    let read = read("empty.ulg", &log, &[""; 0]).expect("a log");
+    assert_eq!((read.samples.len(), read.samples.channels.len()), (100, 3));
+}

@@ -1,0 +1,121 @@
+//! Errors: exit code 1 and one line on standard error, 2 for wrong usage; nothing is written.
+
+use crate::program::{counts, error_line, host_sim, write};
+use std::path::Path;
+use tempfile::tempdir;
+
+/// Arguments in which `DIR` stands for the folder of the test, and words of the error.
+type Case = (&'static [&'static str], &'static [&'static str]);
+
+/// Commands that end with one line of error. The words in which a file is refused are tested in `recordings`.
+const ERRORS: &[Case] = &[
+    (&["analyze", "DIR/missing/x.csv"], &["missing/x.csv", "No such file"]),
+    (
+        &["analyze", "DIR/bad.csv", "--rate", "100"],
+        &["bad.csv: line 3: column gyro_x_counts", "\"x\" is not a whole number"],
+    ),
+    (
+        &["replay", "DIR/bad.csv", "--rate", "100"],
+        &["bad.csv: line 3: column gyro_x_counts", "\"x\" is not a whole number"],
+    ),
+    (&["convert", "DIR/bad.csv", "DIR/never"], &["bad.csv: line 3"]),
+    (&["analyze", "DIR/rows.csv", "--rate", "30"], &["rows.csv: --rate 30 contradicts the time stamps"]),
+    (&["analyze", "DIR/rows.csv", "--from", "500"], &["rows.csv: no sample from 500 to inf s"]),
+    (&["analyze", "DIR/rows.csv", "--topic", "imu"], &["--topic imu: a file of text has no topics"]),
+    (&["analyze", "DIR/rows.csv", "--json", "DIR"], &["DIR"]),
+    (&["analyze", "DIR/rows.csv", "--sensor", "/dev/zero"], &["/dev/zero", "not longer than 1048576 bytes"]),
+    (&["analyze", "DIR/rows.csv", "--sensor", "nowhere.toml"], &["nowhere.toml", "bmi088"]),
+    (&["replay", "DIR/array.npy"], &["neither register counts nor an SPI log"]),
+    (&["compare", "DIR/rows.csv", "DIR/rows.csv"], &["no JSON report"]),
+    // A text of 100 kB where the report has a number.
+    (&["compare", "DIR/long.json", "--data-sheet"], &["long.json", " … "]),
+    (&["record", "DIR/never", "--seconds", "0"], &["duration"]),
+    (&["record", "DIR/never", "--seconds", "-1"], &["duration"]),
+    (&["record", "DIR/never", "--seconds", "NaN"], &["duration"]),
+    (&["record", "DIR/never", "--seconds", "inf"], &["duration"]),
+    (&["record", "DIR/never", "--seconds", "1e9"], &["duration"]),
+    (&["record", "DIR/missing/log.csv", "--seconds", "1"], &["log.csv", "No such file"]),
+    (&["simulate", "DIR/never", "--gyro", "1,2"], &["gyro: `1,2` is not N,B,K"]),
+    (&["simulate", "DIR/never", "--taps", "3"], &["taps: `3` is not 1, 2, 4"]),
+    (&["simulate", "DIR/never", "--range", "75", "--taps", "1"], &["configuration refused"]),
+    (&["simulate", "DIR/never", "--seconds", "0"], &["duration must be positive"]),
+    (&["simulate", "DIR/never", "--rate", "nan"], &["configuration refused"]),
+    (&["simulate", "DIR/never", "--fault", "stale:from=1"], &["--fault: stale needs bursts"]),
+    (&["convert", "DIR/plain.csv", "DIR/never", "--format", "frames"], &["sample 0 has no time"]),
+    (&["convert", "DIR/units.csv", "DIR/never", "--format", "frames"], &["register counts of an ADIS16405"]),
+    (&["convert", "DIR/rows.csv", "DIR/never", "--rate", "100"], &["--rate says where --from and --to are"]),
+];
+
+#[test]
+fn an_error_is_one_line_and_exit_code_1() {
+    let dir = tempdir().expect("a folder");
+    counts(&dir);
+    for (name, content) in [
+        ("bad.csv", "gyro_x_counts\n1\nx\n"),
+        ("plain.csv", "gyro_x_counts\n1\n2\n"),
+        ("units.csv", "time_s,gyro_x_deg_s\n0,1\n1,2\n2,1\n3,2\n"),
+        ("array.npy", "\u{93}NUMPY"),
+        ("long.json", &format!("{{\"schema\": \"{}\"}}", "x".repeat(100_000))),
+    ] {
+        write(&dir, name, &content.chars().map(|c| c as u8).collect::<Vec<_>>());
+    }
+    let folder = dir.path().to_str().expect("UTF-8");
+    for (arguments, words) in ERRORS {
+        let arguments: Vec<String> = arguments.iter().map(|argument| argument.replace("DIR", folder)).collect();
+        let output = host_sim(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+        let line = error_line(&output);
+        assert!(line.len() < 4000, "{arguments:?}: {} bytes", line.len());
+        for word in words.iter().map(|word| word.replace("DIR", folder)) {
+            assert!(line.contains(&word), "{arguments:?}: {word:?} is not in {line:?}");
+        }
+        assert!(!Path::new(&format!("{folder}/never")).exists(), "{arguments:?}");
+    }
+}
+
+#[test]
+fn wrong_usage_has_exit_code_2() {
+    for (arguments, words) in [
+        (&["analyze"][..], "required"),
+        (&["measure"], "unrecognized subcommand"),
+        (&["compare", "a.json"], ""),
+        (&["analyze", "x.csv", "--rate", "fast"], "--rate"),
+        (&["analyze", "x.csv", "--from=-1"], "--from"),
+        (&["analyze", "x.csv", "--to", "nan"], "--to"),
+        // Options of the simulation before a subcommand would be ignored.
+        (&["--seed", "3", "analyze", "x.csv"], ""),
+        // Options are those that a subcommand uses.
+        (&["monitor", "p", "--page", "d"], "unexpected argument"),
+        (&["replay", "a", "--sensor", "generic"], "unexpected argument"),
+        (&["replay", "a", "--columns", "gyro_x=0"], "unexpected argument"),
+        (&["replay", "a", "--topic", "t"], "unexpected argument"),
+        (&["compare", "a", "b", "--page", "d"], "unexpected argument"),
+        (&["monitor", "still.csv", "--speed=0"], "neither a positive number nor max"),
+        (&["monitor", "still.csv", "--speed=-1"], "neither a positive number nor max"),
+        (&["monitor", "still.csv", "--speed=inf"], "neither a positive number nor max"),
+        (&["monitor", "still.csv", "--speed=fast"], "neither a positive number nor max"),
+    ] {
+        let output = host_sim(arguments);
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(2) && errors.contains(words), "{arguments:?}: {errors}");
+        assert!(output.stdout.is_empty());
+    }
+}
+
+/// What a terminal obeys, and what hides or turns other letters, is shown escaped, also where a tip or a table follows.
+#[test]
+fn names_with_control_characters_are_escaped() {
+    let dir = tempdir().expect("a folder");
+    // A right-to-left override in the name of a column.
+    let hidden = write(&dir, "hidden.csv", "a\u{202e}b,c\n1,2\n2,3\n3,4\n4,5\n".as_bytes());
+    for arguments in [
+        ["analyze", "/nowhere/\u{1b}[31m.csv"],
+        ["monitor", "/dev/\u{1b}[31m"],
+        ["analyze", hidden.to_str().expect("UTF-8")],
+        ["simulate", "--effect=\u{1b}[31m:gyro_x:amplitude=1"],
+    ] {
+        let output = host_sim(&arguments);
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success() && error.starts_with("error: "), "{error:?}");
+        assert!(!error.contains(['\u{1b}', '\u{202e}']), "{error:?}");
+    }
+}
