@@ -192,7 +192,7 @@ fn nothing_that_the_first_half_does_not_foretell_is_taken_off_the_second() {
 /// number and size leaves: the deviance a point is 1 for a true model, and from 3 on a model fails.
 #[test]
 fn spikes_and_bursts_are_foretold_at_the_rate_of_the_first_half() {
-    for seed in 0..10 {
+    for seed in 0..4 {
         for bursts in [false, true] {
             let mut random = ChaCha8Rng::seed_from_u64(100 + seed);
             let mut half = || {
@@ -246,7 +246,7 @@ fn held(channel: &ChannelReport) -> usize {
 /// half's own curve, which scatters as the second half does, is 2, and by chance several times that: a model may leave half more.
 #[test]
 fn signals_of_the_first_half_are_foretold() {
-    const SEEDS: u64 = 6;
+    const SEEDS: u64 = 4;
     let sawtooth = |time_s: f64| 0.5 * NOISE * (time_s / 20.0).fract();
     let pulse = |time_s: f64| if (time_s / 20.0).fract() < 0.1 { -0.5 * NOISE } else { 0.0 };
     let seconds = 2.0 * HALF as f64 / RATE_HZ;
@@ -267,7 +267,7 @@ fn signals_of_the_first_half_are_foretold() {
             assert!(after <= 1.5 * curve, "{name}, seed {seed}: {after} {curve}");
             bounds_held += held(&channel);
         }
-        // Of 18 intervals of 95 % fewer than 13 hold in one of 3,000 cases.
-        assert!(bounds_held >= 13, "{name}: {bounds_held}");
+        // Of 12 intervals of 95 % fewer than 8 hold in one of 4,000 cases.
+        assert!(bounds_held >= 8, "{name}: {bounds_held}");
     }
 }

@@ -114,13 +114,13 @@ fn an_offset_of_many_counts_changes_no_coefficient() {
     }
 }
 
-/// So many that neighbouring gaps are closed with the same samples. Of 40 intervals of 95 %, 38 hold; at three standard deviations 34. The
-/// lower bound of B is above 0 in one of 40.
+/// So many that neighbouring gaps are closed with the same samples. Of 15 intervals of 95 %, 14 hold; fewer than 12 in one of 200 cases.
+/// The lower bound of B is above 0 in one of 40.
 #[test]
 fn samples_lost_at_random_are_neither_a_filter_nor_flicker_noise() {
     let (mut held, mut with_flicker) = (0, 0);
     for lost in [0.3, 0.4, 0.5, 0.7, 0.85] {
-        for seed in 0..8 {
+        for seed in 0..3 {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             let slots: Vec<u64> = (0..60_000).filter(|slot| *slot == 0 || !random.random_bool(lost)).collect();
             let counts = white(100 + seed, slots.len(), 20.0);
@@ -133,8 +133,8 @@ fn samples_lost_at_random_are_neither_a_filter_nor_flicker_noise() {
             with_flicker += usize::from(b.low > 0.0);
         }
     }
-    assert!(held >= 34, "{held} of 40 intervals of N hold it");
-    assert!(with_flicker <= 4, "flicker noise in {with_flicker} of 40");
+    assert!(held >= 12, "{held} of 15 intervals of N hold it");
+    assert!(with_flicker <= 2, "flicker noise in {with_flicker} of 15");
 }
 
 /// A quarter and a half of the samples, in a record of which all samples are kept or only means. 150,000 other samples know N to 0.3 %.
@@ -186,7 +186,7 @@ fn a_change_of_the_noise_level_is_told() {
 /// Behind a filter over 64 samples neighbours are equal for long, and so are those of half a count.
 #[test]
 fn equal_neighbours_of_filtered_or_small_noise_are_not_stuck() {
-    for seed in 0..12 {
+    for seed in 0..4 {
         let noise = white(seed, 60_064, 20_000.0);
         for (what, deviation) in [("filtered", 2.0), ("filtered", 10.0)] {
             let average =

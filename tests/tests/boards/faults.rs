@@ -24,13 +24,14 @@ fn noise(count: usize) -> Vec<u8> {
 }
 
 #[test]
-fn faults_of_the_sensor_and_the_line_are_recovered_from_and_counted() {
-    assert_recovers_from_every_fault(RATE_HZ, 3);
+fn faults_at_full_speed_are_recovered_from_and_counted() {
+    assert_recovers_from_every_fault(819.2, 8);
 }
 
 #[test]
-fn faults_at_full_speed_are_recovered_from_and_counted() {
-    assert_recovers_from_every_fault(819.2, 8);
+#[ignore = "long: the faults of the test above at a lower rate; run with --long"]
+fn faults_of_the_sensor_and_the_line_are_recovered_from_and_counted() {
+    assert_recovers_from_every_fault(RATE_HZ, 3);
 }
 
 fn assert_recovers_from_every_fault(rate_hz: f64, seed: u64) {
@@ -160,22 +161,24 @@ fn report_after(event: Event, at_s: f64, seconds: f64) -> (Hello, Health) {
 /// 290 ms.
 #[test]
 fn a_failed_transfer_costs_one_sample() {
-    for (event, bus_errors, recoveries) in [(Event::StopReceiving, 1, 0), (Event::LoseBurstEnd, 0, 1)] {
-        let keys = vec![(0.1, b"i 0\r".to_vec()), (4.0, b"r".to_vec())];
-        let events = vec![(2.0, event)];
-        let sensor = Some(Sensor::Published(11));
-        let Outcome { sensor, received, diagnostics, .. } =
-            run(image(), Scenario { sensor, keys, events, seconds: 6.0, ..Scenario::default() });
-        assert_eq!(diagnostics, [""; 0]);
-        let decoded = Decoded::decode(&received);
-        let health = **decoded.healths().last().expect("a report");
-        println!("{event:?}: {health:?}");
-        assert_eq!((health.bus_errors, health.recoveries), (bus_errors, recoveries), "{health:?}");
+    let keys = vec![(0.1, b"i 0\r".to_vec()), (3.0, b"r".to_vec()), (5.0, b"r".to_vec())];
+    let events = vec![(1.5, Event::StopReceiving), (3.5, Event::LoseBurstEnd)];
+    let sensor = Some(Sensor::Published(11));
+    let scenario = Scenario { sensor, keys, events, seconds: 7.0, ..Scenario::default() };
+    let Outcome { sensor, received, diagnostics, .. } = run(image(), scenario);
+    assert_eq!(diagnostics, [""; 0]);
+    let decoded = Decoded::decode(&received);
+    let healths = decoded.healths();
+    let [stopped, silent] = healths[..] else { panic!("{healths:?}") };
+    for (health, recoveries) in [(stopped, 0), (silent, 1)] {
+        println!("{health:?}");
+        assert_eq!((health.bus_errors, health.recoveries), (1, recoveries), "{health:?}");
         assert_eq!((health.used, health.shifted, health.frozen), (health.bursts, 0, 0), "{health:?}");
         assert!(f64::from(health.lost_edges) < 0.4 * RATE_HZ * f64::from(recoveries) + 1.0, "{health:?}");
-        assert!(f64::from(health.used) > 3.8 * RATE_HZ, "{health:?}");
-        assert_eq!(sensor.expect("a sensor").violations.len(), usize::from(recoveries == 0), "the short frame");
     }
+    assert!(f64::from(stopped.used) > 2.8 * RATE_HZ, "{stopped:?}");
+    assert!(f64::from(silent.used) > 4.5 * RATE_HZ, "{silent:?}");
+    assert_eq!(sensor.expect("a sensor").violations.len(), 1, "the short frame");
 }
 
 /// The counter of microseconds stops, without which no wait would end.

@@ -17,7 +17,7 @@ use system_tests::note_skipped;
 /// Samples of a record, s between them, and records of a case.
 const SAMPLES: usize = 1 << 14;
 const PERIOD_S: f64 = 0.01;
-const RECORDS: u64 = 600;
+const RECORDS: u64 = 200;
 /// N, B and K: the densities of white and flicker noise are equal at 0.6 Hz, those of flicker noise and the walk at 0.16 Hz, 26 periods
 /// of a record.
 const NOISE: [f64; 3] = [1.0, 2.0, 2.0];
@@ -55,13 +55,13 @@ fn outcome(kinds: &[NoiseTerm], truth: [f64; 3], record: impl Fn(&mut ChaCha8Rng
     outcome
 }
 
-/// The share of 600 records in which an interval of 95 % holds has a standard deviation of 0.9 %.
+/// The share of 200 records in which an interval of 95 % holds has a standard deviation of 1.5 %.
 fn assert_held(name: &str, held: [u64; 3]) {
     let shares = held.map(|held| held as f64 / RECORDS as f64);
-    assert!(shares.iter().all(|share| (0.925..=0.975).contains(share)), "{name}: {shares:?}");
+    assert!(shares.iter().all(|share| (0.905..=0.995).contains(share)), "{name}: {shares:?}");
 }
 
-/// By Whittle's information no unbiased estimate has a smaller error. The root mean square of 600 errors is known to 2.9 %; an
+/// By Whittle's information no unbiased estimate has a smaller error. The root mean square of 200 errors is known to 5 %; an
 /// estimate of a coefficient that is known to 15 % is a few percent of that wider than its information says.
 #[test]
 fn coefficients_have_the_error_that_the_samples_allow_and_intervals_that_hold() {
@@ -74,7 +74,7 @@ fn coefficients_have_the_error_that_the_samples_allow_and_intervals_that_hold() 
     for term in 0..3 {
         let least = relative_error(&truth, term, SAMPLES as f64 * PERIOD_S).expect("noise");
         let error = found.root_mean_square(term);
-        assert!((error / least - 1.0).abs() < 0.12, "{term}: {error} and {least}");
+        assert!((error / least - 1.0).abs() < 0.16, "{term}: {error} and {least}");
     }
 }
 
@@ -96,13 +96,13 @@ fn intervals_hold_behind_the_filters_of_the_part() {
 }
 
 /// Of means of eight samples and the averaged spectrum of the samples. Their spectrum has segments of 2,048 samples, 63 of which fit in a
-/// record; the share of 200 records in which an interval of 95 % holds has a standard deviation of 1.5 %, the root mean square of as many
-/// errors is known to 5 %.
+/// record; the share of 80 records in which an interval of 95 % holds has a standard deviation of 2.4 %, the root mean square of as many
+/// errors is known to 8 %.
 #[test]
 fn means_with_the_spectrum_of_the_samples_have_the_error_that_the_samples_allow() {
     const OF_MEAN: usize = 8;
     const MANY: usize = 1 << 16;
-    const CASE_RECORDS: u64 = 200;
+    const CASE_RECORDS: u64 = 80;
     let [_, b, k] = NOISE;
     for taps in [1, 4] {
         let white_noise = match taps {
@@ -132,8 +132,8 @@ fn means_with_the_spectrum_of_the_samples_have_the_error_that_the_samples_allow(
             let least = relative_error(&truth, term, MANY as f64 * PERIOD_S).expect("noise");
             let (error, share) = (errors[term].sqrt(), held[term] as f64 / CASE_RECORDS as f64);
             // The information counts flicker noise and walk as after the filter.
-            assert!(taps > 1 || (error / least - 1.0).abs() < 0.15, "{term}: {error} and {least}");
-            assert!((0.905..=0.995).contains(&share), "{taps} taps, {term}: {share}");
+            assert!(taps > 1 || (error / least - 1.0).abs() < 0.24, "{term}: {error} and {least}");
+            assert!(share >= 0.87, "{taps} taps, {term}: {share}");
         }
     }
 }

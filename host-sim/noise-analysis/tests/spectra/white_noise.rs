@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 const RATE_HZ: f64 = 100.0;
 const SAMPLES: usize = 1 << 16;
 const SEGMENT: usize = 1 << 13;
-const RECORDS: u64 = 600;
+const RECORDS: u64 = 200;
 
 fn fit(series: &UniformSeries, reach_of_slow_reading: Option<u32>) -> Option<WhiteNoiseFit> {
     let model = Model::new(series.sample_period(), []);
@@ -100,9 +100,9 @@ fn the_interval_of_n_holds_the_truth_in_95_of_100_records() {
         ("read slowly", share_that_holds(Some(1), slow)),
         ("8 taps, every 4th", share_that_holds(Some(3), |random| every_fourth(8, random))),
     ];
-    // The share of 600 records has a standard deviation of 0.9 %.
+    // The share of 200 records has a standard deviation of 1.5 %; seven shares are all within three of them in 98 of 100 cases.
     for (name, share) in shares {
-        assert!((0.93..=0.97).contains(&share), "{name}: {shares:?}");
+        assert!((0.905..=0.995).contains(&share), "{name}: {shares:?}");
     }
 }
 
