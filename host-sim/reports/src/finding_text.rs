@@ -570,7 +570,8 @@ mod tests {
 
     /// What a report says of the examples of a kind: the advice once after all sentences that it follows.
     fn sentences_of(kind: &str, examples: &[Effect]) -> String {
-        let texts = examples.iter().filter(|effect| effect.name() == kind).map(|effect| describe(&finding(effect.clone())));
+        let texts =
+            examples.iter().filter(|effect| effect.name() == kind).map(|effect| describe(&finding(effect.clone())));
         let mut by_advice: Vec<(String, Vec<String>)> = Vec::new();
         for FindingText { physics, advice, .. } in texts {
             let known = by_advice.iter().position(|(known, _)| *known == advice);

@@ -107,15 +107,21 @@ fn each_course_of_a_record_has_its_sentence() {
     told(&|of| of.fitted_to = FittedPart::FirstHalf, "The model is fitted to the whole first half.");
     told(
         &|of| of.tracked = TrackedSet::Nothing,
-        "No parameter of the first half moves: from one stretch of 328 s to the next the variance of the white noise lies between",
+        "No parameter of the first half moves: from one stretch of 5 min to the next the variance of the white noise lies between",
     );
-    told(&|of| of.tracked = TrackedSet::Nothing, "With nothing to follow, the model leaves 1.7 a point on a single stretch");
+    told(
+        &|of| of.tracked = TrackedSet::Nothing,
+        "With nothing to follow, the model leaves 1.7 a point on a single stretch",
+    );
     told(&|of| of.tracked = TrackedSet::Level, "The white noise of the first half moves: from one stretch");
     told(
         &|of| of.tracked = TrackedSet::Level,
         "With the white noise followed, each stretch predicted from those before it, the model leaves 1.7",
     );
-    told(&|of| of.related_line.iter_mut().for_each(|line| line.ratio = (1, 1)), "in accel x too, at the same frequency:");
+    told(
+        &|of| of.related_line.iter_mut().for_each(|line| line.ratio = (1, 1)),
+        "in accel x too, at the same frequency:",
+    );
     let with_chance = |p_value: f64, sentence: &str| {
         told(&|of| of.quarters.iter_mut().for_each(|quarters| quarters.p_value = p_value), sentence);
     };
@@ -126,7 +132,7 @@ fn each_course_of_a_record_has_its_sentence() {
 
 #[test]
 fn spikes_and_knocks_are_told_with_their_rate_and_the_errors_without_them() {
-    let mut report = report();
+    let mut report = followed();
     let channel = &mut report.channels[2];
     channel.before.unseen_excluding = Some(channel.before.unseen.clone());
     channel.after.unseen_excluding = Some(channel.after.unseen.clone());
@@ -135,7 +141,7 @@ fn spikes_and_knocks_are_told_with_their_rate_and_the_errors_without_them() {
     let text = text(&report);
     for told in [
         "with 34 spikes and knocks an hour [23, 46], as the first half has them) leaves",
-        "Without the spikes and knocks of both halves 4,512 become 1.4.",
+        "Without the spikes and knocks of both halves 4,500 become 1.4.",
     ] {
         assert!(text.contains(told), "{told:?} is not in\n{text}");
     }

@@ -7,8 +7,7 @@ use noise_analysis::effects::{
     CurveEvidence, Effect, LineEvidence, LineSource, MotionInterval, MotionScale, NoisyInterval, Observation,
     OutputFilter, SinusoidalLine, Unexplained, UnexplainedPlace,
 };
-use noise_analysis::report::assessment::RecordLength;
-use noise_analysis::report::assessment::innovations::Innovations;
+use noise_analysis::report::assessment::{Innovations, RecordLength};
 use noise_analysis::report::{BiasOverTime, ChannelReport, Finding, Parameter, PartNote, Report, Stretch, Validation};
 use reports::terminal::{MOST_LINES, Screen};
 use std::collections::BTreeMap;
