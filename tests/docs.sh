@@ -7,5 +7,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 [ $# -gt 0 ] || set -- --workspace
-WRITE_DOCS=1 cargo test --locked --no-fail-fast "$@" in_the_docs
+status=0
+WRITE_DOCS=1 cargo test --locked --no-fail-fast "$@" in_the_docs || status=$?
 git --no-pager diff --stat
+exit $status

@@ -1,7 +1,8 @@
 //! Parts of the pages of the documentation that tests generate.
 //!
-//! A part stands between `<!-- begin NAME -->` and `<!-- end NAME -->`, on lines of their own or within a line. The test that calls
-//! [`generated`] fails if the part is another text. `tests/docs.sh` sets `WRITE_DOCS`, with which the call writes the part.
+//! A part stands between `<!-- begin NAME -->` and `<!-- end NAME -->`, on lines of their own or within a line after a word. The
+//! test that calls [`generated`] fails if the part is another text. `tests/docs.sh` sets `WRITE_DOCS`, with which the call writes the
+//! part. The name of such a test has the words `in_the_docs`, by which the script finds it.
 
 use crate::{target_folder, workspace};
 use std::fs::File;
@@ -66,6 +67,12 @@ impl Part<'_> {
         let Some((before, (old, after))) = parts else {
             panic!("{name_of_page}: the part \"{name}\" ends before it begins");
         };
+        // Markdown takes a line that begins with a mark for a block of its own.
+        let is_in_line = before.rsplit('\n').next().is_some_and(|line| !line.trim().is_empty());
+        assert!(
+            is_in_line || old.starts_with('\n'),
+            "{name_of_page}: the part \"{name}\" needs its marks on lines of their own, or a word before them"
+        );
         let (old, new) = (if old.starts_with('\n') { old.trim_matches('\n') } else { old }, text.trim_matches('\n'));
         if is_unchanged(old, new) {
             return;
@@ -193,6 +200,7 @@ mod tests {
     fn a_part_without_its_two_marks_is_refused_with_the_names_of_page_and_part() {
         for text in [
             "no marks",
+            "A mark at the beginning of a line:\n<!-- begin cost -->198<!-- end cost -->",
             "<!-- begin cost -->198",
             "198<!-- end cost -->",
             "<!-- end cost -->198<!-- begin cost -->",
