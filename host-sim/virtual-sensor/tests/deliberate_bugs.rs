@@ -199,7 +199,13 @@ impl Copy {
         let lines = kept.map(|line| if line.starts_with("members") { members } else { line });
         write(&root.join("Cargo.toml"), &lines.collect::<Vec<_>>().join("\n"));
         write(&root.join("Cargo.lock"), &read(&from.join("Cargo.lock")));
-        for folder in ["adis16405-driver/src", "host-sim/virtual-sensor/src", "host-sim/virtual-sensor/tests"] {
+        // The driver's manifest names its tests.
+        for folder in [
+            "adis16405-driver/src",
+            "adis16405-driver/tests",
+            "host-sim/virtual-sensor/src",
+            "host-sim/virtual-sensor/tests",
+        ] {
             let _absent_before_the_first_run = fs::remove_dir_all(root.join(folder));
             copy(&from.join(folder), &root.join(folder));
         }
