@@ -8,7 +8,6 @@ mod fit;
 #[cfg(all(feature = "defmt", feature = "host"))]
 mod formatted;
 mod gaps;
-mod guide;
 #[cfg(feature = "host")]
 mod host;
 mod kurtosis;

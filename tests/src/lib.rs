@@ -1,7 +1,11 @@
-//! Shared by the tests of several crates: the measured recordings, the program, and the report of a skipped test.
+//! Shared by the tests of several crates: the measured recordings, the program, generated documentation, and the report of a
+//! skipped test.
 //!
 //! The tests of the noise observatory as a whole live in `tests/`.
 
+mod generated;
+
+pub use generated::{generated, generated_within, writes_docs};
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -6,6 +6,7 @@ mod architecture;
 mod attack;
 #[path = "boards/main.rs"]
 mod boards;
+mod estimator;
 mod fleet;
 mod links;
 mod recorded_words;

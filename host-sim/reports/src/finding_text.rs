@@ -568,69 +568,38 @@ mod tests {
         }
     }
 
-    /// The page with single spaces in the place of line breaks.
-    fn documentation() -> String {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/findings.md");
-        let page = std::fs::read_to_string(path).expect("docs/findings.md");
-        page.split_whitespace().collect::<Vec<_>>().join(" ")
-    }
-
-    /// The words of a text between its numbers, units and names: what does not depend on the parameters.
-    fn fixed_words(text: &str) -> Vec<String> {
-        let names = [
-            "x", "y", "z", "gyro", "gyros", "accel", "accels", "g", "mg", "µg", "s", "ms", "min", "h", "d", "V", "Hz",
-            "mHz",
-        ];
-        let mut runs = vec![Vec::new()];
-        for word in text.split_whitespace() {
-            let bare = word.trim_matches(|letter: char| ".,:;()!*".contains(letter));
-            let is_word =
-                bare.chars().all(|letter| letter.is_alphabetic() || "-'".contains(letter)) && !bare.is_empty();
-            if is_word && !names.contains(&bare) {
-                runs.last_mut().expect("one at least").push(bare);
-            }
-            if !is_word || names.contains(&bare) || bare != word {
-                runs.push(Vec::new());
-            }
+    /// What a report says of the examples of a kind: the advice once after all sentences that it follows.
+    fn sentences_of(kind: &str, examples: &[Effect]) -> String {
+        let texts =
+            examples.iter().filter(|effect| effect.name() == kind).map(|effect| describe(&finding(effect.clone())));
+        let mut by_advice: Vec<(String, Vec<String>)> = Vec::new();
+        for FindingText { physics, advice, .. } in texts {
+            let known = by_advice.iter().position(|(known, _)| *known == advice);
+            let at = known.unwrap_or_else(|| {
+                by_advice.push((advice, Vec::new()));
+                by_advice.len() - 1
+            });
+            by_advice[at].1.push(format!("*{physics}*"));
         }
-        runs.iter().filter(|run| run.len() > 1).map(|run| run.join(" ")).collect()
-    }
-
-    /// A finding as it is, in several channels with a share, and with what the second half says.
-    fn variants(effect: &Effect) -> [Finding; 3] {
-        let alone = finding(effect.clone());
-        let mut shared = alone.clone();
-        shared.channels.push("accl_x".to_owned());
-        shared.share_percent.insert("gyro_z".to_owned(), 60.0);
-        shared.validated = Validation::Yes;
-        let refuted = Finding { validated: Validation::No, ..shared.clone() };
-        [alone, shared, refuted]
+        let said = by_advice.iter().map(|(advice, all)| format!("Says: {}\n\nAdvice: *{advice}*", all.join(" or\n")));
+        said.collect::<Vec<_>>().join("\n\n")
     }
 
     #[test]
-    fn every_sentence_of_every_kind_is_in_the_documentation() {
-        let page = documentation();
-        let general = page.split("## The findings").nth(1).and_then(|rest| rest.split("### `").next()).expect("a part");
+    fn the_sentences_of_every_kind_are_in_the_docs() {
         let examples = examples();
-        for name in Effect::NAMES {
-            assert!(examples.iter().any(|effect| effect.name() == *name), "{name} has no example");
+        for kind in Effect::NAMES {
+            let sentences = sentences_of(kind, &examples);
+            assert!(!sentences.is_empty(), "{kind} has no example");
+            system_tests::generated("docs/findings.md", kind, &sentences);
         }
-        for effect in &examples {
-            let kind = effect.name();
-            let section =
-                page.split(&format!("### `{kind}` ")).nth(1).unwrap_or_else(|| panic!("{kind} has no section"));
-            let section = section.split(" ### `").next().unwrap_or_default();
-            for finding in variants(effect) {
-                let text = describe(&finding);
-                assert!(text.physics.ends_with('.') && text.advice.ends_with('.'), "{kind}: {text:?}");
-                for words in [&text.physics, &text.brief, &text.advice].into_iter().flat_map(|text| fixed_words(text)) {
-                    // The gain is explained once for all kinds.
-                    let is_known = section.contains(&words) || general.contains(&words);
-                    assert!(is_known, "{kind}: the page lacks \"{words}\" of {text:?}");
-                }
-                let words = fixed_words(&capital(&text.weight));
-                assert!(words.iter().all(|words| general.contains(&capital(words))), "{kind}: {}", text.weight);
-            }
+    }
+
+    #[test]
+    fn every_text_of_every_kind_is_a_sentence() {
+        for effect in &examples() {
+            let text = describe(&finding(effect.clone()));
+            assert!(text.physics.ends_with('.') && text.advice.ends_with('.'), "{}: {text:?}", effect.name());
         }
     }
 
@@ -760,6 +729,22 @@ mod tests {
         };
         let text = EvidenceText::of_effect(&stuck.into(), NumberStyle::Prefixed).measured;
         assert!(text.starts_with("5 of 12000 samples are in 1 run of equal values"), "{text}");
+    }
+
+    #[test]
+    fn a_finding_in_several_channels_says_so_and_what_the_second_half_says_of_it() {
+        let mut line = finding(line(20.5));
+        line.channels.push("accl_x".to_owned());
+        for (validated, weight) in [
+            (Validation::Yes, "the second half confirms it"),
+            (Validation::No, "the second half does not confirm it"),
+            (Validation::Untestable, ""),
+        ] {
+            line.validated = validated;
+            let text = describe(&line);
+            assert!(text.physics.contains("20.50 ± 0.10 Hz reaches these channels: "), "{}", text.physics);
+            assert_eq!(text.weight, weight);
+        }
     }
 
     #[test]

@@ -8,8 +8,6 @@ mod exports;
 mod fixture;
 #[path = "live/main.rs"]
 mod live;
-#[path = "rendering/phrases.rs"]
-mod phrases;
 #[path = "rendering/main.rs"]
 mod rendering;
 #[path = "screen/main.rs"]

@@ -1,4 +1,4 @@
-//! The walk through the program in `docs/ten-minutes.md`: its commands run one after the other, and print what the page says.
+//! The walk through the program in `docs/ten-minutes.md`: its commands run one after the other, and what they print is generated.
 
 use std::path::Path;
 use std::process::Command;
@@ -7,57 +7,70 @@ use tempfile::tempdir;
 /// A line of the page that stands for any number of lines.
 const ANY_LINES: &str = "…";
 
-/// A command of the page, and the lines that it prints.
-struct Step {
-    command: String,
-    printed: Vec<String>,
+/// What a line begins with, before its first number.
+fn label(line: &str) -> String {
+    let words: Vec<&str> =
+        line.split(|letter: char| letter.is_ascii_digit()).take(1).flat_map(str::split_whitespace).collect();
+    words.join(" ")
 }
 
-/// The steps in the blocks of console text.
-fn steps(page: &str) -> Vec<Step> {
-    let mut steps: Vec<Step> = Vec::new();
-    let mut in_console = false;
-    for line in page.lines() {
-        match line {
-            "```console" => in_console = true,
-            "```" => in_console = false,
-            _ if !in_console => {}
-            _ => match line.strip_prefix("$ ") {
-                Some(command) => steps.push(Step { command: command.to_owned(), printed: Vec::new() }),
-                None => steps.last_mut().expect("a command before its output").printed.push(line.to_owned()),
-            },
+/// What is printed, with the elisions of the page: as many lines before the first and after the last one, and between two of them the
+/// lines with the same labels.
+fn elided(printed: &[&str], page: &[&str]) -> Vec<String> {
+    let parts: Vec<&[&str]> = page.split(|line| *line == ANY_LINES).collect();
+    let ([first, between @ .., last], true) = (&parts[..], parts.len() > 1) else {
+        return printed.iter().map(|line| (*line).to_owned()).collect();
+    };
+    let missing = |lines: &[&str]| -> ! { panic!("to be edited by hand: no lines {lines:#?} in {printed:#?}") };
+    let Some((head, mut rest)) = printed.split_at_checked(first.len()) else { missing(first) };
+    let mut kept = head.to_vec();
+    for part in between {
+        kept.push(ANY_LINES);
+        for line in *part {
+            let Some(at) = rest.iter().position(|printed| label(printed) == label(line)) else { missing(part) };
+            kept.push(rest[at]);
+            rest = &rest[at + 1..];
         }
     }
-    steps
+    kept.push(ANY_LINES);
+    let Some(skipped) = rest.len().checked_sub(last.len()) else { missing(last) };
+    kept.extend(&rest[skipped..]);
+    kept.into_iter().map(str::to_owned).collect()
 }
 
-/// Whether `printed` is what `expected` says.
-fn is_as_said(printed: &[&str], expected: &[String]) -> bool {
-    match expected.split_first() {
-        None => printed.is_empty(),
-        Some((line, rest)) if line == ANY_LINES => {
-            (0..=printed.len()).any(|skipped| is_as_said(&printed[skipped..], rest))
+#[test]
+fn what_the_commands_of_ten_minutes_print_is_in_the_docs() {
+    let page = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/ten-minutes.md"))
+        .expect("the page");
+    let blocks: Vec<&str> = page.split("```console\n$ ").skip(1).filter_map(|rest| rest.split("```").next()).collect();
+    assert!(blocks.len() >= 5, "{} blocks", blocks.len());
+    let folder = tempdir().expect("a folder");
+    let programs = Path::new(env!("CARGO_BIN_EXE_host-sim")).parent().expect("a folder").display().to_string();
+    let path = format!("{programs}:{}", std::env::var("PATH").unwrap_or_default());
+    for (number, block) in (1..).zip(blocks) {
+        let mut text = "```console\n".to_owned();
+        for step in block.split("\n$ ") {
+            let (command, lines) = step.split_once('\n').unwrap_or((step, ""));
+            let mut shell = Command::new("sh");
+            let output =
+                shell.args(["-c", &format!("{command} 2>&1")]).env("PATH", &path).current_dir(&folder).output();
+            let output = output.expect("a shell");
+            let printed = String::from_utf8(output.stdout).expect("UTF-8");
+            assert!(output.status.success(), "$ {command}\n{printed}");
+            let printed: Vec<&str> = printed.lines().map(str::trim_end).collect();
+            text += &format!("$ {command}\n");
+            for line in elided(&printed, &lines.lines().collect::<Vec<_>>()) {
+                text += &format!("{line}\n");
+            }
         }
-        Some((line, rest)) => {
-            printed.split_first().is_some_and(|(first, others)| first == line && is_as_said(others, rest))
-        }
+        system_tests::generated("docs/ten-minutes.md", &format!("block-{number}"), &format!("{text}```"));
     }
 }
 
 #[test]
-fn the_commands_of_ten_minutes_print_what_the_page_says() {
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/ten-minutes.md");
-    let steps = steps(&std::fs::read_to_string(page).expect("the page"));
-    assert!(steps.len() >= 5, "{} commands", steps.len());
-    let folder = tempdir().expect("a folder");
-    let programs = Path::new(env!("CARGO_BIN_EXE_host-sim")).parent().expect("a folder").display().to_string();
-    let path = format!("{programs}:{}", std::env::var("PATH").unwrap_or_default());
-    for Step { command, printed: expected } in steps {
-        let mut shell = Command::new("sh");
-        let output = shell.args(["-c", &format!("{command} 2>&1")]).env("PATH", &path).current_dir(&folder).output();
-        let output = output.expect("a shell");
-        let text = String::from_utf8(output.stdout).expect("UTF-8");
-        let printed: Vec<&str> = text.lines().map(str::trim_end).collect();
-        assert!(output.status.success() && is_as_said(&printed, &expected), "$ {command}\n{text}");
-    }
+fn elisions_stay_where_they_are_while_the_figures_change() {
+    let printed = ["head", "a 7", "b 8", "c 9", "d 10", "e 11"];
+    assert_eq!(elided(&printed, &["head", "a 1"]), printed);
+    assert_eq!(elided(&printed, &["head", "a 1", "…", "d 4", "…"]), ["head", "a 7", "…", "d 10", "…"]);
+    assert_eq!(elided(&printed, &["head", "…", "c 1", "d 2", "…", "e 5"]), ["head", "…", "c 9", "d 10", "…", "e 11"]);
 }
