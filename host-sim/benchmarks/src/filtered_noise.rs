@@ -222,11 +222,11 @@ mod tests {
     #[test]
     fn a_small_run_has_every_cell_and_its_intervals_hold_for_the_default_filter() {
         let (taps, every) = (TAPS.to_vec(), READ_EVERY.to_vec());
-        let plan = FilteredNoisePlan { taps, every, records: 1, seconds: 60.0, first_seed: 3, jobs: 2 };
+        let plan = FilteredNoisePlan { taps, every, records: 1, seconds: 30.0, first_seed: 3, jobs: 2 };
         let table = plan.run(|_, _| ());
         assert_eq!(table.cells.len(), TAPS.len() * READ_EVERY.len());
         assert!(table.cells.iter().all(|cell| cell.channels.len() == GYROS.len()));
-        // N of white noise in a minute is known to about 1 %: 10 % off is another filter or another rate.
+        // N of white noise in half a minute is known to about 1.5 %: 10 % off is another filter or another rate.
         let default = table.cells.iter().find(|cell| (cell.taps, cell.every) == (4, 1)).expect("4 taps");
         for channel in &default.channels {
             let n = channel.coefficients[0].expect("N");

@@ -1,9 +1,8 @@
 //! Stationary Gaussian noise of a given spectrum, generated in the frequency domain.
 
+use fourier::Complex;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
-use realfft::RealFftPlanner;
-use realfft::num_complex::Complex;
 use std::f64::consts::PI;
 
 /// One-sided density of flicker noise with the bias instability `b` at `frequency` Hz, `B²/(πf)` (IEEE Std 952).
@@ -21,7 +20,7 @@ pub(crate) fn gaussian_noise(
     random: &mut impl Rng,
 ) -> Vec<f64> {
     let length = 2 * samples.next_power_of_two();
-    let transform = RealFftPlanner::<f64>::new().plan_fft_inverse(length);
+    let transform = fourier::inverse(length);
     let mut spectrum = transform.make_input_vec();
     // The inverse transform sums without a factor: a density S at frequency f takes the amplitude √(S·Δf/2)/√2 in each of
     // the real and the imaginary part, Δf being the distance of the frequencies.

@@ -70,7 +70,7 @@ fn measured_noise_is_read_from_a_table_and_an_unusable_one_is_named() {
     let without = benchmarks(&["measured", name]);
     let error = String::from_utf8_lossy(&without.stderr).into_owned();
     assert!(without.status.code() == Some(1) && error.contains("noise.csv") && error.contains("--rate"), "{error}");
-    let with = benchmarks(&["measured", name, "--rate", "100", "--stretches", "1", "--seconds", "30", "--jobs", "1"]);
+    let with = benchmarks(&["measured", name, "--rate", "100", "--stretches", "1", "--seconds", "10", "--jobs", "1"]);
     assert_eq!(with.status.code(), Some(0), "{}", String::from_utf8_lossy(&with.stderr));
     let table = String::from_utf8(with.stdout).expect("UTF-8");
     assert!(table.contains("noise.csv") && table.contains("telegraph"), "{table}");

@@ -171,6 +171,7 @@ fn hidden_effects_are_learned_and_subtracted() {
 /// The sensor's filter at another setting, undeclared to the firmware: sixteen taps a stage (SENS_AVG, lower byte), written by
 /// something else while the self-test runs, after the firmware has set none and before it samples. On the other board.
 #[test]
+#[ignore = "long: two epochs and twice the fits take a minute; run with --long"]
 fn another_filter_is_found() {
     let filter = vec![(SELF_TEST_S, Event::WriteRegister(0xB804))];
     let Epochs { learned, validated, table, .. } =

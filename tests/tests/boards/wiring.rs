@@ -6,9 +6,10 @@ use super::decoded::Decoded;
 use super::images;
 use emulation::{
     DBGMCU_APB1_FZ, EXTI_FTSR, EXTI_IMR, EXTI_RTSR, FEATHER, FLASH_CR, FLASH_OPTCR, FLASH_SR, H405, Outcome, PUPDR,
-    SPI1_CR1, SYSCFG_EXTICR, Scenario, Sensor, gpio,
+    SPI1_CR1, SYSCFG_EXTICR, Scenario, Sensor, Wiring, gpio,
 };
 use link::{BootCause, ClockSource};
+use std::path::Path;
 
 /// Both boards boot, sample and report with their own crystal and pins. The LED changes its level twice a second.
 #[test]
@@ -155,26 +156,30 @@ fn settings_that_the_flash_does_not_take_are_not_called_kept() {
 }
 
 /// Sampling alone at 819.2 SPS, then an epoch that is learned from: flash, RAM, stack, processor, interrupts.
-#[test]
-fn each_board_is_within_its_budget() {
+fn assert_board_within_budget(board: &str, image: &Path, wiring: Wiring) {
     // RM0090 sections 2.3.1 and 3.4.
     let memory = Memory { flash: 1 << 20, ram: 128 << 10 };
+    let keys = vec![(0.1, b"i 0\rf 819.2\re 10\r".to_vec()), (8.0, b"k".to_vec()), (11.0, b"e 0\r".to_vec())];
+    let sensor = Some(Sensor::Published(25));
+    let Outcome { received, diagnostics, .. } =
+        run(image, Scenario { wiring, sensor, keys, seconds: 35.0, ..Scenario::default() });
+    println!("{board}: {diagnostics:?}");
+    let decoded = Decoded::decode(&received);
+    let awake_percent = f64::from(counter(&decoded.lines, "awake_permille").expect("the counters")) / 10.0;
+    let health = **decoded.healths().last().expect("the report of the epoch");
+    assert_eq!((health.used, health.lost_edges), (health.bursts, 0), "{health:?}");
+    assert_within_budget(&Costs { board, memory, image, core_mhz: 168.0, awake_percent, health });
+}
+
+#[test]
+fn the_h405_is_within_its_budget() {
+    assert_board_within_budget("Olimex STM32-H405", image(), H405);
+}
+
+#[test]
+#[ignore = "long: the same microcontroller on other boards; run with --long"]
+fn the_feather_is_within_its_budget() {
+    assert_board_within_budget("Feather STM32F405", feather_image(), FEATHER);
     let usb = images::build("feather", TARGET, &["feather-usb"]);
-    let boards = [
-        ("Olimex STM32-H405", image(), H405),
-        ("Feather STM32F405", feather_image(), FEATHER),
-        ("Feather STM32F405, USB", usb.as_path(), FEATHER),
-    ];
-    for (board, image, wiring) in boards {
-        let keys = vec![(0.1, b"i 0\rf 819.2\re 10\r".to_vec()), (8.0, b"k".to_vec()), (11.0, b"e 0\r".to_vec())];
-        let sensor = Some(Sensor::Published(25));
-        let Outcome { received, diagnostics, .. } =
-            run(image, Scenario { wiring, sensor, keys, seconds: 35.0, ..Scenario::default() });
-        println!("{board}: {diagnostics:?}");
-        let decoded = Decoded::decode(&received);
-        let awake_percent = f64::from(counter(&decoded.lines, "awake_permille").expect("the counters")) / 10.0;
-        let health = **decoded.healths().last().expect("the report of the epoch");
-        assert_eq!((health.used, health.lost_edges), (health.bursts, 0), "{health:?}");
-        assert_within_budget(&Costs { board, memory, image, core_mhz: 168.0, awake_percent, health });
-    }
+    assert_board_within_budget("Feather STM32F405, USB", &usb, FEATHER);
 }

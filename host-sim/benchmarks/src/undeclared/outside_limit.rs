@@ -8,7 +8,6 @@ use super::detection_limit::{
 };
 use super::environment::EnvironmentCourse;
 use super::outside::{OutsideEffect, OutsideKind, relative};
-use realfft::RealFftPlanner;
 
 /// The effect with its size at `strength` times the detection limit, beside the noise of its channel `place`, and the strength that
 /// it has: that of missing codes has no size to choose.
@@ -93,7 +92,7 @@ fn smallest_outside_size(effect: &OutsideEffect, environment: &EnvironmentCourse
 /// Expected log likelihood ratio of a known signal in noise of the two-sided `density`: the energy of its spectrum over that
 /// of the noise (matched filter). The mean is not known.
 fn ratio_of_signal(signal: &[f64], period_s: f64, density: impl Fn(f64) -> f64) -> f64 {
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(signal.len());
+    let transform = fourier::forward(signal.len());
     let (mut input, mut output) = (signal.to_vec(), transform.make_output_vec());
     if transform.process(&mut input, &mut output).is_err() {
         return 0.0;
@@ -101,7 +100,7 @@ fn ratio_of_signal(signal: &[f64], period_s: f64, density: impl Fn(f64) -> f64) 
     let seconds = signal.len() as f64 * period_s;
     // Each ordinate stands for two frequencies, that at half the sample rate for one.
     let is_single = |k: usize| 2 * k == signal.len();
-    let energy = |(k, bin): (usize, &realfft::num_complex::Complex<f64>)| {
+    let energy = |(k, bin): (usize, &fourier::Complex<f64>)| {
         let part = if is_single(k) { 0.5 } else { 1.0 };
         part * period_s * period_s * bin.norm_sqr() / seconds / density(k as f64 / seconds)
     };

@@ -5,9 +5,8 @@
 //! most powerful one (the matched filter; the coherent follow-up of the candidates of a semi-coherent search: P. Brady and T. Creighton,
 //! "Searching for periodic sources with LIGO. II", Phys. Rev. D 61, 2000).
 
-use super::transforms;
 use crate::samples::uniform_series::UniformSeries;
-use realfft::num_complex::Complex;
+use fourier::Complex;
 use std::f64::consts::{PI, TAU};
 
 /// Blocks to a segment: half their rate is twice the resolution of a segment.
@@ -41,7 +40,7 @@ impl CoherentTrack {
         let duration_s = length as f64 * series.sample_period();
         let [first, last] = frequencies.map(|frequency| frequency * duration_s);
         let blocks = turned_back(&series.values()[..length], size, first, last - first);
-        let transform = transforms::forward(PADDING * count);
+        let transform = fourier::forward(PADDING * count);
         let (mut input, mut of_real, mut of_imaginary) =
             (transform.make_input_vec(), transform.make_output_vec(), transform.make_output_vec());
         let reach = (FREQUENCY_OFF * (PADDING * segments) as f64) as usize;

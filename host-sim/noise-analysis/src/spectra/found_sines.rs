@@ -151,10 +151,10 @@ pub(super) fn is_on_skirts(frequency: f64, resonance: &SpectralLine) -> bool {
 mod tests {
     use crate::samples::uniform_series::UniformSeries;
     use crate::spectra::find_lines;
+    use fourier::Complex;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
-    use realfft::num_complex::Complex;
     use std::f64::consts::{PI, TAU};
 
     /// 400 s at 50 Hz: white noise of deviation 1 and a sine of this amplitude at 7.3 Hz, with an envelope by the part of the record.

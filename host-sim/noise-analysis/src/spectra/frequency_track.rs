@@ -7,7 +7,6 @@
 //! best in which the frequency runs by half of the segment's resolution. Where the sums leave it open, the phases of the segments decide.
 
 use super::coherent_track::CoherentTrack;
-use super::transforms;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, chi_squared_tail, exponential_sum_tail};
 use crate::effects::findings::SIGNIFICANCE;
@@ -143,7 +142,7 @@ impl Spectrogram {
         if size < FEWEST_SAMPLES {
             return None;
         }
-        let transform = transforms::forward(PADDING * size);
+        let transform = fourier::forward(PADDING * size);
         let (mut input, mut output) = (transform.make_input_vec(), transform.make_output_vec());
         let mut rows: Vec<Vec<f32>> = Vec::with_capacity(segments);
         for values in series.values().chunks_exact(size).take(segments) {

@@ -12,7 +12,7 @@ use super::whittle::{Sign, SpectralBand, fit_mixture};
 use crate::bounds::MeasuredValue;
 use crate::distributions::NORMAL_975;
 use crate::samples::uniform_series::UniformSeries;
-use realfft::num_complex::Complex;
+use fourier::Complex;
 use std::f64::consts::{PI, TAU};
 
 /// Blocks of the record in whose sums the changes are sought, at least: the sums lose `(π·64/1024)²/3`, 1.3 %, of the power of the

@@ -3,8 +3,8 @@
 use super::periodogram::taper;
 use super::whittle::departure_by_chance;
 use crate::samples::uniform_series::UniformSeries;
+use fourier::Complex;
 use nalgebra::{Matrix4, Vector4};
-use realfft::num_complex::Complex;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 

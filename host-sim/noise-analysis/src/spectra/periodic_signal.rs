@@ -10,7 +10,6 @@ use super::harmonics::Harmonics;
 use super::line_models::{Sine, transform_at};
 use super::periodogram::taper;
 use super::slow_background::SlowBackground;
-use super::transforms;
 use super::whittle::SpectralBand;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, exponential_sum_tail, mean_ratio_tail};
@@ -247,7 +246,7 @@ fn tapered(blocks: &UniformSeries) -> Option<(Vec<f64>, f64)> {
 
 /// `|Σwye^(−iωt)|²/Σw²` of the `values` wy, transformed with zeros up to `length`.
 fn power(values: &[f64], length: usize, squares: f64) -> Option<Vec<f64>> {
-    let transform = transforms::forward(length);
+    let transform = fourier::forward(length);
     let mut input = transform.make_input_vec();
     input.iter_mut().zip(values).for_each(|(slot, value)| *slot = *value);
     let mut output = transform.make_output_vec();

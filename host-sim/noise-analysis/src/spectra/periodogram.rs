@@ -1,9 +1,9 @@
 //! Discrete Fourier transforms of a whole record: the tapered periodogram, at the resolution that the record's length
 //! allows, and transforms under sine tapers for its lowest frequencies.
 
-use super::transforms::{self, BufferedTransform};
+use super::transforms::BufferedTransform;
 use crate::samples::uniform_series::UniformSeries;
-use realfft::num_complex::Complex;
+use fourier::Complex;
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -141,7 +141,7 @@ impl SineTapered {
     pub(super) fn new(series: &UniformSeries) -> Option<Self> {
         let length = smooth_length(series.values().len());
         let (filled, _) = series.interpolated();
-        let transform = transforms::forward(length.max(2));
+        let transform = fourier::forward(length.max(2));
         let under = |taper: usize| {
             let mut input = transform.make_input_vec();
             let mut power = 0.0;

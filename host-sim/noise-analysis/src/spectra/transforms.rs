@@ -1,17 +1,9 @@
-//! Plans of Fourier transforms of real numbers, which are made once for each length.
+//! Fourier transforms of real numbers in buffers that are used again, and the cosine transform.
 
 use crate::parallel::threads;
-use realfft::num_complex::Complex;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use fourier::{Complex, RealToComplex, forward};
 use std::f64::consts::PI;
 use std::sync::{Arc, Mutex, PoisonError};
-
-/// Lengths that are kept: those of one analysis are of the whole record, of its half, of its means and of stretches, each with and without
-/// padding.
-const KEPT: usize = 16;
-
-/// The lengths that were asked for last, the latest first, each with a planner that keeps the plans for it.
-static PLANNERS: Mutex<Vec<(usize, RealFftPlanner<f64>)>> = Mutex::new(Vec::new());
 
 /// Buffers that no transform uses: new ones of megabytes would have to be cleared by the system.
 static BUFFERS: Mutex<Vec<Buffers>> = Mutex::new(Vec::new());
@@ -84,24 +76,4 @@ pub(super) fn cosine_transform(values: impl ExactSizeIterator<Item = f64>) -> Ve
         by_order[count - order] = value.re * sine - value.im * cosine;
     }
     by_order
-}
-
-/// The transform of `length` real numbers, 2 or more.
-pub(super) fn forward(length: usize) -> Arc<dyn RealToComplex<f64>> {
-    planned(length, RealFftPlanner::plan_fft_forward)
-}
-
-/// The transform to `length` real numbers, 2 or more.
-pub(super) fn inverse(length: usize) -> Arc<dyn ComplexToReal<f64>> {
-    planned(length, RealFftPlanner::plan_fft_inverse)
-}
-
-fn planned<P>(length: usize, plan: impl FnOnce(&mut RealFftPlanner<f64>, usize) -> P) -> P {
-    let mut planners = PLANNERS.lock().unwrap_or_else(PoisonError::into_inner);
-    let kept = planners.iter().position(|(of, _)| *of == length).map(|at| planners.remove(at).1);
-    let mut planner = kept.unwrap_or_else(RealFftPlanner::new);
-    let planned = plan(&mut planner, length);
-    planners.insert(0, (length, planner));
-    planners.truncate(KEPT);
-    planned
 }

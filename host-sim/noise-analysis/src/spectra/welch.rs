@@ -1,11 +1,10 @@
 //! Welch's estimate of a power spectral density: the average of the periodograms of overlapping windowed segments.
 
 use super::smooth_shape::{Filters, SpectralShape};
-use super::transforms;
 use super::whittle::SpectralBand;
 use crate::samples::uniform_series::UniformSeries;
-use realfft::RealToComplex;
-use realfft::num_complex::Complex;
+use fourier::Complex;
+use fourier::RealToComplex;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -44,7 +43,7 @@ pub(super) struct WelchSum {
 impl WelchSum {
     /// For segments of `length` samples.
     pub(super) fn new(sample_period: f64, length: usize) -> Self {
-        let transform = transforms::forward(length);
+        let transform = fourier::forward(length);
         let (input, output) = (transform.make_input_vec(), transform.make_output_vec());
         Self {
             sample_period,

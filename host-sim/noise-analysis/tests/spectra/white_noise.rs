@@ -6,7 +6,6 @@ use noise_analysis::spectra::{FilterSpectrum, KnownShapes, Welch, WhiteNoiseFit,
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
-use realfft::RealFftPlanner;
 use std::f64::consts::PI;
 
 const RATE_HZ: f64 = 100.0;
@@ -28,7 +27,7 @@ pub(crate) fn white(count: usize, rate: f64, random: &mut ChaCha8Rng) -> Vec<f64
 pub(crate) fn with_drift(mut values: Vec<f64>, [b, k]: [f64; 2], rate: f64, random: &mut ChaCha8Rng) -> Vec<f64> {
     // Random phases and amplitudes at the frequencies of a record of twice the length.
     let length = 2 * values.len();
-    let transform = RealFftPlanner::<f64>::new().plan_fft_inverse(length);
+    let transform = fourier::inverse(length);
     let mut spectrum = transform.make_input_vec();
     let last = spectrum.len() - 1;
     for (at, value) in spectrum.iter_mut().enumerate().take(last).skip(1) {

@@ -4,7 +4,6 @@
 use crate::undeclared::channel_under_test::{Densities, baseline_densities, fit_baseline, low_pass_gain};
 use adis16405_driver::Channel;
 use measurement::{MeasuredChannel, Measurement};
-use realfft::RealFftPlanner;
 use std::f64::consts::PI;
 use virtual_sensor::{NoiseModel, OutputRegister};
 
@@ -101,7 +100,7 @@ fn bands(values: &[f64], period_s: f64) -> Option<Vec<Band>> {
     if length < 64 || input.iter().all(|value| *value == 0.0) {
         return None;
     }
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(length);
+    let transform = fourier::forward(length);
     let mut output = transform.make_output_vec();
     transform.process(&mut input, &mut output).ok()?;
     // The mean square of Hann's window is 3/8.

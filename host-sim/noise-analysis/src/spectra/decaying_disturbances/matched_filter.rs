@@ -3,9 +3,8 @@
 
 use crate::spectra::periodogram::{smooth_length, taper};
 use crate::spectra::slow_background::SlowBackground;
-use crate::spectra::transforms;
 use crate::spectra::whittle::SpectralBand;
-use realfft::num_complex::Complex;
+use fourier::Complex;
 use std::f64::consts::TAU;
 
 /// Largest part of the blocks that may have no samples.
@@ -46,7 +45,7 @@ impl WhitenedRecord {
     pub(super) fn new(means: &[f64]) -> Option<Self> {
         let mut values = filled(means)?;
         let length = values.len();
-        let forward = transforms::forward(length);
+        let forward = fourier::forward(length);
         // A periodic continuation without a jump.
         let end = length / 256;
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
@@ -101,7 +100,7 @@ impl WhitenedRecord {
     }
 
     fn inverse(&self, bin: impl Fn(usize) -> Complex<f64>) -> Option<Vec<f64>> {
-        let inverse = transforms::inverse(self.length);
+        let inverse = fourier::inverse(self.length);
         let last = self.transform.len() - 1;
         // The first and the last order of real values are real.
         let real_end = |order: usize| if order == last { bin(order).re.into() } else { bin(order) };

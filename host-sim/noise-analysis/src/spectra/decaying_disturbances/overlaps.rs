@@ -5,12 +5,11 @@
 //! are u apart, a Poisson number, and the sums of all are `n·Σr⁴` and `n·Σr³`. So the logarithm of the ratio has the variance
 //! `Σᵤ (G₄/Σr⁴ − G₃/Σr³)²/2N`, whatever n is. A record in which by chance none overlap shows nothing of it.
 
-use crate::spectra::transforms;
-use realfft::num_complex::Complex;
+use fourier::Complex;
 
 /// The variance for a response and so many blocks of the record.
 pub(super) fn variance_of_ratio(response: &[f64], blocks: f64) -> Option<f64> {
-    let (forward, inverse) = (transforms::forward(response.len()), transforms::inverse(response.len()));
+    let (forward, inverse) = (fourier::forward(response.len()), fourier::inverse(response.len()));
     let transform = |power: i32| {
         let (mut powers, mut bins) =
             (response.iter().map(|of| of.powi(power)).collect::<Vec<f64>>(), forward.make_output_vec());
