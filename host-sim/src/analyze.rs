@@ -15,11 +15,11 @@ use noise_analysis::effects::Effect;
 use noise_analysis::record::long_record::{MOST_LOST, MOST_SAMPLES, MOST_SAMPLES_WITH_LOSSES};
 use noise_analysis::report::several::{self, NoiseAgreement, NoiseInflation};
 use noise_analysis::report::{Report, Stretch};
-use recordings::any_sensor::{ReadOptions, SensorRecording};
+use recordings::any_sensor::ReadOptions;
 use recordings::file_format::{FileFormat, InputFile};
 use recordings::recording::Recording;
-use recordings::sample_stream::{KeptInMemory, SampleStream, StreamError};
-use recordings::time_base::{StampQuality, TimeRange, time_base};
+use recordings::sample_stream::{KeptInMemory, Reading, SampleStream, StreamError, part_of};
+use recordings::time_base::TimeRange;
 use recordings::{ColumnSelection, Printable, ReadMonitor, count_table};
 use reports::summary::longest_at_rest;
 use serde::Serialize;
@@ -33,12 +33,8 @@ const ADIS16405: &str = "adis16405";
 /// Rows that a quick report keeps in memory at most; they tell the clock of the time stamps.
 const QUICK_ROWS: u64 = 1 << 17;
 /// Recordings that are not condensed for their analysis.
-const KEPT: KeptInMemory = KeptInMemory {
-    rows: MOST_SAMPLES,
-    rows_with_losses: MOST_SAMPLES_WITH_LOSSES,
-    most_lost: MOST_LOST,
-    irregular: true,
-};
+const KEPT: KeptInMemory =
+    KeptInMemory { rows: MOST_SAMPLES, rows_with_losses: MOST_SAMPLES_WITH_LOSSES, most_lost: MOST_LOST };
 /// Longest profile file.
 const PROFILE_BYTES: u64 = 1 << 20;
 /// Name of a sensor without a data sheet.
@@ -165,7 +161,7 @@ fn report_of_samples(
         let mut stream = open_stream(
             recording,
             monitor,
-            KeptInMemory { rows: QUICK_ROWS, rows_with_losses: QUICK_ROWS, most_lost: 1.0, irregular: false },
+            KeptInMemory { rows: QUICK_ROWS, rows_with_losses: QUICK_ROWS, most_lost: 1.0 },
         )?;
         let estimators = streaming::curves(&mut stream)?;
         end_reading(&stream);
@@ -193,28 +189,24 @@ fn note_all(notes: &[String]) {
     notes.iter().for_each(|sentence| note(format_args!("{sentence}")));
 }
 
-/// Opens a recording of any format to read it in blocks.
+/// Opens a recording of any format, or the part of it that the arguments say. What the user should know of an SPI log is noted.
 fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor, kept: KeptInMemory) -> Result<SampleStream> {
-    let name = || recording.input.file.display().to_string();
-    let RecordingArguments { rate, .. } = recording;
+    let reading = Reading::new(recording.rate, kept).of_part(recording.time_range());
     let opened = match open(&recording.input, monitor)? {
-        opened if recording.time_range().is_some() => match read_opened(opened, recording, monitor)? {
-            Recorded::Counts(part) => return SampleStream::recorded(part, *rate, kept).with_context(name),
-            Recorded::AnySensor(part) => {
-                return SampleStream::sensor_recording(*part, *rate, monitor).with_context(name);
-            }
-        },
-        Opened::Counts(input) => SampleStream::counts(input, recording.input.range.into(), recording.rate, kept),
-        Opened::AnySensor(input, options) => SampleStream::any_sensor(input, *options, recording.rate, kept),
-        Opened::Replayed(replayed) => {
-            return SampleStream::recorded(replayed, recording.rate, kept).with_context(name);
-        }
+        Opened::Counts(input) => SampleStream::counts(input, recording.input.range.into(), reading),
+        Opened::AnySensor(input, options) => SampleStream::any_sensor(input, *options, reading),
+        Opened::Replayed(replayed) => SampleStream::recorded(replayed, reading).map_err(StreamError::from),
     };
-    opened.map_err(|error| match error {
+    opened.map_err(|error| named(error, recording))
+}
+
+/// An error with the name of the file.
+fn named(error: StreamError, recording: &RecordingArguments) -> anyhow::Error {
+    match error {
         // The others name the file themselves.
-        StreamError::TimeBase(error) => anyhow::Error::from(error).context(name()),
+        StreamError::TimeBase(error) => anyhow::Error::from(error).context(recording.input.file.display().to_string()),
         error => error.into(),
-    })
+    }
 }
 
 /// The JSON of several recordings.
@@ -240,16 +232,8 @@ pub(crate) fn analyze_replay(arguments: &ReplayArguments) -> Result<Report> {
 
 /// Analyses a recording; `rate_hz` overrides the rate that its time stamps show.
 pub(crate) fn analyze_recording(recording: Recording, rate_hz: Option<f64>) -> Result<Report> {
-    let stream = SampleStream::recorded(recording, rate_hz, KEPT)?;
+    let stream = SampleStream::recorded(recording, Reading::new(rate_hz, KEPT))?;
     analyze_stream(stream, &mut |stream| note_all(stream.notes()))
-}
-
-/// What a file of any format holds.
-pub(crate) enum Recorded {
-    /// Register counts of an ADIS16405.
-    Counts(Recording),
-    /// Numbers of any sensor.
-    AnySensor(Box<SensorRecording>),
 }
 
 /// An open file, by the way in which it is read.
@@ -285,54 +269,36 @@ fn open(arguments: &InputArguments, monitor: &ReadMonitor) -> Result<Opened> {
     }
 }
 
-/// Reads a file of any format, or the part of it that the arguments say. What the user should know of an SPI log is noted.
-pub(crate) fn read(arguments: &RecordingArguments) -> Result<Recorded> {
-    read_content(arguments, &ReadMonitor::default())
+/// A recording to write anew.
+pub(crate) enum Recorded {
+    /// Register counts of an ADIS16405.
+    Counts(Recording),
+    /// Numbers of any sensor, which are read when they are written.
+    AnySensor(InputFile, Box<ReadOptions>),
 }
 
-fn read_content(arguments: &RecordingArguments, monitor: &ReadMonitor) -> Result<Recorded> {
-    read_opened(open(&arguments.input, monitor)?, arguments, monitor)
-}
-
-fn read_opened(opened: Opened, arguments: &RecordingArguments, monitor: &ReadMonitor) -> Result<Recorded> {
-    let RecordingArguments { input: InputArguments { range, file, .. }, rate, .. } = arguments;
-    let recorded = match opened {
+/// Opens a file of any format to write it anew; register counts are read, or the part of them that the arguments say.
+pub(crate) fn open_rows(arguments: &RecordingArguments) -> Result<Recorded> {
+    let RecordingArguments { input: InputArguments { range, .. }, rate, .. } = arguments;
+    let part = arguments.time_range();
+    Ok(match open(&arguments.input, &ReadMonitor::default())? {
         Opened::Counts(input) => {
-            let recording = count_table::read_monitored(input.path(), (*range).into(), monitor);
-            Recorded::Counts(recording.map_err(|error| input.rename(error))?)
+            let recording = count_table::read_part(&input, (*range).into(), part, *rate);
+            Recorded::Counts(recording.map_err(|error| named(error, arguments))?)
         }
-        Opened::AnySensor(input, options) => Recorded::AnySensor(Box::new(input.read(&options)?)),
-        Opened::Replayed(recording) => Recorded::Counts(recording),
-    };
-    let Some(range) = arguments.time_range() else { return Ok(recorded) };
-    let part = match recorded {
-        Recorded::Counts(recording) => range.of_recording(recording, *rate).map(Recorded::Counts),
-        Recorded::AnySensor(recording) => {
-            recording.within(range, *rate).map(|part| Recorded::AnySensor(Box::new(part)))
-        }
-    };
-    part.with_context(|| file.display().to_string())
+        Opened::Replayed(recording) => Recorded::Counts(match part {
+            Some(part) => part_of(recording, part, *rate).map_err(|error| named(error.into(), arguments))?,
+            None => recording,
+        }),
+        Opened::AnySensor(input, options) => Recorded::AnySensor(input, options),
+    })
 }
 
 /// The samples of a recording of any format on their time base. What the user should know is noted.
 pub(crate) fn read_measurement(arguments: &RecordingArguments) -> Result<Measurement> {
-    let (measurement, notes) = read_with(arguments, &ReadMonitor::default())?;
-    note_all(&notes);
-    Ok(measurement)
-}
-
-/// The samples of a recording of any format on their time base, and what the user should know.
-fn read_with(arguments: &RecordingArguments, monitor: &ReadMonitor) -> Result<(Measurement, Vec<String>)> {
-    let RecordingArguments { input, rate, .. } = arguments;
-    let name = || input.file.display().to_string();
-    match read_content(arguments, monitor)? {
-        Recorded::Counts(recording) => on_time_base(&recording, *rate).with_context(name),
-        Recorded::AnySensor(recording) => {
-            let (base, mut notes) = recording.time_base(*rate).with_context(name)?;
-            notes.extend(base.stamps.iter().flat_map(StampQuality::notes));
-            Ok((base.measurement, notes))
-        }
-    }
+    let stream = open_stream(arguments, &ReadMonitor::default(), KeptInMemory::ALL)?;
+    note_all(stream.notes());
+    Ok(stream.into_beginning())
 }
 
 /// What the driver reads of a log or of counts.
@@ -344,12 +310,6 @@ fn replayed(input: &InputFile, range: GyroRangeArgument) -> Result<Recording> {
         note(format_args!("{other_transactions} transactions that are no bursts"));
     }
     Ok(recording)
-}
-
-fn on_time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<(Measurement, Vec<String>)> {
-    let base = time_base(recording, rate_hz)?;
-    let notes = base.stamps.iter().flat_map(StampQuality::notes).collect();
-    Ok((base.measurement, notes))
 }
 
 /// The profile of a known sensor, or of a profile file; `range` is that of an ADIS16405's gyros.

@@ -2,8 +2,6 @@
 
 mod ardupilot_log;
 mod array_topics;
-mod betaflight;
-mod blackbox_frames;
 mod calendar;
 pub mod file_format;
 mod foreign_format;

@@ -10,7 +10,7 @@ mod counts;
 mod formats;
 mod input;
 pub mod inspection;
-mod streams;
+mod reading;
 mod tables;
 pub mod time_base;
 
@@ -21,5 +21,5 @@ pub use counts::{
 pub use formats::file_format;
 pub use input::input_error::{InputError, Printable, Reason};
 pub use input::read_monitor::{ReadMonitor, ReadPass};
-pub use streams::sample_stream;
+pub use reading::{row_writer, sample_stream};
 pub use tables::any_sensor;

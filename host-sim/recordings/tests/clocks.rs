@@ -9,7 +9,7 @@ use recordings::ColumnSelection;
 use recordings::any_sensor::ReadOptions;
 use recordings::file_format::InputFile;
 use recordings::recording::{Recorder, TimeStamp};
-use recordings::sample_stream::{KeptInMemory, SampleStream};
+use recordings::sample_stream::{KeptInMemory, Reading, SampleStream};
 use recordings::time_base::{EstimatedTimeBase, TimeBaseError, time_base};
 
 fn base(times: impl IntoIterator<Item = f64>) -> Result<EstimatedTimeBase, TimeBaseError> {
@@ -127,15 +127,16 @@ fn a_rate_that_changes_is_no_loss() {
     assert_eq!(found(kept.iter().map(time)).1, 60_000 - kept.len() as u64);
 }
 
-/// Rate and missing samples of the same stamps in a table of which the first 16,384 rows are read in memory, and what is noted.
+/// Rate and missing samples of the same stamps in a table, and what is noted.
 fn streamed(times: &[f64]) -> (f64, u64, Vec<String>) {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("counts.csv");
     let rows = times.iter().enumerate().map(|(at, time)| format!("{time:.6},{}\n", at % 100));
     std::fs::write(&file, format!("time_s,gyro_x_counts\n{}", rows.collect::<String>())).expect("a table");
-    let kept = KeptInMemory { rows: 1 << 14, rows_with_losses: 1 << 14, most_lost: 1.0, irregular: true };
+    let kept = KeptInMemory { rows: 1 << 14, rows_with_losses: 1 << 14, most_lost: 1.0 };
     let input = InputFile::open(&file).expect("a table");
-    let stream = SampleStream::counts(input, GyroRange::Dps300, None, kept).expect("a time base");
+    let reading = Reading::new(None, kept);
+    let stream = SampleStream::counts(input, GyroRange::Dps300, reading).expect("a time base");
     assert!(!stream.is_in_memory(), "{:?}", stream.notes());
     let description = stream.description();
     (description.sample_rate_hz, description.dropped["gap"], stream.notes().to_vec())
@@ -221,9 +222,10 @@ fn measured_bursts_show_the_rate() {
     let Some(file) = system_tests::recording(test, "others/stampfly_fft_20260114T115628.csv") else { return };
     let selection = ColumnSelection::parse(&[], &["rad/s", "m/s^2"].map(str::to_owned)).expect("units");
     let options = ReadOptions { sensor: SensorProfile::generic(), selection, topic: None };
-    let recording = InputFile::open(&file).expect("a table").read(&options).expect("rows");
-    let (base, _) = recording.time_base(None).expect("a time base");
-    let rate_hz = base.measurement.sample_rate_hz;
+    let input = InputFile::open(&file).expect("a table");
+    let reading = Reading::new(None, KeptInMemory::ALL);
+    let samples = SampleStream::any_sensor(input, options, reading).expect("a time base").into_beginning();
+    let rate_hz = samples.sample_rate_hz;
     assert!((rate_hz / 399.91 - 1.0).abs() < 1e-3, "{rate_hz} Hz");
-    assert_eq!(base.measurement.dropped["gap"], 0);
+    assert_eq!(samples.dropped["gap"], 0);
 }

@@ -9,7 +9,7 @@ use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray, stated_
 use crate::formats::message_layout::Scalar;
 use crate::input::budget::{Budget, Meter};
 use crate::input::input_error::{InputError, Reason};
-use crate::tables::sensor_table::Number;
+use crate::reading::batch::Number;
 use hdf5_pure::{AttrValue, Dataset, Datatype, DatatypeByteOrder, File, Group};
 use std::collections::HashMap;
 use std::path::Path;

@@ -1,19 +1,17 @@
 //! Arrays of NumPy: `.npy` and `.npz`.
 
-use crate::columns::column_selection::ChosenColumn;
 use crate::columns::unit::Unit;
 use crate::counts::recording::MAX_SAMPLES;
-use crate::formats::array_topics::{self, ArrayReader, ArraySource, NamedArray};
+use crate::formats::array_topics::{ArrayReader, ArraySource, EachArrayRow, NamedArray};
 use crate::formats::message_layout::Scalar;
 use crate::input::budget::{Budget, Meter, Metered};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::{Counted, ReadMonitor};
-use crate::tables::any_sensor::ReadOptions;
-use crate::tables::sensor_table::{Number, TableBuilder};
+use crate::reading::batch::Number;
 use npyz::{DType, Endianness, NpyHeader, Order, TypeChar, TypeStr};
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use zip::ZipArchive;
 
 /// Columns of a matrix beyond which it is no recording.
@@ -27,20 +25,47 @@ const MOST_BRACKETS: usize = 8;
 /// Bytes of the header of an array of [`MAX_COLUMNS`] named fields, with room.
 const MOST_HEADER_BYTES: u64 = 1 << 20;
 
+/// Rows of an array that are read at once.
+const ROWS_AT_ONCE: usize = 4096;
+
 /// An open `.npy` file.
 pub(crate) struct NpyReader {
-    input: BufReader<File>,
+    input: BufReader<Counted<File>>,
     layout: ArrayLayout,
+    /// Where the numbers begin, bytes.
+    start: u64,
 }
 
 impl NpyReader {
-    /// Opens a file whose numbers are held in memory.
-    pub(crate) fn open(file: &Path, budget: Budget) -> Result<ArraySource<'_, Self>, InputError> {
+    /// Opens a file.
+    pub(crate) fn open<'a>(
+        file: &'a Path,
+        budget: Budget,
+        monitor: &ReadMonitor,
+    ) -> Result<ArraySource<'a, Self>, InputError> {
         let fail = |reason| InputError::file(file, reason);
-        let mut input = BufReader::new(File::open(file).map_err(|error| fail(Reason::Io(error)))?);
+        let io = |error| fail(Reason::Io(error));
+        let mut input = BufReader::new(Counted::new(File::open(file).map_err(io)?, monitor));
         let layout = ArrayLayout::read(&mut input, "").map_err(fail)?;
+        let start = input.stream_position().map_err(io)?;
         let arrays = vec![layout.array()];
-        Ok(ArraySource::new(file, Self { input, layout }, arrays, budget))
+        Ok(ArraySource::new(file, Self { input, layout, start }, arrays, budget))
+    }
+
+    /// The bytes of some rows from `first` on: of each of `columns`, or of whole rows.
+    fn fill(&mut self, first: usize, columns: &[usize], buffers: &mut [Vec<u8>]) -> Result<usize, Reason> {
+        let Self { layout, input, start } = self;
+        let rows = ROWS_AT_ONCE.min(layout.rows - first);
+        for (buffer, column) in buffers.iter_mut().zip(columns) {
+            let before = if layout.by_column { column * layout.rows + first } else { first };
+            input.seek(SeekFrom::Start(*start + (before * layout.stride) as u64)).map_err(Reason::Io)?;
+            buffer.resize(rows * layout.stride, 0);
+            input.read_exact(buffer).map_err(|error| match error.kind() {
+                io::ErrorKind::UnexpectedEof => Reason::Truncated { format: "NumPy array" },
+                _ => Reason::Io(error),
+            })?;
+        }
+        Ok(rows)
     }
 }
 
@@ -53,95 +78,38 @@ impl ArrayReader for NpyReader {
         columns: &[usize],
         add: &mut dyn FnMut(u64) -> Result<(), Reason>,
     ) -> Result<Vec<Vec<Number>>, Reason> {
+        self.input.seek(SeekFrom::Start(self.start)).map_err(Reason::Io)?;
         self.layout.columns(&mut self.input, columns, add)
     }
-}
 
-/// Rows of an array that are read at once.
-const ROWS_AT_ONCE: usize = 4096;
-
-/// An open `.npy` file, read row by row.
-pub(crate) struct NpyRows {
-    file: PathBuf,
-    input: Counted<File>,
-    monitor: ReadMonitor,
-    layout: ArrayLayout,
-    chosen: Vec<ChosenColumn>,
-    /// Where the numbers begin, bytes.
-    start: u64,
-    next: usize,
-    /// Bytes of the rows that were read at once: of each chosen column, or of whole rows.
-    buffers: Vec<Vec<u8>>,
-    row: Vec<Number>,
-    is_stopped: bool,
-}
-
-impl NpyRows {
-    /// Opens a file and chooses its columns.
-    pub(crate) fn open(file: &Path, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
-        let fail = |reason| InputError::file(file, reason);
-        let io = |error| fail(Reason::Io(error));
-        monitor.begin();
-        let mut input = Counted::new(File::open(file).map_err(io)?, monitor);
-        let layout = ArrayLayout::read(&mut input, "").map_err(fail)?;
-        let chosen = array_topics::choose(&layout.array(), options).map_err(fail)?;
-        let start = input.stream_position().map_err(io)?;
-        let buffers = vec![Vec::new(); if layout.by_column { chosen.len() } else { 1 }];
-        let (file, monitor, row) = (file.to_owned(), monitor.clone(), Vec::with_capacity(chosen.len()));
-        Ok(Self { file, input, monitor, layout, chosen, start, next: 0, buffers, row, is_stopped: false })
-    }
-
-    /// The columns that are read.
-    pub(crate) fn chosen(&self) -> &[ChosenColumn] {
-        &self.chosen
-    }
-
-    /// Whether the reading was stopped before the end of the array.
-    pub(crate) fn is_stopped(&self) -> bool {
-        self.is_stopped
-    }
-
-    /// Adds the next row to `builder`; false at the end.
-    pub(crate) fn add_row(&mut self, builder: &mut TableBuilder) -> Result<bool, InputError> {
-        self.is_stopped |= self.monitor.take_stop();
-        if self.is_stopped || self.next == self.layout.rows {
-            self.monitor.end();
-            return Ok(false);
-        }
-        let at = self.next % ROWS_AT_ONCE;
-        if at == 0 {
-            self.fill().map_err(|reason| InputError::file(&self.file, reason))?;
-        }
-        let Self { layout, buffers, row, chosen, .. } = self;
-        row.clear();
-        row.extend(chosen.iter().enumerate().map(|(number, column)| {
-            let field = &layout.fields[column.position];
-            let (buffer, offset) = if layout.by_column { (number, 0) } else { (0, field.offset) };
-            decode(&field.encoding, &buffers[buffer][at * layout.stride + offset..])
-        }));
-        self.next += 1;
-        builder.push(&self.row).map(|()| true).map_err(|(column, reason)| {
-            let label = self.chosen.get(column).map_or("", |column| column.label.as_str());
-            InputError::row(&self.file, self.next as u64, label, reason)
-        })
-    }
-
-    /// Reads the rows from the next one on.
-    fn fill(&mut self) -> Result<(), Reason> {
-        let Self { layout, buffers, chosen, input, .. } = self;
-        let bytes = ROWS_AT_ONCE.min(layout.rows - self.next) * layout.stride;
-        for (buffer, column) in buffers.iter_mut().zip(chosen) {
-            if layout.by_column {
-                let first = (column.position * layout.rows + self.next) as u64;
-                input.seek(SeekFrom::Start(self.start + first * layout.stride as u64)).map_err(Reason::Io)?;
+    fn for_each_row(
+        &mut self,
+        _array: usize,
+        columns: &[usize],
+        each: &mut EachArrayRow,
+    ) -> Option<Result<(), InputError>> {
+        let mut buffers = vec![Vec::new(); if self.layout.by_column { columns.len() } else { 1 }];
+        let mut row = Vec::with_capacity(columns.len());
+        let mut first = 0;
+        while first < self.layout.rows {
+            let rows = match self.fill(first, columns, &mut buffers) {
+                Ok(rows) => rows,
+                Err(reason) => return Some(each(Err(reason))),
+            };
+            for at in 0..rows {
+                row.clear();
+                row.extend(columns.iter().enumerate().map(|(number, &column)| {
+                    let field = &self.layout.fields[column];
+                    let (buffer, offset) = if self.layout.by_column { (number, 0) } else { (0, field.offset) };
+                    decode(&field.encoding, &buffers[buffer][at * self.layout.stride + offset..])
+                }));
+                if let Err(error) = each(Ok(&row)) {
+                    return Some(Err(error));
+                }
             }
-            buffer.resize(bytes, 0);
-            input.read_exact(buffer).map_err(|error| match error.kind() {
-                io::ErrorKind::UnexpectedEof => Reason::Truncated { format: "NumPy array" },
-                _ => Reason::Io(error),
-            })?;
+            first += rows;
         }
-        Ok(())
+        Some(Ok(()))
     }
 }
 

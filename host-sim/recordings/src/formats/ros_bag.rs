@@ -110,7 +110,7 @@ impl Source for RosBagSource<'_> {
                 }
             }
         }
-        Ok(Ending { damage, notes: rows.notes(), rate_hz: None })
+        Ok(Ending { damage, notes: rows.notes() })
     }
 }
 

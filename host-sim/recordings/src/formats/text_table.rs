@@ -7,11 +7,13 @@ use crate::formats::calendar::{self, CalendarClock, CalendarColumns};
 use crate::formats::labelled_row;
 use crate::formats::nmea::{self, Sentence};
 use crate::formats::row_kinds::RowKinds;
+use crate::input::budget::Budget;
 use crate::input::delimited_text::{self, Lines};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::ReadMonitor;
+use crate::reading::batch::{BatchBuilder, Number, RowFault};
+use crate::reading::row_source::{EachRow, Ending, Refusal, RowSource};
 use crate::tables::any_sensor::ReadOptions;
-use crate::tables::sensor_table::{Number, SensorTable, TableBuilder};
 use crate::tables::whole_table::{WholeTable, most_rows};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
@@ -31,30 +33,72 @@ const FIRST_LINES: usize = 64;
 /// What the serial monitor of the Arduino IDE writes between the time of a line and the line.
 const ARROW: &str = " -> ";
 
-/// Reads a table; `monitor` counts the bytes and may stop the reading.
-pub(crate) fn read(file: &Path, options: &ReadOptions, monitor: &ReadMonitor) -> Result<SensorTable, InputError> {
-    let mut table = TextTable::open(file, options, monitor)?;
-    let mut builder = TableBuilder::new(table.chosen().to_vec());
-    while table.add_row(&mut builder)? {}
-    let mut read = builder.finish().map_err(|reason| InputError::file(file, reason))?;
-    read.notes.extend(table.notes());
-    // Time stamps say more than a stated rate.
-    read.rate_hz = table.rate_hz().filter(|_| read.times_s.is_none());
-    Ok(read)
+/// The rows of a table, which can be read again; a monitor counts the bytes and may stop the reading.
+pub(crate) struct TextRows<'a> {
+    file: &'a Path,
+    options: ReadOptions,
+    monitor: ReadMonitor,
+    chosen: Vec<ChosenColumn>,
+    rate_hz: Option<f64>,
+    /// The table before its first reading.
+    opened: Option<TextTable>,
+}
+
+impl<'a> TextRows<'a> {
+    /// Opens a table and chooses its columns.
+    pub(crate) fn open(file: &'a Path, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
+        let table = TextTable::open(file, options, monitor)?;
+        let (chosen, rate_hz) = (table.chosen.clone(), table.rate_hz);
+        let (options, monitor) = (options.clone(), monitor.clone());
+        Ok(Self { file, options, monitor, chosen, rate_hz, opened: Some(table) })
+    }
+}
+
+impl RowSource for TextRows<'_> {
+    fn chosen(&self) -> &[ChosenColumn] {
+        &self.chosen
+    }
+
+    fn rate_hz(&self) -> Option<f64> {
+        self.rate_hz
+    }
+
+    fn budget(&self) -> Option<Budget> {
+        None
+    }
+
+    fn read(&mut self, each: &mut EachRow) -> Result<Ending, InputError> {
+        let mut table = match self.opened.take() {
+            Some(table) => table,
+            None => TextTable::open(self.file, &self.options, &self.monitor)?,
+        };
+        while let Some(line) = table.next_row()? {
+            match each(&table.row) {
+                Ok(()) => {}
+                Err(Refusal::Fault(fault)) => return Err(table.fault(line, fault)),
+                Err(Refusal::Enough) => break,
+            }
+        }
+        Ok(Ending { damage: None, notes: table.notes() })
+    }
 }
 
 /// Reads all columns of a table; fields that are no numbers are missing.
 pub(crate) fn read_whole(file: &Path, topic: Option<&str>, monitor: &ReadMonitor) -> Result<WholeTable, InputError> {
     let mut table = TextTable::open_with(file, topic, monitor, &|available| Ok(as_they_are(available)))?;
     table.is_lenient = true;
-    let mut builder = TableBuilder::new(table.chosen().to_vec());
-    let most = most_rows(table.chosen().len());
+    let mut builder = BatchBuilder::new(&table.chosen, &[], None);
+    let most = most_rows(table.chosen.len());
     let mut whole = WholeTable { name: topic.unwrap_or_default().to_owned(), ..WholeTable::default() };
     loop {
         whole.is_cut = builder.rows() >= most;
-        match table.add_row(&mut builder) {
-            Ok(true) if !whole.is_cut => {}
-            Ok(_) => break,
+        let row = table.next_row().and_then(|line| {
+            let Some(line) = line.filter(|_| !whole.is_cut) else { return Ok(false) };
+            builder.push(&table.row).map(|()| true).map_err(|fault| table.fault(line, fault))
+        });
+        match row {
+            Ok(true) => {}
+            Ok(false) => break,
             Err(error) if builder.rows() == 0 => return Err(error),
             Err(error) => {
                 whole.notes.push(format!("{error}; the {} rows before that are shown", builder.rows()));
@@ -63,8 +107,8 @@ pub(crate) fn read_whole(file: &Path, topic: Option<&str>, monitor: &ReadMonitor
         }
     }
     whole.notes.extend(table.notes());
-    whole.rate_hz = table.rate_hz();
-    Ok(whole.with_rows(builder))
+    whole.rate_hz = table.rate_hz;
+    Ok(whole.with_rows(table.chosen, builder))
 }
 
 /// Chooses the columns to read of those that there are.
@@ -310,13 +354,8 @@ impl TextTable {
         })
     }
 
-    /// The columns that are read.
-    pub(crate) fn chosen(&self) -> &[ChosenColumn] {
-        &self.chosen
-    }
-
     /// What the user should know of the rows that were read, one sentence each.
-    pub(crate) fn notes(&self) -> Vec<String> {
+    fn notes(&self) -> Vec<String> {
         let of_rate = self.rate_hz.map(|hz| format!("the file states a rate of {hz} Hz before its rows"));
         let mut notes: Vec<String> = self.note.iter().cloned().chain(of_rate).collect();
         let (name, damaged, others) = match &self.layout {
@@ -339,13 +378,16 @@ impl TextTable {
         notes
     }
 
-    /// The rate that the file states before its rows, Hz.
-    pub(crate) fn rate_hz(&self) -> Option<f64> {
-        self.rate_hz
+    /// An error of a row of a line.
+    fn fault(&self, line: u64, RowFault { column, reason }: RowFault) -> InputError {
+        match column {
+            Some(at) => InputError::field(&self.file, line, &self.chosen[at].label, reason),
+            None => InputError::line(&self.file, line, reason),
+        }
     }
 
-    /// Adds the next row to `builder`; false at the end.
-    pub(crate) fn add_row(&mut self, builder: &mut TableBuilder) -> Result<bool, InputError> {
+    /// Reads the next row into `row`; its line, or `None` at the end.
+    fn next_row(&mut self) -> Result<Option<u64>, InputError> {
         let Self { file, lines, chosen, layout, is_lenient, width, first, row, .. } = self;
         loop {
             let first = first.pop_front();
@@ -353,7 +395,7 @@ impl TextTable {
                 Some((line, text)) => (*line, text.as_str()),
                 None => match lines.next()? {
                     Some(next) => next,
-                    None => return Ok(false),
+                    None => return Ok(None),
                 },
             };
             let of_layout = match layout {
@@ -402,23 +444,14 @@ impl TextTable {
                 (Some(_), Reason::NotNumber(_) | Reason::NotTime(_)) if *is_lenient => Ok(true),
                 fault => Err(fault),
             });
-            let added = of_layout.and_then(|is_row| {
-                let of_column = |(at, reason)| (Some(at), reason);
-                if is_row { builder.push(row).map(|()| true).map_err(of_column) } else { Ok(false) }
-            });
-            let is_added = added.map_err(|(at, reason)| match at {
+            let is_row = of_layout.map_err(|(at, reason)| match at {
                 Some(at) => InputError::field(file, line, &chosen[at].label, reason),
                 None => InputError::line(file, line, reason),
             })?;
-            if is_added {
-                return Ok(true);
+            if is_row {
+                return Ok(Some(line));
             }
         }
-    }
-
-    /// Whether the reading was stopped before the end of the table.
-    pub(crate) fn is_stopped(&self) -> bool {
-        self.lines.is_stopped()
     }
 }
 

@@ -9,7 +9,7 @@ use crate::formats::message_layout::{Definitions, Encoding, Field, FieldType, Me
 use crate::formats::topics::{EachRow, Ending, Source, Topic, TopicSensor};
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
-use crate::tables::sensor_table::Number;
+use crate::reading::batch::Number;
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -288,7 +288,7 @@ impl Source for UlogSource<'_> {
         let name = &self.topics[topic].name;
         let note =
             format!("{alone} samples of {name} have no sample of the other sensor at their time and are left out");
-        Ok(Ending { damage, notes: Some(note).filter(|_| alone > 0).into_iter().collect(), rate_hz: None })
+        Ok(Ending { damage, notes: Some(note).filter(|_| alone > 0).into_iter().collect() })
     }
 }
 
@@ -454,7 +454,7 @@ fn format(text: &[u8]) -> Option<(String, Vec<Field>)> {
 #[cfg(test)]
 mod tests {
     use super::{MOST_WAITING, Pairing};
-    use crate::tables::sensor_table::Number;
+    use crate::reading::batch::Number;
 
     fn sample(time_us: i64, value: f64) -> [Number; 4] {
         [Number::Integer(time_us), Number::Real(value), Number::Real(value + 1.0), Number::Real(value + 2.0)]

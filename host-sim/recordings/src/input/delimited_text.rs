@@ -30,8 +30,6 @@ pub(crate) struct Lines {
     /// Whether the line in `bytes` is read once more.
     again: bool,
     monitor: ReadMonitor,
-    /// Whether the reading was stopped before the end of the file.
-    is_stopped: bool,
 }
 
 impl Lines {
@@ -43,7 +41,7 @@ impl Lines {
         Self::open_monitored(file, &ReadMonitor::default())
     }
 
-    /// As [`open`](Self::open); `monitor` counts the bytes and may stop the reading.
+    /// As [`open`](Self::open); `monitor` counts the bytes.
     pub(crate) fn open_monitored(file: &Path, monitor: &ReadMonitor) -> Result<Self, InputError> {
         let fail = |reason| InputError::file(file, reason);
         let mut raw = File::open(file).map_err(|e| fail(Reason::Io(e)))?;
@@ -78,7 +76,6 @@ impl Lines {
             is_latin: false,
             again: false,
             monitor: monitor.clone(),
-            is_stopped: false,
         })
     }
 
@@ -89,10 +86,6 @@ impl Lines {
     /// The file cannot be read or decompressed, or the line is longer than 65536 bytes or has control characters.
     pub(crate) fn next(&mut self) -> Result<Option<(u64, &str)>, InputError> {
         while !std::mem::take(&mut self.again) {
-            self.is_stopped |= self.monitor.take_stop();
-            if self.is_stopped {
-                return Ok(None);
-            }
             self.line += 1;
             self.bytes.clear();
             let read = (&mut self.input).take(MAX_LINE_BYTES).read_until(b'\n', &mut self.bytes);
@@ -126,11 +119,6 @@ impl Lines {
         self.latin.extend(latin);
         self.is_latin = true;
         Ok(Some((self.line, &self.latin)))
-    }
-
-    /// Whether the reading was stopped before the end of the file.
-    pub(crate) fn is_stopped(&self) -> bool {
-        self.is_stopped
     }
 
     /// The header without consuming it: what [`next`](Self::next) returns now, and will return once more. `None` for a file of

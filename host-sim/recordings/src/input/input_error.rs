@@ -84,8 +84,8 @@ pub enum Reason {
     },
     /// A binary format that is not known.
     #[error(
-        "of no known format: it begins with {begins}; known are tables in text, NumPy, MATLAB, HDF5, bags of ROS, MCAP, ULog, DataFlash \
-         and blackbox logs; write its numbers as text or, in Python, with numpy.save(\"FILE.npy\", array)"
+        "of no known format: it begins with {begins}; known are tables in text, NumPy, MATLAB, HDF5, bags of ROS, MCAP, ULog and \
+         DataFlash logs; write its numbers as text or, in Python, with numpy.save(\"FILE.npy\", array)"
     )]
     UnknownBinary {
         /// The first bytes.
@@ -275,6 +275,18 @@ pub enum Reason {
 }
 
 impl Reason {
+    /// Whether a limit of this program was met: the file need not be damaged.
+    pub(crate) fn is_limit(&self) -> bool {
+        matches!(
+            self,
+            Self::TooManySamples
+                | Self::Expands { .. }
+                | Self::TooManyValues { .. }
+                | Self::TooDeep { .. }
+                | Self::TooSlow { .. }
+        )
+    }
+
     /// Why reading failed: what a [`Metered`](crate::input::budget::Metered) input refused, or the error itself.
     pub(crate) fn from_io(error: io::Error) -> Self {
         match error.downcast::<Self>() {

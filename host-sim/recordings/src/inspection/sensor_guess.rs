@@ -6,7 +6,7 @@ use crate::columns::unit::{COUNT, SECOND, Unit};
 use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::time_unit::time_unit;
 use crate::inspection::unit_guess::{self, UnitGuess};
-use crate::tables::sensor_table::usual_unit;
+use crate::reading::batch::usual_unit;
 use crate::tables::whole_table::{WholeSensor, WholeTable};
 use measurement::SensorProfile;
 use std::collections::BTreeMap;

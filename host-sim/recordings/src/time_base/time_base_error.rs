@@ -26,8 +26,8 @@ pub enum TimeBaseError {
         /// By the time stamps, Hz.
         measured_hz: f64,
     },
-    /// Stamps of a recording that is not held in memory, which need all of them to be understood.
-    #[error("the time stamps are too irregular to be read in blocks ({0}): leave out --quick")]
+    /// Stamps that need all of them to be understood, of too many rows.
+    #[error("the time stamps are too irregular for a recording of this length ({0}): give it in parts")]
     Irregular(String),
     /// No sample follows another one by one sample period.
     #[error("no two neighbouring samples: a step of the column sample is at least {0}")]
