@@ -2,7 +2,7 @@
 
 use crate::cli::{AnalyzeArguments, GyroRangeArgument, InputArguments, RecordingArguments, ReplayArguments};
 use crate::inspect::{self, read_or_ask};
-use crate::output::{self, note};
+use crate::output::{self, Analysed, Incomplete, note};
 use crate::output_files::{OutputFiles, is_standard_stream};
 use crate::progress::{self, Progress};
 use crate::tip::UnknownSensor;
@@ -20,10 +20,12 @@ use recordings::file_format::{FileFormat, InputFile};
 use recordings::recording::Recording;
 use recordings::sample_stream::{KeptInMemory, Reading, SampleStream, StreamError, part_of};
 use recordings::time_base::TimeRange;
-use recordings::{ColumnSelection, Printable, ReadMonitor, count_table};
+use recordings::{ColumnSelection, FileHash, Printable, ReadMonitor, count_table};
+use reports::reading::ReadingRecord;
 use reports::summary::longest_at_rest;
 use serde::Serialize;
 use simulation::Replay;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
@@ -77,8 +79,13 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
     if !refused.is_empty() {
         bail!("several recordings have a summary and no report: leave out {}", refused.join(", "));
     }
-    let read = |recording: &RecordingArguments| read_or_ask(recording, read_measurement);
-    let still: Vec<Measurement> = recordings.iter().map(read).collect::<Result<_>>()?;
+    let mut is_complete = true;
+    let mut read = |recording: &RecordingArguments| -> Result<Measurement> {
+        let read = read_or_ask(recording, |recording| open_measured(recording))?;
+        is_complete &= read.rows_read().is_complete();
+        Ok(read.into_beginning())
+    };
+    let still: Vec<Measurement> = recordings.iter().map(&mut read).collect::<Result<_>>()?;
     if *each_sensor {
         let names: Vec<String> = recordings.iter().map(sensor_name).collect();
         note(format_args!("recordings: {}", Printable(&names.join(", "))));
@@ -93,12 +100,13 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
         output::write_json(&several, file, &outputs)?;
     }
     if output.quiet || output.json.as_deref().is_some_and(is_standard_stream) {
-        return Ok(());
+        return Incomplete::check(is_complete);
     }
     output::print(|out| {
         agreement.as_ref().map_or(Ok(()), |agreement| reports::several::write_agreement(agreement, out))?;
         inflation.as_ref().map_or(Ok(()), |inflation| reports::several::write_inflation(inflation, out))
-    })
+    })?;
+    Incomplete::check(is_complete)
 }
 
 /// What tells a sensor from the others of its file: its topic, or its columns.
@@ -114,7 +122,7 @@ fn of_file(recording: &RecordingArguments, file: &Path) -> RecordingArguments {
 }
 
 /// The report of a recording. Shows how far the reading is, and makes the report of what was read if that is interrupted.
-fn watched_report(recording: &RecordingArguments, is_quick: bool) -> Result<Report> {
+fn watched_report(recording: &RecordingArguments, is_quick: bool) -> Result<Analysed> {
     let mut progress = Progress::reading(&recording.input.file);
     let monitor = progress.monitor().clone();
     let mut end_reading = |stream: &SampleStream| {
@@ -136,19 +144,20 @@ fn report(
     is_quick: bool,
     monitor: &ReadMonitor,
     end_reading: &mut dyn FnMut(&SampleStream),
-) -> Result<Report> {
-    let mut report = report_of_samples(recording, is_quick, monitor, end_reading)?;
+) -> Result<Analysed> {
+    let mut analysed = report_of_samples(recording, is_quick, monitor, end_reading)?;
+    let report = &mut analysed.report;
     if report.findings.iter().any(|finding| matches!(finding.effect, Effect::MotionInterval(_))) {
         let by_motions = || {
             // From the first sample of the part that was read.
             let from_s = recording.from.unwrap_or(0.0);
-            let longest = longest_at_rest(&report)?;
+            let longest = longest_at_rest(report)?;
             Some(Stretch { from_s: from_s + longest.from_s, to_s: from_s + longest.to_s })
         };
         let by_file = inspect::part_at_rest(recording).map(|TimeRange { from_s, to_s }| Stretch { from_s, to_s });
         report.longest_at_rest = by_file.or_else(by_motions);
     }
-    Ok(report)
+    Ok(analysed)
 }
 
 fn report_of_samples(
@@ -156,21 +165,63 @@ fn report_of_samples(
     is_quick: bool,
     monitor: &ReadMonitor,
     end_reading: &mut dyn FnMut(&SampleStream),
-) -> Result<Report> {
+) -> Result<Analysed> {
+    let quick = KeptInMemory { rows: QUICK_ROWS, rows_with_losses: QUICK_ROWS, most_lost: 1.0 };
+    let OpenStream { mut stream, hash } = open_stream(recording, monitor, if is_quick { quick } else { KEPT })?;
     if is_quick {
-        let mut stream = open_stream(
-            recording,
-            monitor,
-            KeptInMemory { rows: QUICK_ROWS, rows_with_losses: QUICK_ROWS, most_lost: 1.0 },
-        )?;
         let estimators = streaming::curves(&mut stream)?;
         end_reading(&stream);
+        let reading = reading_record(recording, true, &stream, hash);
         let bar = progress::fitting(stream.description().channels.len());
         let report = estimators.report(&|| bar.inc(1));
         bar.finish_and_clear();
-        return Ok(report);
+        return Ok(Analysed { report, reading: Some(reading) });
     }
-    analyze_stream(open_stream(recording, monitor, KEPT)?, end_reading)
+    let mut reading = None;
+    let report = analyze_stream(stream, &mut |stream| {
+        end_reading(stream);
+        reading = Some(reading_record(recording, false, stream, None));
+    })?;
+    // The hash is made while the samples are analysed.
+    if let Some(reading) = &mut reading {
+        reading.sha256 = finished(hash);
+    }
+    Ok(Analysed { report, reading })
+}
+
+/// What was read of a recording.
+fn reading_record(
+    recording: &RecordingArguments,
+    is_quick: bool,
+    stream: &SampleStream,
+    hash: Option<FileHash>,
+) -> ReadingRecord {
+    let read = stream.rows_read();
+    let mut left_out: BTreeMap<String, u64> = stream
+        .description()
+        .dropped
+        .iter()
+        .filter(|(cause, _)| **cause != "gap")
+        .map(|(cause, rows)| ((*cause).to_owned(), *rows))
+        .collect();
+    left_out.insert("outside_part".to_owned(), read.outside);
+    left_out.retain(|_, rows| *rows > 0);
+    ReadingRecord {
+        file: output::source_name(&recording.input.file),
+        sha256: finished(hash),
+        program: env!("CARGO_PKG_NAME").to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        options: recording.options(is_quick),
+        rows: read.rows,
+        left_out,
+        complete: read.is_complete(),
+        damage: read.damage.clone(),
+        notes: stream.notes().to_vec(),
+    }
+}
+
+fn finished(hash: Option<FileHash>) -> Option<String> {
+    hash.and_then(|hash| hash.finish().ok())
 }
 
 /// The report of all samples of `stream`; `end_reading` is called when they were read, before they are analysed.
@@ -190,14 +241,35 @@ fn note_all(notes: &[String]) {
 }
 
 /// Opens a recording of any format, or the part of it that the arguments say. What the user should know of an SPI log is noted.
-fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor, kept: KeptInMemory) -> Result<SampleStream> {
+fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor, kept: KeptInMemory) -> Result<OpenStream> {
     let reading = Reading::new(recording.rate, kept).of_part(recording.time_range());
+    let mut hash = None;
     let opened = match open(&recording.input, monitor)? {
-        Opened::Counts(input) => SampleStream::counts(input, recording.input.range.into(), reading),
-        Opened::AnySensor(input, options) => SampleStream::any_sensor(input, *options, reading),
+        Opened::Counts(input) => {
+            hash = input.begin_hash().ok();
+            SampleStream::counts(input, recording.input.range.into(), reading)
+        }
+        Opened::AnySensor(input, options) => {
+            hash = input.begin_hash().ok();
+            SampleStream::any_sensor(input, *options, reading)
+        }
         Opened::Replayed(replayed) => SampleStream::recorded(replayed, reading).map_err(StreamError::from),
     };
-    opened.map_err(|error| named(error, recording))
+    let stream = opened.map_err(|error| named(error, recording))?;
+    Ok(OpenStream { stream, hash })
+}
+
+/// An open recording, and the hash of its file.
+struct OpenStream {
+    stream: SampleStream,
+    hash: Option<FileHash>,
+}
+
+/// All samples of a recording in memory. What the user should know is noted.
+fn open_measured(recording: &RecordingArguments) -> Result<SampleStream> {
+    let OpenStream { stream, .. } = open_stream(recording, &ReadMonitor::default(), KeptInMemory::ALL)?;
+    note_all(stream.notes());
+    Ok(stream)
 }
 
 /// An error with the name of the file.
@@ -296,9 +368,7 @@ pub(crate) fn open_rows(arguments: &RecordingArguments) -> Result<Recorded> {
 
 /// The samples of a recording of any format on their time base. What the user should know is noted.
 pub(crate) fn read_measurement(arguments: &RecordingArguments) -> Result<Measurement> {
-    let stream = open_stream(arguments, &ReadMonitor::default(), KeptInMemory::ALL)?;
-    note_all(stream.notes());
-    Ok(stream.into_beginning())
+    Ok(open_measured(arguments)?.into_beginning())
 }
 
 /// What the driver reads of a log or of counts.

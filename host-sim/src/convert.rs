@@ -3,7 +3,7 @@
 use crate::analyze::{Recorded, open_rows};
 use crate::cli::{ConvertArguments, InputArguments, RecordingArguments, RecordingFormat};
 use crate::inspect::read_or_ask;
-use crate::output::note;
+use crate::output::{Incomplete, note};
 use crate::output_files::OutputFiles;
 use crate::recording_file;
 use anyhow::{Error, Result, anyhow, bail};
@@ -32,7 +32,7 @@ fn convert(arguments: &RecordingArguments, out: &Path, format: RecordingFormat, 
             let (part, stated_hz) = (arguments.time_range(), arguments.rate);
             let written = write(&SensorRows { input: &input, options: *options, part, stated_hz }, out, format, files)?;
             written.notes.iter().for_each(|sentence| note(format_args!("{sentence}")));
-            Ok(())
+            Incomplete::check(written.is_complete)
         }
     }
 }

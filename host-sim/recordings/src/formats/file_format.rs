@@ -19,6 +19,7 @@ use crate::formats::ulog::UlogSource;
 use crate::formats::{foreign_format, text_table};
 use crate::input::budget::{Budget, Metered};
 use crate::input::delimited_text::Lines;
+use crate::input::file_hash::FileHash;
 use crate::input::gzip_members::{GZIP_MAGIC, GzipMembers};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::{Counted, ReadMonitor};
@@ -201,6 +202,14 @@ impl InputFile {
     /// What was recognised.
     pub fn format(&self) -> FileFormat {
         self.format
+    }
+
+    /// Begins to make the hash of the bytes.
+    ///
+    /// # Errors
+    /// The file cannot be opened.
+    pub fn begin_hash(&self) -> io::Result<FileHash> {
+        FileHash::begin(self.path())
     }
 
     /// As the user named it.

@@ -13,6 +13,9 @@ const MAX_BACKWARDS: f64 = 0.1;
 /// Sample rates, Hz, that a time column without a unit may have.
 const PLAUSIBLE_HZ: std::ops::RangeInclusive<f64> = 0.2..=40_000.0;
 
+/// Larger first time stamps, in the unit of the file, are taken off all of them: a float has too few digits for ns since 1970.
+const LARGEST_OWN_TIME: f64 = (1u64 << 40) as f64;
+
 /// A number as a file holds it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Number {
@@ -69,7 +72,7 @@ pub(crate) struct Verdict {
 pub(crate) struct Batch {
     /// Number of rows.
     pub(crate) rows: usize,
-    /// Time stamps from the first row of the recording, s once the unit is known; empty where there are none.
+    /// Time stamps, s once the unit is known; large ones count from the first. Empty where there are none.
     pub(crate) times: Vec<f64>,
     /// Running numbers; empty where there are none.
     pub(crate) indices: Vec<u64>,
@@ -116,7 +119,8 @@ pub(crate) struct BatchBuilder {
     /// Of each chosen column, the least and the largest number of its register field.
     limits: Vec<Option<(i16, i16)>>,
     batch: Batch,
-    origin: Option<Number>,
+    /// The first time stamp.
+    first_time: Option<Number>,
     last_time: Option<f64>,
     last_index: Option<u64>,
     rows: u64,
@@ -139,7 +143,7 @@ impl BatchBuilder {
             limits: limits.collect(),
             batch: empty(chosen.iter().filter(|column| matches!(column.role, Role::Channel(_))).count()),
             chosen: chosen.to_vec(),
-            origin: None,
+            first_time: None,
             last_time: None,
             last_index: None,
             rows: 0,
@@ -160,8 +164,8 @@ impl BatchBuilder {
     }
 
     /// The first time stamp, in the unit of the file.
-    pub(crate) fn origin(&self) -> f64 {
-        self.origin.map_or(0.0, Number::value)
+    pub(crate) fn first_time(&self) -> f64 {
+        self.first_time.map_or(0.0, Number::value)
     }
 
     /// Adds a row: one number for each chosen column. A row whose time goes back is left out.
@@ -177,8 +181,9 @@ impl BatchBuilder {
                     if !number.value().is_finite() {
                         return fault(position, Reason::NotFinite(number.value().to_string()));
                     }
-                    let origin = *self.origin.get_or_insert(number);
-                    let time = number.since(origin);
+                    let first = *self.first_time.get_or_insert(number);
+                    let is_large = first.value().abs() > LARGEST_OWN_TIME;
+                    let time = number.since(if is_large { first } else { Number::Integer(0) });
                     if let Some(last) = self.last_time.filter(|last| time < *last) {
                         self.backwards += 1;
                         self.first_backwards.get_or_insert((self.rows, last - time));
@@ -254,13 +259,14 @@ fn empty(columns: usize) -> Batch {
     Batch { values: vec![Vec::new(); columns], ..Batch::default() }
 }
 
-/// The unit of times that do not say it: of a clock that counts from 1970 (2001 to 2096) the one that gives this date, else
-/// seconds if they give a plausible sample rate. `None` where neither is so.
+/// The unit of times that do not say it, of which the first is `origin`: of a clock that counts from 1970 (2001 to 2096) the one that gives
+/// this date, else seconds if they give a plausible sample rate. `None` where neither is so.
 pub(crate) fn usual_unit(times: &[f64], origin: f64) -> Option<Unit> {
     let units = || ["s", "ms", "us", "ns"].into_iter().filter_map(Unit::parse);
     let by_date = units().find(|unit| (1e9..4e9).contains(&(origin * unit.factor)));
     let rows = times.len().saturating_sub(1).max(1) as f64;
-    let interval = times.last().copied().unwrap_or(0.0) / rows;
+    let span = times.first().zip(times.last()).map_or(0.0, |(first, last)| last - first);
+    let interval = span / rows;
     let seconds = units().next().filter(|_| PLAUSIBLE_HZ.contains(&interval.recip()));
     debug_assert!(seconds.is_none_or(|unit| unit.base == SECOND));
     by_date.or(seconds)

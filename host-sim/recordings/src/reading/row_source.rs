@@ -81,17 +81,25 @@ impl WantedRows {
 
 /// What was read, beside the batches.
 #[derive(Debug, Default, Clone, PartialEq)]
-pub(crate) struct RowsRead {
+pub struct RowsRead {
     /// Rows of the file.
-    pub(crate) rows: u64,
-    /// Rows outside of the part that is wanted.
-    pub(crate) outside: u64,
+    pub rows: u64,
+    /// Rows outside of the part that is wanted, as far as it was read for it.
+    pub outside: u64,
     /// Whether the user stopped the reading before the end.
-    pub(crate) is_stopped: bool,
-    /// Why the file was not read to its end.
-    pub(crate) damage: Option<String>,
+    pub is_stopped: bool,
+    /// Why the file was not read to its end, where it is damaged.
+    pub damage: Option<String>,
     /// What the user should know, one sentence each.
-    pub(crate) notes: Vec<String>,
+    pub notes: Vec<String>,
+}
+
+impl RowsRead {
+    /// Whether the file was read to its end, or to that of the part that is wanted.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.damage.is_none() && !self.is_stopped
+    }
 }
 
 /// A recording as batches of columns, which can be read again.
@@ -149,6 +157,7 @@ struct PartFilter {
     part: Option<TimeRange>,
     period_s: Option<f64>,
     first_index: Option<u64>,
+    first_s: Option<f64>,
     rows: u64,
     kept: u64,
     last_s: f64,
@@ -157,7 +166,7 @@ struct PartFilter {
 impl PartFilter {
     fn new(wanted: WantedRows, file_hz: Option<f64>) -> Self {
         let period_s = wanted.stated_hz.or(file_hz).map(f64::recip);
-        Self { part: wanted.part, period_s, first_index: None, rows: 0, kept: 0, last_s: 0.0 }
+        Self { part: wanted.part, period_s, first_index: None, first_s: None, rows: 0, kept: 0, last_s: 0.0 }
     }
 
     /// Leaves out what is outside of the part; whether later rows may be inside.
@@ -168,12 +177,15 @@ impl PartFilter {
             Some(period_s) => Err(TimeBaseError::InvalidRate(period_s.recip())),
             None => Err(TimeBaseError::NoRate),
         };
-        let elapsed_s: Vec<f64> = if !batch.times.is_empty() || batch.rows == 0 {
-            batch.times.clone()
+        let elapsed_s: Vec<f64> = if let Some(&first) = batch.times.first() {
+            let first_s = *self.first_s.get_or_insert(first);
+            batch.times.iter().map(|time| time - first_s).collect()
         } else if let Some(&first) = batch.indices.first() {
             let first = *self.first_index.get_or_insert(first);
             let period_s = period_s()?;
             batch.indices.iter().map(|index| (index - first) as f64 * period_s).collect()
+        } else if batch.rows == 0 {
+            Vec::new()
         } else {
             let period_s = period_s()?;
             (0..batch.rows as u64).map(|row| (self.rows + row) as f64 * period_s).collect()
@@ -294,7 +306,7 @@ impl<'a> FileRows<'a> {
         let mut notes_of_rows: Vec<String> = backwards.into_iter().chain(delivery.notes).collect();
         notes_of_rows.extend(notes);
         let damage = damage.map(|damage| format!("{damage}; the {rows} rows before that are used"));
-        let outside = delivery.filter.rows - delivery.filter.kept.min(delivery.filter.rows);
+        let outside = delivery.filter.rows.saturating_sub(delivery.filter.kept);
         Ok(RowsRead { rows, outside, is_stopped, damage, notes: notes_of_rows })
     }
 }
@@ -330,7 +342,7 @@ impl Delivery<'_> {
             None => {
                 let times: Vec<f64> =
                     self.waiting.iter().flat_map(|batch| &batch.times).copied().take(ROWS_OF_UNIT).collect();
-                let unit = usual_unit(&times, self.builder.origin());
+                let unit = usual_unit(&times, self.builder.first_time());
                 let unit = unit.ok_or_else(|| InputError::file(file, Reason::NoTimeUnit(self.time_label.clone())))?;
                 self.notes.push(format!("the column {} is taken to be in {}", self.time_label, unit.name));
                 self.time_unit_s = Some(unit.factor);
@@ -395,12 +407,11 @@ impl<'a> RecordedRows<'a> {
         let wanted = WantedRows { part: Some(part), ..WantedRows::all(stated_hz) };
         let mut filter = PartFilter::new(wanted, None);
         let samples = &self.recording.samples;
-        let first_s = samples.first().and_then(|sample| sample.time_stamp.time_s).unwrap_or_default();
         let is_inside = |sample: &RecordedSample| {
             let TimeStamp { index, time_s } = sample.time_stamp;
             let mut batch = Batch {
                 rows: 1,
-                times: time_s.filter(|_| self.has_times).map(|time| time - first_s).into_iter().collect(),
+                times: time_s.filter(|_| self.has_times).into_iter().collect(),
                 indices: index.filter(|_| self.has_indices).into_iter().collect(),
                 ..Batch::default()
             };
@@ -415,10 +426,9 @@ impl<'a> RecordedRows<'a> {
     fn read(&self, wanted: WantedRows, give: &mut dyn FnMut(Batch) -> bool) -> Result<RowsRead, StreamError> {
         let samples = &self.recording.samples;
         let samples = &samples[..samples.len().min(usize::try_from(wanted.most_rows).unwrap_or(usize::MAX))];
-        let first_s = samples.first().and_then(|sample| sample.time_stamp.time_s).unwrap_or_default();
         let mut filter = PartFilter::new(wanted, None);
         for part in samples.chunks(wanted.batch_rows) {
-            let times = part.iter().filter_map(|sample| sample.time_stamp.time_s).map(|time| time - first_s);
+            let times = part.iter().filter_map(|sample| sample.time_stamp.time_s);
             let indices = part.iter().filter_map(|sample| sample.time_stamp.index);
             let column = |&channel: &Channel| part.iter().map(|of| f64::from(of.counts.get(channel))).collect();
             let mut batch = Batch {

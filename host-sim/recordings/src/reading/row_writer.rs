@@ -132,7 +132,12 @@ impl SensorRows<'_> {
         let columns = source.columns().to_vec();
         let (mut names, mut failure) = (Vec::new(), None);
         let wanted = WantedRows { part: self.part, ..WantedRows::all(self.stated_hz) };
-        let read = source.for_each_batch(wanted, |batch| {
+        let mut first_s = None;
+        let read = source.for_each_batch(wanted, |mut batch| {
+            if let Some(&first) = batch.times.first() {
+                let first_s = *first_s.get_or_insert(first);
+                batch.times.iter_mut().for_each(|time| *time -= first_s);
+            }
             if failure.is_none() {
                 failure = write(&columns, &batch, &mut names).err();
             }
@@ -141,8 +146,9 @@ impl SensorRows<'_> {
         if let Some(failure) = failure {
             return Err(failure.into());
         }
-        let RowsRead { damage, notes, is_stopped, .. } = read.map_err(rename)?;
-        let is_complete = damage.is_none() && !is_stopped;
+        let read = read.map_err(rename)?;
+        let is_complete = read.is_complete();
+        let RowsRead { damage, notes, .. } = read;
         Ok(WrittenRows { columns: names, notes: notes.into_iter().chain(damage).collect(), is_complete })
     }
 }

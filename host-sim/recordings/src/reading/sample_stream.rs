@@ -12,7 +12,7 @@ use crate::reading::batch::{Batch, ValueColumn, Verdict};
 use crate::reading::column_survey::{ColumnSurvey, refusal, rounding_note};
 use crate::reading::full_scale::FullScale;
 use crate::reading::quantizer::Quantizer;
-use crate::reading::row_source::{BATCH, BatchSource, RecordedRows, RowsRead, WantedRows};
+use crate::reading::row_source::{BATCH, BatchSource, RecordedRows, WantedRows};
 use crate::tables::any_sensor::ReadOptions;
 use crate::time_base::clock::{Clock, Place, RowStamp};
 use crate::time_base::stamp_quality::StampQuality;
@@ -27,6 +27,7 @@ use measurement::{
 use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
 
+pub use crate::reading::row_source::RowsRead;
 pub use crate::time_base::time_base_error::StreamError;
 
 /// Sample periods at the start of a recording whose samples are kept.
@@ -205,6 +206,12 @@ impl SampleStream {
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.samples.notes
+    }
+
+    /// What was read of the file.
+    #[must_use]
+    pub fn rows_read(&self) -> &RowsRead {
+        &self.survey.read
     }
 
     /// What the time stamps show; `None` where there are none.

@@ -145,7 +145,12 @@ fn wrong_fields_are_refused_with_their_line_and_column() {
     ] {
         let rows = rows.map(|at| format!("{at},1\n")).concat();
         let text = format!("{clock},gyro_x_counts\n{rows}");
-        refuses((name, text.as_bytes(), &["--rate", "10"], &["line 4", &format!("column {clock}"), reason]));
+        refuses((
+            name,
+            text.as_bytes(),
+            &["--rate", "10"],
+            &["line 4", &format!("column {}", clock.trim_end_matches("_s")), reason],
+        ));
     }
 }
 
