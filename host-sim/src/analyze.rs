@@ -81,7 +81,7 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
     }
     let mut is_complete = true;
     let mut read = |recording: &RecordingArguments| -> Result<Measurement> {
-        let read = read_or_ask(recording, |recording| open_measured(recording))?;
+        let read = read_or_ask(recording, open_measured)?;
         is_complete &= read.rows_read().is_complete();
         Ok(read.into_beginning())
     };

@@ -141,7 +141,7 @@ pub(crate) struct TextTable {
     /// The rate that a line before the rows states, Hz.
     rate_hz: Option<f64>,
     /// What the user should know of the columns.
-    note: Option<String>,
+    columns_notes: Vec<String>,
     /// Whether a field that is no number is a missing one.
     is_lenient: bool,
     /// Fields of a row.
@@ -156,7 +156,8 @@ impl TextTable {
     pub(crate) fn open(file: &Path, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
         let choose = |available: &[AvailableColumn]| options.choose(available);
         let table = Self::open_with(file, options.topic.as_deref(), monitor, &choose)?;
-        Ok(Self { note: options.selection.left_out(&table.available, &options.sensor), ..table })
+        let columns_notes = options.selection.notes(&table.available, &table.chosen, &options.sensor);
+        Ok(Self { columns_notes, ..table })
     }
 
     fn open_with(file: &Path, topic: Option<&str>, monitor: &ReadMonitor, choose: &Choose) -> Result<Self, InputError> {
@@ -251,7 +252,7 @@ impl TextTable {
             chosen,
             layout,
             rate_hz: preamble.iter().find_map(|(_, text)| stated_rate(text)),
-            note: None,
+            columns_notes: Vec::new(),
             is_lenient: false,
             width,
             first,
@@ -313,7 +314,7 @@ impl TextTable {
             chosen,
             layout,
             rate_hz: None,
-            note: None,
+            columns_notes: Vec::new(),
             is_lenient: false,
             width,
             first,
@@ -346,7 +347,7 @@ impl TextTable {
             chosen,
             layout: Layout::Labelled { names, calendar: calendar.map(CalendarClock::new), others: 0 },
             rate_hz: None,
-            note: None,
+            columns_notes: Vec::new(),
             is_lenient: false,
             width,
             first: first.into(),
@@ -357,7 +358,7 @@ impl TextTable {
     /// What the user should know of the rows that were read, one sentence each.
     fn notes(&self) -> Vec<String> {
         let of_rate = self.rate_hz.map(|hz| format!("the file states a rate of {hz} Hz before its rows"));
-        let mut notes: Vec<String> = self.note.iter().cloned().chain(of_rate).collect();
+        let mut notes: Vec<String> = self.columns_notes.iter().cloned().chain(of_rate).collect();
         let (name, damaged, others) = match &self.layout {
             Layout::Columns { others: 0, .. } | Layout::Labelled { others: 0, .. } => return notes,
             Layout::Labelled { others, .. } => {

@@ -290,9 +290,7 @@ impl<'a> TopicRows<'a> {
         let mut notes: Vec<String> = Vec::new();
         let states_units = |selection: &ColumnSelection| selection.has_units();
         notes.extend(sensor.and_then(|sensor| sensor.note.clone()).filter(|_| !states_units(&options.selection)));
-        if sensor.is_none() {
-            notes.extend(options.selection.left_out(&topic.columns, &options.sensor));
-        }
+        notes.extend(options.selection.notes(&topic.columns, &chosen, &options.sensor));
         let name = sensor.map_or_else(|| topic.name.clone(), |sensor| sensor_name(topic, sensor));
         if options.topic.is_none() && source.preferred() == Some(name.as_str()) {
             let all = sensors(source.topics());

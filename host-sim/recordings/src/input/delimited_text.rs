@@ -59,8 +59,7 @@ impl Lines {
         let counted = Counted::new(Cursor::new(start).chain(raw), monitor);
         let whole = BufReader::with_capacity(BUFFER_BYTES, counted);
         let bytes: Box<dyn Read + Send> = if compressed {
-            // The time is that of the caller, who works on the lines while they are read.
-            let budget = Budget::of_file(file).map_err(|e| fail(Reason::Io(e)))?.without_time();
+            let budget = Budget::of_file(file).map_err(|e| fail(Reason::Io(e)))?;
             let members = Metered::new(GzipMembers::new(whole), budget.meter());
             Box::new(ReadAhead::new(members).map_err(|e| fail(Reason::Io(e)))?)
         } else {
