@@ -22,7 +22,14 @@ use std::path::{Path, PathBuf};
 const SEPARATORS: [char; 3] = [';', '\t', ','];
 
 /// Fields that stand for a missing value, in small letters.
-const MISSING: [&str; 6] = ["", "nan", "na", "n/a", "null", "none"];
+const MISSING: [&str; 22] = [
+    "", "nan", "na", "n/a", "null", "none", "nil", "-", "--", "---", "*", "?", "#n/a", "#na", "#value!", "#num!",
+    "#div/0!", "1.#qnan", "-1.#ind", "1.#inf", "ovf", "missing",
+];
+
+/// Part of the rows that may be damaged: a file with more is another one than it is taken for. So many are damaged before that is asked.
+const MOST_DAMAGED: f64 = 0.1;
+const FIRST_DAMAGED: u64 = 64;
 
 /// Lines before the first row of numbers that may be comments or a heading.
 const MAX_PREAMBLE: usize = 64;
@@ -74,11 +81,15 @@ impl RowSource for TextRows<'_> {
         };
         while let Some(line) = table.next_row()? {
             match each(&table.row) {
-                Ok(()) => {}
-                Err(Refusal::Fault(fault)) => return Err(table.fault(line, fault)),
+                Ok(()) => table.damaged.rows += 1,
+                Err(Refusal::Fault(fault)) => {
+                    let error = table.fault(line, fault);
+                    table.damaged.add(error)?;
+                }
                 Err(Refusal::Enough) => break,
             }
         }
+        table.damaged.check()?;
         Ok(Ending { damage: None, notes: table.notes() })
     }
 }
@@ -94,8 +105,13 @@ pub(crate) fn read_whole(file: &Path, topic: Option<&str>, monitor: &ReadMonitor
         whole.is_cut = builder.rows() >= most;
         let row = table.next_row().and_then(|line| {
             let Some(line) = line.filter(|_| !whole.is_cut) else { return Ok(false) };
+            table.damaged.rows += 1;
             builder.push(&table.row).map(|()| true).map_err(|fault| table.fault(line, fault))
         });
+        let row = match row {
+            Ok(false) => table.damaged.check().map(|()| false),
+            row => row,
+        };
         match row {
             Ok(true) => {}
             Ok(false) => break,
@@ -131,6 +147,41 @@ enum Layout {
     Labelled { names: Vec<String>, calendar: Option<CalendarClock>, others: u64 },
 }
 
+/// Rows that are left out because they cannot be read.
+#[derive(Debug, Default)]
+struct DamagedRows {
+    rows: u64,
+    damaged: u64,
+    first: Option<InputError>,
+    note: String,
+}
+
+impl DamagedRows {
+    /// Leaves out a row.
+    ///
+    /// # Errors
+    /// Too many rows are damaged.
+    fn add(&mut self, error: InputError) -> Result<(), InputError> {
+        self.damaged += 1;
+        if self.first.is_none() {
+            let line = error.line.map_or_else(String::new, |line| format!("line {line}: "));
+            self.note = format!("{line}{}", error.reason);
+            self.first = Some(error);
+        }
+        if self.damaged >= FIRST_DAMAGED { self.check() } else { Ok(()) }
+    }
+
+    fn check(&mut self) -> Result<(), InputError> {
+        let are_many = self.damaged as f64 > MOST_DAMAGED * self.rows as f64;
+        self.first.take_if(|_| are_many).map_or(Ok(()), Err)
+    }
+
+    fn note(&self) -> Option<String> {
+        let Self { damaged, note, .. } = self;
+        (*damaged > 0).then(|| format!("{damaged} damaged rows are left out, the first of them {note}"))
+    }
+}
+
 /// An open table, read row by row.
 pub(crate) struct TextTable {
     file: PathBuf,
@@ -142,6 +193,7 @@ pub(crate) struct TextTable {
     rate_hz: Option<f64>,
     /// What the user should know of the columns.
     columns_notes: Vec<String>,
+    damaged: DamagedRows,
     /// Whether a field that is no number is a missing one.
     is_lenient: bool,
     /// Fields of a row.
@@ -192,6 +244,14 @@ impl TextTable {
             let Some((line, text)) = lines.next()? else { break };
             first.push_back((line, text.to_owned()));
         }
+        let has_kinds = {
+            let rows: Vec<Vec<&str>> = first.iter().map(|(_, text)| split(text, separator).collect()).collect();
+            RowKinds::find(&rows).is_some()
+        };
+        if !has_kinds {
+            leave_preamble(&mut first, &mut preamble);
+        }
+        let separator = first.front().map_or(separator, |(_, text)| separator_of(text));
         let rows: Vec<Vec<&str>> = first.iter().map(|(_, text)| split(text, separator).collect()).collect();
         let kinds = RowKinds::find(&rows);
         let kind = match (&kinds, topic) {
@@ -204,7 +264,7 @@ impl TextTable {
         };
         let is_kind = |row: &&Vec<&str>| kind.as_ref().is_none_or(|(at, name)| row.get(*at) == Some(&name.as_str()));
         let row = rows.iter().find(is_kind).cloned().unwrap_or_default();
-        let (width, calendar) = (row.len(), CalendarColumns::find(&row));
+        let (width, calendar) = (width_of(&row, &preamble, separator), CalendarColumns::find(&row));
         // As `write.table` of R numbers the rows, without a name in the heading.
         let is_numbered = matches!(rows.as_slice(), [first, second, ..] if first[0] == "1" && second[0] == "2");
         // The heading may have one name for a date and a time of day.
@@ -221,13 +281,18 @@ impl TextTable {
         if kind.is_some() && heading.is_none_or(|(_, text)| fields(text) != width) {
             // Rows of several kinds have no common heading.
             heading = None;
-        } else if heading.is_none()
-            && let Some((line, text)) = preamble.iter().rev().find(|(_, text)| !text.starts_with(['#', '%', '/']))
-        {
-            return Err(InputError::line(file, *line, Reason::FieldCount { found: width, expected: fields(text) }));
         }
         let mut available: Vec<AvailableColumn> = match heading {
-            Some((_, text)) => named_columns(names(text, separator, width).into_iter(), units.as_deref()),
+            Some((line, text)) => {
+                let above = preamble.iter().rev().find(|(above, _)| above + 1 == *line);
+                let own = names(text, separator, width);
+                let above = above.map(|(_, text)| names(text, separator, width));
+                let joined = above.and_then(|above| joined_names(&above, &own));
+                match &joined {
+                    Some(joined) => named_columns(joined.iter().map(String::as_str), units.as_deref()),
+                    None => named_columns(own.into_iter(), units.as_deref()),
+                }
+            }
             None => (0..width).map(|number| AvailableColumn { name: number.to_string(), unit: None }).collect(),
         };
         if let Some(calendar) = calendar {
@@ -253,6 +318,7 @@ impl TextTable {
             layout,
             rate_hz: preamble.iter().find_map(|(_, text)| stated_rate(text)),
             columns_notes: Vec::new(),
+            damaged: DamagedRows::default(),
             is_lenient: false,
             width,
             first,
@@ -315,6 +381,7 @@ impl TextTable {
             layout,
             rate_hz: None,
             columns_notes: Vec::new(),
+            damaged: DamagedRows::default(),
             is_lenient: false,
             width,
             first,
@@ -348,6 +415,7 @@ impl TextTable {
             layout: Layout::Labelled { names, calendar: calendar.map(CalendarClock::new), others: 0 },
             rate_hz: None,
             columns_notes: Vec::new(),
+            damaged: DamagedRows::default(),
             is_lenient: false,
             width,
             first: first.into(),
@@ -358,7 +426,10 @@ impl TextTable {
     /// What the user should know of the rows that were read, one sentence each.
     fn notes(&self) -> Vec<String> {
         let of_rate = self.rate_hz.map(|hz| format!("the file states a rate of {hz} Hz before its rows"));
+        let zeros = self.lines.zero_bytes();
+        let of_zeros = (zeros > 0).then(|| format!("{zeros} bytes that are zero are left out"));
         let mut notes: Vec<String> = self.columns_notes.iter().cloned().chain(of_rate).collect();
+        notes.extend(self.damaged.note().into_iter().chain(of_zeros));
         let (name, damaged, others) = match &self.layout {
             Layout::Columns { others: 0, .. } | Layout::Labelled { others: 0, .. } => return notes,
             Layout::Labelled { others, .. } => {
@@ -389,7 +460,7 @@ impl TextTable {
 
     /// Reads the next row into `row`; its line, or `None` at the end.
     fn next_row(&mut self) -> Result<Option<u64>, InputError> {
-        let Self { file, lines, chosen, layout, is_lenient, width, first, row, .. } = self;
+        let Self { file, lines, chosen, layout, is_lenient, width, first, row, damaged, .. } = self;
         loop {
             let first = first.pop_front();
             let (line, text) = match &first {
@@ -407,14 +478,17 @@ impl TextTable {
                     Ok(false)
                 }
                 Layout::Columns { separator, calendar, .. } => {
-                    numbers(split(text, *separator), chosen, *width, calendar.as_mut(), row).map(|()| true)
+                    // The tabs at the end of a line are blanks too.
+                    let width = RowWidth { fields: *width, may_be_short: *separator == Some('\t') };
+                    numbers(split(text, *separator), chosen, width, calendar.as_mut(), row).map(|()| true)
                 }
                 Layout::Labelled { names, calendar, others } => {
                     let row_of = labelled_row::parse(text);
                     match row_of.filter(|row_of| row_of.iter().any(|(name, _)| names.contains(name))) {
                         Some(row_of) => {
                             let values = values_of(names, row_of);
-                            numbers(values.iter().map(String::as_str), chosen, *width, calendar.as_mut(), row)
+                            let width = RowWidth { fields: *width, may_be_short: false };
+                            numbers(values.iter().map(String::as_str), chosen, width, calendar.as_mut(), row)
                                 .map(|()| true)
                         }
                         None => {
@@ -432,7 +506,8 @@ impl TextTable {
                         Ok(chosen.iter().all(|column| matches!(column.role, Role::Channel(_))))
                     }
                     Some(Sentence { name: own, fields, .. }) if own == *name => {
-                        numbers(fields.into_iter(), chosen, *width, None, row).map(|()| true)
+                        let width = RowWidth { fields: *width, may_be_short: false };
+                        numbers(fields.into_iter(), chosen, width, None, row).map(|()| true)
                     }
                     _ => {
                         *others += 1;
@@ -445,12 +520,11 @@ impl TextTable {
                 (Some(_), Reason::NotNumber(_) | Reason::NotTime(_)) if *is_lenient => Ok(true),
                 fault => Err(fault),
             });
-            let is_row = of_layout.map_err(|(at, reason)| match at {
-                Some(at) => InputError::field(file, line, &chosen[at].label, reason),
-                None => InputError::line(file, line, reason),
-            })?;
-            if is_row {
-                return Ok(Some(line));
+            match of_layout {
+                Ok(true) => return Ok(Some(line)),
+                Ok(false) => {}
+                Err((Some(at), reason)) => damaged.add(InputError::field(file, line, &chosen[at].label, reason))?,
+                Err((None, reason)) => damaged.add(InputError::line(file, line, reason))?,
             }
         }
     }
@@ -497,22 +571,86 @@ fn is_short(fields: usize, width: usize, calendar: Option<CalendarColumns>) -> b
     fields + 1 == width && matches!(calendar, Some(CalendarColumns::Two(_)))
 }
 
+/// Fields of a row.
+#[derive(Debug, Clone, Copy)]
+struct RowWidth {
+    fields: usize,
+    /// Whether empty fields at the end may be absent.
+    may_be_short: bool,
+}
+
+/// Moves the lines before the rows of the most frequent width to the `preamble`.
+fn leave_preamble(first: &mut VecDeque<(u64, String)>, preamble: &mut Vec<(u64, String)>) {
+    let width = |text: &str| trimmed_width(&split(text, separator_of(text)).collect::<Vec<_>>());
+    let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
+    for (_, text) in first.iter().filter(|(_, text)| is_row(text)) {
+        *counts.entry(width(text)).or_insert(0) += 1;
+    }
+    // Of equally frequent widths the widest.
+    let Some((&usual, &count)) = counts.iter().max_by_key(|(_, count)| **count) else { return };
+    if 2 * count <= first.len() {
+        return;
+    }
+    // Of rows between tabs the empty cells at the end are cut.
+    let is_of_table = |text: &str| {
+        let width = width(text);
+        is_row(text) && (width == usual || width > usual && separator_of(text) == Some('\t'))
+    };
+    while first.front().is_some_and(|(_, text)| !is_of_table(text)) {
+        preamble.extend(first.pop_front());
+    }
+}
+
+/// Fields up to the last one that is not empty.
+fn trimmed_width(fields: &[&str]) -> usize {
+    fields.iter().rposition(|field| !field.is_empty()).map_or(0, |at| at + 1)
+}
+
+/// Fields of the rows of a table: those of `row`, but for empty ones at the end that no heading has a name for.
+fn width_of(row: &[&str], preamble: &[(u64, String)], separator: Option<char>) -> usize {
+    let least = trimmed_width(row);
+    let headings = preamble.iter().map(|(_, text)| trimmed_width(&split(text, separator).collect::<Vec<_>>()));
+    headings.filter(|names| (least..row.len()).contains(names)).max().unwrap_or(row.len())
+}
+
+/// The names of a heading in two lines, of which the upper one names groups of columns: `Gyroscope,,` over `X,Y,Z`. `None` for one in a line.
+fn joined_names(above: &[&str], own: &[&str]) -> Option<Vec<String>> {
+    let is_of_groups = above.len() == own.len()
+        && above.iter().any(|name| name.is_empty())
+        && above.iter().any(|name| !name.is_empty())
+        && above.iter().all(|name| number(name).is_none_or(|number| number.value().is_nan()));
+    if !is_of_groups {
+        return None;
+    }
+    let mut group = "";
+    let joined = above.iter().zip(own).map(|(above, own)| {
+        group = if above.is_empty() { group } else { above };
+        format!("{group} {own}").trim().to_owned()
+    });
+    Some(joined.collect())
+}
+
 /// The numbers of the `chosen` columns of a row of `width` fields.
 fn numbers<'a>(
     mut fields: impl Iterator<Item = &'a str>,
     chosen: &[ChosenColumn],
-    width: usize,
+    width: RowWidth,
     mut calendar: Option<&mut CalendarClock>,
     row: &mut Vec<Number>,
 ) -> Result<(), (Option<usize>, Reason)> {
     row.clear();
     row.resize(chosen.len(), Number::Real(f64::NAN));
     let mut found = 0;
+    // Fields up to the last one that is not empty.
+    let mut filled = 0;
     let mut fault: Option<(usize, Reason)> = None;
     let mut after_date = None;
     while let Some(field) = after_date.take().or_else(|| fields.next()) {
         let position = found;
         found += 1;
+        if !field.is_empty() {
+            filled = found;
+        }
         let mut time_ns = None;
         if let Some(clock) = calendar.as_mut().filter(|clock| clock.columns.position() == position) {
             if matches!(clock.columns, CalendarColumns::Two(_)) {
@@ -532,8 +670,9 @@ fn numbers<'a>(
             }
         }
     }
+    let is_complete = found >= width.fields || width.may_be_short && found + 1 >= width.fields.min(2);
     match fault {
-        _ if found != width => Err((None, Reason::FieldCount { found, expected: width })),
+        _ if !is_complete || filled > width.fields => Err((None, Reason::FieldCount { found, expected: width.fields })),
         Some((at, reason)) => Err((Some(at), reason)),
         None => Ok(()),
     }
@@ -561,15 +700,51 @@ fn split(text: &str, separator: Option<char>) -> Box<dyn Iterator<Item = &str> +
         return Box::new(std::iter::once(time.trim()).chain(split(rest, separator)));
     }
     match separator {
+        Some(separator) if text.contains('"') => Box::new(QuotedFields { rest: Some(text), separator }),
         Some(separator) => Box::new(text.split(separator).map(delimited_text::field)),
         None => Box::new(text.split_ascii_whitespace().map(delimited_text::field)),
+    }
+}
+
+/// Fields of which some stand between quotation marks, in which a separator is none (RFC 4180).
+struct QuotedFields<'a> {
+    rest: Option<&'a str>,
+    separator: char,
+}
+
+impl<'a> Iterator for QuotedFields<'a> {
+    type Item = &'a str;
+
+    fn next(&mut self) -> Option<&'a str> {
+        let rest = self.rest.take()?;
+        let quoted = rest.trim_start().strip_prefix('"').and_then(|inner| {
+            // Two marks are one in the text.
+            let mut marks = inner.match_indices('"').map(|(at, _)| at).peekable();
+            while let Some(at) = marks.next() {
+                if marks.next_if_eq(&(at + 1)).is_none() {
+                    return Some((&inner[..at], &inner[at + 1..]));
+                }
+            }
+            None
+        });
+        let Some((field, after)) = quoted else {
+            let (field, after) =
+                rest.split_once(self.separator).map_or((rest, None), |(field, after)| (field, Some(after)));
+            self.rest = after;
+            return Some(delimited_text::field(field));
+        };
+        self.rest = after.split_once(self.separator).map(|(_, after)| after);
+        Some(field.trim())
     }
 }
 
 /// The names in a heading above rows of `width` fields. Between blanks, a unit in brackets belongs to the name before it, and quotation
 /// marks hold a name together.
 fn names(text: &str, separator: Option<char>, width: usize) -> Vec<&str> {
-    let plain: Vec<&str> = split(text, separator).collect();
+    let mut plain: Vec<&str> = split(text, separator).collect();
+    while plain.len() > width && plain.last() == Some(&"") {
+        plain.pop();
+    }
     if separator.is_some() || plain.len() == width {
         return plain;
     }

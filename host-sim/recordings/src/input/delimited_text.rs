@@ -29,6 +29,8 @@ pub(crate) struct Lines {
     is_latin: bool,
     /// Whether the line in `bytes` is read once more.
     again: bool,
+    /// Bytes that are zero, as where a disk was full or a device lost its power.
+    zero_bytes: u64,
     monitor: ReadMonitor,
 }
 
@@ -74,6 +76,7 @@ impl Lines {
             latin: String::new(),
             is_latin: false,
             again: false,
+            zero_bytes: 0,
             monitor: monitor.clone(),
         })
     }
@@ -98,7 +101,13 @@ impl Lines {
                 self.monitor.end();
                 return Ok(None);
             }
-            if read as u64 == MAX_LINE_BYTES && self.bytes.last() != Some(&b'\n') {
+            if self.bytes.contains(&0) {
+                let length = self.bytes.len();
+                self.bytes.retain(|byte| *byte != 0);
+                self.zero_bytes += (length - self.bytes.len()) as u64;
+                // The rest of a line of zeros follows.
+                self.line -= u64::from(self.bytes.is_empty());
+            } else if read as u64 == MAX_LINE_BYTES && self.bytes.last() != Some(&b'\n') {
                 return Err(InputError::line(&self.file, self.line, Reason::LongLine));
             }
             if !self.bytes.trim_ascii().is_empty() {
@@ -118,6 +127,11 @@ impl Lines {
         self.latin.extend(latin);
         self.is_latin = true;
         Ok(Some((self.line, &self.latin)))
+    }
+
+    /// Bytes that are zero, which were left out.
+    pub(crate) fn zero_bytes(&self) -> u64 {
+        self.zero_bytes
     }
 
     /// The header without consuming it: what [`next`](Self::next) returns now, and will return once more. `None` for a file of

@@ -175,32 +175,25 @@ impl BatchBuilder {
         if let Some(meter) = &mut self.meter {
             meter.add_values(row.len() as u64).map_err(|reason| RowFault { column: None, reason })?;
         }
+        // A row at fault leaves nothing behind.
+        let (mut time, mut index) = (None, None);
         for (position, (column, &number)) in self.chosen.iter().zip(row).enumerate() {
             match column.role {
                 Role::Time => {
                     if !number.value().is_finite() {
                         return fault(position, Reason::NotFinite(number.value().to_string()));
                     }
-                    let first = *self.first_time.get_or_insert(number);
+                    let first = self.first_time.unwrap_or(number);
                     let is_large = first.value().abs() > LARGEST_OWN_TIME;
-                    let time = number.since(if is_large { first } else { Number::Integer(0) });
-                    if let Some(last) = self.last_time.filter(|last| time < *last) {
-                        self.backwards += 1;
-                        self.first_backwards.get_or_insert((self.rows, last - time));
-                        self.batch.backwards.push(self.batch.rows);
-                        return Ok(());
-                    }
-                    self.last_time = Some(time);
-                    self.batch.times.push(time);
+                    time = Some((first, number.since(if is_large { first } else { Number::Integer(0) })));
                 }
                 Role::Index => match number {
-                    Number::Integer(index) if index >= 0 => {
-                        let now = index.unsigned_abs();
+                    Number::Integer(now) if now >= 0 => {
+                        let now = now.unsigned_abs();
                         if let Some(before) = self.last_index.filter(|before| now <= *before) {
                             return fault(position, Reason::IndexBackwards { before, now });
                         }
-                        self.last_index = Some(now);
-                        self.batch.indices.push(now);
+                        index = Some(now);
                     }
                     Number::Integer(index) => return fault(position, Reason::NotInteger(index.to_string())),
                     Number::Real(index) => return fault(position, Reason::NotInteger(index.to_string())),
@@ -211,6 +204,21 @@ impl BatchBuilder {
                     }
                 }
             }
+        }
+        if let Some((first, time)) = time {
+            self.first_time = Some(first);
+            if let Some(last) = self.last_time.filter(|last| time < *last) {
+                self.backwards += 1;
+                self.first_backwards.get_or_insert((self.rows, last - time));
+                self.batch.backwards.push(self.batch.rows);
+                return Ok(());
+            }
+            self.last_time = Some(time);
+            self.batch.times.push(time);
+        }
+        if let Some(index) = index {
+            self.last_index = Some(index);
+            self.batch.indices.push(index);
         }
         let channels = self.chosen.iter().zip(row).filter(|(column, _)| matches!(column.role, Role::Channel(_)));
         for ((_, number), values) in channels.zip(&mut self.batch.values) {

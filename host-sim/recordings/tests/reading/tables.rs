@@ -365,3 +365,118 @@ fn compression_padding_line_ends_and_quotation_marks_change_nothing() {
         assert!(read.samples == plain, "{case}");
     }
 }
+
+/// Kinds of damage and of punctuation, each in the same table of noise: every intact row is read, and what is left out is told.
+#[test]
+fn a_damaged_place_costs_its_rows_and_is_told() {
+    let mut normal = normal(31);
+    let intact: Vec<String> = (0..ROWS)
+        .map(|row| {
+            let [x, y, z] = [(); 3].map(|()| format!("{:.5}", NOISE * normal()));
+            format!("{},{x},{y},{z}", seconds(row))
+        })
+        .collect();
+    let table = |change: &dyn Fn(&mut Vec<String>)| {
+        let mut rows = intact.clone();
+        change(&mut rows);
+        format!("t_s,gx_rad_s,gy_rad_s,gz_rad_s\n{}\n", rows.join("\n"))
+    };
+    let replaced = |row: usize, text: &str| {
+        let text = text.to_owned();
+        table(&move |rows| rows[row].clone_from(&text))
+    };
+    let zeros = |row: usize, count: usize| table(&move |rows| rows[row].insert_str(0, &"\0".repeat(count)));
+    for (name, text, lost, note) in [
+        (
+            "a message",
+            replaced(3000, "WARNING: FIFO overflow"),
+            1,
+            "1 damaged rows are left out, the first of them line 3002",
+        ),
+        ("a cut row", replaced(40, "0.40,0.1"), 1, "1 damaged rows"),
+        ("glued rows", replaced(3000, "30.00,0.1,0.230.01,0.1,0.1,0.1"), 1, "1 damaged rows"),
+        (
+            "a heading",
+            table(&|rows| rows.insert(2000, "t_s,gx_rad_s,gy_rad_s,gz_rad_s".to_owned())),
+            0,
+            "1 damaged rows",
+        ),
+        ("zeros", zeros(3000, 4096), 0, "4096 bytes that are zero are left out"),
+        ("many zeros", zeros(3000, 200_000), 0, "200000 bytes that are zero are left out"),
+    ] {
+        let read = reading(name, &text, &[]);
+        assert_eq!(
+            (read.samples.len() as u32, read.missing()),
+            (ROWS - lost, u64::from(lost)),
+            "{name}: {:?}",
+            read.notes
+        );
+        assert!(read.notes_contain(note), "{name}: {:?}", read.notes);
+    }
+    for word in ["-", "#N/A", "1.#QNAN", "ovf", "NaN", ""] {
+        let text = table(&move |rows| {
+            for row in rows.iter_mut().skip(7).step_by(50) {
+                let time = row.split(',').next().expect("a time").to_owned();
+                *row = format!("{time},{word},{word},{word}");
+            }
+        });
+        let read = reading(word, &text, &[]);
+        assert_eq!((read.samples.len() as u32, read.refused("gyro_y", "missing")), (ROWS, 120), "{word}");
+    }
+    // A tenth of the rows is another file.
+    let text = table(&|rows| rows.iter_mut().step_by(8).for_each(|row| row.push_str(",x")));
+    let error = read("damaged.csv", text.as_bytes(), &[""; 0]).err().expect("refused").to_string();
+    assert!(error.contains("line 10") && error.contains("5 fields"), "{error}");
+}
+
+/// Delimiters after the last cell, texts with delimiters, headings in two lines, lines before the table.
+#[test]
+fn a_table_is_found_in_what_is_around_it() {
+    let mut normal = normal(32);
+    let rows: Vec<[String; 4]> = (0..ROWS)
+        .map(|row| {
+            let [x, y, z] = [(); 3].map(|()| format!("{:.5}", NOISE * normal()));
+            [seconds(row), x, y, z]
+        })
+        .collect();
+    let body = |row: &dyn Fn(&[String; 4]) -> String| rows.iter().map(row).collect::<String>();
+    let plain = body(&|row| row.join(",") + "\n");
+    for (name, text, options) in [
+        (
+            "a comma after every row",
+            "t_s,gx_rad_s,gy_rad_s,gz_rad_s\n".to_owned() + &body(&|row| row.join(",") + ",\n"),
+            &[][..],
+        ),
+        ("a comma after the heading", format!("t_s,gx_rad_s,gy_rad_s,gz_rad_s,\n{plain}"), &[]),
+        (
+            "empty cells before tabs are cut",
+            "t_s\tgx_rad_s\tgy_rad_s\tgz_rad_s\tmx_uT\n".to_owned()
+                + &body(&|row| row.join("\t") + if row[0].ends_with('0') { "\t20.1\n" } else { "\t\n" }),
+            &[],
+        ),
+        (
+            "a text with a comma",
+            "t_s,note,gx_rad_s,gy_rad_s,gz_rad_s\n".to_owned()
+                + &body(&|[t, x, y, z]| format!("{t},\"bench, left\",{x},{y},{z}\n")),
+            &[],
+        ),
+        (
+            "units behind commas",
+            format!("\"Time, s\",\"Gyro X, rad/s\",\"Gyro Y, rad/s\",\"Gyro Z, rad/s\"\n{plain}"),
+            &[],
+        ),
+        ("a heading in two lines", format!("Time (s),Gyroscope,,\n,X,Y,Z\n{plain}"), &["--units", "rad/s"]),
+        ("keys and values", format!("rate,100\nrange,250\nn,6000\nt_s,gx_rad_s,gy_rad_s,gz_rad_s\n{plain}"), &[]),
+        (
+            "texts",
+            format!("bus opened\nDevice found\n{plain}"),
+            &["--columns", "time=0,gyro_x=1,gyro_y=2,gyro_z=3", "--units", "s,rad/s"],
+        ),
+    ] {
+        let read = reading(name, &text, options);
+        assert_eq!((read.samples.len() as u32, read.missing()), (ROWS, 0), "{name}: {:?}", read.notes);
+        assert!((read.rate_hz() / 100.0 - 1.0).abs() < 1e-6, "{name}: {}", read.rate_hz());
+        let deviation = read.neighbours("gyro_y") / NOISE.to_degrees();
+        assert!((deviation - 1.0).abs() < 5.0 * 0.011, "{name}: {deviation} of the noise");
+    }
+}
