@@ -9,6 +9,7 @@ mod indexed_clock;
 mod lateness_track;
 mod lower_envelope;
 mod stamp_alignment;
+pub(crate) mod stamp_order;
 pub(crate) mod stamp_quality;
 mod stamp_tick;
 pub(crate) mod stream_clock;

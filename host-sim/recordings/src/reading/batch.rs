@@ -4,6 +4,7 @@ use crate::columns::column_selection::{ChosenColumn, Role};
 use crate::columns::unit::{SECOND, Unit};
 use crate::input::budget::{Budget, Meter};
 use crate::input::input_error::Reason;
+use crate::time_base::stamp_order::{Order, ROWS_OF_FIRST, ROWS_OF_SET_CLOCK, StampOrder};
 use adis16405_driver::{Channel, ChannelMask, Faults};
 use measurement::ChannelProfile;
 
@@ -85,6 +86,26 @@ pub(crate) struct Batch {
 }
 
 impl Batch {
+    /// The first rows, which are removed.
+    fn split_off_front(&mut self, rows: usize) -> Self {
+        fn front<T>(values: &mut Vec<T>, rows: usize) -> Vec<T> {
+            let rest = values.split_off(rows.min(values.len()));
+            std::mem::replace(values, rest)
+        }
+        let is_front = |at: &&usize| **at < rows;
+        let backwards = self.backwards.iter().filter(is_front).copied().collect();
+        self.backwards = self.backwards.iter().filter(|at| !is_front(at)).map(|at| at - rows).collect();
+        self.rows -= rows;
+        Self {
+            rows,
+            times: front(&mut self.times, rows),
+            indices: front(&mut self.indices, rows),
+            values: self.values.iter_mut().map(|column| front(column, rows)).collect(),
+            verdicts: front(&mut self.verdicts, rows),
+            backwards,
+        }
+    }
+
     /// Leaves out the rows whose flag is not set, and what was left out before them.
     pub(crate) fn retain(&mut self, is_kept: &[bool]) {
         fn retain<T>(values: &mut Vec<T>, is_kept: &[bool]) {
@@ -112,6 +133,23 @@ pub(crate) struct RowFault {
     pub(crate) reason: Reason,
 }
 
+/// A row whose time goes back.
+#[derive(Debug)]
+struct BackRow {
+    time: f64,
+    number: u64,
+    index: Option<u64>,
+    values: Vec<f64>,
+}
+
+/// Rows that a later one may show to be wrong.
+pub(crate) const HELD_ROWS: usize = ROWS_OF_FIRST + 1;
+
+/// Numbers at which counters of samples begin anew.
+const COUNTERS: [u64; 3] = [1 << 8, 1 << 16, 1 << 32];
+/// Part of a counter that may be missing where it begins anew.
+const MOST_MISSING: u64 = 8;
+
 /// Makes batches of the rows of a file.
 #[derive(Debug)]
 pub(crate) struct BatchBuilder {
@@ -121,14 +159,21 @@ pub(crate) struct BatchBuilder {
     batch: Batch,
     /// The first time stamp.
     first_time: Option<Number>,
-    last_time: Option<f64>,
+    order: StampOrder,
+    /// Rows whose time goes back, each with its time and number, until more of them come or another row.
+    back: Vec<BackRow>,
     last_index: Option<u64>,
+    index_offset: u64,
     rows: u64,
     /// What the file may cost.
     meter: Option<Meter>,
     backwards: u64,
     /// The first row whose time went back: number of the row, and by how much.
     first_backwards: Option<(u64, f64)>,
+    /// Whether the first row is not judged yet.
+    is_first_open: bool,
+    /// The numbers of the row that is added.
+    row: Vec<f64>,
 }
 
 impl BatchBuilder {
@@ -144,12 +189,16 @@ impl BatchBuilder {
             batch: empty(chosen.iter().filter(|column| matches!(column.role, Role::Channel(_))).count()),
             chosen: chosen.to_vec(),
             first_time: None,
-            last_time: None,
+            order: StampOrder::default(),
+            back: Vec::new(),
             last_index: None,
+            index_offset: 0,
             rows: 0,
             meter: budget.map(Budget::meter),
             backwards: 0,
             first_backwards: None,
+            is_first_open: true,
+            row: Vec::new(),
         }
     }
 
@@ -189,11 +238,19 @@ impl BatchBuilder {
                 }
                 Role::Index => match number {
                     Number::Integer(now) if now >= 0 => {
-                        let now = now.unsigned_abs();
-                        if let Some(before) = self.last_index.filter(|before| now <= *before) {
+                        let now = now.unsigned_abs() + self.index_offset;
+                        let Some(before) = self.last_index.filter(|before| now <= *before) else {
+                            index = Some(now);
+                            continue;
+                        };
+                        let (own, before_own) = (now - self.index_offset, before - self.index_offset);
+                        let is_passed =
+                            |size: &&u64| before_own < **size && (**size - before_own) + own <= **size / MOST_MISSING;
+                        let Some(size) = COUNTERS.iter().find(is_passed) else {
                             return fault(position, Reason::IndexBackwards { before, now });
-                        }
-                        index = Some(now);
+                        };
+                        self.index_offset += size;
+                        index = Some(now + size);
                     }
                     Number::Integer(index) => return fault(position, Reason::NotInteger(index.to_string())),
                     Number::Real(index) => return fault(position, Reason::NotInteger(index.to_string())),
@@ -205,33 +262,125 @@ impl BatchBuilder {
                 }
             }
         }
-        if let Some((first, time)) = time {
-            self.first_time = Some(first);
-            if let Some(last) = self.last_time.filter(|last| time < *last) {
-                self.backwards += 1;
-                self.first_backwards.get_or_insert((self.rows, last - time));
-                self.batch.backwards.push(self.batch.rows);
-                return Ok(());
+        let mut values = std::mem::take(&mut self.row);
+        values.clear();
+        let channels = self.chosen.iter().zip(row).filter(|(column, _)| matches!(column.role, Role::Channel(_)));
+        values.extend(channels.map(|(_, number)| number.value()));
+        self.place(time, index, &values);
+        self.row = values;
+        Ok(())
+    }
+
+    /// Adds a row where its time says it belongs; `time` is the first time stamp and that of the row.
+    fn place(&mut self, time: Option<(Number, f64)>, index: Option<u64>, values: &[f64]) {
+        let Some((first, stamp)) = time else {
+            self.add(None, index, values);
+            return;
+        };
+        self.first_time = Some(first);
+        match self.order.judge(stamp) {
+            Order::Next(time) => {
+                self.leave_out_back();
+                self.add(Some(time), index, values);
+                self.check_first();
             }
-            self.last_time = Some(time);
+            Order::AfterWrong(time) => {
+                self.leave_out_back();
+                self.remove(self.batch.rows.saturating_sub(1));
+                self.order.forget_last();
+                self.add(Some(time), index, values);
+            }
+            Order::Back(time) => {
+                if self.back.last().is_some_and(|before| time < before.time) {
+                    self.leave_out_back();
+                }
+                self.back.push(BackRow { time, number: self.rows, index, values: values.to_vec() });
+                self.check_clock();
+            }
+        }
+    }
+
+    /// Adds a row to the batch.
+    fn add(&mut self, time: Option<f64>, index: Option<u64>, values: &[f64]) {
+        if let Some(time) = time {
+            self.order.accept(time);
             self.batch.times.push(time);
         }
         if let Some(index) = index {
             self.last_index = Some(index);
             self.batch.indices.push(index);
         }
-        let channels = self.chosen.iter().zip(row).filter(|(column, _)| matches!(column.role, Role::Channel(_)));
-        for ((_, number), values) in channels.zip(&mut self.batch.values) {
-            values.push(number.value());
+        for (column, value) in self.batch.values.iter_mut().zip(values) {
+            column.push(*value);
         }
         self.batch.rows += 1;
-        Ok(())
     }
 
-    /// The rows that were added since they were taken last.
+    /// Removes a row of the batch, and counts it.
+    fn remove(&mut self, row: usize) {
+        let is_kept: Vec<bool> = (0..self.batch.rows).map(|at| at != row).collect();
+        self.batch.retain(&is_kept);
+        self.batch.backwards.push(row);
+        self.batch.backwards.sort_unstable();
+    }
+
+    /// Leaves out the rows whose time goes back: the others have gone on without them.
+    fn leave_out_back(&mut self) {
+        for row in std::mem::take(&mut self.back) {
+            self.backwards += 1;
+            let by = self.batch.times.last().map_or(0.0, |last| last - row.time);
+            self.first_backwards.get_or_insert((row.number, by));
+            self.batch.backwards.push(self.batch.rows);
+        }
+    }
+
+    /// Leaves out the first row where the next ones are far from it.
+    fn check_first(&mut self) {
+        let is_time = self.is_first_open && self.batch.times.len() == ROWS_OF_FIRST;
+        if is_time {
+            self.is_first_open = false;
+            if self.order.is_first_wrong(&self.batch.times) {
+                self.remove(0);
+            }
+        }
+    }
+
+    /// Goes on with a clock that was set back, when enough rows go on by it.
+    fn check_clock(&mut self) {
+        let is_first_wrong = self.order.has_first_alone() && self.back.len() == ROWS_OF_FIRST;
+        if !is_first_wrong && self.back.len() < ROWS_OF_SET_CLOCK {
+            return;
+        }
+        let rows = std::mem::take(&mut self.back);
+        let offset = self.order.offset();
+        if is_first_wrong {
+            self.order.begin_anew();
+            self.remove(0);
+        } else {
+            self.order.set_clock(rows[0].time, rows[0].number);
+        }
+        for row in rows {
+            let time = self.order.shift(row.time, if is_first_wrong { 0.0 } else { offset });
+            self.add(Some(time), row.index, &row.values);
+        }
+    }
+
+    /// The rows that were added since they were taken last, but for those that a later one may show to be wrong.
     pub(crate) fn take(&mut self) -> Batch {
+        let held = if self.batch.times.is_empty() { 0 } else { HELD_ROWS };
+        self.batch.split_off_front(self.batch.rows.saturating_sub(held))
+    }
+
+    /// The last rows.
+    pub(crate) fn take_last(&mut self) -> Batch {
+        self.leave_out_back();
         let next = empty(self.batch.values.len());
         std::mem::replace(&mut self.batch, next)
+    }
+
+    /// Sentences on stamps that go back and are understood.
+    pub(crate) fn notes(&self) -> Vec<String> {
+        self.order.notes()
     }
 
     /// A sentence on the rows whose time goes back; `None` without one.

@@ -5,7 +5,7 @@ use crate::counts::recording::{NOT_RECORDED, RecordedSample, Recorder, Recording
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::ReadMonitor;
-use crate::reading::batch::{Batch, BatchBuilder, Number, RowFault, ValueColumn, Verdict, usual_unit};
+use crate::reading::batch::{Batch, BatchBuilder, HELD_ROWS, Number, RowFault, ValueColumn, Verdict, usual_unit};
 use crate::time_base::time_base_error::{StreamError, TimeBaseError};
 use crate::time_base::time_range::TimeRange;
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
@@ -288,7 +288,7 @@ impl<'a> FileRows<'a> {
                 return Err(Refusal::Enough);
             }
             delivery.builder.push(row).map_err(Refusal::Fault)?;
-            if delivery.builder.waiting() >= wanted.batch_rows {
+            if delivery.builder.waiting() >= wanted.batch_rows.saturating_add(HELD_ROWS) {
                 delivery.deliver(file);
             }
             Ok(())
@@ -303,7 +303,8 @@ impl<'a> FileRows<'a> {
         delivery.finish(file)?;
         let backwards = delivery.builder.backwards().map_err(|reason| InputError::file(file, reason))?;
         let rows = delivery.builder.rows();
-        let mut notes_of_rows: Vec<String> = backwards.into_iter().chain(delivery.notes).collect();
+        let mut notes_of_rows: Vec<String> =
+            backwards.into_iter().chain(delivery.builder.notes()).chain(delivery.notes).collect();
         notes_of_rows.extend(notes);
         let damage = damage.map(|damage| format!("{damage}; the {rows} rows before that are used"));
         let outside = delivery.filter.rows.saturating_sub(delivery.filter.kept);
@@ -327,7 +328,7 @@ impl Delivery<'_> {
     }
 
     fn finish(&mut self, file: &Path) -> Result<(), StreamError> {
-        let batch = self.builder.take();
+        let batch = self.builder.take_last();
         self.waiting.push(batch);
         if self.builder.rows() > 0 {
             self.give_waiting(file)?;

@@ -57,7 +57,7 @@ impl WholeTable {
             column: AvailableColumn { name: chosen.label, unit: chosen.unit },
             values,
         };
-        Self { columns: chosen.into_iter().zip(builder.take().values).map(column).collect(), ..self }
+        Self { columns: chosen.into_iter().zip(builder.take_last().values).map(column).collect(), ..self }
     }
 
     /// Number of rows.
