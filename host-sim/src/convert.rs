@@ -21,7 +21,7 @@ pub(crate) fn run(arguments: &ConvertArguments) -> Result<()> {
     let sensor = sensor.as_deref().map(Path::new);
     let files = OutputFiles::beside([file.as_path()].into_iter().chain(sensor));
     files.check(out)?;
-    let format = recording_file::format_of(out, *format);
+    let format = recording_file::format_of(out, *format)?;
     read_or_ask(recording, |recording| convert(recording, out, format, &files))
 }
 

@@ -6,7 +6,7 @@ mod steady_part;
 mod time_unit;
 mod unit_guess;
 
-use crate::columns::column_selection::ColumnSelection;
+use crate::columns::column_selection::{ColumnSelection, is_output_register};
 use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::sensor_guess::SensorGuess;
 use crate::tables::whole_table::WholeTable;
@@ -133,6 +133,11 @@ impl InspectedTable {
         }
         let has_rate = inspected.rate.is_some() || table.rate_hz.is_some();
         inspected.proposals = sensors.iter().map(|sensor| sensor.proposal(&table, &facts, has_rate)).collect();
+        let has_registers = table.columns.iter().any(|of| is_output_register(&of.column.name));
+        for proposal in inspected.proposals.iter_mut().filter(|_| has_registers) {
+            proposal.sensor = Some("adis16405");
+            proposal.is_guessed = true;
+        }
         let guess = |at: usize| sensors.iter().find_map(|sensor| sensor.guess(at));
         inspected.columns =
             facts.iter().enumerate().map(|(at, facts)| InspectedColumn::new(facts, guess(at))).collect();

@@ -13,7 +13,7 @@ const ERRORS: &[Case] = &[
     (&["analyze", "DIR/bad.csv", "--rate", "100"], &["bad.csv: line 3: column gyro_x", "\"x\" is not a number"]),
     (&["replay", "DIR/bad.csv", "--rate", "100"], &["bad.csv: line 3: column gyro_x", "\"x\" is not a number"]),
     (&["convert", "DIR/bad.csv", "DIR/never"], &["bad.csv: line 3"]),
-    (&["analyze", "DIR/rows.csv", "--rate", "30"], &["rows.csv: --rate 30 contradicts the time stamps"]),
+    (&["convert", "DIR/rows.csv", "DIR/never.h5"], &["never.h5: .h5 is not written", "--format"]),
     (&["analyze", "DIR/rows.csv", "--from", "500"], &["rows.csv: no sample from 500 to inf s"]),
     (&["analyze", "DIR/rows.csv", "--topic", "imu"], &["--topic imu: a file of text has no topics"]),
     (&["analyze", "DIR/rows.csv", "--json", "DIR"], &["DIR"]),

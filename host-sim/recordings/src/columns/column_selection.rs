@@ -451,7 +451,7 @@ fn some_of(names: &[&str]) -> String {
 }
 
 /// Whether a heading is the name of an output register in the data sheets of the ADIS164xx.
-fn is_output_register(heading: &str) -> bool {
+pub(crate) fn is_output_register(heading: &str) -> bool {
     const OF_PART: [&str; 3] = ["SUPPLY_OUT", "TEMP_OUT", "AUX_ADC"];
     let of_axis = heading.strip_suffix("_OUT").and_then(|name| name.strip_prefix(['X', 'Y', 'Z']));
     OF_PART.contains(&heading) || of_axis.is_some_and(|name| ["GYRO", "ACCL", "MAGN"].contains(&name))

@@ -1,6 +1,6 @@
 //! Which format a file has, by its content; and the reading of any of them.
 
-use crate::columns::column_selection::ColumnSelection;
+use crate::columns::column_selection::{ColumnSelection, is_output_register};
 use crate::counts::count_table;
 use crate::counts::frame_log;
 use crate::counts::{serial, spi_export};
@@ -26,6 +26,7 @@ use crate::input::read_monitor::{Counted, ReadMonitor};
 use crate::inspection::InspectedTable;
 use crate::reading::row_source::{BatchSource, FileRows, RowSource};
 use crate::tables::any_sensor::ReadOptions;
+use crate::tables::whole_table::WholeTable;
 use adis16405_driver::GyroRange;
 use measurement::{SensorProfile, adis16405};
 use std::fs::File;
@@ -277,12 +278,17 @@ impl InputFile {
                 self.source(budget).and_then(|mut source| topics::read_whole(path, source.as_mut(), topic, budget))
             }
         };
-        let sensor = match self.format {
-            FileFormat::CountTable => adis16405::profile(adis16405::GYRO_LSB_300),
-            _ => SensorProfile::generic(),
-        };
         let tables = whole.map_err(|error| self.rename(error))?;
-        Ok(tables.into_iter().map(|table| InspectedTable::new(table, &sensor, selection)).collect())
+        let inspect = |table: WholeTable| {
+            let has_registers = table.columns.iter().any(|of| is_output_register(&of.column.name));
+            let sensor = match self.format {
+                FileFormat::CountTable => adis16405::profile(adis16405::GYRO_LSB_300),
+                FileFormat::TextTable if has_registers => adis16405::profile(adis16405::GYRO_LSB_300),
+                _ => SensorProfile::generic(),
+            };
+            InspectedTable::new(table, &sensor, selection)
+        };
+        Ok(tables.into_iter().map(inspect).collect())
     }
 
     /// Names of the sensors of one kind that the file has, each to be read with [`ReadOptions::topic`]; none of a file with one sensor,

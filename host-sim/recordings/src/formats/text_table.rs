@@ -253,7 +253,11 @@ impl TextTable {
         }
         let separator = first.front().map_or(separator, |(_, text)| separator_of(text));
         let rows: Vec<Vec<&str>> = first.iter().map(|(_, text)| split(text, separator).collect()).collect();
-        let kinds = RowKinds::find(&rows);
+        let of_numbers = || {
+            let heading = split(&preamble.last()?.1, separator).collect::<Vec<_>>();
+            RowKinds::find_by_number(&rows, &heading)
+        };
+        let kinds = RowKinds::find(&rows).or_else(of_numbers);
         let kind = match (&kinds, topic) {
             (None, None) => None,
             (None, Some(topic)) => {
@@ -308,6 +312,7 @@ impl TextTable {
             Some((line, _)) => InputError::line(file, *line, Reason::Selection(Box::new(error))),
             None => InputError::file(file, Reason::Selection(Box::new(error))),
         })?;
+        check_origin(&rows, &chosen).map_err(|reason| InputError::file(file, reason))?;
         let row = Vec::with_capacity(chosen.len());
         let layout = Layout::Columns { separator, calendar: calendar.map(CalendarClock::new), kind, others: 0 };
         Ok(Self {
@@ -477,10 +482,19 @@ impl TextTable {
                     *others += 1;
                     Ok(false)
                 }
-                Layout::Columns { separator, calendar, .. } => {
+                Layout::Columns { separator, calendar, others, .. } => {
                     // The tabs at the end of a line are blanks too.
                     let width = RowWidth { fields: *width, may_be_short: *separator == Some('\t') };
-                    numbers(split(text, *separator), chosen, width, calendar.as_mut(), row).map(|()| true)
+                    let read = numbers(split(text, *separator), chosen, width, calendar.as_mut(), row);
+                    let is_empty = |(column, number): (&ChosenColumn, &Number)| {
+                        !matches!(column.role, Role::Channel(_)) || number.value().is_nan()
+                    };
+                    let is_other = read.is_ok()
+                        && !*is_lenient
+                        && chosen.iter().zip(row.iter()).all(is_empty)
+                        && is_of_other_sensor(split(text, *separator), chosen);
+                    *others += u64::from(is_other);
+                    read.map(|()| !is_other)
                 }
                 Layout::Labelled { names, calendar, others } => {
                     let row_of = labelled_row::parse(text);
@@ -577,6 +591,42 @@ struct RowWidth {
     fields: usize,
     /// Whether empty fields at the end may be absent.
     may_be_short: bool,
+}
+
+/// Whether a row has a number, but none of the `chosen` channels: it is of another sensor.
+fn is_of_other_sensor<'a>(fields: impl Iterator<Item = &'a str>, chosen: &[ChosenColumn]) -> bool {
+    let (mut has_other, mut has_own) = (false, false);
+    for (at, field) in fields.enumerate().filter(|(_, field)| !field.is_empty()) {
+        match chosen.iter().find(|column| column.position == at) {
+            Some(column) if matches!(column.role, Role::Channel(_)) => has_own = true,
+            Some(_) => {}
+            None => has_other |= number(field).is_some_and(|number| !number.value().is_nan()),
+        }
+    }
+    has_other && !has_own
+}
+
+/// Refuses rows of two sensors in one table: some have one part of the `chosen` channels, the others the rest.
+fn check_origin(rows: &[Vec<&str>], chosen: &[ChosenColumn]) -> Result<(), Reason> {
+    let channels: Vec<&ChosenColumn> = chosen.iter().filter(|column| matches!(column.role, Role::Channel(_))).collect();
+    let mut parts: Vec<Vec<bool>> = Vec::new();
+    for row in rows {
+        let has = |column: &&ChosenColumn| row.get(column.position).is_some_and(|field| !field.is_empty());
+        let part: Vec<bool> = channels.iter().map(has).collect();
+        if part.contains(&true) && !parts.contains(&part) {
+            parts.push(part);
+        }
+    }
+    let are_apart = |one: &[bool], other: &[bool]| one.iter().zip(other).all(|(one, other)| !(*one && *other));
+    let [one, other] = parts.as_slice() else { return Ok(()) };
+    if !are_apart(one, other) {
+        return Ok(());
+    }
+    let name = |part: &[bool]| {
+        let names = channels.iter().zip(part).filter(|(_, has)| **has).map(|(column, _)| column.label.as_str());
+        names.collect::<Vec<_>>().join(", ")
+    };
+    Err(Reason::SeveralOrigins(Box::new((name(one), name(other)))))
 }
 
 /// Moves the lines before the rows of the most frequent width to the `preamble`.

@@ -246,6 +246,12 @@ pub enum Reason {
     /// Several topics of which the user names none.
     #[error("several topics: choose one with --topic: {0}")]
     SeveralTopics(String),
+    /// Rows of two sensors in one table: the columns of each.
+    #[error(
+        "some rows have {} and the others {}, as of two sensors; read one of them with --columns, as in --columns gyro_x=NAME",
+        .0.0, .0.1
+    )]
+    SeveralOrigins(Box<(String, String)>),
     /// A ROS 1 bag of a recording that was interrupted.
     #[error("the bag has no index, as after an interrupted recording; make one with `rosbag reindex`")]
     NoIndex,

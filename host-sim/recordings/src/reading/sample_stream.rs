@@ -586,6 +586,7 @@ impl Survey {
         let rounded = self.columns.iter().filter_map(|of| Some((&of.column.profile, of.quantizer.as_ref()?)));
         notes.extend(rounding_note(rounded));
         notes.extend(self.stamps.iter().flat_map(StampQuality::notes));
+        notes.extend(self.clock.note().map(str::to_owned));
         notes
     }
 

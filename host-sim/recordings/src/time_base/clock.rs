@@ -59,6 +59,8 @@ pub(crate) enum Place {
 pub(crate) struct Clock {
     stated_hz: Option<f64>,
     state: State,
+    /// Why the time stamps are ignored, where a stated rate contradicts them.
+    ignored: Option<String>,
 }
 
 enum State {
@@ -154,7 +156,7 @@ impl Clock {
         if let Some(rate) = stated_hz.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
             return Err(TimeBaseError::InvalidRate(rate));
         }
-        Ok(Self { stated_hz, state: State::FirstRows(Vec::new()) })
+        Ok(Self { stated_hz, state: State::FirstRows(Vec::new()), ignored: None })
     }
 
     /// The same for another reading of the rows that were placed.
@@ -166,7 +168,7 @@ impl Clock {
             }
             State::FirstRows(_) | State::Coarse(_) => State::FirstRows(Vec::new()),
         };
-        Ok(Self { stated_hz: self.stated_hz, state })
+        Ok(Self { stated_hz: self.stated_hz, state, ignored: self.ignored.clone() })
     }
 
     /// Takes the next rows, and returns the places of the oldest rows that are not placed yet, as far as they can be told; with `is_last` of
@@ -185,7 +187,13 @@ impl Clock {
                 let mut first = std::mem::take(first);
                 let later = first.split_off(first.len().min(FIRST_ROWS));
                 let is_all = is_last && later.is_empty();
-                self.state = begin(&first, self.stated_hz, is_all)?;
+                self.state = begin(&first, self.stated_hz, is_all).or_else(|error| match self.stated_hz {
+                    Some(_) if is_of_stamps(&error) => {
+                        self.ignored = Some(format!("the time stamps are ignored: {error}"));
+                        self.row_clock()
+                    }
+                    _ => Err(error),
+                })?;
                 let mut places = self.place(first, is_all)?;
                 if !is_all {
                     places.extend(self.place(later, is_last)?);
@@ -199,7 +207,15 @@ impl Clock {
                     return Ok(Vec::new());
                 }
                 let Coarse { times_s, repeated, .. } = coarse;
-                let places = align(&std::mem::take(times_s), std::mem::take(repeated), self.stated_hz)?;
+                let (times_s, repeated) = (std::mem::take(times_s), std::mem::take(repeated));
+                let rows = times_s.len();
+                let places = align(&times_s, repeated, self.stated_hz).or_else(|error| match self.stated_hz {
+                    Some(_) if is_of_stamps(&error) => {
+                        self.ignored = Some(format!("the time stamps are ignored: {error}"));
+                        Ok(KnownPlaces::of_rows(rows))
+                    }
+                    _ => Err(error),
+                })?;
                 let count = places.periods.len() + places.repeated.len();
                 let mut known = Known { places: Arc::new(places), next_row: 0, next_arrived: 0 };
                 let placed = known.next(count);
@@ -208,6 +224,19 @@ impl Clock {
             }
             State::Known(known) => Ok(known.next(rows.len())),
         }
+    }
+
+    /// Places rows by their number alone.
+    fn row_clock(&self) -> Result<State, TimeBaseError> {
+        let (repeats, clock) = (RepeatRule { shortest_s: 0.0 }, StreamClock::new(false, None)?);
+        let (before_s, waiting, first_rows, all_rows) = (None, VecDeque::new(), None, None);
+        let stream = Stream { clock, repeats, before_s, waiting, has_index: false, first_rows, all_rows };
+        Ok(State::Stream(Box::new(stream)))
+    }
+
+    /// Why the time stamps are ignored, in a sentence; `None` where they are not.
+    pub(crate) fn note(&self) -> Option<&str> {
+        self.ignored.as_deref()
     }
 
     /// What the stamps of the rows that were placed show; `None` where there are none.
@@ -245,6 +274,21 @@ impl Clock {
         let measured_hz = || self.stamps()?.rate.map(|rate| rate.hz);
         self.stated_hz.or_else(measured_hz).ok_or(TimeBaseError::NoRate)
     }
+}
+
+impl KnownPlaces {
+    /// Of so many rows one after the other.
+    fn of_rows(rows: usize) -> Self {
+        Self { periods: (0..rows as u64).collect(), repeated: Vec::new(), stamps: StampQuality::default() }
+    }
+}
+
+/// Whether it is the stamps that are at fault: a stated rate needs none.
+fn is_of_stamps(error: &TimeBaseError) -> bool {
+    matches!(
+        error,
+        TimeBaseError::RateContradictsStamps { .. } | TimeBaseError::NoPeriod | TimeBaseError::TooSparse { .. }
+    )
 }
 
 /// The rule for all rows by the first ones, which are all where `is_all`.

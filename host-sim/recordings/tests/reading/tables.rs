@@ -284,6 +284,39 @@ fn rows_of_several_kinds_are_several_sensors() {
     assert!(refusal(&["--topic", "up"]).contains("it has left, right"));
 }
 
+/// Two devices that a number tells from each other, and two sensors of different rates in one table, with blanks where the other has a row.
+#[test]
+fn rows_of_different_origin_are_no_series() {
+    let mut normal = normal(33);
+    let mut two = "id,t_ms,gx_dps,gy_dps,gz_dps\n".to_owned();
+    let mut merged: Vec<(u32, String)> = Vec::new();
+    for row in 0..ROWS {
+        let [x, y, z] = [(); 3].map(|()| NOISE * normal());
+        two += &format!("1,{},{x:.5},{y:.5},{z:.5}\n2,{},{:.5},{y:.5},{z:.5}\n", 10 * row, 10 * row + 3, x + 9.0);
+        merged.push((10 * row, format!("{},{x:.5},{y:.5},{z:.5},,,\n", 10 * row)));
+        if row < ROWS / 2 {
+            merged.push((20 * row + 7, format!("{},,,,{x:.5},{y:.5},{z:.5}\n", 20 * row + 7)));
+        }
+    }
+    merged.sort();
+    let merged = "t_ms,gx_rad_s,gy_rad_s,gz_rad_s,ax_g,ay_g,az_g\n".to_owned()
+        + &merged.into_iter().map(|(_, row)| row).collect::<String>();
+    let refusal = |text: &str| read("t.csv", text.as_bytes(), &[""; 0]).err().expect("refused").to_string();
+    assert!(refusal(&two).contains("choose one with --topic: 1, 2"), "{}", refusal(&two));
+    assert!(refusal(&merged).contains("as of two sensors"), "{}", refusal(&merged));
+    let one = reading("one device", &two, &["--topic", "2"]);
+    assert_eq!((one.samples.len() as u32, one.missing()), (ROWS, 0));
+    assert!((one.rate_hz() / 100.0 - 1.0).abs() < 1e-6, "{}", one.rate_hz());
+    for (columns, units, rate_hz, rows) in [
+        ("time=t,gyro_x=gx,gyro_y=gy,gyro_z=gz", "rad/s", 100.0, ROWS),
+        ("time=t,accl_x=ax,accl_y=ay,accl_z=az", "g", 50.0, ROWS / 2),
+    ] {
+        let one = reading(columns, &merged, &["--columns", columns, "--units", units]);
+        assert_eq!((one.samples.len() as u32, one.missing()), (rows, 0), "{columns}");
+        assert!((one.rate_hz() / rate_hz - 1.0).abs() < 1e-6, "{columns}: {}", one.rate_hz());
+    }
+}
+
 /// A gyroscope that is held at full scale of 16 bits for a while.
 #[test]
 fn samples_at_full_scale_are_counted_and_told() {
@@ -339,6 +372,23 @@ fn a_nominal_rate_that_is_a_little_wrong_is_taken() {
     let table = counts("time_s,gyro_x_counts", 20_000, |i| format!("{},", i as f64 / 100.0));
     let read = read("timed.csv", &table, &["--rate", "102.4"]).expect("a time base");
     assert_eq!((read.rate_hz(), read.missing()), (102.4, 0));
+}
+
+/// A stated rate holds against any column of times, and what they show is told.
+#[test]
+fn a_stated_rate_beats_any_time_stamps() {
+    for (rate, hz) in [("30", 30.0), ("300", 300.0), ("819.2", 819.2), ("1000", 1000.0)] {
+        let table = counts("time_s,gyro_x_counts", 20_000, |i| format!("{},", i as f64 / 100.0));
+        let read = read("timed.csv", &table, &["--rate", rate]).expect("a time base");
+        assert_eq!((read.rate_hz(), read.samples.len(), read.missing()), (hz, 20_000, 0));
+        for words in ["ignored", "100.0000 Hz"] {
+            assert!(read.notes_contain(words), "{rate}: {:?}", read.notes);
+        }
+    }
+    // Stamps that show nothing.
+    let table = counts("time_s,gyro_x_counts", 2000, |_| "7,".to_owned());
+    let read = read("frozen.csv", &table, &["--rate", "100"]).expect("a time base");
+    assert_eq!((read.rate_hz(), read.samples.len(), read.missing()), (100.0, 2000, 0));
 }
 
 /// The same samples, whatever is around them.
