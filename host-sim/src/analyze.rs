@@ -205,6 +205,7 @@ fn reading_record(
         .map(|(cause, rows)| ((*cause).to_owned(), *rows))
         .collect();
     left_out.insert("outside_part".to_owned(), read.outside);
+    left_out.insert("padding".to_owned(), read.padding);
     left_out.retain(|_, rows| *rows > 0);
     ReadingRecord {
         file: output::source_name(&recording.input.file),

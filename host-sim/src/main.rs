@@ -120,8 +120,9 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
             let report = match port {
                 Some(port) => record::record_device(&out, &port, baud, simulate.seconds.unwrap_or(record::DEFAULT_S))?,
                 None => {
+                    let report = record::record_simulation(&out, &simulate.simulation(record::DEFAULT_S))?;
                     output::note(format_args!("without --port this is the virtual sensor, and no measurement"));
-                    record::record_simulation(&out, &simulate.simulation(record::DEFAULT_S))?
+                    report
                 }
             };
             output::write_report(&report.into(), Some(&output::source_name(&out)), &output, &files)

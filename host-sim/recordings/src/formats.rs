@@ -13,6 +13,7 @@ mod mcap_file;
 mod message_layout;
 mod nmea;
 pub(crate) mod numpy;
+pub(crate) mod numpy_header;
 mod ros_bag;
 mod ros_definition;
 mod ros_message;

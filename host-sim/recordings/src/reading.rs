@@ -3,6 +3,7 @@
 pub(crate) mod batch;
 pub(crate) mod column_survey;
 pub(crate) mod full_scale;
+pub(crate) mod padding;
 pub(crate) mod quantizer;
 pub(crate) mod row_source;
 pub mod row_writer;

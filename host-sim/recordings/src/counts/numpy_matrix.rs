@@ -109,9 +109,13 @@ mod tests {
         let names = write(&recorder.finish(), &file).expect("written");
         assert_eq!(names, ["time_s", "gyro_x_rad_s", "accl_z_m_s2", "temp_degC"]);
         let bytes = std::fs::read(&file).expect("a file");
-        let read = npyz::NpyFile::new(&bytes[..]).expect("an array");
-        assert_eq!(read.shape(), [3, 4]);
-        let values: Vec<f64> = read.into_vec().expect("doubles");
+        // numpy.lib.format, version 1.0: magic, version, length of the header, header, and the numbers, aligned to 64 bytes.
+        let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (3, 4), }";
+        assert_eq!(bytes[..10], *b"\x93NUMPY\x01\x00\x76\x00");
+        assert_eq!(std::str::from_utf8(&bytes[10..128]).expect("text").trim_end(), header);
+        assert_eq!((bytes[127], bytes.len()), (b'\n', 128 + 3 * 4 * 8));
+        let values: Vec<f64> =
+            bytes[128..].chunks_exact(8).map(|of| f64::from_le_bytes(of.try_into().expect("eight"))).collect();
         // Data sheet: 0.025 °/s, 3.33 mg and 0.14 °C per count; 25 °C at 0 counts.
         let expected = [0.02, (200.0 * 0.025_f64).to_radians(), -300.0 * 3.33e-3 * 9.806_65, 25.0 + 10.0 * 0.14];
         for (found, expected) in values[8..].iter().zip(expected) {

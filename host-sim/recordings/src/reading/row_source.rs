@@ -86,6 +86,8 @@ pub struct RowsRead {
     pub rows: u64,
     /// Rows outside of the part that is wanted, as far as it was read for it.
     pub outside: u64,
+    /// Rows at either end that are all equal, which are padding.
+    pub padding: u64,
     /// Whether the user stopped the reading before the end.
     pub is_stopped: bool,
     /// Why the file was not read to its end, where it is damaged.
@@ -308,7 +310,7 @@ impl<'a> FileRows<'a> {
         notes_of_rows.extend(notes);
         let damage = damage.map(|damage| format!("{damage}; the {rows} rows before that are used"));
         let outside = delivery.filter.rows.saturating_sub(delivery.filter.kept);
-        Ok(RowsRead { rows, outside, is_stopped, damage, notes: notes_of_rows })
+        Ok(RowsRead { rows, outside, padding: 0, is_stopped, damage, notes: notes_of_rows })
     }
 }
 

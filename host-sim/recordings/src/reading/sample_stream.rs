@@ -11,6 +11,7 @@ use crate::input::read_monitor::{ReadMonitor, ReadPass};
 use crate::reading::batch::{Batch, ValueColumn, Verdict};
 use crate::reading::column_survey::{ColumnSurvey, refusal, rounding_note};
 use crate::reading::full_scale::FullScale;
+use crate::reading::padding::{PaddingFinder, Unpadded};
 use crate::reading::quantizer::Quantizer;
 use crate::reading::row_source::{BATCH, BatchSource, RecordedRows, WantedRows};
 use crate::tables::any_sensor::ReadOptions;
@@ -256,7 +257,13 @@ impl SampleStream {
         } else {
             monitor.begin_pass(ReadPass::Samples);
             let wanted = reading.wanted(survey.read.rows);
-            let read = origin.open()?.for_each_batch(wanted, |batch| give(&mut placer, Some(batch)))?;
+            let mut rows_before = 0;
+            let read = origin.open()?.for_each_batch(wanted, |mut batch| {
+                let rows = batch.rows as u64;
+                survey.unpadded.apply(rows_before, &mut batch);
+                rows_before += rows;
+                give(&mut placer, Some(batch))
+            })?;
             if read.is_stopped && read.rows < survey.read.rows {
                 *survey = Survey::read(origin, *reading, read.rows, monitor)?;
                 survey.read.is_stopped = true;
@@ -457,6 +464,7 @@ struct StreamedColumn {
 /// What the first reading of a recording has found.
 struct Survey {
     sensor: SensorProfile,
+    unpadded: Unpadded,
     columns: Vec<StreamedColumn>,
     clock: Clock,
     stamps: Option<StampQuality>,
@@ -473,8 +481,30 @@ struct Survey {
 }
 
 impl Survey {
-    /// Reads `most_rows` rows.
+    /// Reads `most_rows` rows, without the padding at either end of them.
     fn read(origin: &Origin, reading: Reading, most_rows: u64, monitor: &ReadMonitor) -> Result<Self, StreamError> {
+        let mut padding = PaddingFinder::default();
+        let survey = Self::read_rows(origin, reading, most_rows, monitor, Unpadded::ALL, Some(&mut padding));
+        let Some(unpadded) = padding.finish() else { return survey };
+        let mut survey = Self::read_rows(origin, reading, most_rows, monitor, unpadded, None)?;
+        let before = unpadded.first;
+        let after = padding.rows() - unpadded.end;
+        survey.read.padding = before + after;
+        survey.read.notes.push(format!(
+            "{} rows that are all equal, {before} at the start and {after} at the end, are padding and left out",
+            before + after
+        ));
+        Ok(survey)
+    }
+
+    fn read_rows(
+        origin: &Origin,
+        reading: Reading,
+        most_rows: u64,
+        monitor: &ReadMonitor,
+        unpadded: Unpadded,
+        mut padding: Option<&mut PaddingFinder>,
+    ) -> Result<Self, StreamError> {
         monitor.begin_pass(ReadPass::FirstRows);
         let mut source = origin.open()?;
         let columns: Vec<ValueColumn> = source.columns().to_vec();
@@ -484,7 +514,14 @@ impl Survey {
         let mut full_scale = FullScale::new(&columns);
         let mut kept = Kept::new(reading.kept, columns.len() as u64, origin.is_quick_to_read());
         let mut rows_before = 0u64;
-        let read = source.for_each_batch(reading.wanted(most_rows), |batch| {
+        let are_registers = columns.iter().any(|column| column.register.is_some());
+        let read = source.for_each_batch(reading.wanted(most_rows), |mut batch| {
+            let all_rows = batch.rows as u64;
+            unpadded.apply(rows_before, &mut batch);
+            // Registers that do not change are frozen ones, which the burst validator counts.
+            if let Some(padding) = padding.as_deref_mut().filter(|_| !are_registers) {
+                padding.add(&batch);
+            }
             for (survey, (column, values)) in surveys.iter_mut().zip(columns.iter().zip(&batch.values)) {
                 survey.add(column, values, &batch.verdicts);
             }
@@ -496,7 +533,7 @@ impl Survey {
                 };
                 full_scale.add(&columns, rows_before + row as u64, columns.iter().zip(&batch.values).map(number));
             }
-            rows_before += batch.rows as u64;
+            rows_before += all_rows;
             if kept.add(&batch) {
                 monitor.begin_pass(ReadPass::Survey);
             }
@@ -524,6 +561,7 @@ impl Survey {
                 .map(|((column, survey), quantizer)| StreamedColumn { column, survey, quantizer })
                 .collect(),
             sensor: origin.sensor(),
+            unpadded,
             stamps: clock.stamps(),
             clock,
             stated_hz,

@@ -317,6 +317,28 @@ fn rows_of_different_origin_are_no_series() {
     }
 }
 
+/// Rows that are all equal at either end: zeros, and a value that is held.
+#[test]
+fn padding_is_named_and_left_out() {
+    let mut normal = normal(34);
+    let rows: Vec<[String; 3]> = (0..ROWS).map(|_| [(); 3].map(|()| format!("{:.5}", NOISE * normal()))).collect();
+    let line = |row: &[String; 3]| row.join(",") + "\n";
+    let noise: String = rows.iter().map(line).collect();
+    let held = line(&rows[rows.len() - 1]);
+    for (name, before, after, samples) in [
+        ("zeros at the end", String::new(), "0,0,0\n".repeat(240), ROWS),
+        ("zeros at the start", "0,0,0\n".repeat(1500), String::new(), ROWS),
+        ("both", "65535,65535,65535\n".repeat(100), "0,0,0\n".repeat(100), ROWS),
+        // The held row is one of them.
+        ("a held value", String::new(), held.repeat(500), ROWS - 1),
+    ] {
+        let text = format!("gx_rad_s,gy_rad_s,gz_rad_s\n{before}{noise}{after}");
+        let read = reading(name, &text, &["--rate", "100"]);
+        assert_eq!((read.samples.len() as u32, read.missing()), (samples, 0), "{name}");
+        assert!(read.notes_contain("are padding and left out"), "{name}: {:?}", read.notes);
+    }
+}
+
 /// A gyroscope that is held at full scale of 16 bits for a while.
 #[test]
 fn samples_at_full_scale_are_counted_and_told() {
