@@ -252,9 +252,6 @@ pub enum Reason {
         .0.0, .0.1
     )]
     SeveralOrigins(Box<(String, String)>),
-    /// A ROS 1 bag of a recording that was interrupted.
-    #[error("the bag has no index, as after an interrupted recording; make one with `rosbag reindex`")]
-    NoIndex,
     /// Arrays that cannot be columns of one table: what each has.
     #[error("{0}; columns of one table have as many rows")]
     UnequalRows(String),

@@ -157,3 +157,38 @@ fn a_field_without_a_number_leaves_the_others() {
     let read = read("empty.ulg", &log, &[""; 0]).expect("a log");
     assert_eq!((read.samples.len(), read.samples.channels.len()), (100, 3));
 }
+
+/// A ULog to which data were appended after a crash: the message before them has no end, and what stands there is no sample.
+#[test]
+fn data_that_were_appended_to_a_log_are_no_message() {
+    let record =
+        |kind: u8, body: &[u8]| [&u16::try_from(body.len()).expect("short").to_le_bytes()[..], &[kind], body].concat();
+    let log = |flags: [u8; 8], has_appended: bool| {
+        let mut log = [&b"ULog\x01\x12\x35\x01"[..], &[0; 8]].concat();
+        let at_flags = log.len();
+        log.extend(record(b'B', &[&[0; 8][..], &flags, &[0; 24]].concat()));
+        log.extend(record(b'F', b"sensor_gyro:uint64_t timestamp;float x;float y;float z;"));
+        log.extend(record(b'A', &[&[0, 0, 0][..], b"sensor_gyro"].concat()));
+        for row in 0..100u64 {
+            let values = [1u64, 2, 3].map(|axis| (axis * row * 7919 % 13) as f32 * 0.01).map(f32::to_le_bytes).concat();
+            log.extend(record(b'D', &[&[0, 0][..], &(row * 10_000).to_le_bytes(), &values].concat()));
+        }
+        if has_appended {
+            let cut = record(b'D', &[&[0, 0][..], &1_000_000u64.to_le_bytes(), &[0; 12]].concat());
+            log.extend(&cut[..7]);
+            let offset = (log.len() as u64).to_le_bytes();
+            log[at_flags + 3 + 16..][..8].copy_from_slice(&offset);
+            log.extend(record(b'L', b"6________hardfault"));
+        }
+        log
+    };
+    for appended in [false, true] {
+        let flags = [u8::from(appended), 0, 0, 0, 0, 0, 0, 0];
+        let read = read("crash.ulg", &log(flags, appended), &[""; 0]).expect("a log");
+        assert_eq!(read.samples.len(), 100, "{appended}: {:?}", read.notes);
+        assert!(!read.notes_contain("truncated"), "{:?}", read.notes);
+    }
+    // Features that a reader has to know.
+    let error = read("new.ulg", &log([2, 0, 0, 0, 0, 0, 0, 0], false), &[""; 0]).err().expect("refused").to_string();
+    assert!(error.contains("features"), "{error}");
+}
