@@ -3,7 +3,6 @@
 use crate::counts::recording::{MAX_SAMPLES, NOT_RECORDED, Recorder, Recording, TimeStamp};
 use crate::formats::file_format::InputFile;
 use crate::formats::text_table::TextRows;
-use crate::input::delimited_text;
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::ReadMonitor;
 use crate::reading::batch::Batch;
@@ -13,18 +12,6 @@ use crate::time_base::TimeRange;
 use crate::time_base::time_base_error::StreamError;
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
 use std::path::Path;
-
-/// Suffix of every column that holds counts.
-const COUNTS: &str = "_counts";
-
-/// Whether a first line names a channel of register counts.
-pub(crate) fn is_header(header: &str) -> bool {
-    let is_channel = |name: &str| {
-        let channel = delimited_text::field(name).strip_suffix(COUNTS);
-        channel.is_some_and(|name| Channel::ALL.iter().any(|channel| channel.name() == name))
-    };
-    header.split([',', ';', '\t', ' ']).any(is_channel)
-}
 
 /// Reads a table, plain or gzip, into a recording whose rates were taken in `range`.
 ///

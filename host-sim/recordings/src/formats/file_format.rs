@@ -1,7 +1,7 @@
 //! Which format a file has, by its content; and the reading of any of them.
 
 use crate::columns::column_selection::{ColumnSelection, is_output_register};
-use crate::counts::count_table;
+use crate::counts::count_table_writer;
 use crate::counts::frame_log;
 use crate::counts::{serial, spi_export};
 use crate::formats::ardupilot_log::{self, ArduPilotSource};
@@ -420,7 +420,7 @@ fn text_format(file: &Path) -> Result<FileFormat, InputError> {
         None => return Err(InputError::file(file, Reason::Empty)),
         Some(frame_log::HEADER) => FileFormat::FrameLog,
         Some(header) if spi_export::is_header(header) => FileFormat::SpiExport,
-        Some(header) if count_table::is_header(header) => FileFormat::CountTable,
+        Some(header) if count_table_writer::is_header(header) => FileFormat::CountTable,
         Some(_) => FileFormat::TextTable,
     })
 }

@@ -413,7 +413,7 @@ mod tests {
         let expected: Vec<f64> = (0..50).map(f64::from).collect();
         for compression in ["none", "lz4", "bz2"] {
             let whole = chunk(compression, &compressed(compression, &records(50)));
-            let (_dir, file) = bag(&[whole.clone()]);
+            let (_dir, file) = bag(std::slice::from_ref(&whole));
             let mut source = RosBagSource::open(&file, Budget::new(10_000)).expect("a bag");
             assert_eq!(source.topics()[0].rows, Some(50), "{compression}");
             assert_eq!(read(&mut source), (expected.clone(), None), "{compression}");
