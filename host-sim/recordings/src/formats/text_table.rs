@@ -484,7 +484,7 @@ impl TextTable {
                 }
                 Layout::Columns { separator, calendar, others, .. } => {
                     // The tabs at the end of a line are blanks too.
-                    let width = RowWidth { fields: *width, may_be_short: *separator == Some('\t') };
+                    let width = RowWidth::new(*width, *separator == Some('\t'), chosen);
                     let read = numbers(split(text, *separator), chosen, width, calendar.as_mut(), row);
                     let is_empty = |(column, number): (&ChosenColumn, &Number)| {
                         !matches!(column.role, Role::Channel(_)) || number.value().is_nan()
@@ -501,7 +501,7 @@ impl TextTable {
                     match row_of.filter(|row_of| row_of.iter().any(|(name, _)| names.contains(name))) {
                         Some(row_of) => {
                             let values = values_of(names, row_of);
-                            let width = RowWidth { fields: *width, may_be_short: false };
+                            let width = RowWidth::new(*width, false, chosen);
                             numbers(values.iter().map(String::as_str), chosen, width, calendar.as_mut(), row)
                                 .map(|()| true)
                         }
@@ -520,7 +520,7 @@ impl TextTable {
                         Ok(chosen.iter().all(|column| matches!(column.role, Role::Channel(_))))
                     }
                     Some(Sentence { name: own, fields, .. }) if own == *name => {
-                        let width = RowWidth { fields: *width, may_be_short: false };
+                        let width = RowWidth::new(*width, false, chosen);
                         numbers(fields.into_iter(), chosen, width, None, row).map(|()| true)
                     }
                     _ => {
@@ -591,6 +591,20 @@ struct RowWidth {
     fields: usize,
     /// Whether empty fields at the end may be absent.
     may_be_short: bool,
+    /// A bit for each of the first fields that is read.
+    read: u64,
+}
+
+impl RowWidth {
+    fn new(fields: usize, may_be_short: bool, chosen: &[ChosenColumn]) -> Self {
+        let bits = chosen.iter().filter(|column| column.position < 64).map(|column| 1u64 << column.position);
+        Self { fields, may_be_short, read: bits.fold(0, |read, bit| read | bit) }
+    }
+
+    /// Whether the field at this position may be one that is read.
+    fn is_read(self, position: usize) -> bool {
+        position >= 64 || self.read >> position & 1 == 1
+    }
 }
 
 /// Whether a row has a number, but none of the `chosen` channels: it is of another sensor.
@@ -707,6 +721,9 @@ fn numbers<'a>(
                 after_date = fields.next();
             }
             time_ns = Some(clock.time_ns(field, after_date.unwrap_or_default()));
+        }
+        if !width.is_read(position) {
+            continue;
         }
         for (at, _) in chosen.iter().enumerate().filter(|(_, column)| column.position == position) {
             let (known, reason): (_, fn(String) -> Reason) = match time_ns {
@@ -852,12 +869,31 @@ fn named_columns<'a>(names: impl Iterator<Item = &'a str>, units: Option<&[Optio
 
 /// A number, with a decimal comma too; NaN for a missing one; `None` for other texts.
 fn number(field: &str) -> Option<Number> {
-    if let Ok(integer) = field.parse() {
+    // Most fields have a point, or are short whole numbers.
+    if let Some(integer) = short_integer(field.as_bytes()) {
+        return Some(Number::Integer(integer));
+    }
+    if !field.contains('.')
+        && let Ok(integer) = field.parse()
+    {
         return Some(Number::Integer(integer));
     }
     let real = field.parse().ok().or_else(|| field.replace(',', ".").parse().ok());
     let missing = || MISSING.contains(&field.to_lowercase().as_str()).then_some(f64::NAN);
     real.or_else(missing).map(Number::Real)
+}
+
+/// A whole number of at most 18 digits; `None` for other texts.
+fn short_integer(field: &[u8]) -> Option<i64> {
+    let (is_negative, digits) = field.strip_prefix(b"-").map_or((false, field), |digits| (true, digits));
+    if digits.is_empty() || digits.len() > 18 {
+        return None;
+    }
+    let mut value = 0_i64;
+    for byte in digits {
+        value = 10 * value + i64::from(byte.checked_sub(b'0').filter(|digit| *digit < 10)?);
+    }
+    Some(if is_negative { -value } else { value })
 }
 
 /// Whether a line is a row and no heading or comment: at least half of its fields are numbers or calendar times, or all are missing. The

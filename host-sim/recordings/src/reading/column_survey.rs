@@ -69,9 +69,10 @@ impl ColumnSurvey {
         Self { values: Vec::new(), seen: 0, stride: 1, is_usable: false, refused: BTreeMap::new() }
     }
 
-    /// Adds the numbers of rows that arrived; those that are refused are NaN in the sample.
-    pub(crate) fn add(&mut self, column: &ValueColumn, values: &[f64], verdicts: &[Verdict]) {
-        for (row, &value) in values.iter().enumerate() {
+    /// Adds the numbers of rows that arrived, and makes those that are refused NaN.
+    pub(crate) fn add(&mut self, column: &ValueColumn, values: &mut [f64], verdicts: &[Verdict]) {
+        for (row, own) in values.iter_mut().enumerate() {
+            let value = *own;
             let refused = refusal(column, value, verdicts.get(row));
             let value = match refused {
                 Some(cause) => {
@@ -80,6 +81,7 @@ impl ColumnSurvey {
                 }
                 None => value,
             };
+            *own = value;
             self.is_usable |= refused.is_none();
             if (self.seen / RUN).is_multiple_of(self.stride) {
                 if self.values.len() == MOST_KEPT {

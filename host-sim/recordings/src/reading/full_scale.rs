@@ -43,10 +43,31 @@ impl FullScale {
         Self { extremes: columns.iter().take(MOST_COLUMNS).map(of_column).collect(), rows: BTreeMap::new() }
     }
 
+    /// Adds consecutive rows from this one on, column by column; numbers that are refused are NaN.
+    pub(crate) fn add_rows(&mut self, columns: &[ValueColumn], first_row: u64, values: &[Vec<f64>]) {
+        let is_candidate = |(values, [most, least]): (&Vec<f64>, &[Extreme; 2])| {
+            values.iter().any(|value| *value >= most.value || *value <= least.value)
+        };
+        let watched = columns.iter().zip(values).zip(&self.extremes);
+        // Hardly any row has the largest or the smallest number of its column so far.
+        let has_candidate = watched
+            .filter(|((column, _), _)| is_watched(column))
+            .any(|((_, values), extremes)| is_candidate((values, extremes)));
+        if !has_candidate {
+            return;
+        }
+        for row in 0..values.first().map_or(0, Vec::len) {
+            self.add(columns, first_row + row as u64, values.iter().map(|column| column[row]));
+        }
+    }
+
     /// Adds a usable row, by its number from 0; numbers that are refused are NaN.
-    pub(crate) fn add(&mut self, columns: &[ValueColumn], row: u64, numbers: impl Iterator<Item = f64>) {
+    fn add(&mut self, columns: &[ValueColumn], row: u64, numbers: impl Iterator<Item = f64>) {
         let mut mask = 0u128;
         for (at, (number, column)) in numbers.zip(columns).take(MOST_COLUMNS).enumerate() {
+            if !is_watched(column) {
+                continue;
+            }
             for side in 0..2 {
                 let extreme = &mut self.extremes[at][side];
                 let is_beyond = if side == 0 { number > extreme.value } else { number < extreme.value };
@@ -96,6 +117,11 @@ impl FullScale {
         let rows = self.rows.iter().filter(|(of, _)| **of & mask != 0).map(|(_, rows)| rows).sum();
         (rows, notes)
     }
+}
+
+/// Whether a column may be at full scale: a supply or a temperature without a range is often constant.
+fn is_watched(column: &ValueColumn) -> bool {
+    column.profile.range.is_some() || column.profile.quantity.is_inertial()
 }
 
 /// Forgets that rows had an extreme that is none any more.

@@ -514,6 +514,8 @@ impl Survey {
         let mut full_scale = FullScale::new(&columns);
         let mut kept = Kept::new(reading.kept, columns.len() as u64, origin.is_quick_to_read());
         let mut rows_before = 0u64;
+        // The numbers of a batch, NaN where they are refused.
+        let mut usable: Vec<Vec<f64>> = Vec::new();
         let are_registers = columns.iter().any(|column| column.register.is_some());
         let read = source.for_each_batch(reading.wanted(most_rows), |mut batch| {
             let all_rows = batch.rows as u64;
@@ -522,21 +524,15 @@ impl Survey {
             if let Some(padding) = padding.as_deref_mut().filter(|_| !are_registers) {
                 padding.add(&batch);
             }
-            for (survey, (column, values)) in surveys.iter_mut().zip(columns.iter().zip(&batch.values)) {
-                survey.add(column, values, &batch.verdicts);
-            }
-            for row in 0..batch.rows {
-                let verdict = batch.verdicts.get(row);
-                let number = |(column, values): (&ValueColumn, &Vec<f64>)| match refusal(column, values[row], verdict) {
-                    Some(_) => f64::NAN,
-                    None => values[row],
-                };
-                full_scale.add(&columns, rows_before + row as u64, columns.iter().zip(&batch.values).map(number));
-            }
-            rows_before += all_rows;
             if kept.add(&batch) {
                 monitor.begin_pass(ReadPass::Survey);
             }
+            usable.clone_from(&batch.values);
+            for (survey, (column, values)) in surveys.iter_mut().zip(columns.iter().zip(&mut usable)) {
+                survey.add(column, values, &batch.verdicts);
+            }
+            full_scale.add_rows(&columns, rows_before, &usable);
+            rows_before += all_rows;
             placer.place(Some(batch))?;
             Ok(())
         })?;
