@@ -2,7 +2,7 @@
 
 use crate::cli::{AnalyzeArguments, GyroRangeArgument, InputArguments, RecordingArguments, ReplayArguments};
 use crate::inspect::{self, read_or_ask};
-use crate::output::{self, note};
+use crate::output::{self, Analysed, Incomplete, note};
 use crate::output_files::{OutputFiles, is_standard_stream};
 use crate::progress::{self, Progress};
 use crate::tip::UnknownSensor;
@@ -15,15 +15,17 @@ use noise_analysis::effects::Effect;
 use noise_analysis::record::long_record::{MOST_LOST, MOST_SAMPLES, MOST_SAMPLES_WITH_LOSSES};
 use noise_analysis::report::several::{self, NoiseAgreement, NoiseInflation};
 use noise_analysis::report::{Report, Stretch};
-use recordings::any_sensor::{ReadOptions, SensorRecording};
+use recordings::any_sensor::ReadOptions;
 use recordings::file_format::{FileFormat, InputFile};
 use recordings::recording::Recording;
-use recordings::sample_stream::{KeptInMemory, SampleStream, StreamError};
-use recordings::time_base::{StampQuality, TimeRange, time_base};
-use recordings::{ColumnSelection, Printable, ReadMonitor, count_table};
+use recordings::sample_stream::{KeptInMemory, Reading, SampleStream, StreamError, part_of};
+use recordings::time_base::TimeRange;
+use recordings::{ColumnSelection, FileHash, Printable, ReadMonitor, count_table};
+use reports::reading::ReadingRecord;
 use reports::summary::longest_at_rest;
 use serde::Serialize;
 use simulation::Replay;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
@@ -33,12 +35,8 @@ const ADIS16405: &str = "adis16405";
 /// Rows that a quick report keeps in memory at most; they tell the clock of the time stamps.
 const QUICK_ROWS: u64 = 1 << 17;
 /// Recordings that are not condensed for their analysis.
-const KEPT: KeptInMemory = KeptInMemory {
-    rows: MOST_SAMPLES,
-    rows_with_losses: MOST_SAMPLES_WITH_LOSSES,
-    most_lost: MOST_LOST,
-    irregular: true,
-};
+const KEPT: KeptInMemory =
+    KeptInMemory { rows: MOST_SAMPLES, rows_with_losses: MOST_SAMPLES_WITH_LOSSES, most_lost: MOST_LOST };
 /// Longest profile file.
 const PROFILE_BYTES: u64 = 1 << 20;
 /// Name of a sensor without a data sheet.
@@ -81,8 +79,13 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
     if !refused.is_empty() {
         bail!("several recordings have a summary and no report: leave out {}", refused.join(", "));
     }
-    let read = |recording: &RecordingArguments| read_or_ask(recording, read_measurement);
-    let still: Vec<Measurement> = recordings.iter().map(read).collect::<Result<_>>()?;
+    let mut is_complete = true;
+    let mut read = |recording: &RecordingArguments| -> Result<Measurement> {
+        let read = read_or_ask(recording, open_measured)?;
+        is_complete &= read.rows_read().is_complete();
+        Ok(read.into_beginning())
+    };
+    let still: Vec<Measurement> = recordings.iter().map(&mut read).collect::<Result<_>>()?;
     if *each_sensor {
         let names: Vec<String> = recordings.iter().map(sensor_name).collect();
         note(format_args!("recordings: {}", Printable(&names.join(", "))));
@@ -97,12 +100,13 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
         output::write_json(&several, file, &outputs)?;
     }
     if output.quiet || output.json.as_deref().is_some_and(is_standard_stream) {
-        return Ok(());
+        return Incomplete::check(is_complete);
     }
     output::print(|out| {
         agreement.as_ref().map_or(Ok(()), |agreement| reports::several::write_agreement(agreement, out))?;
         inflation.as_ref().map_or(Ok(()), |inflation| reports::several::write_inflation(inflation, out))
-    })
+    })?;
+    Incomplete::check(is_complete)
 }
 
 /// What tells a sensor from the others of its file: its topic, or its columns.
@@ -118,7 +122,7 @@ fn of_file(recording: &RecordingArguments, file: &Path) -> RecordingArguments {
 }
 
 /// The report of a recording. Shows how far the reading is, and makes the report of what was read if that is interrupted.
-fn watched_report(recording: &RecordingArguments, is_quick: bool) -> Result<Report> {
+fn watched_report(recording: &RecordingArguments, is_quick: bool) -> Result<Analysed> {
     let mut progress = Progress::reading(&recording.input.file);
     let monitor = progress.monitor().clone();
     let mut end_reading = |stream: &SampleStream| {
@@ -140,19 +144,20 @@ fn report(
     is_quick: bool,
     monitor: &ReadMonitor,
     end_reading: &mut dyn FnMut(&SampleStream),
-) -> Result<Report> {
-    let mut report = report_of_samples(recording, is_quick, monitor, end_reading)?;
+) -> Result<Analysed> {
+    let mut analysed = report_of_samples(recording, is_quick, monitor, end_reading)?;
+    let report = &mut analysed.report;
     if report.findings.iter().any(|finding| matches!(finding.effect, Effect::MotionInterval(_))) {
         let by_motions = || {
             // From the first sample of the part that was read.
             let from_s = recording.from.unwrap_or(0.0);
-            let longest = longest_at_rest(&report)?;
+            let longest = longest_at_rest(report)?;
             Some(Stretch { from_s: from_s + longest.from_s, to_s: from_s + longest.to_s })
         };
         let by_file = inspect::part_at_rest(recording).map(|TimeRange { from_s, to_s }| Stretch { from_s, to_s });
         report.longest_at_rest = by_file.or_else(by_motions);
     }
-    Ok(report)
+    Ok(analysed)
 }
 
 fn report_of_samples(
@@ -160,21 +165,64 @@ fn report_of_samples(
     is_quick: bool,
     monitor: &ReadMonitor,
     end_reading: &mut dyn FnMut(&SampleStream),
-) -> Result<Report> {
+) -> Result<Analysed> {
+    let quick = KeptInMemory { rows: QUICK_ROWS, rows_with_losses: QUICK_ROWS, most_lost: 1.0 };
+    let OpenStream { mut stream, hash } = open_stream(recording, monitor, if is_quick { quick } else { KEPT })?;
     if is_quick {
-        let mut stream = open_stream(
-            recording,
-            monitor,
-            KeptInMemory { rows: QUICK_ROWS, rows_with_losses: QUICK_ROWS, most_lost: 1.0, irregular: false },
-        )?;
         let estimators = streaming::curves(&mut stream)?;
         end_reading(&stream);
+        let reading = reading_record(recording, true, &stream, hash);
         let bar = progress::fitting(stream.description().channels.len());
         let report = estimators.report(&|| bar.inc(1));
         bar.finish_and_clear();
-        return Ok(report);
+        return Ok(Analysed { report, reading: Some(reading) });
     }
-    analyze_stream(open_stream(recording, monitor, KEPT)?, end_reading)
+    let mut reading = None;
+    let report = analyze_stream(stream, &mut |stream| {
+        end_reading(stream);
+        reading = Some(reading_record(recording, false, stream, None));
+    })?;
+    // The hash is made while the samples are analysed.
+    if let Some(reading) = &mut reading {
+        reading.sha256 = finished(hash);
+    }
+    Ok(Analysed { report, reading })
+}
+
+/// What was read of a recording.
+fn reading_record(
+    recording: &RecordingArguments,
+    is_quick: bool,
+    stream: &SampleStream,
+    hash: Option<FileHash>,
+) -> ReadingRecord {
+    let read = stream.rows_read();
+    let mut left_out: BTreeMap<String, u64> = stream
+        .description()
+        .dropped
+        .iter()
+        .filter(|(cause, _)| **cause != "gap")
+        .map(|(cause, rows)| ((*cause).to_owned(), *rows))
+        .collect();
+    left_out.insert("outside_part".to_owned(), read.outside);
+    left_out.insert("padding".to_owned(), read.padding);
+    left_out.retain(|_, rows| *rows > 0);
+    ReadingRecord {
+        file: output::source_name(&recording.input.file),
+        sha256: finished(hash),
+        program: env!("CARGO_PKG_NAME").to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        options: recording.options(is_quick),
+        rows: read.rows,
+        left_out,
+        complete: read.is_complete(),
+        damage: read.damage.clone(),
+        notes: stream.notes().to_vec(),
+    }
+}
+
+fn finished(hash: Option<FileHash>) -> Option<String> {
+    hash.and_then(|hash| hash.finish().ok())
 }
 
 /// The report of all samples of `stream`; `end_reading` is called when they were read, before they are analysed.
@@ -193,28 +241,45 @@ fn note_all(notes: &[String]) {
     notes.iter().for_each(|sentence| note(format_args!("{sentence}")));
 }
 
-/// Opens a recording of any format to read it in blocks.
-fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor, kept: KeptInMemory) -> Result<SampleStream> {
-    let name = || recording.input.file.display().to_string();
-    let RecordingArguments { rate, .. } = recording;
+/// Opens a recording of any format, or the part of it that the arguments say. What the user should know of an SPI log is noted.
+fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor, kept: KeptInMemory) -> Result<OpenStream> {
+    let reading = Reading::new(recording.rate, kept).of_part(recording.time_range());
+    let mut hash = None;
     let opened = match open(&recording.input, monitor)? {
-        opened if recording.time_range().is_some() => match read_opened(opened, recording, monitor)? {
-            Recorded::Counts(part) => return SampleStream::recorded(part, *rate, kept).with_context(name),
-            Recorded::AnySensor(part) => {
-                return SampleStream::sensor_recording(*part, *rate, monitor).with_context(name);
-            }
-        },
-        Opened::Counts(input) => SampleStream::counts(input, recording.input.range.into(), recording.rate, kept),
-        Opened::AnySensor(input, options) => SampleStream::any_sensor(input, *options, recording.rate, kept),
-        Opened::Replayed(replayed) => {
-            return SampleStream::recorded(replayed, recording.rate, kept).with_context(name);
+        Opened::Counts(input) => {
+            hash = input.begin_hash().ok();
+            SampleStream::counts(input, recording.input.range.into(), reading)
         }
+        Opened::AnySensor(input, options) => {
+            hash = input.begin_hash().ok();
+            SampleStream::any_sensor(input, *options, reading)
+        }
+        Opened::Replayed(replayed) => SampleStream::recorded(replayed, reading).map_err(StreamError::from),
     };
-    opened.map_err(|error| match error {
+    let stream = opened.map_err(|error| named(error, recording))?;
+    Ok(OpenStream { stream, hash })
+}
+
+/// An open recording, and the hash of its file.
+struct OpenStream {
+    stream: SampleStream,
+    hash: Option<FileHash>,
+}
+
+/// All samples of a recording in memory. What the user should know is noted.
+fn open_measured(recording: &RecordingArguments) -> Result<SampleStream> {
+    let OpenStream { stream, .. } = open_stream(recording, &ReadMonitor::default(), KeptInMemory::ALL)?;
+    note_all(stream.notes());
+    Ok(stream)
+}
+
+/// An error with the name of the file.
+fn named(error: StreamError, recording: &RecordingArguments) -> anyhow::Error {
+    match error {
         // The others name the file themselves.
-        StreamError::TimeBase(error) => anyhow::Error::from(error).context(name()),
+        StreamError::TimeBase(error) => anyhow::Error::from(error).context(recording.input.file.display().to_string()),
         error => error.into(),
-    })
+    }
 }
 
 /// The JSON of several recordings.
@@ -240,16 +305,8 @@ pub(crate) fn analyze_replay(arguments: &ReplayArguments) -> Result<Report> {
 
 /// Analyses a recording; `rate_hz` overrides the rate that its time stamps show.
 pub(crate) fn analyze_recording(recording: Recording, rate_hz: Option<f64>) -> Result<Report> {
-    let stream = SampleStream::recorded(recording, rate_hz, KEPT)?;
+    let stream = SampleStream::recorded(recording, Reading::new(rate_hz, KEPT))?;
     analyze_stream(stream, &mut |stream| note_all(stream.notes()))
-}
-
-/// What a file of any format holds.
-pub(crate) enum Recorded {
-    /// Register counts of an ADIS16405.
-    Counts(Recording),
-    /// Numbers of any sensor.
-    AnySensor(Box<SensorRecording>),
 }
 
 /// An open file, by the way in which it is read.
@@ -285,54 +342,34 @@ fn open(arguments: &InputArguments, monitor: &ReadMonitor) -> Result<Opened> {
     }
 }
 
-/// Reads a file of any format, or the part of it that the arguments say. What the user should know of an SPI log is noted.
-pub(crate) fn read(arguments: &RecordingArguments) -> Result<Recorded> {
-    read_content(arguments, &ReadMonitor::default())
+/// A recording to write anew.
+pub(crate) enum Recorded {
+    /// Register counts of an ADIS16405.
+    Counts(Recording),
+    /// Numbers of any sensor, which are read when they are written.
+    AnySensor(InputFile, Box<ReadOptions>),
 }
 
-fn read_content(arguments: &RecordingArguments, monitor: &ReadMonitor) -> Result<Recorded> {
-    read_opened(open(&arguments.input, monitor)?, arguments, monitor)
-}
-
-fn read_opened(opened: Opened, arguments: &RecordingArguments, monitor: &ReadMonitor) -> Result<Recorded> {
-    let RecordingArguments { input: InputArguments { range, file, .. }, rate, .. } = arguments;
-    let recorded = match opened {
+/// Opens a file of any format to write it anew; register counts are read, or the part of them that the arguments say.
+pub(crate) fn open_rows(arguments: &RecordingArguments) -> Result<Recorded> {
+    let RecordingArguments { input: InputArguments { range, .. }, rate, .. } = arguments;
+    let part = arguments.time_range();
+    Ok(match open(&arguments.input, &ReadMonitor::default())? {
         Opened::Counts(input) => {
-            let recording = count_table::read_monitored(input.path(), (*range).into(), monitor);
-            Recorded::Counts(recording.map_err(|error| input.rename(error))?)
+            let recording = count_table::read_part(&input, (*range).into(), part, *rate);
+            Recorded::Counts(recording.map_err(|error| named(error, arguments))?)
         }
-        Opened::AnySensor(input, options) => Recorded::AnySensor(Box::new(input.read(&options)?)),
-        Opened::Replayed(recording) => Recorded::Counts(recording),
-    };
-    let Some(range) = arguments.time_range() else { return Ok(recorded) };
-    let part = match recorded {
-        Recorded::Counts(recording) => range.of_recording(recording, *rate).map(Recorded::Counts),
-        Recorded::AnySensor(recording) => {
-            recording.within(range, *rate).map(|part| Recorded::AnySensor(Box::new(part)))
-        }
-    };
-    part.with_context(|| file.display().to_string())
+        Opened::Replayed(recording) => Recorded::Counts(match part {
+            Some(part) => part_of(recording, part, *rate).map_err(|error| named(error.into(), arguments))?,
+            None => recording,
+        }),
+        Opened::AnySensor(input, options) => Recorded::AnySensor(input, options),
+    })
 }
 
 /// The samples of a recording of any format on their time base. What the user should know is noted.
 pub(crate) fn read_measurement(arguments: &RecordingArguments) -> Result<Measurement> {
-    let (measurement, notes) = read_with(arguments, &ReadMonitor::default())?;
-    note_all(&notes);
-    Ok(measurement)
-}
-
-/// The samples of a recording of any format on their time base, and what the user should know.
-fn read_with(arguments: &RecordingArguments, monitor: &ReadMonitor) -> Result<(Measurement, Vec<String>)> {
-    let RecordingArguments { input, rate, .. } = arguments;
-    let name = || input.file.display().to_string();
-    match read_content(arguments, monitor)? {
-        Recorded::Counts(recording) => on_time_base(&recording, *rate).with_context(name),
-        Recorded::AnySensor(recording) => {
-            let (base, mut notes) = recording.time_base(*rate).with_context(name)?;
-            notes.extend(base.stamps.iter().flat_map(StampQuality::notes));
-            Ok((base.measurement, notes))
-        }
-    }
+    Ok(open_measured(arguments)?.into_beginning())
 }
 
 /// What the driver reads of a log or of counts.
@@ -344,12 +381,6 @@ fn replayed(input: &InputFile, range: GyroRangeArgument) -> Result<Recording> {
         note(format_args!("{other_transactions} transactions that are no bursts"));
     }
     Ok(recording)
-}
-
-fn on_time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<(Measurement, Vec<String>)> {
-    let base = time_base(recording, rate_hz)?;
-    let notes = base.stamps.iter().flat_map(StampQuality::notes).collect();
-    Ok((base.measurement, notes))
 }
 
 /// The profile of a known sensor, or of a profile file; `range` is that of an ADIS16405's gyros.

@@ -364,6 +364,30 @@ impl RecordingArguments {
         Self { input, rate: None, from: None, to: None }
     }
 
+    /// The options that say how it is read, as they are typed.
+    pub(crate) fn options(&self, is_quick: bool) -> Vec<String> {
+        let Self { input: InputArguments { columns, units, topic, range, sensor, .. }, rate, from, to } = self;
+        let list = |texts: &[String]| Some(texts.join(",")).filter(|text| !text.is_empty());
+        let number = |number: &Option<f64>| number.map(|number| number.to_string());
+        let range = match range {
+            GyroRangeArgument::Dps300 => None,
+            GyroRangeArgument::Dps150 => Some("150".to_owned()),
+            GyroRangeArgument::Dps75 => Some("75".to_owned()),
+        };
+        let options = [
+            ("--topic", topic.clone()),
+            ("--columns", list(columns)),
+            ("--units", list(units)),
+            ("--rate", number(rate)),
+            ("--sensor", sensor.clone()),
+            ("--range", range),
+            ("--from", number(from)),
+            ("--to", number(to)),
+        ];
+        let typed = options.into_iter().filter_map(|(name, value)| Some([name.to_owned(), value?])).flatten();
+        typed.chain(is_quick.then(|| "--quick".to_owned())).collect()
+    }
+
     /// The part of the recording that is read; `None` for all of it.
     pub(crate) fn time_range(&self) -> Option<TimeRange> {
         let is_part = self.from.is_some() || self.to.is_some();

@@ -1,13 +1,14 @@
 //! `convert`: a recording in another format.
 
-use crate::analyze::{Recorded, read};
-use crate::cli::{ConvertArguments, InputArguments, RecordingFormat};
+use crate::analyze::{Recorded, open_rows};
+use crate::cli::{ConvertArguments, InputArguments, RecordingArguments, RecordingFormat};
 use crate::inspect::read_or_ask;
-use crate::output::note;
+use crate::output::{Incomplete, note};
 use crate::output_files::OutputFiles;
 use crate::recording_file;
-use anyhow::{Result, bail};
-use recordings::any_sensor::SensorRecording;
+use anyhow::{Error, Result, anyhow, bail};
+use recordings::row_writer::{SensorRows, WriteError, WrittenRows};
+use recordings::sample_stream::StreamError;
 use std::path::Path;
 
 /// Reads a recording of any format and writes it anew.
@@ -20,25 +21,48 @@ pub(crate) fn run(arguments: &ConvertArguments) -> Result<()> {
     let sensor = sensor.as_deref().map(Path::new);
     let files = OutputFiles::beside([file.as_path()].into_iter().chain(sensor));
     files.check(out)?;
-    let format = recording_file::format_of(out, *format);
-    match read_or_ask(recording, read)? {
-        Recorded::Counts(recording) => recording_file::write(&recording, out, format, &files),
-        Recorded::AnySensor(recording) => {
-            recording.notes().iter().for_each(|sentence| note(format_args!("{sentence}")));
-            write(&recording, out, format, &files)
+    let format = recording_file::format_of(out, *format)?;
+    read_or_ask(recording, |recording| convert(recording, out, format, &files))
+}
+
+fn convert(arguments: &RecordingArguments, out: &Path, format: RecordingFormat, files: &OutputFiles) -> Result<()> {
+    match open_rows(arguments)? {
+        Recorded::Counts(recording) => recording_file::write(&recording, out, format, files),
+        Recorded::AnySensor(input, options) => {
+            let (part, stated_hz) = (arguments.time_range(), arguments.rate);
+            let written = write(&SensorRows { input: &input, options: *options, part, stated_hz }, out, format, files)?;
+            written.notes.iter().for_each(|sentence| note(format_args!("{sentence}")));
+            Incomplete::check(written.is_complete)
         }
     }
 }
 
-fn write(recording: &SensorRecording, out: &Path, format: RecordingFormat, files: &OutputFiles) -> Result<()> {
-    match format {
-        RecordingFormat::Table => files.write_with(out, |out| Ok(recording.write_table(out)?)),
-        RecordingFormat::Npy => {
-            recording_file::note_columns(out, &files.write_with(out, |out| Ok(recording.write_array(out)?))?);
-            Ok(())
+fn write(rows: &SensorRows, out: &Path, format: RecordingFormat, files: &OutputFiles) -> Result<WrittenRows> {
+    let mut unread = None;
+    // An error of the reader names the file that is read.
+    let mut without_name = |error: WriteError| match error {
+        WriteError::Write(error) => Error::from(error),
+        WriteError::Read(error) => {
+            unread = Some(error);
+            anyhow!("not read")
         }
+    };
+    let written = match format {
+        RecordingFormat::Table => files.write_with(out, |out| rows.write_table(out).map_err(&mut without_name)),
+        RecordingFormat::Npy => files.write_with(out, |out| rows.write_array(out).map_err(&mut without_name)),
         RecordingFormat::Frames => {
             bail!("an SPI frame log has the register counts of an ADIS16405, which the recording has not")
         }
+    };
+    if let Some(error) = unread {
+        return Err(match error {
+            StreamError::Input(error) => error.into(),
+            StreamError::TimeBase(error) => Error::from(error).context(rows.input.name().display().to_string()),
+        });
     }
+    let written = written?;
+    if format == RecordingFormat::Npy {
+        recording_file::note_columns(out, &written.columns);
+    }
+    Ok(written)
 }

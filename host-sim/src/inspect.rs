@@ -138,6 +138,7 @@ impl Contents {
         arguments.input.topic.clone_from(&proposal.topic);
         arguments.input.columns.clone_from(&proposal.columns);
         arguments.input.units.clone_from(&proposal.units);
+        arguments.input.sensor = self.given.input.sensor.clone().or(proposal.sensor.map(str::to_owned));
         arguments
     }
 
@@ -155,7 +156,7 @@ impl Contents {
             ("--columns", list(columns)),
             ("--units", list(units)),
             ("--rate", rate),
-            ("--sensor", sensor.clone()),
+            ("--sensor", sensor.clone().or(proposal.sensor.map(str::to_owned))),
             ("--from", number(from)),
             ("--to", number(to)),
         ];

@@ -26,6 +26,7 @@ use host_sim::monitor;
 use inspect::Question;
 use live::{DeviceSource, GrowingRecording};
 use mimalloc::MiMalloc;
+use output::Incomplete;
 use output_files::OutputFiles;
 use recordings::Printable;
 use std::ffi::c_long;
@@ -59,7 +60,11 @@ fn set_eager_commit() {
 /// Folder of the page if none is named.
 const DEFAULT_PAGE: &str = "report";
 
-/// Exit code 0 for success, 1 for an error; the argument parser ends the process with 2 for wrong usage.
+/// Exit code of a result of a recording that was not read to its end.
+const INCOMPLETE: u8 = 3;
+
+/// Exit code 0 for success, 1 for an error, 3 for a result of a recording that was not read to its end; the argument parser ends the process
+/// with 2 for wrong usage.
 fn main() -> ExitCode {
     let cli = Cli::try_parse().unwrap_or_else(|mut error| {
         tip::suggest(&mut error);
@@ -72,6 +77,10 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         // The reader of standard output has closed it, as `head` does.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) if error.is::<Incomplete>() => {
+            let _ = writeln!(io::stderr(), "warning: {}", Printable(&error.to_string()));
+            ExitCode::from(INCOMPLETE)
+        }
         Err(error) => {
             // Where standard error is closed too, the exit code alone shows the error.
             let _ = writeln!(io::stderr(), "error: {}", Printable(&output::brief(&format!("{error:#}"))));
@@ -92,7 +101,7 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
             output.page.get_or_insert_with(|| PathBuf::from(DEFAULT_PAGE));
             let files = OutputFiles::default();
             output::check(&output, &files)?;
-            output::write_report(&record::simulate(&simulate.simulation(3600.0))?, None, &output, &files)
+            output::write_report(&record::simulate(&simulate.simulation(3600.0))?.into(), None, &output, &files)
         }
         Some(Command::Analyze(arguments)) => analyze::run(&arguments),
         Some(Command::Inspect(arguments)) => inspect::run(&arguments, analyze::read_measurement),
@@ -101,7 +110,7 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
             let files = OutputFiles::beside([file.as_path()]);
             output::check(output, &files)?;
             let report = analyze::analyze_replay(&arguments)?;
-            output::write_report(&report, Some(&output::source_name(file)), output, &files)
+            output::write_report(&report.into(), Some(&output::source_name(file)), output, &files)
         }
         Some(Command::Record { out, port, baud, simulate, output }) => {
             OutputFiles::default().check(&out)?;
@@ -110,9 +119,13 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
             output::check(&output, &files)?;
             let report = match port {
                 Some(port) => record::record_device(&out, &port, baud, simulate.seconds.unwrap_or(record::DEFAULT_S))?,
-                None => record::record_simulation(&out, &simulate.simulation(record::DEFAULT_S))?,
+                None => {
+                    let report = record::record_simulation(&out, &simulate.simulation(record::DEFAULT_S))?;
+                    output::note(format_args!("without --port this is the virtual sensor, and no measurement"));
+                    report
+                }
             };
-            output::write_report(&report, Some(&output::source_name(&out)), &output, &files)
+            output::write_report(&report.into(), Some(&output::source_name(&out)), &output, &files)
         }
         Some(Command::Export(arguments)) => export::run(&arguments),
         Some(Command::Compare(arguments)) => compare::run(&arguments),

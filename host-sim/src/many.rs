@@ -1,11 +1,10 @@
 //! `analyze --reports`: one report a recording, as many recordings at a time as there are cores.
 
 use crate::cli::RecordingArguments;
-use crate::output::{self, note, progress_bar};
+use crate::output::{self, Analysed, Incomplete, note, progress_bar};
 use crate::output_files::OutputFiles;
 use anyhow::{Context, Result, bail};
 use noise_analysis::parallel::{in_parallel, on_one_thread};
-use noise_analysis::report::Report;
 use recordings::Printable;
 use reports::json::ReportJson;
 use std::collections::BTreeMap;
@@ -25,7 +24,7 @@ pub(crate) fn write_reports(
     folder: &Path,
     is_quiet: bool,
     outputs: &OutputFiles,
-    analyze: impl Fn(&RecordingArguments) -> Result<Report> + Sync,
+    analyze: impl Fn(&RecordingArguments) -> Result<Analysed> + Sync,
 ) -> Result<()> {
     let reports = names(recordings, folder)?;
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
@@ -34,12 +33,24 @@ pub(crate) fn write_reports(
     }
     let bar = progress_bar(recordings.len() as u64, "{wide_bar} {pos}/{len} {eta}");
     let work: Vec<(&RecordingArguments, &PathBuf)> = recordings.iter().zip(&reports).collect();
-    let written = in_parallel(&work, |(recording, report)| {
-        let written = on_one_thread(|| output::write_json(&ReportJson::from(&analyze(recording)?), report, outputs));
+    let written: Vec<Result<bool, String>> = in_parallel(&work, |(recording, report)| {
+        let written = on_one_thread(|| {
+            let analysed = analyze(recording)?;
+            let json = ReportJson::from(&analysed.report).with_reading(analysed.reading.as_ref());
+            output::write_json(&json, report, outputs)?;
+            Ok(analysed.is_complete())
+        });
         bar.inc(1);
         written.map_err(|error| named(&recording.input.file, &error))
     });
     bar.finish_and_clear();
+    let incomplete: Vec<String> = written
+        .iter()
+        .zip(recordings)
+        .filter(|(written, _)| matches!(written, Ok(false)))
+        .map(|(_, recording)| recording.input.file.display().to_string())
+        .collect();
+    incomplete.iter().for_each(|file| note(format_args!("{file}: not read to its end; its report says why")));
     let failures: Vec<String> = written.into_iter().filter_map(Result::err).collect();
     failures.iter().for_each(|failure| note(format_args!("no report: {failure}")));
     let written = recordings.len() - failures.len();
@@ -50,6 +61,10 @@ pub(crate) fn write_reports(
     }
     if !failures.is_empty() {
         bail!("{} of {} recordings have no report", failures.len(), recordings.len());
+    }
+    if !incomplete.is_empty() {
+        let count = incomplete.len();
+        return Err(Incomplete(format!("{count} of {} recordings were not read to their end", recordings.len())).into());
     }
     Ok(())
 }

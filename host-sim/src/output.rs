@@ -9,6 +9,7 @@ use recordings::Printable;
 use reports::export::{self, AxisChoice};
 use reports::figure::{self, Picture};
 use reports::json::ReportJson;
+use reports::reading::ReadingRecord;
 use reports::saved_report::SavedReport;
 use reports::terminal::Screen;
 use reports::{explanation, full_tables, page};
@@ -43,27 +44,65 @@ pub(crate) fn check(output: &OutputArguments, files: &OutputFiles) -> Result<()>
     files.check_all(&written)
 }
 
+/// A report, and what was read for it.
+#[derive(Debug)]
+pub(crate) struct Analysed {
+    pub(crate) report: Report,
+    /// `None` where it is of no file, or of one that the driver has read.
+    pub(crate) reading: Option<ReadingRecord>,
+}
+
+impl From<Report> for Analysed {
+    fn from(report: Report) -> Self {
+        Self { report, reading: None }
+    }
+}
+
+impl Analysed {
+    /// Whether the recording was read to its end.
+    pub(crate) fn is_complete(&self) -> bool {
+        self.reading.as_ref().is_none_or(|reading| reading.complete)
+    }
+}
+
+/// The result is written, and the recording was not read to its end.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct Incomplete(pub(crate) String);
+
+impl Incomplete {
+    /// Of one recording.
+    pub(crate) fn check(is_complete: bool) -> Result<()> {
+        if is_complete { Ok(()) } else { Err(Self("the recording was not read to its end".to_owned()).into()) }
+    }
+}
+
 /// Prints a report and writes the files that the arguments name; `source` is the name of the recording. A file that cannot be
 /// written does not keep the others, or the report, from being written.
+///
+/// # Errors
+/// A file cannot be written; or the recording was [not read to its end](Incomplete).
 pub(crate) fn write_report(
-    report: &Report,
+    analysed: &Analysed,
     source: Option<&str>,
     output: &OutputArguments,
     files: &OutputFiles,
 ) -> Result<()> {
-    let json = output.json.as_ref().map_or(Ok(()), |file| write_json(&ReportJson::from(report), file, files));
+    let Analysed { report, reading } = analysed;
+    let as_json = ReportJson::from(report).with_reading(reading.as_ref());
+    let json = output.json.as_ref().map_or(Ok(()), |file| write_json(&as_json, file, files));
     let exports = write_exports(report, output, files);
     let write_page = |folder: &PathBuf| -> Result<PathBuf> {
         let file = folder.join(page::FILE);
-        files.write(&file, page::html(report, source).as_bytes())?;
+        files.write(&file, page::html_with_reading(report, source, reading.as_ref()).as_bytes())?;
         Ok(file)
     };
     let page = output.page.as_ref().map(write_page).transpose();
     let pictures = output.pictures.as_ref().map_or(Ok(()), |folder| write_pictures(report, folder, files));
-    show(report, source, output, page.as_ref().ok().and_then(Option::as_deref))?;
+    show(analysed, source, output, page.as_ref().ok().and_then(Option::as_deref))?;
     json.and(exports).and(pictures)?;
     page?;
-    Ok(())
+    Incomplete::check(analysed.is_complete())
 }
 
 /// How a recording is called in a report: by the name of its file, without the folder.
@@ -76,10 +115,14 @@ pub(crate) fn source_name(file: &Path) -> String {
 }
 
 /// Prints a report, and where its page is.
-fn show(report: &Report, source: Option<&str>, output: &OutputArguments, page: Option<&Path>) -> Result<()> {
+fn show(analysed: &Analysed, source: Option<&str>, output: &OutputArguments, page: Option<&Path>) -> Result<()> {
+    let Analysed { report, reading } = analysed;
     // Nothing beside JSON on standard output.
     if output.quiet || output.json.as_deref().is_some_and(is_standard_stream) {
         return Ok(());
+    }
+    if let Some(sentence) = reading.as_ref().and_then(ReadingRecord::incomplete) {
+        print(|out| writeln!(out, "{}", Printable(&sentence)))?;
     }
     if output.full {
         print(|out| full_tables::write(report, source, out))?;

@@ -59,8 +59,12 @@ pub(crate) fn record_device(log: &Path, port: &str, baud: u32, seconds: f64) -> 
     interrupt::on_signal(move || !flag.swap(true, Ordering::Relaxed));
     let recorded = serial::record(&mut link, log, seconds, || is_interrupted.load(Ordering::Relaxed))
         .with_context(|| format!("{port}, {}", log.display()))?;
-    if recorded.interrupted {
-        note(format_args!("interrupted; the recording until then is analysed"));
+    match recorded.lost_after {
+        Some(bursts) => {
+            note(format_args!("the device hung up or fell silent after {bursts} bursts, which are analysed"))
+        }
+        None if recorded.interrupted => note(format_args!("interrupted; the recording until then is analysed")),
+        None => {}
     }
     if recorded.restarts > 0 {
         note(format_args!("the device restarted {} times; time goes on by the host's clock", recorded.restarts));

@@ -10,10 +10,27 @@ use recordings::recording::{RecordedSample, Recording};
 use recordings::{count_table_writer, numpy_matrix};
 use std::path::Path;
 
-/// The format that the name of `out` stands for, if none is named: `.npy` is a NumPy array, everything else a table.
-pub(crate) fn format_of(out: &Path, named: Option<RecordingFormat>) -> RecordingFormat {
-    let is_npy = out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npy"));
-    named.unwrap_or(if is_npy { RecordingFormat::Npy } else { RecordingFormat::Table })
+/// Endings of formats that are read or known and not written.
+const NOT_WRITTEN: [&str; 18] = [
+    "arrow", "bag", "bin", "db3", "feather", "h5", "hdf5", "json", "mat", "mcap", "npz", "parquet", "pkl", "rda",
+    "tdms", "ulg", "xls", "xlsx",
+];
+
+/// The format that the name of `out` stands for, if none is named: `.npy` is a NumPy array, every other ending that is none of another format
+/// a table.
+///
+/// # Errors
+/// It is the ending of a format that is not written.
+pub(crate) fn format_of(out: &Path, named: Option<RecordingFormat>) -> Result<RecordingFormat> {
+    let ending = out.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+    match named {
+        Some(named) => Ok(named),
+        None if ending == "npy" => Ok(RecordingFormat::Npy),
+        None if NOT_WRITTEN.contains(&ending.as_str()) => {
+            bail!("{}: .{ending} is not written; name a .csv, .csv.gz or .npy file, or say --format", out.display())
+        }
+        None => Ok(RecordingFormat::Table),
+    }
 }
 
 /// Writes `recording` to `out`.

@@ -22,7 +22,7 @@ pub(crate) fn run(arguments: &SimulateArguments) -> Result<()> {
     }
     let bar = progress_bar(simulation.samples()?, "{msg} {wide_bar} {pos}/{len} samples, {eta} left");
     bar.set_message("virtual ADIS16405");
-    let format = recording_file::format_of(out, arguments.format);
+    let format = recording_file::format_of(out, arguments.format)?;
     // A frame log is written as the bus is read: it has the configuration and every fault.
     let recording = match format {
         RecordingFormat::Frames => {

@@ -2,8 +2,6 @@
 
 mod ardupilot_log;
 mod array_topics;
-mod betaflight;
-mod blackbox_frames;
 mod calendar;
 pub mod file_format;
 mod foreign_format;
@@ -15,6 +13,7 @@ mod mcap_file;
 mod message_layout;
 mod nmea;
 pub(crate) mod numpy;
+pub(crate) mod numpy_header;
 mod ros_bag;
 mod ros_definition;
 mod ros_message;

@@ -6,13 +6,14 @@ mod steady_part;
 mod time_unit;
 mod unit_guess;
 
-use crate::columns::column_selection::ColumnSelection;
+use crate::columns::column_selection::{ColumnSelection, is_output_register};
 use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::sensor_guess::SensorGuess;
 use crate::tables::whole_table::WholeTable;
-use crate::time_base::sample_slots::SampleSlots;
-use crate::time_base::{RateEstimate, StampQuality, TimeRange};
+use crate::time_base::clock::{Clock, Place, RowStamp};
+use crate::time_base::{RateEstimate, StampQuality, TimeBaseError, TimeRange};
 use measurement::SensorProfile;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 pub use crate::inspection::sensor_guess::{ColumnGuess, Proposal};
@@ -120,11 +121,11 @@ impl InspectedTable {
         let rows = times_s.map_or(inspected.rows, <[f64]>::len);
         // Without times the length of a period does not matter here.
         let stated_hz = table.rate_hz.or(Some(1.0).filter(|_| times_s.is_none()));
-        if let Ok(slots) = SampleSlots::new(rows, times_s, indices.as_deref(), stated_hz) {
-            inspected.rate = slots.stamps.as_ref().and_then(|stamps| stamps.rate);
-            inspected.missing = slots.never_arrived;
-            inspected.gaps = slots.slots.windows(2).filter(|pair| pair[1] - pair[0] > 1).count();
-            inspected.notes.extend(slots.stamps.iter().flat_map(StampQuality::notes));
+        if let Ok(placed) = PlacedTable::new(rows, times_s, indices.as_deref(), stated_hz) {
+            inspected.rate = placed.stamps.as_ref().and_then(|stamps| stamps.rate);
+            inspected.missing = placed.missing;
+            inspected.gaps = placed.gaps;
+            inspected.notes.extend(placed.stamps.iter().flat_map(StampQuality::notes));
         }
         if let Some(SteadyPart { rows, .. }) = &inspected.steady {
             let rate_hz = inspected.rate.map(|rate| rate.hz).or(table.rate_hz);
@@ -132,6 +133,11 @@ impl InspectedTable {
         }
         let has_rate = inspected.rate.is_some() || table.rate_hz.is_some();
         inspected.proposals = sensors.iter().map(|sensor| sensor.proposal(&table, &facts, has_rate)).collect();
+        let has_registers = table.columns.iter().any(|of| is_output_register(&of.column.name));
+        for proposal in inspected.proposals.iter_mut().filter(|_| has_registers) {
+            proposal.sensor = Some("adis16405");
+            proposal.is_guessed = true;
+        }
         let guess = |at: usize| sensors.iter().find_map(|sensor| sensor.guess(at));
         inspected.columns =
             facts.iter().enumerate().map(|(at, facts)| InspectedColumn::new(facts, guess(at))).collect();
@@ -150,6 +156,44 @@ impl InspectedTable {
     #[must_use]
     pub fn has(&self, channel: &str) -> bool {
         self.columns.iter().any(|column| column.guess.as_ref().is_some_and(|guess| guess.channel == channel))
+    }
+}
+
+/// The rows of a table on their time base.
+struct PlacedTable {
+    stamps: Option<StampQuality>,
+    missing: u64,
+    gaps: usize,
+}
+
+impl PlacedTable {
+    fn new(
+        rows: usize,
+        times_s: Option<&[f64]>,
+        indices: Option<&[u64]>,
+        stated_hz: Option<f64>,
+    ) -> Result<Self, TimeBaseError> {
+        let mut clock = Clock::new(stated_hz)?;
+        let stamp = |row: usize| RowStamp {
+            time_s: times_s.and_then(|times| times.get(row)).copied(),
+            index: indices.and_then(|indices| indices.get(row)).copied(),
+            is_equal: false,
+        };
+        let places = clock.place((0..rows).map(stamp).collect(), true)?;
+        let periods: Vec<u64> = places
+            .iter()
+            .filter_map(|place| match place {
+                Place::At(placed) => Some(placed.period),
+                Place::Repeated => None,
+            })
+            .collect();
+        let span = periods.first().zip(periods.last()).map_or(0, |(first, last)| (last - first).saturating_add(1));
+        clock.rate_hz(rows as u64, span, &BTreeMap::new())?;
+        Ok(Self {
+            stamps: clock.stamps(),
+            missing: span - periods.len() as u64,
+            gaps: periods.windows(2).filter(|pair| pair[1] - pair[0] > 1).count(),
+        })
     }
 }
 

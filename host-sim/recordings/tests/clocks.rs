@@ -9,7 +9,7 @@ use recordings::ColumnSelection;
 use recordings::any_sensor::ReadOptions;
 use recordings::file_format::InputFile;
 use recordings::recording::{Recorder, TimeStamp};
-use recordings::sample_stream::{KeptInMemory, SampleStream};
+use recordings::sample_stream::{KeptInMemory, Reading, SampleStream};
 use recordings::time_base::{EstimatedTimeBase, TimeBaseError, time_base};
 
 fn base(times: impl IntoIterator<Item = f64>) -> Result<EstimatedTimeBase, TimeBaseError> {
@@ -127,15 +127,16 @@ fn a_rate_that_changes_is_no_loss() {
     assert_eq!(found(kept.iter().map(time)).1, 60_000 - kept.len() as u64);
 }
 
-/// Rate and missing samples of the same stamps in a table of which the first 16,384 rows are read in memory, and what is noted.
+/// Rate and missing samples of the same stamps in a table, and what is noted.
 fn streamed(times: &[f64]) -> (f64, u64, Vec<String>) {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("counts.csv");
     let rows = times.iter().enumerate().map(|(at, time)| format!("{time:.6},{}\n", at % 100));
     std::fs::write(&file, format!("time_s,gyro_x_counts\n{}", rows.collect::<String>())).expect("a table");
-    let kept = KeptInMemory { rows: 1 << 14, rows_with_losses: 1 << 14, most_lost: 1.0, irregular: true };
+    let kept = KeptInMemory { rows: 1 << 14, rows_with_losses: 1 << 14, most_lost: 1.0 };
     let input = InputFile::open(&file).expect("a table");
-    let stream = SampleStream::counts(input, GyroRange::Dps300, None, kept).expect("a time base");
+    let reading = Reading::new(None, kept);
+    let stream = SampleStream::counts(input, GyroRange::Dps300, reading).expect("a time base");
     assert!(!stream.is_in_memory(), "{:?}", stream.notes());
     let description = stream.description();
     (description.sample_rate_hz, description.dropped["gap"], stream.notes().to_vec())
@@ -221,9 +222,88 @@ fn measured_bursts_show_the_rate() {
     let Some(file) = system_tests::recording(test, "others/stampfly_fft_20260114T115628.csv") else { return };
     let selection = ColumnSelection::parse(&[], &["rad/s", "m/s^2"].map(str::to_owned)).expect("units");
     let options = ReadOptions { sensor: SensorProfile::generic(), selection, topic: None };
-    let recording = InputFile::open(&file).expect("a table").read(&options).expect("rows");
-    let (base, _) = recording.time_base(None).expect("a time base");
-    let rate_hz = base.measurement.sample_rate_hz;
+    let input = InputFile::open(&file).expect("a table");
+    let reading = Reading::new(None, KeptInMemory::ALL);
+    let samples = SampleStream::any_sensor(input, options, reading).expect("a time base").into_beginning();
+    let rate_hz = samples.sample_rate_hz;
     assert!((rate_hz / 399.91 - 1.0).abs() < 1e-3, "{rate_hz} Hz");
-    assert_eq!(base.measurement.dropped["gap"], 0);
+    assert_eq!(samples.dropped["gap"], 0);
+}
+
+/// Rows at 100 Hz whose stamps `change` makes wrong, in the unit of the column: samples, rate, missing samples, and notes.
+fn read_stamps(heading: &str, stamps: &[String]) -> (usize, f64, u64, Vec<String>) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("stamps.csv");
+    let row = |(at, stamp): (usize, &String)| format!("{stamp},{}\n", at * 7919 % 101);
+    let rows: String = stamps.iter().enumerate().map(row).collect();
+    std::fs::write(&file, format!("{heading},gx [deg/s]\n{rows}")).expect("room");
+    let selection = ColumnSelection::parse(&[], &[]).expect("nothing");
+    let options = ReadOptions { sensor: SensorProfile::generic(), selection, topic: None };
+    let reading = Reading::new(None, KeptInMemory::ALL);
+    let stream = SampleStream::any_sensor(InputFile::open(&file).expect("a table"), options, reading);
+    let stream = stream.unwrap_or_else(|error| panic!("{heading}: {error}"));
+    let notes = stream.notes().to_vec();
+    let samples = stream.into_beginning();
+    (samples.len(), samples.sample_rate_hz, samples.dropped["gap"], notes)
+}
+
+#[test]
+fn counters_that_begin_anew_go_on() {
+    const ROWS: u64 = 30_000;
+    for (heading, modulus, step) in [
+        ("t_us", 1u64 << 32, 10_000u64),
+        ("t_ms", 1 << 16, 10),
+        ("t_ms", 1 << 15, 10),
+        ("t_ms", 604_800_000, 10),
+        ("t_us", 86_400_000_000, 10_000),
+    ] {
+        // The counter begins anew a third into the record; one of 16 bits several times.
+        let stamps: Vec<String> =
+            (0..ROWS).map(|row| ((modulus - step * ROWS / 3 % modulus + row * step) % modulus).to_string()).collect();
+        let (samples, rate_hz, missing, notes) = read_stamps(heading, &stamps);
+        assert_eq!((samples as u64, missing), (ROWS, 0), "{heading} of {modulus}: {notes:?}");
+        assert!((rate_hz / 100.0 - 1.0).abs() < 1e-6, "{heading} of {modulus}: {rate_hz}");
+        assert!(notes.iter().any(|note| note.contains(&format!("begin anew at {modulus}"))), "{notes:?}");
+    }
+}
+
+/// One stamp that is wrong costs one row, wherever it is.
+#[test]
+fn one_wrong_stamp_costs_one_row() {
+    const ROWS: usize = 20_000;
+    for (name, at, wrong) in [
+        ("forward", 10_000, 93_877.3),
+        ("the first in the future", 0, 93_877.3),
+        ("the first is zero", 0, 0.0),
+        ("backward", 10_000, 13.0),
+        ("the last in the future", ROWS - 2, 93_877.3),
+    ] {
+        let time = |row: usize| if row == at { wrong } else { 1000.0 + row as f64 / 100.0 };
+        let stamps: Vec<String> = (0..ROWS).map(|row| format!("{:.3}", time(row))).collect();
+        let (samples, rate_hz, missing, notes) = read_stamps("t_s", &stamps);
+        assert_eq!(samples, ROWS - 1, "{name}: {notes:?}");
+        assert!(missing <= 1 && !notes.is_empty(), "{name}: {missing} missing, {notes:?}");
+        assert!((rate_hz / 100.0 - 1.0).abs() < 1e-6, "{name}: {rate_hz}");
+    }
+}
+
+#[test]
+fn a_clock_that_was_set_back_goes_on() {
+    const ROWS: usize = 12_000;
+    for (name, time) in [
+        // A leap second, and a time server.
+        (
+            "a second",
+            (|row: usize| 1000.0 + row as f64 / 100.0 - if row >= 6000 { 1.0 } else { 0.0 }) as fn(usize) -> f64,
+        ),
+        ("half a minute", |row| 1000.0 + row as f64 / 100.0 - if row >= 6000 { 30.0 } else { 0.0 }),
+        // A logger that was started three times.
+        ("to the start", |row| (row % 4000) as f64 / 100.0),
+    ] {
+        let stamps: Vec<String> = (0..ROWS).map(|row| format!("{:.3}", time(row))).collect();
+        let (samples, rate_hz, _, notes) = read_stamps("t_s", &stamps);
+        assert_eq!(samples, ROWS, "{name}: {notes:?}");
+        assert!((rate_hz / 100.0 - 1.0).abs() < 1e-6, "{name}: {rate_hz}");
+        assert!(notes.iter().any(|note| note.contains("the clock was set back")), "{name}: {notes:?}");
+    }
 }

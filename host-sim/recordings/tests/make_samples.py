@@ -3,9 +3,9 @@
 
     python3 make_samples.py FOLDER
 
-Needs numpy, scipy, h5py, rosbags, mcap, mcap-ros2-support, pyulog, pymavlink and orangebox, and sigrok-cli for its SPI decoder. The writers are
-those of the formats' own projects (numpy, scipy, h5py, rosbags, mcap). ULog, ArduPilot and blackbox logs have no writer in Python: the bytes
-are written here and read back by pyulog, pymavlink and orangebox, which must find every sample. FOLDER/truth.json says what each file holds: arguments, rate in
+Needs numpy, scipy, h5py, rosbags, mcap, mcap-ros2-support, pyulog, and pymavlink, and sigrok-cli for its SPI decoder. The writers are
+those of the formats' own projects (numpy, scipy, h5py, rosbags, mcap). ULog and ArduPilot logs have no writer in Python: the bytes
+are written here and read back by pyulog and pymavlink, which must find every sample. FOLDER/truth.json says what each file holds: arguments, rate in
 Hz, rows, samples that are missing between them, the angle random walk of each channel in deg/s/sqrt(Hz) or g/sqrt(Hz) that was
 drawn from, and, computed by numpy from the samples that were written, the Allan deviation of neighbours in deg/s or g and the
 angle random walk sigma/sqrt(rate), the maximum-likelihood estimate for white noise.
@@ -557,96 +557,6 @@ def old_ardupilot(folder, truth):
     truth.add("imu_2014.bin", both(gyro, accl), kept=KEPT)
 
 
-def blackbox(folder, truth):
-    """Betaflight's log by its own header lines; orangebox reads it back."""
-    from orangebox import Parser
-
-    rate, acc_1g = 1000.0, 2048
-    kept = np.setdiff1d(np.arange(ROWS), LOST)
-    random = np.random.default_rng(24)
-    sigma = np.array([9, 11, 14, 30, 40, 50])
-    counts = np.round(random.normal(0, sigma, (ROWS, 6)) + [3, -2, 1, 50, -20, acc_1g]).astype(int)[kept]
-    # What the controller writes beside: sticks, integrals, battery, motors.
-    wander = np.cumsum(random.normal(0, [3, 40, 900, 2, 5, 90, 9000, 1, 4, 1], (ROWS, 10)), axis=0).round().astype(int)
-    sticks, integrals, battery = wander[:, :4], wander[:, 4:7], wander[:, 7:] % 1000
-    motors = 158 + np.abs(random.normal(0, 300, (ROWS, 2)).round().astype(int))
-    table = np.c_[np.arange(ROWS), 5_000_000 + 1000 * np.arange(ROWS), sticks, integrals, battery, np.zeros((ROWS, 6), int), motors][kept]
-    table[:, 12:18] = counts
-    names = [f"{name}[{axis}]" for name, axes in [("rcCommand", 4), ("axisI", 3)] for axis in range(axes)]
-    names = ["loopIteration", "time", *names, "vbatLatest", "amperageLatest", "rssi"]
-    names += [f"{name}[{axis}]" for name, axes in [("gyroADC", 3), ("accSmooth", 3), ("motor", 2)] for axis in range(axes)]
-    lines = [
-        "Product:Blackbox flight data recorder by Nicholas Sherlock", "Data version:2", f"Field I name:{','.join(names)}",
-        "Field I signed:0,0,1,1,1,1,1,1,1,0,1,0,1,1,1,1,1,1,0,0", "Field I predictor:0,0,0,0,0,0,0,0,0,9,0,0,0,0,0,0,0,0,11,5",
-        "Field I encoding:1,1,0,0,0,0,0,0,0,3,0,1,0,0,0,0,0,0,1,0", "Field P predictor:6,2,1,1,1,1,1,1,1,1,1,1,3,3,3,3,3,3,3,3",
-        "Field P encoding:9,0,8,8,8,8,7,7,7,6,6,6,0,0,0,0,0,0,0,0", "Field S name:flightModeFlags,stateFlags,failsafePhase",
-        "Field S signed:0,0,0", "Field S predictor:0,0,0", "Field S encoding:1,1,1", "Firmware type:Cleanflight",
-        "Firmware revision:Betaflight 4.4.2 (23d066d08) STM32F411", "Firmware date:Jun  1 2023 18:17:04", "I interval:32",
-        "P interval:1", "P ratio:32", "minthrottle:1070", "maxthrottle:2000", "gyro_scale:0x3f800000", "motorOutput:158,2047",
-        f"acc_1G:{acc_1g}", "vbatref:1604", "looptime:1000", "gyro_sync_denom:1", "pid_process_denom:1", "debug_mode:0",
-        "features:541130760", "fields_disabled_mask:0", "motor_pwm_protocol:5",
-    ]
-    log = "".join(f"H {line}\n" for line in lines).encode()
-
-    def unsigned(value):
-        out = bytearray()
-        while value > 127:
-            out.append(value & 127 | 128)
-            value >>= 7
-        return bytes(out) + bytes([value])
-
-    def signed(value):
-        return unsigned((value << 1 ^ value >> 31) & 0xFFFFFFFF)
-
-    def two_complement(values, bits):
-        return all(-(1 << bits - 1) <= value < 1 << bits - 1 for value in values)
-
-    def three(values):
-        if two_complement(values, 2):
-            return bytes([(values[0] & 3) << 4 | (values[1] & 3) << 2 | values[2] & 3])
-        if two_complement(values, 4):
-            return bytes([1 << 6 | values[0] & 15, (values[1] & 15) << 4 | values[2] & 15])
-        if two_complement(values, 6):
-            return bytes([2 << 6 | values[0] & 63, values[1] & 63, values[2] & 63])
-        sizes = [next(size for size in (1, 2, 3, 4) if two_complement([value], 8 * size)) for value in values]
-        first = 3 << 6 | sum(size - 1 << 2 * at for at, size in enumerate(sizes))
-        return bytes([first]) + b"".join(value.to_bytes(size, "little", signed=True) for value, size in zip(values, sizes))
-
-    def four(values):
-        sizes = [0 if value == 0 else next(size for size in (1, 2, 4) if two_complement([value], 4 * size)) for value in values]
-        halves = "".join(f"{value & (1 << 4 * size) - 1:0{size}x}" for value, size in zip(values, sizes) if size)
-        code = sum({0: 0, 1: 1, 2: 2, 4: 3}[size] << 2 * at for at, size in enumerate(sizes))
-        return bytes([code]) + bytes.fromhex(halves + "0" * (len(halves) % 2))
-
-    def eight(values):
-        present = sum((value != 0) << at for at, value in enumerate(values))
-        return bytes([present]) + b"".join(signed(value) for value in values if value)
-
-    toward_zero = lambda sums: (np.abs(sums) // 2) * np.sign(sums)
-    before = []
-    for at, row in enumerate(table):
-        # A frame on its own where the one before is missing, as after a dropout. The two frames before the next one are both this frame.
-        if at % 32 == 0 or table[at - 1, 0] != row[0] - 1:
-            log += (b"S\x01\x02\x00" if at else b"") + b"I" + b"".join(unsigned(int(value)) for value in row[:2]) + b"".join(signed(int(value)) for value in row[2:9])
-            log += unsigned((1604 - int(row[9])) & 0x3FFF) + signed(int(row[10])) + unsigned(int(row[11]))
-            log += b"".join(signed(int(value)) for value in row[12:18]) + unsigned(int(row[18]) - 158) + signed(int(row[19] - row[18]))
-            before = [row, row]
-        else:
-            last, earlier = before
-            change = [int(value) for value in row - last]
-            mean = [int(value) for value in row - toward_zero(last + earlier)]
-            log += b"P" + signed(int(row[1] - (2 * last[1] - earlier[1]))) + four(change[2:6]) + three(change[6:9]) + eight(change[9:12])
-            log += b"".join(signed(value) for value in mean[12:])
-            before = [row, last]
-    log += b"E\xffEnd of log\0"
-    (folder / "blackbox.bbl").write_bytes(log)
-    frames = np.array([frame.data[: len(names)] for frame in Parser.load(str(folder / "blackbox.bbl")).frames()])
-    assert np.array_equal(frames, table)
-    scale = np.array([1, 1, 1, 1 / acc_1g, 1 / acc_1g, 1 / acc_1g])
-    known = truth.add("blackbox.bbl", dict(zip(GYRO + ACCL, (counts * scale).T)), rate=rate, kept=kept)
-    known["angle_random_walk"] = {name: float(deviation / np.sqrt(rate)) for name, deviation in zip(GYRO + ACCL, sigma * scale)}
-
-
 def other_shapes(folder, truth):
     """What the same libraries write in other ways."""
     import h5py
@@ -743,7 +653,7 @@ def main():
     folder.mkdir(parents=True, exist_ok=True)
     truth = Truth()
     writers = [tables, numpy_arrays, matlab, matlab_structures, hdf5, ros_bags, drawn_messages, ulog, ardupilot, old_ardupilot]
-    for write in writers + [blackbox, spi_captures, other_shapes, other_bags]:
+    for write in writers + [spi_captures, other_shapes, other_bags]:
         write(folder, truth)
     (folder / "truth.json").write_text(json.dumps(truth, indent=1))
 

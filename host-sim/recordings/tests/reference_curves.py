@@ -46,16 +46,6 @@ def hdf5(file, dataset):
         return None, np.asarray(opened[dataset])[1:4].T
 
 
-def blackbox(file, _):
-    from orangebox import Parser
-
-    parser = Parser.load(file)
-    at = [parser.field_names.index(name) for name in ["time", *(f"gyroADC[{axis}]" for axis in range(3)), *(f"accSmooth[{axis}]" for axis in range(3))]]
-    rows = np.array([[frame.data[column] for column in at] for frame in parser.frames()], float)
-    rows[:, 4:] /= parser.headers["acc_1G"]
-    return rows[:, 0], rows[:, 1:]
-
-
 def ulog(file, topic):
     from pyulog import ULog
 

@@ -82,15 +82,19 @@ fn time_goes_on_where_the_device_restarts() {
 }
 
 #[test]
-fn a_device_that_hangs_up_is_named_and_its_bursts_are_kept() {
+fn what_came_until_a_device_hung_up_is_a_recording() {
     let dir = tempfile::tempdir().expect("a folder");
     let log = dir.path().join("device.csv.gz");
     let mut sent = Vec::new();
     let answers = messages(&mut Encoder::default(), 0, 0, 100);
     let mut link = SerialLink::new(Port { answers, sent: &mut sent });
-    let error = record(&mut link, &log, 5.0, || false).expect_err("it hung up");
-    assert!(matches!(error, SerialRecordingError::Disconnected(100)), "{error}");
+    let summary = record(&mut link, &log, 5.0, || false).expect("a hundred bursts");
+    assert_eq!((summary.bursts, summary.interrupted, summary.lost_after), (100, true, Some(100)));
     assert_eq!(times(&log).len(), 100);
+    // Without a burst there is nothing.
+    let mut link = SerialLink::new(Port { answers: Default::default(), sent: &mut sent });
+    let error = record(&mut link, &log, 5.0, || false).expect_err("it hung up");
+    assert!(matches!(error, SerialRecordingError::Disconnected(0)), "{error}");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 mod clocks;
 mod coarse_stamps;
-mod other_formats;
+mod one_path;
 #[path = "reading/main.rs"]
 mod reading;
 mod serial;

@@ -3,6 +3,7 @@
 
 use crate::evidence::{EvidenceText, NumberStyle};
 use crate::part_note;
+use crate::reading::ReadingRecord;
 use noise_analysis::report::assessment::Assessment;
 use noise_analysis::report::{
     ChannelEffect, ChannelReport, CommonModeRegression, CurvePoint, FigureData, Finding, MissingSamples,
@@ -16,6 +17,8 @@ use std::collections::BTreeMap;
 #[derive(Debug, Serialize)]
 pub struct ReportJson<'a> {
     schema: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reading: Option<&'a ReadingRecord>,
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     quick: bool,
     sample_rate_hz: f64,
@@ -82,6 +85,14 @@ struct EffectJson {
     finding: usize,
 }
 
+impl<'a> ReportJson<'a> {
+    /// The same with what was read for it.
+    #[must_use]
+    pub fn with_reading(self, reading: Option<&'a ReadingRecord>) -> Self {
+        Self { reading, ..self }
+    }
+}
+
 impl<'a> From<&'a Report> for ReportJson<'a> {
     fn from(report: &'a Report) -> Self {
         let Report {
@@ -99,6 +110,7 @@ impl<'a> From<&'a Report> for ReportJson<'a> {
         } = report;
         Self {
             schema: *schema,
+            reading: None,
             quick: *quick,
             sample_rate_hz: *sample_rate_hz,
             samples: *samples,

@@ -17,6 +17,7 @@ mod line_breaks;
 pub mod live;
 pub mod page;
 mod part_note;
+pub mod reading;
 pub mod rounding;
 pub mod saved_report;
 pub mod several;

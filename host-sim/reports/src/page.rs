@@ -12,6 +12,7 @@ use crate::formatting::{
     capital, count, filter_consistency, interval, missing_samples, number, parameter_name, recording_advice, words,
     worst_deviations,
 };
+use crate::reading::ReadingRecord;
 use crate::rounding::{bounded_quantity, p_value, unit};
 use crate::summary;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -30,7 +31,13 @@ pub const FILE: &str = "index.html";
 /// The report on the recording `source` as a page.
 #[must_use]
 pub fn html(report: &Report, source: Option<&str>) -> String {
-    render(report, source).into_string()
+    render(report, source, None).into_string()
+}
+
+/// The same with what was read for it.
+#[must_use]
+pub fn html_with_reading(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>) -> String {
+    render(report, source, reading).into_string()
 }
 
 /// The page could not be written.
@@ -56,7 +63,7 @@ pub fn write(report: &Report, source: Option<&str>, dir: &Path) -> Result<PathBu
     Ok(path)
 }
 
-fn render(report: &Report, source: Option<&str>) -> Markup {
+fn render(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>) -> Markup {
     let [light, dark] = figure::style();
     let (title, headline) = {
         let headline = summary::headline(report, source);
@@ -83,6 +90,7 @@ fn render(report: &Report, source: Option<&str>) -> Markup {
                 }
                 (contents(report))
                 main {
+                    @if let Some(sentence) = reading.and_then(ReadingRecord::incomplete) { p { strong { (sentence) } } }
                     div.first {
                         (verdict(report))
                         section.steps aria-label="Curves and what to do" {
@@ -92,10 +100,21 @@ fn render(report: &Report, source: Option<&str>) -> Markup {
                     }
                     (findings(report))
                     @for channel in in_reading_order(report) { (channel_section(report, channel)) }
+                    @if let Some(reading) = reading { (what_was_read(reading)) }
                     (definitions())
                 }
                 script { (PreEscaped(SCRIPT)) }
             }
+        }
+    }
+}
+
+/// The file, and what of it is no sample.
+fn what_was_read(reading: &ReadingRecord) -> Markup {
+    html! {
+        section id="file" aria-label="What was read" {
+            h2 { "What was read" }
+            @for line in reading.lines() { p { (line) } }
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::bus_timing::CapturedBusTiming;
 use adis16405_driver::{Adis16405, BURST_BYTES, BURST_REQUEST, Burst, Channel, Config, GyroRange, Register};
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{Error, ErrorKind, ErrorType, Operation, SpiDevice};
-use recordings::count_table::CountTable;
+use recordings::count_table;
 use recordings::frame_log::{Frame, FrameLogReader};
 use recordings::recorded_file::{FrameReader, RecordedFile};
 use recordings::recording::{MAX_SAMPLES, Recorder, Recording, TimeStamp};
@@ -34,7 +34,7 @@ pub struct Replay {
 pub fn replay(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
     match RecordedFile::open(file)? {
         RecordedFile::Frames(frames) => replay_frames(file, frames, range),
-        RecordedFile::Table(rows) => replay_rows(file, rows, range),
+        RecordedFile::Table => replay_table(file, range),
     }
 }
 
@@ -43,19 +43,16 @@ pub fn replay(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
 /// # Errors
 /// As [`replay`].
 pub fn replay_table(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
-    replay_rows(file, CountTable::open(file)?, range)
-}
-
-fn replay_rows(file: &Path, mut rows: CountTable, range: GyroRange) -> Result<Replay, InputError> {
-    let mut recorder = Recorder::new(rows.channels(), range);
+    let mut recorder: Option<Recorder> = None;
     let mut player = Player::new();
-    while let Some(row) = rows.next()? {
-        let answer = Burst::from_counts(&row.counts).to_bytes();
-        let burst =
-            player.burst(&BURST_REQUEST, &answer).map_err(|reason| InputError::line(file, rows.line(), reason))?;
-        recorder.push(row.time_stamp, &burst);
-    }
-    Ok(Replay { recording: recorder.finish(), other_transactions: 0, timing: CapturedBusTiming::default() })
+    count_table::for_each_row(file, range, |channels, time_stamp, counts| {
+        let answer = Burst::from_counts(&counts).to_bytes();
+        let burst = player.burst(&BURST_REQUEST, &answer)?;
+        recorder.get_or_insert_with(|| Recorder::new(channels.to_vec(), range)).push(time_stamp, &burst);
+        Ok(())
+    })?;
+    let recording = recorder.map(Recorder::finish).ok_or_else(|| InputError::file(file, Reason::NoData))?;
+    Ok(Replay { recording, other_transactions: 0, timing: CapturedBusTiming::default() })
 }
 
 /// Replays a frame log. The range is `range` unless a write to SENS_AVG before the first burst selects another.

@@ -1,6 +1,6 @@
 //! A recording gives the same report whether its counts are read or its bursts are replayed over the emulated bus.
 
-use crate::program::{counts, host_sim, json_of};
+use crate::program::{analysis_of, counts, host_sim, json_of, write};
 use serde_json::Value;
 use tempfile::tempdir;
 
@@ -9,7 +9,7 @@ fn a_table_has_one_report_analyzed_and_replayed() {
     let dir = tempdir().expect("a folder");
     let table = counts(&dir);
     let table = table.to_str().expect("UTF-8");
-    assert!(json_of(&dir, &["analyze", table]) == json_of(&dir, &["replay", table]), "the reports differ");
+    assert!(analysis_of(&dir, &["analyze", table]) == analysis_of(&dir, &["replay", table]), "the reports differ");
     let [analyzed, replayed] = ["analyze", "replay"].map(|command| host_sim(&[command, table]).stdout);
     assert!(!analyzed.is_empty() && analyzed == replayed, "the screens differ");
 }
@@ -21,8 +21,8 @@ fn a_recorded_simulation_replays_to_the_same_report() {
         let log = dir.path().join(name);
         let log = log.to_str().expect("UTF-8");
         let recorded = json_of(&dir, &["record", log, "--seconds", "5", "--seed", "7"]);
-        assert!(recorded == json_of(&dir, &["replay", log]), "{name}");
         let report: Value = serde_json::from_slice(&recorded).expect("JSON");
+        assert!(report == analysis_of(&dir, &["replay", log]), "{name}");
         // 5 s at 204.8 samples per second.
         let dropped = report["dropped"].as_object().expect("causes").values().filter_map(Value::as_u64);
         assert_eq!(report["samples"].as_u64().expect("a number") + dropped.sum::<u64>(), 1024);
@@ -32,4 +32,59 @@ fn a_recorded_simulation_replays_to_the_same_report() {
         assert!((rate - 204.8).abs() < 1e-6, "{rate}");
         assert_eq!(std::fs::read(log).expect("a log")[0] == 0x1f, name.ends_with(".gz"));
     }
+}
+
+/// A log of PX4 whose rows are a gyroscope at 250 Hz.
+fn flight_log(rows: u64) -> Vec<u8> {
+    let record =
+        |kind: u8, body: &[u8]| [&u16::try_from(body.len()).expect("short").to_le_bytes()[..], &[kind], body].concat();
+    let mut log = [&b"ULog\x01\x12\x35\x01"[..], &[0; 8]].concat();
+    log.extend(record(b'F', b"sensor_gyro:uint64_t timestamp;float x;float y;float z;"));
+    log.extend(record(b'A', &[&[0, 0, 0][..], b"sensor_gyro"].concat()));
+    for row in 0..rows {
+        let axes = [0u64, 1, 2].map(|axis| ((row + axis) * 7919 % 1009) as f32 * 1e-5 - 5e-3).map(f32::to_le_bytes);
+        log.extend(record(b'D', &[&[0, 0][..], &(row * 4000).to_le_bytes(), &axes.concat()].concat()));
+    }
+    log
+}
+
+/// In the JSON, on the screen, on the page and by the exit code; in a report of many as in that of one.
+#[test]
+fn a_file_that_is_cut_is_told_everywhere() {
+    let dir = tempdir().expect("a folder");
+    let (whole, page, reports) = (flight_log(5000), dir.path().join("page"), dir.path().join("reports"));
+    let cut = write(&dir, "cut.ulg", &whole[..whole.len() - 1010]);
+    let file = cut.to_str().expect("UTF-8");
+    let [json, page, reports] =
+        [dir.path().join("cut.json"), page, reports].map(|path| path.to_str().expect("UTF-8").to_owned());
+    let output = host_sim(&["analyze", file, "--json", &json, "--page", &page]);
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(3), "{errors}");
+    assert!(errors.contains("not read to its end"), "{errors}");
+    let screen = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(screen.starts_with("Not read to its end: truncated"), "{screen}");
+    let read: Value = serde_json::from_slice(&std::fs::read(&json).expect("a report")).expect("JSON");
+    let reading = &read["reading"];
+    assert_eq!((&reading["file"], &reading["complete"]), (&"cut.ulg".into(), &false.into()));
+    assert!(reading["damage"].as_str().expect("a sentence").contains("truncated"), "{reading}");
+    assert_eq!(reading["rows"], read["samples"]);
+    let hash = std::process::Command::new("sha256sum").arg(&cut).output().expect("sha256sum starts").stdout;
+    let hash = String::from_utf8(hash).expect("digits");
+    assert_eq!(reading["sha256"].as_str(), hash.split_whitespace().next());
+    let html = std::fs::read_to_string(format!("{page}/index.html")).expect("a page");
+    assert!(html.contains("Not read to its end: truncated") && html.contains("What was read"));
+    // Of many.
+    let intact = write(&dir, "whole.ulg", &whole);
+    let output = host_sim(&["analyze", file, intact.to_str().expect("UTF-8"), "--reports", &reports]);
+    assert_eq!(output.status.code(), Some(3), "{}", String::from_utf8_lossy(&output.stderr));
+    for (name, complete) in [("cut", false), ("whole", true)] {
+        let report = std::fs::read(format!("{reports}/{name}.ulg.json")).expect("a report");
+        let report: Value = serde_json::from_slice(&report).expect("JSON");
+        assert_eq!(report["reading"]["complete"], complete, "{name}");
+    }
+    let whole = json_of(&dir, &["analyze", intact.to_str().expect("UTF-8"), "--from", "4"]);
+    let whole: Value = serde_json::from_slice(&whole).expect("JSON");
+    assert_eq!((&whole["reading"]["rows"], &whole["samples"]), (&5000.into(), &4000.into()));
+    assert_eq!(whole["reading"]["left_out"]["outside_part"], 1000);
+    assert_eq!(whole["reading"]["options"], serde_json::json!(["--from", "4"]));
 }

@@ -1,6 +1,6 @@
 //! `simulate`, `convert` and `export`: what is described is in the file, and another format has the same samples.
 
-use crate::program::{host_sim, json_of};
+use crate::program::{analysis_of, host_sim, json_of};
 use serde_json::Value;
 use std::path::Path;
 use tempfile::{TempDir, tempdir};
@@ -92,8 +92,8 @@ fn every_format_has_the_same_samples() {
     assert!(notes.contains("--range 75") && notes.contains("1 transactions that are no bursts"), "{notes}");
     assert_eq!(std::fs::read(&table).expect("a table"), std::fs::read(&back).expect("a table"));
     assert_eq!(
-        json_of(&dir, &["analyze", &table, "--range", "75"]),
-        json_of(&dir, &["replay", &frames]),
+        analysis_of(&dir, &["analyze", &table, "--range", "75"]),
+        analysis_of(&dir, &["replay", &frames]),
         "the log has the range"
     );
 }

@@ -100,9 +100,10 @@ fn an_interrupt_while_a_pipe_is_read_gives_the_report_of_what_came() {
         signal(&program, "INT");
         let output = program.wait_with_output().expect("the program ends");
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.success(), "{errors}");
+        assert_eq!(output.status.code(), Some(3), "{errors}");
         let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
         assert_eq!(report["samples"], 200_000);
+        assert_eq!(report["reading"]["complete"], false);
         assert!(errors.contains("interrupted") && errors.contains("first 200000 samples"), "{errors}");
         drop(pipe);
     }

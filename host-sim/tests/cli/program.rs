@@ -2,6 +2,7 @@
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use serde_json::Value;
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::{Child, Command, Output};
@@ -29,6 +30,18 @@ pub(crate) fn json_of(dir: &TempDir, arguments: &[&str]) -> Vec<u8> {
     let bytes = std::fs::read(&out).expect("a report");
     std::fs::remove_file(&out).expect("removed");
     bytes
+}
+
+/// A report without what was read for it: the same samples in another file have the same one.
+pub(crate) fn analysis_of(dir: &TempDir, arguments: &[&str]) -> Value {
+    without_reading(&json_of(dir, arguments))
+}
+
+/// The same of the bytes of a report.
+pub(crate) fn without_reading(bytes: &[u8]) -> Value {
+    let mut report: Value = serde_json::from_slice(bytes).expect("JSON");
+    report.as_object_mut().expect("an object").remove("reading");
+    report
 }
 
 /// Writes a file into a temporary folder.

@@ -5,13 +5,13 @@ use measurement::SensorProfile;
 use recordings::any_sensor::ReadOptions;
 use recordings::file_format::{FileFormat, InputFile};
 use recordings::recorded_file::RecordedFile;
-use recordings::sample_stream::{KeptInMemory, SampleStream};
+use recordings::sample_stream::{KeptInMemory, Reading, SampleStream};
 use recordings::{ColumnSelection, count_table};
 use reports::export::{AxisChoice, ExportFormat, export};
 use reports::saved_report::SavedReport;
 use std::io::Write;
 
-const KEPT: KeptInMemory = KeptInMemory { rows: 1 << 12, rows_with_losses: 1 << 14, most_lost: 0.25, irregular: true };
+const KEPT: KeptInMemory = KeptInMemory { rows: 1 << 12, rows_with_losses: 1 << 14, most_lost: 0.25 };
 
 /// A file with these bytes is read as every command reads it.
 pub(crate) fn recording(bytes: &[u8]) {
@@ -28,14 +28,14 @@ pub(crate) fn recording(bytes: &[u8]) {
         }
         FileFormat::CountTable => {
             let _any = count_table::read(input.path(), range);
-            if let Ok(stream) = SampleStream::counts(input, range, None, KEPT) {
+            if let Ok(stream) = SampleStream::counts(input, range, Reading::new(None, KEPT)) {
                 read_to_its_end(stream);
             }
         }
         _ => {
             let options =
                 ReadOptions { sensor: SensorProfile::generic(), selection: ColumnSelection::default(), topic: None };
-            if let Ok(stream) = SampleStream::any_sensor(input, options, None, KEPT) {
+            if let Ok(stream) = SampleStream::any_sensor(input, options, Reading::new(None, KEPT)) {
                 read_to_its_end(stream);
             }
         }

@@ -243,7 +243,9 @@ impl ColumnSelection {
         }
         let is_unitless = |(role, position): &(Role, usize)| {
             quantity(role).is_some_and(|quantity| {
-                let own = available[*position].unit.filter(|unit| unit.measures(quantity) || unit.base == COUNT);
+                let column = &available[*position];
+                let own = column.unit.filter(|unit| unit.measures(quantity) || unit.base == COUNT);
+                let own = own.or_else(|| unit_by_interface(&column.name, quantity));
                 let stated = self.stated_unit(quantity.unit()).or_else(|| self.stated_unit(COUNT));
                 !quantity.is_inertial() && own.or(stated).is_none()
             })
@@ -251,12 +253,57 @@ impl ColumnSelection {
         chosen.iter().copied().filter(is_unitless).map(|(_, position)| position).collect()
     }
 
-    /// Which columns are left out of those that their names tell, in a sentence; `None` where none is.
-    pub(crate) fn left_out(&self, available: &[AvailableColumn], sensor: &SensorProfile) -> Option<String> {
-        let named = by_name(available, sensor).ok().filter(|_| self.assignments.is_empty())?;
-        let left_out = self.unitless_companions(&named, available);
-        let names: Vec<&str> = left_out.iter().map(|&at| available[at].name.as_str()).collect();
-        (!names.is_empty()).then(|| format!("{} left out: no unit; --units gives one", names.join(", ")))
+    /// Which of the columns are not among the `chosen` ones, and why, and which units their names tell: a sentence each; none where the user
+    /// chooses the columns.
+    pub(crate) fn notes(
+        &self,
+        available: &[AvailableColumn],
+        chosen: &[ChosenColumn],
+        sensor: &SensorProfile,
+    ) -> Vec<String> {
+        if !self.assignments.is_empty() {
+            return Vec::new();
+        }
+        let named = by_name(available, sensor).unwrap_or_default();
+        let unitless = self.unitless_companions(&named, available);
+        let is_used = |at: &usize| chosen.iter().any(|column| column.position == *at);
+        let (mut no_channel, mut other_unit) = (Vec::new(), Vec::new());
+        for (_, column) in available.iter().enumerate().filter(|(at, _)| !is_used(at) && !unitless.contains(at)) {
+            match (sensor.channel(&column.name).or_else(|| column.channel(sensor)), column.unit) {
+                (Some(_), Some(unit)) => other_unit.push(format!("{} in {}", column.name, unit.name)),
+                _ => no_channel.push(column.name.as_str()),
+            }
+        }
+        let mut notes = Vec::new();
+        if !unitless.is_empty() {
+            let names: Vec<&str> = unitless.iter().map(|&at| available[at].name.as_str()).collect();
+            notes.push(format!("{} left out: no unit; --units gives one", some_of(&names)));
+        }
+        if !other_unit.is_empty() {
+            let names: Vec<&str> = other_unit.iter().map(String::as_str).collect();
+            notes.push(format!(
+                "{} left out: a unit of another quantity than the name; --columns reads it",
+                some_of(&names)
+            ));
+        }
+        if !no_channel.is_empty() {
+            notes.push(format!("{} left out: no known name of a channel; --columns reads it", some_of(&no_channel)));
+        }
+        let by_interface = chosen.iter().filter(|column| self.unit_of_interface(column).is_some());
+        let by_interface: Vec<&str> = by_interface.map(|column| column.label.as_str()).collect();
+        if !by_interface.is_empty() {
+            let of =
+                "in the units of the industrial I/O interface of Linux, rad/s, m/s^2 and gauss; --units says otherwise";
+            notes.push(format!("{} taken to be {of}", some_of(&by_interface)));
+        }
+        notes
+    }
+
+    /// The unit that the name of a column alone tells.
+    fn unit_of_interface(&self, column: &ChosenColumn) -> Option<Unit> {
+        let Role::Channel(profile) = column.role else { return None };
+        let is_stated = self.stated_unit(profile.quantity.unit()).is_some();
+        unit_by_interface(&column.label, profile.quantity).filter(|unit| !is_stated && column.unit == Some(*unit))
     }
 
     fn assigned(
@@ -297,12 +344,11 @@ impl ColumnSelection {
             Role::Time => (stated(SECOND).or(column.unit.filter(|unit| unit.base == SECOND)), 1.0),
             Role::Channel(profile) => {
                 let own = column.unit.filter(|unit| unit.measures(profile.quantity) || unit.base == COUNT);
-                let unit = stated(profile.quantity.unit()).or(own).or_else(|| stated(COUNT)).ok_or_else(|| {
-                    SelectionError::NoUnit {
-                        column: column.name.clone(),
-                        channel: profile.name.to_owned(),
-                        example: profile.quantity.unit(),
-                    }
+                let own = own.or_else(|| stated(COUNT)).or_else(|| unit_by_interface(&column.name, profile.quantity));
+                let unit = stated(profile.quantity.unit()).or(own).ok_or_else(|| SelectionError::NoUnit {
+                    column: column.name.clone(),
+                    channel: profile.name.to_owned(),
+                    example: profile.quantity.unit(),
                 })?;
                 let is_known = profile != ChannelProfile::generic(profile.name, profile.quantity);
                 match unit.base {
@@ -317,9 +363,18 @@ impl ColumnSelection {
 }
 
 impl AvailableColumn {
-    /// From a heading that may end in a unit: `ax [m/s^2]`, `wx (rad/s)`, `gyro_x_deg_s`, `time_us`, `gyro_x_counts`.
+    /// From a heading that may end in a unit: `ax [m/s^2]`, `wx (rad/s)`, `gyro x, deg/s`, `gyro_x_deg_s`, `time_us`, `gyro_x_counts`. The
+    /// output registers of the ADIS164xx, `XGYRO_OUT`, have counts.
     pub(crate) fn from_heading(heading: &str) -> Self {
         let heading = heading.trim().trim_start_matches(['#', '%']).trim();
+        if let Some((name, unit)) = heading.rsplit_once(',')
+            && let Some(unit) = Unit::parse(unit)
+        {
+            return Self { name: name.trim().to_owned(), unit: Some(unit) };
+        }
+        if is_output_register(heading) {
+            return Self { name: heading.to_owned(), unit: Unit::parse(COUNT) };
+        }
         for (open, close) in [('[', ']'), ('(', ')')] {
             let bracketed = heading.strip_suffix(close).and_then(|text| text.rsplit_once(open));
             if let Some((name, unit)) = bracketed
@@ -356,6 +411,19 @@ impl AvailableColumn {
         Some((&self.name[..short.clone().find(is_name).unwrap_or(0)], channel))
     }
 
+    /// The channel of `sensor` that its name tells.
+    fn channel(&self, sensor: &SensorProfile) -> Option<ChannelProfile> {
+        match role_of(&self.name)? {
+            NamedRole::Channel(name) => sensor.channel(name),
+            NamedRole::Time | NamedRole::Index => None,
+        }
+    }
+
+    /// Whether its unit may be that of a channel.
+    fn may_measure(&self, profile: &ChannelProfile) -> bool {
+        self.unit.is_none_or(|unit| unit.measures(profile.quantity) || unit.base == COUNT)
+    }
+
     /// Whether its name is that of a time.
     pub(crate) fn is_time(&self) -> bool {
         matches!(role_of(&self.name), Some(NamedRole::Time))
@@ -375,6 +443,32 @@ fn names(available: &[AvailableColumn]) -> String {
     format!("{}{more}", shown.join(", "))
 }
 
+/// Names of columns in a note; of many the first, and how many there are.
+fn some_of(names: &[&str]) -> String {
+    const SHOWN: usize = 8;
+    let shown = names.iter().take(SHOWN).copied().collect::<Vec<_>>().join(", ");
+    if names.len() > SHOWN { format!("{shown}, … ({} columns)", names.len()) } else { shown }
+}
+
+/// Whether a heading is the name of an output register in the data sheets of the ADIS164xx.
+pub(crate) fn is_output_register(heading: &str) -> bool {
+    const OF_PART: [&str; 3] = ["SUPPLY_OUT", "TEMP_OUT", "AUX_ADC"];
+    let of_axis = heading.strip_suffix("_OUT").and_then(|name| name.strip_prefix(['X', 'Y', 'Z']));
+    OF_PART.contains(&heading) || of_axis.is_some_and(|name| ["GYRO", "ACCL", "MAGN"].contains(&name))
+}
+
+/// The unit of a quantity in the industrial I/O interface of Linux, by a name of it that is not that of raw counts: `in_anglvel_x`.
+fn unit_by_interface(name: &str, quantity: Quantity) -> Option<Unit> {
+    let plain = name.to_lowercase();
+    let unit = match quantity.unit() {
+        "deg/s" if plain.starts_with("in_anglvel_") => "rad/s",
+        "g" if plain.starts_with("in_accel_") => "m/s^2",
+        "gauss" if plain.starts_with("in_magn_") => "gauss",
+        _ => return None,
+    };
+    if plain.ends_with("_raw") { None } else { Unit::parse(unit) }
+}
+
 /// The columns whose names say what they are: the name of a channel of any sensor, `time` or `sample`, and the position. `None` where
 /// two columns look like one channel.
 pub(crate) fn known_by_name(available: &[AvailableColumn]) -> Option<Vec<(&'static str, usize)>> {
@@ -387,10 +481,16 @@ fn by_name(available: &[AvailableColumn], sensor: &SensorProfile) -> Result<Vec<
     let mut named: Vec<(Role, usize)> = Vec::new();
     for (position, column) in available.iter().enumerate() {
         let own = sensor.channel(&column.name).map(Role::Channel);
-        let role = own.or_else(|| match role_of(&column.name)? {
+        let of_body = || rate_of_body(available, position).and_then(|name| sensor.channel(name)).map(Role::Channel);
+        let by_name = || match role_of(&column.name)? {
             NamedRole::Time => Some(Role::Time),
             NamedRole::Index => Some(Role::Index),
             NamedRole::Channel(name) => sensor.channel(name).map(Role::Channel),
+        };
+        let role = own.or_else(by_name).or_else(of_body).filter(|role| match role {
+            // A magnetic field is no rate, whatever it is called.
+            Role::Channel(profile) => column.may_measure(profile),
+            Role::Time | Role::Index => true,
         });
         let Some(role) = role else { continue };
         if let Some((_, other)) = named.iter().find(|(known, _)| *known == role) {
@@ -410,6 +510,15 @@ fn by_name(available: &[AvailableColumn], sensor: &SensorProfile) -> Result<Vec<
     Ok(named)
 }
 
+/// The rate that a column is by the names of aviation: p, q and r, where there are all three.
+fn rate_of_body(available: &[AvailableColumn], position: usize) -> Option<&'static str> {
+    let is_named = |column: &AvailableColumn, letter: &str| column.name.trim().eq_ignore_ascii_case(letter);
+    let letters = ["p", "q", "r"];
+    let has_all = letters.iter().all(|letter| available.iter().any(|column| is_named(column, letter)));
+    let axis = letters.iter().position(|letter| has_all && is_named(&available[position], letter))?;
+    Some(AXES[0].1[axis])
+}
+
 /// What the name of a column says.
 enum NamedRole {
     Time,
@@ -418,7 +527,7 @@ enum NamedRole {
 }
 
 /// The usual names, in small letters with `_` for other signs and without the axis.
-const GYROSCOPE: [&str; 22] = [
+const GYROSCOPE: [&str; 32] = [
     "gyro",
     "gy",
     "gyr",
@@ -441,8 +550,18 @@ const GYROSCOPE: [&str; 22] = [
     "angular_rate",
     "w_rs_s",
     "gyro_rad",
+    "anglvel",
+    "angular_vel",
+    "angularvel",
+    "angularrate",
+    "ang_rate",
+    "angrate",
+    "rotrate",
+    "rotation",
+    "gyroadc",
+    "gyroscope_rate",
 ];
-const ACCELEROMETER: [&str; 17] = [
+const ACCELEROMETER: [&str; 23] = [
     "accl",
     "ac",
     "fb",
@@ -460,8 +579,26 @@ const ACCELEROMETER: [&str; 17] = [
     "a_rs_s",
     "accelerometer_m_s2",
     "force",
+    "accels",
+    "linear_accel",
+    "linearaccel",
+    "specificforce",
+    "accsmooth",
+    "accelerometer_acceleration",
 ];
-const MAGNETOMETER: [&str; 7] = ["magn", "mag", "magnetometer", "m", "mb", "b", "magnetic_field"];
+const MAGNETOMETER: [&str; 11] = [
+    "magn",
+    "mag",
+    "magnetometer",
+    "m",
+    "mb",
+    "b",
+    "magnetic_field",
+    "magneticfield",
+    "mag_field",
+    "magfield",
+    "compass",
+];
 const AXES: [(&str, [&str; 3]); 3] = [
     ("gyro", ["gyro_x", "gyro_y", "gyro_z"]),
     ("accl", ["accl_x", "accl_y", "accl_z"]),
@@ -478,6 +615,10 @@ fn role_of(name: &str) -> Option<NamedRole> {
     let plain: String =
         name.to_lowercase().chars().map(|letter| if letter.is_ascii_alphanumeric() { letter } else { '_' }).collect();
     let plain = plain.trim_matches('_');
+    // As the industrial I/O interface of Linux and data sheets call them: `in_anglvel_x_raw`, `XGYRO_OUT`.
+    let plain = plain.strip_prefix("in_").unwrap_or(plain);
+    let plain =
+        ["_raw", "_out", "_input", "_lsb"].iter().find_map(|ending| plain.strip_suffix(ending)).unwrap_or(plain);
     match plain {
         "time" | "times" | "t" | "timestamp" | "timestamps" | "time_stamp" | "stamp" | "timestamp_sample"
         | "timeus" | "elapsed" | "elapsed_time" => {
@@ -494,11 +635,20 @@ fn role_of(name: &str) -> Option<NamedRole> {
         "aux_adc" => return Some(NamedRole::Channel("aux_adc")),
         _ => {}
     }
+    let groups = [&GYROSCOPE[..], &ACCELEROMETER[..], &MAGNETOMETER[..]];
+    // The axis before the name: `xgyro`, `x_accel`. Single letters behind it are no name.
+    let before = plain.chars().next().and_then(|axis| "xyz".find(axis)).and_then(|axis| {
+        let base = plain[1..].trim_start_matches('_');
+        let group = groups.iter().position(|group| base.len() > 2 && group.contains(&base))?;
+        Some(NamedRole::Channel(AXES[group].1[axis]))
+    });
+    if before.is_some() {
+        return before;
+    }
     let axis = plain.chars().last().and_then(|axis| "xyz".find(axis).or_else(|| "012".find(axis)))?;
     let base = plain[..plain.len() - 1].trim_end_matches('_');
     // A longer name may stand before the usual one: `imu0_gyro`, `field_angular_velocity`. Single letters stand alone.
     let matches = |known: &str| base == known || known.len() > 2 && base.ends_with(&format!("_{known}"));
-    let groups = [&GYROSCOPE[..], &ACCELEROMETER[..], &MAGNETOMETER[..]];
     let group = groups.iter().position(|group| group.iter().any(|known| matches(known)))?;
     Some(NamedRole::Channel(AXES[group].1[axis]))
 }
@@ -555,6 +705,63 @@ mod tests {
         }
         let plain = chosen(&["time_us", "ax [g]", "gyro_z_deg_s"], &[], &[]).expect("columns");
         assert_eq!(plain[1], ("gyro_z=2".to_owned(), 1.0));
+    }
+
+    /// Spellings of programs, drivers and data sheets, each beside a time.
+    #[test]
+    fn the_names_of_all_trades_are_known() {
+        for (name, channel) in [
+            ("in_anglvel_x", "gyro_x"),
+            ("in_anglvel_z_raw", "gyro_z"),
+            ("in_accel_y", "accl_y"),
+            ("in_magn_z", "magn_z"),
+            ("XGYRO_OUT", "gyro_x"),
+            ("ZACCL_OUT", "accl_z"),
+            ("YMAGN_OUT", "magn_y"),
+            ("TEMP_OUT", "temp"),
+            ("gyro_x_radps", "gyro_x"),
+            ("accel_z_mps2", "accl_z"),
+            ("x_gyro", "gyro_x"),
+            ("zAccel", "accl_z"),
+            ("angular_velocity.y", "gyro_y"),
+            ("AngularRateX", "gyro_x"),
+            ("RotRateZ", "gyro_z"),
+            ("gyro_z, deg/s", "gyro_z"),
+            ("linear_accel_x", "accl_x"),
+            ("Magnetic Field y (uT)", "magn_y"),
+            ("compass_x", "magn_x"),
+        ] {
+            let column = AvailableColumn::from_heading(name);
+            let found = super::known_by_name(&[column]).expect("one");
+            assert_eq!(found, [(channel, 0)], "{name}");
+        }
+        let body = ["t (s)", "p (deg/s)", "q (deg/s)", "r (deg/s)"];
+        let expected = ["time s=0", "gyro_x=1", "gyro_y=2", "gyro_z=3"];
+        let found = chosen(&body, &[], &[]).expect("columns");
+        assert_eq!(found.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), expected);
+        // Pressure and rain, and a field that is called as a rate.
+        for headings in [&["t_s", "p", "r"][..], &["t_s", "w_x [uT]"], &["latitude", "quality"]] {
+            assert!(matches!(chosen(headings, &[], &["deg/s"]), Err(SelectionError::NoChannel(_))), "{headings:?}");
+        }
+    }
+
+    /// No column disappears without a word.
+    #[test]
+    fn every_column_is_used_or_named_as_left_out() {
+        let headings = ["time_s", "gx [deg/s]", "gy [deg/s]", "gz [deg/s]", "temp", "my_rate_q", "m_x [V]", "note"];
+        let available: Vec<AvailableColumn> = headings.iter().map(|text| AvailableColumn::from_heading(text)).collect();
+        let sensor = SensorProfile::generic();
+        let selection = ColumnSelection::default();
+        let chosen = selection.choose(&available, &sensor).expect("columns");
+        let notes = selection.notes(&available, &chosen, &sensor);
+        assert_eq!(
+            notes,
+            [
+                "temp left out: no unit; --units gives one",
+                "m_x in V left out: a unit of another quantity than the name; --columns reads it",
+                "my_rate_q, note left out: no known name of a channel; --columns reads it"
+            ]
+        );
     }
 
     #[test]

@@ -25,18 +25,23 @@ pub(crate) const COUNT: &str = "count";
 
 /// The first spelling is the name; all but it are as [`normalized`] leaves them.
 const UNITS: &[(&[&str], &str, f64)] = &[
-    (&["deg/s", "degs", "degs-1", "deg/sec", "dps"], "deg/s", 1.0),
+    (&["deg/s", "degs", "degs-1", "deg/sec", "dps", "degps"], "deg/s", 1.0),
+    (&["rpm", "r/min", "rev/min"], "deg/s", 6.0),
     (&["mdeg/s", "mdegs", "mdps"], "deg/s", 1e-3),
     (&["deg/h", "degh", "deg/hr", "dph"], "deg/s", 1.0 / 3600.0),
-    (&["rad/s", "rads", "rads-1", "rad/sec"], "deg/s", DEGREES),
+    (&["rad/s", "rads", "rads-1", "rad/sec", "radps"], "deg/s", DEGREES),
     (&["mrad/s", "mrads", "mrads-1"], "deg/s", 1e-3 * DEGREES),
     (&["g"], "g", 1.0),
     (&["mg"], "g", 1e-3),
     (&["ug"], "g", 1e-6),
     (&["m/s^2", "m/s2", "ms2", "ms-2", "m/s/s", "mps2", "m/ss"], "g", 1.0 / GRAVITY),
+    (&["cm/s^2", "cm/s2", "cms2", "cms-2"], "g", 1e-2 / GRAVITY),
+    (&["mm/s^2", "mm/s2", "mms2", "mms-2"], "g", 1e-3 / GRAVITY),
+    (&["mGal", "mgal"], "g", 1e-5 / GRAVITY),
     (&["gauss", "gs"], "gauss", 1.0),
     (&["mgauss"], "gauss", 1e-3),
     (&["T", "tesla"], "gauss", 1e4),
+    (&["mT", "mt"], "gauss", 10.0),
     (&["uT", "ut"], "gauss", 1e-2),
     (&["nT", "nt"], "gauss", 1e-5),
     // The origin of the scale does not matter to noise.
@@ -116,8 +121,13 @@ mod tests {
         // 1 rad/s is 57.29578 deg/s; 1 m/s² is 0.1019716 g; 1 µT is 0.01 gauss.
         for (texts, base, factor) in [
             (&["deg/s", "°/s", "dps", "deg_s", "deg_per_s", "deg s^-1"][..], "deg/s", 1.0),
-            (&["rad/s", "rad s^-1", "rad_s", "rad_per_sec", "Rad/S"], "deg/s", 57.295_78),
-            (&["m/s^2", "m s^-2", "m/s²", "m_s2", "m/s**2", "m_per_s2"], "g", 0.101_971_6),
+            (&["rad/s", "rad s^-1", "rad_s", "rad_per_sec", "Rad/S", "radps"], "deg/s", 57.295_78),
+            (&["m/s^2", "m s^-2", "m/s²", "m_s2", "m/s**2", "m_per_s2", "mps2"], "g", 0.101_971_6),
+            (&["cm/s^2", "cm/s²"], "g", 1.019_716e-3),
+            (&["mm/s^2", "mm_s2"], "g", 1.019_716e-4),
+            (&["mGal"], "g", 1.019_716e-6),
+            (&["rpm"], "deg/s", 6.0),
+            (&["mT"], "gauss", 10.0),
             (&["mg"], "g", 1e-3),
             (&["µT", "uT"], "gauss", 0.01),
             (&["°C", "degC", "C"], "degC", 1.0),

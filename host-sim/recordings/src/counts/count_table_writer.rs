@@ -1,11 +1,25 @@
 //! Recordings written as a table of register counts, which [`count_table`](crate::counts::count_table) reads back.
 
 use crate::counts::recording::Recording;
+use crate::input::delimited_text;
+use adis16405_driver::Channel;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
+
+/// Suffix of every column that holds counts.
+const COUNTS: &str = "_counts";
+
+/// Whether a first line names a channel of register counts.
+pub(crate) fn is_header(header: &str) -> bool {
+    let is_channel = |name: &str| {
+        let channel = delimited_text::field(name).strip_suffix(COUNTS);
+        channel.is_some_and(|name| Channel::ALL.iter().any(|channel| channel.name() == name))
+    };
+    header.split([',', ';', '\t', ' ']).any(is_channel)
+}
 
 /// Writes the samples of `recording` as a table, gzip if the name of `file` ends in `.gz`.
 ///

@@ -1,9 +1,8 @@
 //! Recordings written as a NumPy array of doubles in SI units, for programs that know no register counts.
 
 use crate::counts::recording::Recording;
-use npyz::WriterBuilder;
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
 /// Standard gravity, m/s².
@@ -22,30 +21,51 @@ pub fn write(recording: &Recording, file: &Path) -> io::Result<Vec<String>> {
     names.extend(
         recording.channels.iter().zip(&units).map(|(channel, unit)| format!("{}_{}", channel.name(), unit.suffix)),
     );
-    let values = recording.samples.iter().flat_map(|sample| {
+    let mut matrix = MatrixWriter::create(file)?;
+    for sample in &recording.samples {
         let channels = recording.channels.iter().zip(&units).map(|(&channel, unit)| {
             let count = f64::from(sample.counts.get(channel));
             (count * channel.lsb(recording.range) + channel.offset()) * unit.factor
         });
-        sample.time_stamp.time_s.filter(|_| has_time).into_iter().chain(channels)
-    });
-    write_matrix(file, recording.samples.len(), names.len(), values)?;
+        matrix.write_row(sample.time_stamp.time_s.filter(|_| has_time).into_iter().chain(channels))?;
+    }
+    matrix.finish(names.len())?;
     Ok(names)
 }
 
-/// Writes doubles in the order of the rows.
-pub(crate) fn write_matrix(
-    file: &Path,
-    rows: usize,
-    columns: usize,
-    values: impl Iterator<Item = f64>,
-) -> io::Result<()> {
-    let mut out = BufWriter::new(File::create(file)?);
-    let shape = [rows as u64, columns as u64];
-    let mut matrix = npyz::WriteOptions::<f64>::new().default_dtype().shape(&shape).writer(&mut out).begin_nd()?;
-    matrix.extend(values)?;
-    matrix.finish()?;
-    out.flush()
+/// Bytes up to the numbers.
+const HEADER: usize = 128;
+
+/// Writes doubles in the order of the rows: format 1.0 of NumPy, whose header is written when the number of rows is known.
+pub(crate) struct MatrixWriter {
+    out: BufWriter<File>,
+    rows: u64,
+}
+
+impl MatrixWriter {
+    pub(crate) fn create(file: &Path) -> io::Result<Self> {
+        let mut out = BufWriter::new(File::create(file)?);
+        out.write_all(&[b' '; HEADER])?;
+        Ok(Self { out, rows: 0 })
+    }
+
+    pub(crate) fn write_row(&mut self, values: impl Iterator<Item = f64>) -> io::Result<()> {
+        for value in values {
+            self.out.write_all(&value.to_le_bytes())?;
+        }
+        self.rows += 1;
+        Ok(())
+    }
+
+    /// Ends a matrix of so many columns.
+    pub(crate) fn finish(mut self, columns: usize) -> io::Result<()> {
+        let start = [&b"\x93NUMPY\x01\x00"[..], &(HEADER as u16 - 10).to_le_bytes()].concat();
+        let shape = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, {columns}), }}", self.rows);
+        self.out.seek(SeekFrom::Start(0))?;
+        self.out.write_all(&start)?;
+        writeln!(self.out, "{shape:<width$}", width = HEADER - start.len() - 1)?;
+        self.out.flush()
+    }
 }
 
 /// The unit of a column in SI.
@@ -89,9 +109,13 @@ mod tests {
         let names = write(&recorder.finish(), &file).expect("written");
         assert_eq!(names, ["time_s", "gyro_x_rad_s", "accl_z_m_s2", "temp_degC"]);
         let bytes = std::fs::read(&file).expect("a file");
-        let read = npyz::NpyFile::new(&bytes[..]).expect("an array");
-        assert_eq!(read.shape(), [3, 4]);
-        let values: Vec<f64> = read.into_vec().expect("doubles");
+        // numpy.lib.format, version 1.0: magic, version, length of the header, header, and the numbers, aligned to 64 bytes.
+        let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (3, 4), }";
+        assert_eq!(bytes[..10], *b"\x93NUMPY\x01\x00\x76\x00");
+        assert_eq!(std::str::from_utf8(&bytes[10..128]).expect("text").trim_end(), header);
+        assert_eq!((bytes[127], bytes.len()), (b'\n', 128 + 3 * 4 * 8));
+        let values: Vec<f64> =
+            bytes[128..].chunks_exact(8).map(|of| f64::from_le_bytes(of.try_into().expect("eight"))).collect();
         // Data sheet: 0.025 °/s, 3.33 mg and 0.14 °C per count; 25 °C at 0 counts.
         let expected = [0.02, (200.0 * 0.025_f64).to_radians(), -300.0 * 3.33e-3 * 9.806_65, 25.0 + 10.0 * 0.14];
         for (found, expected) in values[8..].iter().zip(expected) {

@@ -3,6 +3,7 @@
 //! [`Recorder`] takes the rows of a table and the bursts from the bus alike and checks both with the driver's
 //! [`BurstValidator`], so that the same words give the same recording either way.
 
+use crate::reading::batch::Verdict;
 use adis16405_driver::{Burst, BurstValidator, Channel, ChannelMask, Counts, Faults, GyroRange};
 
 /// Counts that stand for the channels that a table lacks: 0, and a supply of 5 V (2068 counts of 2.418 mV).
@@ -45,24 +46,11 @@ pub struct RecordedSample {
 }
 
 impl RecordedSample {
-    /// Why no channel of the sample is used: its faults, or that it was `read_twice`. `None` if there is a channel to use.
-    pub(crate) fn cause_of_loss(&self, read_twice: bool) -> Option<&'static str> {
-        if self.refused == ChannelMask::ALL {
-            (self.faults - Faults::WARNINGS).cause()
-        } else {
-            (self.faults & Faults::REPEATED).cause().filter(|_| read_twice)
-        }
-    }
-
-    /// Why the word of `channel` is not used; `None` if it is.
-    pub(crate) fn cause_of_refusal(&self, channel: Channel) -> Option<&'static str> {
-        let is_impossible = self.counts.get(channel).unsigned_abs() > Faults::LARGEST_RATE.unsigned_abs();
-        let fault = match channel {
-            Channel::GyroX | Channel::GyroY | Channel::GyroZ if is_impossible => Faults::IMPOSSIBLE_RATE,
-            Channel::GyroX if self.faults.contains(Faults::X_SIGN) => Faults::X_SIGN,
-            _ => Faults::NO_NEW_DATA,
-        };
-        fault.cause().filter(|_| self.refused.contains(channel))
+    /// What the faults say of the sample.
+    pub(crate) fn verdict(&self) -> Verdict {
+        let is_lost = self.refused == ChannelMask::ALL;
+        let loss = (self.faults - Faults::WARNINGS).cause().filter(|_| is_lost);
+        Verdict { loss, faults: self.faults, refused: self.refused }
     }
 }
 
@@ -110,6 +98,11 @@ impl Recorder {
         // Samples that need more memory than there is fail when they come.
         let _ = self.recording.samples.try_reserve_exact(usize::try_from(samples).unwrap_or(0));
         self
+    }
+
+    /// The channels that are recorded, in the order of the burst.
+    pub(crate) fn channels(&self) -> &[Channel] {
+        &self.recording.channels
     }
 
     /// Adds a burst.

@@ -138,6 +138,8 @@ pub struct SerialRecordingSummary {
     pub restarts: u64,
     /// Whether the recording was ended before its time.
     pub interrupted: bool,
+    /// Bursts until the device hung up or fell silent, where it did after the first of them.
+    pub lost_after: Option<u64>,
     /// Of the link.
     pub counters: DecoderCounters,
 }
@@ -146,7 +148,7 @@ pub struct SerialRecordingSummary {
 /// early, with what came until then, as soon as `is_interrupted` returns true. The file is created at the first burst.
 ///
 /// # Errors
-/// The device is silent or hangs up, or the port or the file fails. The bursts that came until then are in the file.
+/// The device is silent or hangs up before its first burst, or the port or the file fails. The bursts that came until then are in the file.
 pub fn record<P: Read + Write>(
     link: &mut SerialLink<P>,
     file: &Path,
@@ -191,15 +193,28 @@ pub fn record<P: Read + Write>(
     };
     // A device that has disconnected cannot be told; the outcome says so already.
     let _ = link.send_command("w 0");
-    let mut summary =
-        SerialRecordingSummary { bursts: 0, missing: 0, restarts: 0, interrupted: false, counters: link.counters() };
+    let mut summary = SerialRecordingSummary {
+        bursts: 0,
+        missing: 0,
+        restarts: 0,
+        interrupted: false,
+        lost_after: None,
+        counters: link.counters(),
+    };
     let mut finished = Ok(());
     if let Some(recorder) = recorder {
         (summary.bursts, summary.missing, summary.restarts) =
             (recorder.bursts(), recorder.missing(), recorder.restarts());
         finished = recorder.finish().map_err(SerialRecordingError::Log);
     }
-    summary.interrupted = outcome?;
+    // What came until then is in the log, and is as good as without the end.
+    summary.interrupted = match outcome {
+        Err(SerialRecordingError::Disconnected(bursts) | SerialRecordingError::Silent(bursts)) if bursts > 0 => {
+            summary.lost_after = Some(bursts);
+            true
+        }
+        outcome => outcome?,
+    };
     finished?;
     Ok(summary)
 }

@@ -7,7 +7,7 @@ use crate::columns::column_selection::AvailableColumn;
 use crate::formats::topics::{EachRow, Ending, Source, Topic, TopicSensor};
 use crate::input::budget::{Budget, Metered};
 use crate::input::input_error::{InputError, Reason};
-use crate::tables::sensor_table::Number;
+use crate::reading::batch::Number;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read};
@@ -147,7 +147,7 @@ impl Source for ArduPilotSource<'_> {
             each(&picked)
         })?;
         let note = format!("{skipped} bytes of the log are no message and are skipped");
-        Ok(Ending { damage: None, notes: Some(note).filter(|_| skipped > 0).into_iter().collect(), rate_hz: None })
+        Ok(Ending { damage: None, notes: Some(note).filter(|_| skipped > 0).into_iter().collect() })
     }
 }
 

@@ -1,13 +1,12 @@
 //! Arrays of numbers with names, as NumPy, MATLAB and HDF5 keep them: which of them are columns of one table.
 
 use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
-use crate::columns::column_selection::{AvailableColumn, ChosenColumn, known_by_name};
+use crate::columns::column_selection::{AvailableColumn, known_by_name};
 use crate::columns::unit::Unit;
 use crate::formats::topics::{EachRow, Ending, Source, Topic, TopicSensor};
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
-use crate::tables::any_sensor::ReadOptions;
-use crate::tables::sensor_table::Number;
+use crate::reading::batch::Number;
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 
@@ -93,16 +92,11 @@ impl NamedArray {
     }
 }
 
-/// The columns to read of the only array of a file.
-pub(crate) fn choose(array: &NamedArray, options: &ReadOptions) -> Result<Vec<ChosenColumn>, Reason> {
-    let is_named = options.topic.as_ref().is_none_or(|topic| *topic == array.name);
-    let columns = (0..array.columns.len()).filter(|_| is_named);
-    let available: Vec<AvailableColumn> = columns.map(|column| array.available(&array.name, column)).collect();
-    options.choose(&available).map_err(|error| Reason::Selection(Box::new(error)))
-}
+/// Takes the numbers of a row, or the reason why there are no more.
+pub(crate) type EachArrayRow<'a> = dyn FnMut(Result<&[Number], Reason>) -> Result<(), InputError> + 'a;
 
 /// The numbers in the arrays of a file.
-pub(crate) trait ArrayReader {
+pub(crate) trait ArrayReader: Send {
     /// Name of the format.
     const FORMAT: &'static str;
 
@@ -113,6 +107,16 @@ pub(crate) trait ArrayReader {
         columns: &[usize],
         add: &mut dyn FnMut(u64) -> Result<(), Reason>,
     ) -> Result<Vec<Vec<Number>>, Reason>;
+
+    /// Gives the rows of these columns, or the reason why there are no more, without holding them; `None` where the format has to hold them.
+    fn for_each_row(
+        &mut self,
+        _array: usize,
+        _columns: &[usize],
+        _each: &mut EachArrayRow,
+    ) -> Option<Result<(), InputError>> {
+        None
+    }
 }
 
 /// A file with named arrays.
@@ -164,6 +168,13 @@ impl<'a, R: ArrayReader> ArraySource<'a, R> {
         self.topics.push(Topic { name, rows, columns, ..Topic::default() });
         self.members.push(members);
         self.topics.len() - 1
+    }
+
+    /// The rate that the file states for some columns of a topic, Hz, and what states it.
+    fn stated_rate(&self, topic: usize, columns: &[usize]) -> Option<&(f64, String)> {
+        let mut arrays: Vec<usize> = columns.iter().map(|&column| self.places[self.members[topic][column]].0).collect();
+        arrays.sort_unstable();
+        arrays.into_iter().find_map(|array| self.arrays[array].rate.as_ref())
     }
 
     /// The sensor that the arrays directly in `group` are, by their names.
@@ -277,15 +288,27 @@ impl<R: ArrayReader> Source for ArraySource<'_, R> {
         tables
     }
 
+    fn rate_hz(&self, topic: usize, columns: &[usize]) -> Option<f64> {
+        self.stated_rate(topic, columns).map(|(hz, _)| *hz)
+    }
+
     fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError> {
         let file = self.file;
         let fail = |reason| InputError::file(file, reason);
         let places: Vec<(usize, usize)> =
             columns.iter().map(|&column| self.places[self.members[topic][column]]).collect();
         let first = places.first().map_or(0, |(array, _)| *array);
+        let note = |(hz, by): &(f64, String)| format!("the file states a rate of {hz} Hz ({by})");
+        let notes = self.stated_rate(topic, columns).map(note).into_iter().collect();
+        if places.iter().all(|(array, _)| *array == first) {
+            let of_array: Vec<usize> = places.iter().map(|(_, column)| *column).collect();
+            let mut each_row = |row: Result<&[Number], Reason>| each(row.map_err(fail)?);
+            if let Some(streamed) = self.reader.for_each_row(first, &of_array, &mut each_row) {
+                return streamed.map(|()| Ending { damage: None, notes });
+            }
+        }
         let mut values: Vec<Vec<Number>> = vec![Vec::new(); places.len()];
         let mut meter = self.budget.meter();
-        let mut rate: Option<&(f64, String)> = None;
         for (number, array) in self.arrays.iter().enumerate() {
             let own: Vec<usize> = (0..places.len()).filter(|&at| places[at].0 == number).collect();
             if own.is_empty() {
@@ -301,7 +324,6 @@ impl<R: ArrayReader> Source for ArraySource<'_, R> {
             for (at, column) in own.into_iter().zip(read) {
                 values[at] = column;
             }
-            rate = rate.or(array.rate.as_ref());
         }
         let rows = values.iter().map(Vec::len).min().unwrap_or(0);
         let mut row = Vec::with_capacity(values.len());
@@ -310,7 +332,6 @@ impl<R: ArrayReader> Source for ArraySource<'_, R> {
             row.extend(values.iter().map(|column| column[at]));
             each(&row)?;
         }
-        let note = |(hz, by): &(f64, String)| format!("the file states a rate of {hz} Hz ({by})");
-        Ok(Ending { damage: None, notes: rate.map(note).into_iter().collect(), rate_hz: rate.map(|(hz, _)| *hz) })
+        Ok(Ending { damage: None, notes })
     }
 }

@@ -63,6 +63,10 @@ pub(crate) fn time_of_day(text: &str) -> Option<i64> {
         Some(at) => (&clock[..at], offset(&clock[at..])?),
         None => (clock, 0),
     };
+    // Minutes and seconds with a fraction, as of an elapsed time.
+    let is_without_hour = clock.matches(':').count() == 1 && clock.contains('.');
+    let with_hour = format!("0:{clock}");
+    let clock = if is_without_hour { with_hour.as_str() } else { clock };
     let mut parts = clock.split(':');
     let two_digits = |text: &str, below: i64| {
         let is_number = (1..=2).contains(&text.len()) && text.bytes().all(|b| b.is_ascii_digit());

@@ -1,11 +1,10 @@
 //! Which format a file has, by its content; and the reading of any of them.
 
-use crate::columns::column_selection::ColumnSelection;
-use crate::counts::count_table;
+use crate::columns::column_selection::{ColumnSelection, is_output_register};
+use crate::counts::count_table_writer;
 use crate::counts::frame_log;
 use crate::counts::{serial, spi_export};
 use crate::formats::ardupilot_log::{self, ArduPilotSource};
-use crate::formats::betaflight::{self, BlackboxSource};
 use crate::formats::hdf5::{self, Hdf5Reader};
 use crate::formats::matlab::{self, MatReader};
 use crate::formats::mcap_bag::McapSource;
@@ -13,17 +12,22 @@ use crate::formats::numpy::{NpyReader, NpzReader};
 use crate::formats::ros_bag::RosBagSource;
 use crate::formats::sqlite_bag::SqliteSource;
 use crate::formats::sqlite_bag::ZSTD_MAGIC;
+use crate::formats::text_table::TextRows;
 pub use crate::formats::topics::TopicDescription;
-use crate::formats::topics::{self, Source};
+use crate::formats::topics::{self, Source, TopicRows};
 use crate::formats::ulog::UlogSource;
 use crate::formats::{foreign_format, text_table};
 use crate::input::budget::{Budget, Metered};
 use crate::input::delimited_text::Lines;
+use crate::input::file_hash::FileHash;
 use crate::input::gzip_members::{GZIP_MAGIC, GzipMembers};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::{Counted, ReadMonitor};
 use crate::inspection::InspectedTable;
-use crate::tables::any_sensor::{ReadOptions, SensorRecording};
+use crate::reading::row_source::{BatchSource, FileRows, RowSource};
+use crate::tables::any_sensor::ReadOptions;
+use crate::tables::whole_table::WholeTable;
+use adis16405_driver::GyroRange;
 use measurement::{SensorProfile, adis16405};
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
@@ -65,8 +69,6 @@ pub enum FileFormat {
     ArduPilot,
     /// HDF5, which is also MATLAB 7.3.
     Hdf5,
-    /// A blackbox log of Betaflight or INAV.
-    Blackbox,
 }
 
 impl FileFormat {
@@ -86,7 +88,6 @@ impl FileFormat {
             Self::Ulog => "a log of PX4",
             Self::ArduPilot => "a DataFlash log of ArduPilot",
             Self::Hdf5 => "HDF5",
-            Self::Blackbox => "a blackbox log",
         }
     }
 
@@ -97,7 +98,7 @@ impl FileFormat {
 }
 
 /// First bytes of the binary formats.
-const MAGICS: [(&[u8], FileFormat); 9] = [
+const MAGICS: [(&[u8], FileFormat); 8] = [
     (b"\x93NUMPY", FileFormat::Npy),
     (b"PK\x03\x04", FileFormat::Npz),
     (b"MATLAB 5.0 MAT-file", FileFormat::Mat),
@@ -106,7 +107,6 @@ const MAGICS: [(&[u8], FileFormat); 9] = [
     (b"SQLite format 3\0", FileFormat::Sqlite),
     (b"ULog\x01\x12\x35", FileFormat::Ulog),
     (&ardupilot_log::MAGIC, FileFormat::ArduPilot),
-    (betaflight::MAGIC, FileFormat::Blackbox),
 ];
 
 /// An input that can be read more than once: a file, or a copy of what came through a pipe or was compressed.
@@ -205,6 +205,19 @@ impl InputFile {
         self.format
     }
 
+    /// Begins to make the hash of the bytes.
+    ///
+    /// # Errors
+    /// The file cannot be opened.
+    pub fn begin_hash(&self) -> io::Result<FileHash> {
+        FileHash::begin(self.path())
+    }
+
+    /// As the user named it.
+    pub fn name(&self) -> &Path {
+        &self.name
+    }
+
     /// Who watches the reading.
     pub fn monitor(&self) -> &ReadMonitor {
         &self.monitor
@@ -220,21 +233,25 @@ impl InputFile {
         renamed(error, &self.name)
     }
 
-    /// Reads the recording of any sensor.
+    /// The rows of any sensor, or of register counts of an ADIS16405 whose rates were taken in `range`.
     ///
     /// # Errors
     /// The file is damaged, its topic or columns cannot be chosen, or it is a log of the SPI bus.
-    pub fn read(&self, options: &ReadOptions) -> Result<SensorRecording, InputError> {
+    pub(crate) fn batches(
+        &self,
+        options: &ReadOptions,
+        range: Option<GyroRange>,
+    ) -> Result<BatchSource<'_>, InputError> {
         let path = self.path();
-        let table = match self.format {
-            FileFormat::CountTable | FileFormat::TextTable => text_table::read(path, options, &self.monitor),
-            FileFormat::FrameLog | FileFormat::SpiExport => Err(InputError::file(path, Reason::FrameLog)),
+        let rows: Box<dyn RowSource + '_> = match self.format {
+            FileFormat::CountTable | FileFormat::TextTable => Box::new(TextRows::open(path, options, &self.monitor)?),
+            FileFormat::FrameLog | FileFormat::SpiExport => return Err(InputError::file(path, Reason::FrameLog)),
             _ => {
                 let budget = self.budget.again();
-                self.source(budget).and_then(|mut source| topics::read(path, source.as_mut(), options, budget))
+                Box::new(TopicRows::open(path, self.source(budget)?, options, budget)?)
             }
         };
-        table.map(|table| SensorRecording::new(table, &options.sensor)).map_err(|error| self.rename(error))
+        Ok(BatchSource::File(Box::new(FileRows::new(path, rows, &self.monitor, range))))
     }
 
     /// What is in the file without an analysis, of the topic that is named or of all that have an inertial sensor; `selection` is what the
@@ -261,12 +278,17 @@ impl InputFile {
                 self.source(budget).and_then(|mut source| topics::read_whole(path, source.as_mut(), topic, budget))
             }
         };
-        let sensor = match self.format {
-            FileFormat::CountTable => adis16405::profile(adis16405::GYRO_LSB_300),
-            _ => SensorProfile::generic(),
-        };
         let tables = whole.map_err(|error| self.rename(error))?;
-        Ok(tables.into_iter().map(|table| InspectedTable::new(table, &sensor, selection)).collect())
+        let inspect = |table: WholeTable| {
+            let has_registers = table.columns.iter().any(|of| is_output_register(&of.column.name));
+            let sensor = match self.format {
+                FileFormat::CountTable => adis16405::profile(adis16405::GYRO_LSB_300),
+                FileFormat::TextTable if has_registers => adis16405::profile(adis16405::GYRO_LSB_300),
+                _ => SensorProfile::generic(),
+            };
+            InspectedTable::new(table, &sensor, selection)
+        };
+        Ok(tables.into_iter().map(inspect).collect())
     }
 
     /// Names of the sensors of one kind that the file has, each to be read with [`ReadOptions::topic`]; none of a file with one sensor,
@@ -301,7 +323,7 @@ impl InputFile {
             FileFormat::CountTable | FileFormat::TextTable | FileFormat::FrameLog | FileFormat::SpiExport => {
                 return Err(InputError::file(path, Reason::NoTopic { format: "text" }));
             }
-            FileFormat::Npy => Box::new(NpyReader::open(path, budget)?),
+            FileFormat::Npy => Box::new(NpyReader::open(path, budget, &self.monitor)?),
             FileFormat::Npz => Box::new(NpzReader::open(path, budget)?),
             FileFormat::Mat => Box::new(MatReader::open(path, budget)?),
             FileFormat::RosBag => Box::new(RosBagSource::open(path, budget)?),
@@ -310,7 +332,6 @@ impl InputFile {
             FileFormat::Ulog => Box::new(UlogSource::open(path, budget)?),
             FileFormat::ArduPilot => Box::new(ArduPilotSource::open(path, budget)?),
             FileFormat::Hdf5 => Box::new(Hdf5Reader::open(path, budget)?),
-            FileFormat::Blackbox => Box::new(BlackboxSource::open(path)?),
         })
     }
 }
@@ -399,7 +420,7 @@ fn text_format(file: &Path) -> Result<FileFormat, InputError> {
         None => return Err(InputError::file(file, Reason::Empty)),
         Some(frame_log::HEADER) => FileFormat::FrameLog,
         Some(header) if spi_export::is_header(header) => FileFormat::SpiExport,
-        Some(header) if count_table::is_header(header) => FileFormat::CountTable,
+        Some(header) if count_table_writer::is_header(header) => FileFormat::CountTable,
         Some(_) => FileFormat::TextTable,
     })
 }

@@ -30,6 +30,11 @@ const FOREIGN: &[(&[u8], &str, &str)] = &[
         "convert its RAWIMU messages to CSV with NovAtel's program",
     ),
     (b"\xB5\x62", "a binary log of a u-blox receiver (UBX)", "convert its ESF-MEAS messages to CSV"),
+    (
+        b"H Product:Blackbox flight data recorder",
+        "a blackbox log of Betaflight or INAV",
+        "its rates are filtered and rounded by the controller, so that they have no Allan variance of the sensor; record the sensor itself",
+    ),
     (b"%PDF-", "a PDF document", "give the recording itself"),
     (b"\x89PNG", "a picture", "give the recording itself"),
     (b"\x7FELF", "a program", "give the recording itself"),

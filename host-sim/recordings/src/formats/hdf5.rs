@@ -9,7 +9,7 @@ use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray, stated_
 use crate::formats::message_layout::Scalar;
 use crate::input::budget::{Budget, Meter};
 use crate::input::input_error::{InputError, Reason};
-use crate::tables::sensor_table::Number;
+use crate::reading::batch::Number;
 use hdf5_pure::{AttrValue, Dataset, Datatype, DatatypeByteOrder, File, Group};
 use std::collections::HashMap;
 use std::path::Path;
@@ -83,7 +83,7 @@ impl Hdf5Reader {
     pub(crate) fn open(path: &Path, budget: Budget) -> Result<ArraySource<'_, Self>, InputError> {
         let fail = |reason| InputError::file(path, reason);
         let file = File::open_streaming(path).map_err(|error| fail(damaged(error)))?;
-        let mut found = Found { layouts: Vec::new(), arrays: Vec::new(), objects: 0, budget };
+        let mut found = Found { layouts: Vec::new(), arrays: Vec::new(), objects: 0 };
         found.add_group(&file.root(), "", &Stated::default(), 0).map_err(fail)?;
         let Found { layouts, arrays, .. } = found;
         Ok(ArraySource::new(path, Self { file, layouts, meter: budget.meter() }, arrays, budget))
@@ -99,13 +99,11 @@ struct Found {
     layouts: Vec<Layout>,
     arrays: Vec<NamedArray>,
     objects: usize,
-    budget: Budget,
 }
 
 impl Found {
     fn add_group(&mut self, group: &Group, path: &str, around: &Stated, level: usize) -> Result<(), Reason> {
         Budget::check_depth(level)?;
-        self.budget.check_time()?;
         let stated = around.with(&group.attrs().unwrap_or_default(), path);
         for name in group.datasets().map_err(damaged)? {
             self.count()?;

@@ -6,7 +6,7 @@ use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray};
 use crate::formats::message_layout::Scalar;
 use crate::input::budget::{Budget, Meter, Metered};
 use crate::input::input_error::{InputError, Reason};
-use crate::tables::sensor_table::Number;
+use crate::reading::batch::Number;
 use flate2::read::ZlibDecoder;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};

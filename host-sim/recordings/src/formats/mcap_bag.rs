@@ -116,6 +116,6 @@ impl Source for McapSource<'_> {
             }
             _ => Ok(()),
         })?;
-        Ok(Ending { damage, notes: rows.notes(), rate_hz: None })
+        Ok(Ending { damage, notes: rows.notes() })
     }
 }

@@ -6,7 +6,7 @@
 
 use crate::input::budget::Budget;
 use crate::input::input_error::Reason;
-use crate::tables::sensor_table::Number;
+use crate::reading::batch::Number;
 use std::collections::HashMap;
 
 /// Elements of an array that are columns of their own.

@@ -1,19 +1,17 @@
 //! Arrays of NumPy: `.npy` and `.npz`.
 
-use crate::columns::column_selection::ChosenColumn;
 use crate::columns::unit::Unit;
 use crate::counts::recording::MAX_SAMPLES;
-use crate::formats::array_topics::{self, ArrayReader, ArraySource, NamedArray};
+use crate::formats::array_topics::{ArrayReader, ArraySource, EachArrayRow, NamedArray};
 use crate::formats::message_layout::Scalar;
+use crate::formats::numpy_header::{ElementType, Encoding, Header};
 use crate::input::budget::{Budget, Meter, Metered};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::{Counted, ReadMonitor};
-use crate::tables::any_sensor::ReadOptions;
-use crate::tables::sensor_table::{Number, TableBuilder};
-use npyz::{DType, Endianness, NpyHeader, Order, TypeChar, TypeStr};
+use crate::reading::batch::Number;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use zip::ZipArchive;
 
 /// Columns of a matrix beyond which it is no recording.
@@ -22,25 +20,47 @@ const MAX_COLUMNS: u64 = 1024;
 const OBJECTS: &str = "holds Python objects, which are not read; of a dict of arrays, in Python: \
                        numpy.savez(\"FILE.npz\", **numpy.load(\"FILE\", allow_pickle=True).item())";
 
-/// Brackets within brackets in the header of an array; fields within fields, which are not read, have five.
-const MOST_BRACKETS: usize = 8;
-/// Bytes of the header of an array of [`MAX_COLUMNS`] named fields, with room.
-const MOST_HEADER_BYTES: u64 = 1 << 20;
+/// Rows of an array that are read at once.
+const ROWS_AT_ONCE: usize = 4096;
 
 /// An open `.npy` file.
 pub(crate) struct NpyReader {
-    input: BufReader<File>,
+    input: BufReader<Counted<File>>,
     layout: ArrayLayout,
+    /// Where the numbers begin, bytes.
+    start: u64,
 }
 
 impl NpyReader {
-    /// Opens a file whose numbers are held in memory.
-    pub(crate) fn open(file: &Path, budget: Budget) -> Result<ArraySource<'_, Self>, InputError> {
+    /// Opens a file.
+    pub(crate) fn open<'a>(
+        file: &'a Path,
+        budget: Budget,
+        monitor: &ReadMonitor,
+    ) -> Result<ArraySource<'a, Self>, InputError> {
         let fail = |reason| InputError::file(file, reason);
-        let mut input = BufReader::new(File::open(file).map_err(|error| fail(Reason::Io(error)))?);
+        let io = |error| fail(Reason::Io(error));
+        let mut input = BufReader::new(Counted::new(File::open(file).map_err(io)?, monitor));
         let layout = ArrayLayout::read(&mut input, "").map_err(fail)?;
+        let start = input.stream_position().map_err(io)?;
         let arrays = vec![layout.array()];
-        Ok(ArraySource::new(file, Self { input, layout }, arrays, budget))
+        Ok(ArraySource::new(file, Self { input, layout, start }, arrays, budget))
+    }
+
+    /// The bytes of some rows from `first` on: of each of `columns`, or of whole rows.
+    fn fill(&mut self, first: usize, columns: &[usize], buffers: &mut [Vec<u8>]) -> Result<usize, Reason> {
+        let Self { layout, input, start } = self;
+        let rows = ROWS_AT_ONCE.min(layout.rows - first);
+        for (buffer, column) in buffers.iter_mut().zip(columns) {
+            let before = if layout.by_column { column * layout.rows + first } else { first };
+            input.seek(SeekFrom::Start(*start + (before * layout.stride) as u64)).map_err(Reason::Io)?;
+            buffer.resize(rows * layout.stride, 0);
+            input.read_exact(buffer).map_err(|error| match error.kind() {
+                io::ErrorKind::UnexpectedEof => Reason::Truncated { format: "NumPy array" },
+                _ => Reason::Io(error),
+            })?;
+        }
+        Ok(rows)
     }
 }
 
@@ -53,95 +73,38 @@ impl ArrayReader for NpyReader {
         columns: &[usize],
         add: &mut dyn FnMut(u64) -> Result<(), Reason>,
     ) -> Result<Vec<Vec<Number>>, Reason> {
+        self.input.seek(SeekFrom::Start(self.start)).map_err(Reason::Io)?;
         self.layout.columns(&mut self.input, columns, add)
     }
-}
 
-/// Rows of an array that are read at once.
-const ROWS_AT_ONCE: usize = 4096;
-
-/// An open `.npy` file, read row by row.
-pub(crate) struct NpyRows {
-    file: PathBuf,
-    input: Counted<File>,
-    monitor: ReadMonitor,
-    layout: ArrayLayout,
-    chosen: Vec<ChosenColumn>,
-    /// Where the numbers begin, bytes.
-    start: u64,
-    next: usize,
-    /// Bytes of the rows that were read at once: of each chosen column, or of whole rows.
-    buffers: Vec<Vec<u8>>,
-    row: Vec<Number>,
-    is_stopped: bool,
-}
-
-impl NpyRows {
-    /// Opens a file and chooses its columns.
-    pub(crate) fn open(file: &Path, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
-        let fail = |reason| InputError::file(file, reason);
-        let io = |error| fail(Reason::Io(error));
-        monitor.begin();
-        let mut input = Counted::new(File::open(file).map_err(io)?, monitor);
-        let layout = ArrayLayout::read(&mut input, "").map_err(fail)?;
-        let chosen = array_topics::choose(&layout.array(), options).map_err(fail)?;
-        let start = input.stream_position().map_err(io)?;
-        let buffers = vec![Vec::new(); if layout.by_column { chosen.len() } else { 1 }];
-        let (file, monitor, row) = (file.to_owned(), monitor.clone(), Vec::with_capacity(chosen.len()));
-        Ok(Self { file, input, monitor, layout, chosen, start, next: 0, buffers, row, is_stopped: false })
-    }
-
-    /// The columns that are read.
-    pub(crate) fn chosen(&self) -> &[ChosenColumn] {
-        &self.chosen
-    }
-
-    /// Whether the reading was stopped before the end of the array.
-    pub(crate) fn is_stopped(&self) -> bool {
-        self.is_stopped
-    }
-
-    /// Adds the next row to `builder`; false at the end.
-    pub(crate) fn add_row(&mut self, builder: &mut TableBuilder) -> Result<bool, InputError> {
-        self.is_stopped |= self.monitor.take_stop();
-        if self.is_stopped || self.next == self.layout.rows {
-            self.monitor.end();
-            return Ok(false);
-        }
-        let at = self.next % ROWS_AT_ONCE;
-        if at == 0 {
-            self.fill().map_err(|reason| InputError::file(&self.file, reason))?;
-        }
-        let Self { layout, buffers, row, chosen, .. } = self;
-        row.clear();
-        row.extend(chosen.iter().enumerate().map(|(number, column)| {
-            let field = &layout.fields[column.position];
-            let (buffer, offset) = if layout.by_column { (number, 0) } else { (0, field.offset) };
-            decode(&field.encoding, &buffers[buffer][at * layout.stride + offset..])
-        }));
-        self.next += 1;
-        builder.push(&self.row).map(|()| true).map_err(|(column, reason)| {
-            let label = self.chosen.get(column).map_or("", |column| column.label.as_str());
-            InputError::row(&self.file, self.next as u64, label, reason)
-        })
-    }
-
-    /// Reads the rows from the next one on.
-    fn fill(&mut self) -> Result<(), Reason> {
-        let Self { layout, buffers, chosen, input, .. } = self;
-        let bytes = ROWS_AT_ONCE.min(layout.rows - self.next) * layout.stride;
-        for (buffer, column) in buffers.iter_mut().zip(chosen) {
-            if layout.by_column {
-                let first = (column.position * layout.rows + self.next) as u64;
-                input.seek(SeekFrom::Start(self.start + first * layout.stride as u64)).map_err(Reason::Io)?;
+    fn for_each_row(
+        &mut self,
+        _array: usize,
+        columns: &[usize],
+        each: &mut EachArrayRow,
+    ) -> Option<Result<(), InputError>> {
+        let mut buffers = vec![Vec::new(); if self.layout.by_column { columns.len() } else { 1 }];
+        let mut row = Vec::with_capacity(columns.len());
+        let mut first = 0;
+        while first < self.layout.rows {
+            let rows = match self.fill(first, columns, &mut buffers) {
+                Ok(rows) => rows,
+                Err(reason) => return Some(each(Err(reason))),
+            };
+            for at in 0..rows {
+                row.clear();
+                row.extend(columns.iter().enumerate().map(|(number, &column)| {
+                    let field = &self.layout.fields[column];
+                    let (buffer, offset) = if self.layout.by_column { (number, 0) } else { (0, field.offset) };
+                    decode(&field.encoding, &buffers[buffer][at * self.layout.stride + offset..])
+                }));
+                if let Err(error) = each(Ok(&row)) {
+                    return Some(Err(error));
+                }
             }
-            buffer.resize(bytes, 0);
-            input.read_exact(buffer).map_err(|error| match error.kind() {
-                io::ErrorKind::UnexpectedEof => Reason::Truncated { format: "NumPy array" },
-                _ => Reason::Io(error),
-            })?;
+            first += rows;
         }
-        Ok(())
+        Some(Ok(()))
     }
 }
 
@@ -160,7 +123,6 @@ impl NpzReader {
         let mut archive = ZipArchive::new(input).map_err(|error| fail(damaged(error)))?;
         let mut layouts: Vec<(usize, ArrayLayout)> = Vec::new();
         for number in 0..archive.len() {
-            budget.check_time().map_err(fail)?;
             if let Some(layout) = entry_layout(&mut archive, number).map_err(fail)? {
                 layouts.push((number, layout));
             }
@@ -221,43 +183,7 @@ fn damaged(error: zip::result::ZipError) -> Reason {
 struct FieldLayout {
     name: String,
     offset: usize,
-    encoding: TypeStr,
-}
-
-/// The bytes up to the numbers, checked for what its parser does not survive: it takes twice the time for each level of brackets.
-fn checked_header(input: &mut impl Read) -> Result<Vec<u8>, Reason> {
-    let damaged = |error: io::Error| Reason::Format { format: "NumPy array", error: error.to_string().into() };
-    let truncated = || Reason::Truncated { format: "NumPy array" };
-    let mut bytes = Vec::new();
-    let mut take = |count: u64, bytes: &mut Vec<u8>| {
-        let read = input.by_ref().take(count).read_to_end(bytes).map_err(damaged)?;
-        if read as u64 == count { Ok(()) } else { Err(truncated()) }
-    };
-    // The magic and two numbers of the version; then the length of the rest, of two bytes in version 1.
-    take(8, &mut bytes)?;
-    let length_bytes = if bytes[6] == 1 { 2 } else { 4 };
-    take(length_bytes, &mut bytes)?;
-    let mut length = [0; 8];
-    length[..bytes.len() - 8].copy_from_slice(&bytes[8..]);
-    let length = u64::from_le_bytes(length);
-    if length > MOST_HEADER_BYTES {
-        return Err(Reason::Array(format!("the header of the array has {length} bytes")));
-    }
-    let start = bytes.len();
-    take(length, &mut bytes)?;
-    let (mut open, mut quoted) = (0usize, false);
-    for byte in &bytes[start..] {
-        match byte {
-            b'\'' | b'"' => quoted = !quoted,
-            b'[' | b'(' | b'{' if !quoted => open += 1,
-            b']' | b')' | b'}' if !quoted => open = open.saturating_sub(1),
-            _ => {}
-        }
-        if open > MOST_BRACKETS {
-            return Err(Reason::TooDeep { most: MOST_BRACKETS });
-        }
-    }
-    Ok(bytes)
+    encoding: Encoding,
 }
 
 /// How an array lies in its file.
@@ -276,14 +202,13 @@ struct ArrayLayout {
 impl ArrayLayout {
     /// Reads the header; the numbers follow in `input`.
     fn read(input: &mut impl Read, name: &str) -> Result<Self, Reason> {
-        let damaged = |error: io::Error| Reason::Format { format: "NumPy array", error: error.to_string().into() };
         let unusable = |what: String| Reason::Array(format!("array {name:?} {what}"));
-        let header = NpyHeader::from_reader(checked_header(input)?.as_slice()).map_err(damaged)?;
-        let (outer, inner, first_is_time) = match *header.shape() {
+        let Header { element, is_fortran_order, shape } = Header::read(input)?;
+        let (outer, inner, first_is_time) = match *shape.as_slice() {
             [] => (1, 1, true),
             [rows] => (rows, 1, true),
             [rows, columns] => (rows.max(columns), rows.min(columns), rows >= columns),
-            ref shape => return Err(unusable(format!("has {} dimensions; a recording has 1 or 2", shape.len()))),
+            _ => return Err(unusable(format!("has {} dimensions; a recording has 1 or 2", shape.len()))),
         };
         if inner > MAX_COLUMNS {
             return Err(unusable(format!("has {inner} columns, more than {MAX_COLUMNS}")));
@@ -291,37 +216,37 @@ impl ArrayLayout {
         let mut unit = None;
         let mut fields = Vec::new();
         let mut stride = 0usize;
-        let mut add = |name: String, encoding: &TypeStr| -> Result<(), Reason> {
-            let bytes = encoding.num_bytes().filter(|_| is_number(encoding));
-            if encoding.type_char() == TypeChar::Object {
+        let mut add = |name: String, encoding: &Encoding| -> Result<(), Reason> {
+            if encoding.kind == 'O' {
                 return Err(unusable(OBJECTS.to_owned()));
             }
-            let bytes = bytes.ok_or_else(|| unusable(format!("holds no numbers but {encoding}")))?;
-            let units = encoding.time_units().map(npyz::TimeUnits::to_str);
-            unit = unit.or_else(|| units.and_then(Unit::parse));
+            if !encoding.is_number() {
+                return Err(unusable(format!("holds no numbers but {}", encoding.text)));
+            }
+            unit = unit.or_else(|| encoding.time_unit().and_then(Unit::parse));
             fields.push(FieldLayout { name, offset: stride, encoding: encoding.clone() });
-            stride += bytes;
+            stride += encoding.bytes;
             Ok(())
         };
-        let is_plain = match header.dtype() {
-            DType::Record(named) => {
+        let is_plain = match element {
+            ElementType::Record(named) => {
                 if inner > 1 {
                     return Err(unusable("is a matrix of records".to_owned()));
                 }
                 let mut plain = Vec::new();
-                for field in &named {
-                    flatten(&field.name, &field.dtype, &mut plain).map_err(unusable)?;
+                for (name, field) in &named {
+                    flatten(name, field, &mut plain).map_err(unusable)?;
                 }
                 plain.into_iter().try_for_each(|(name, encoding)| add(name, encoding))?;
                 false
             }
-            DType::Plain(encoding) => {
+            ElementType::Plain(encoding) => {
                 (0..inner).try_for_each(|number| add(number.to_string(), &encoding))?;
                 true
             }
-            DType::Array(..) => return Err(unusable("has rows within rows".to_owned())),
+            ElementType::Array(..) => return Err(unusable("has rows within rows".to_owned())),
         };
-        let by_column = is_plain && inner > 1 && (header.order() == Order::C) != first_is_time;
+        let by_column = is_plain && inner > 1 && is_fortran_order == first_is_time;
         let stride = if by_column { stride / fields.len().max(1) } else { stride };
         Ok(Self { name: name.to_owned(), rows: outer as usize, fields, stride, by_column, unit })
     }
@@ -374,10 +299,10 @@ impl ArrayLayout {
 }
 
 /// Adds the numbers in a field of a record: `gyro.0` of an array in it, `imu.gx` of a record in it.
-fn flatten<'a>(name: &str, dtype: &'a DType, plain: &mut Vec<(String, &'a TypeStr)>) -> Result<(), String> {
-    match dtype {
-        DType::Plain(encoding) => plain.push((name.to_owned(), encoding)),
-        DType::Array(count, inner) => {
+fn flatten<'a>(name: &str, element: &'a ElementType, plain: &mut Vec<(String, &'a Encoding)>) -> Result<(), String> {
+    match element {
+        ElementType::Plain(encoding) => plain.push((name.to_owned(), encoding)),
+        ElementType::Array(count, inner) => {
             for number in 0..*count {
                 let before = plain.len();
                 flatten(&format!("{name}.{number}"), inner, plain)?;
@@ -387,9 +312,9 @@ fn flatten<'a>(name: &str, dtype: &'a DType, plain: &mut Vec<(String, &'a TypeSt
                 }
             }
         }
-        DType::Record(fields) => {
-            for field in fields {
-                flatten(&format!("{name}.{}", field.name), &field.dtype, plain)?;
+        ElementType::Record(fields) => {
+            for (of_field, field) in fields {
+                flatten(&format!("{name}.{of_field}"), field, plain)?;
             }
         }
     }
@@ -397,29 +322,19 @@ fn flatten<'a>(name: &str, dtype: &'a DType, plain: &mut Vec<(String, &'a TypeSt
     if plain.len() as u64 > most { Err(format!("has more than {most} columns")) } else { Ok(()) }
 }
 
-/// Whether [`decode`] knows the encoding.
-fn is_number(encoding: &TypeStr) -> bool {
-    match encoding.type_char() {
-        TypeChar::Int | TypeChar::Uint | TypeChar::Bool => matches!(encoding.num_bytes(), Some(1 | 2 | 4 | 8)),
-        TypeChar::Float => matches!(encoding.num_bytes(), Some(2 | 4 | 8)),
-        TypeChar::TimeDelta | TypeChar::DateTime => encoding.num_bytes() == Some(8),
-        _ => false,
-    }
-}
-
 /// The number at the start of `bytes`; NaN where they are too few.
-fn decode(encoding: &TypeStr, bytes: &[u8]) -> Number {
-    let size = encoding.num_bytes().unwrap_or(0);
+fn decode(encoding: &Encoding, bytes: &[u8]) -> Number {
+    let size = encoding.bytes;
     let Some(own) = bytes.get(..size).filter(|own| own.len() <= 8) else { return Number::Real(f64::NAN) };
     let mut word = [0; 8];
     for (at, &byte) in own.iter().enumerate() {
-        word[if encoding.endianness() == Endianness::Big { size - 1 - at } else { at }] = byte;
+        word[if encoding.is_big_endian { size - 1 - at } else { at }] = byte;
     }
     let bits = u64::from_le_bytes(word);
     let unused = 64 - 8 * size as u32;
-    match (encoding.type_char(), size) {
-        (TypeChar::Float, _) => Scalar::Float(size as u8).number(bits),
-        (TypeChar::Uint | TypeChar::Bool, _) => i64::try_from(bits).map_or(Number::Real(bits as f64), Number::Integer),
+    match encoding.kind {
+        'f' => Scalar::Float(size as u8).number(bits),
+        'u' | 'b' => i64::try_from(bits).map_or(Number::Real(bits as f64), Number::Integer),
         _ => Number::Integer((bits << unused).cast_signed() >> unused),
     }
 }

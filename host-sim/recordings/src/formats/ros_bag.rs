@@ -1,27 +1,74 @@
 //! Bags of ROS 1 (`.bag`, format 2.0): the definition of each type of message is in the connection of its topic.
+//!
+//! A bag is a row of records, each a header of named fields and its data; messages lie in chunks, which may be compressed. What a record says of
+//! its own length is believed as far as the bytes come. The index at the end is used where there is one: a bag of a recording that was
+//! interrupted has none, and is read from its start.
 
 use crate::formats::message_layout::{Encoding, MessageLayout};
 use crate::formats::ros_definition::{self, RosVersion};
 use crate::formats::ros_message::{self, RosRows};
 use crate::formats::topics::{EachRow, Ending, Source, Topic};
-use crate::input::budget::Budget;
+use crate::input::budget::{Budget, Meter, Metered};
 use crate::input::input_error::{InputError, Reason};
-use rosbag::{ChunkRecord, IndexRecord, MessageRecord, RosBag};
+use bzip2::read::BzDecoder;
+use lz4_flex::frame::FrameDecoder;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
-use std::io::Read;
+use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
 
 const FORMAT: &str = "ROS 1 bag";
+/// First line of every bag.
+const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
+/// Bytes of the header of a record, of which the definition of a message is none.
+const MOST_HEADER_BYTES: u32 = 1 << 20;
+/// Bytes of a message, or of the definition of one: images have some of ten million.
+const MOST_DATA_BYTES: u32 = 1 << 28;
 
-/// Where the bag header of ROS 1 states the position of the index, in the first bytes of the file.
-const BAG_HEADER: u64 = 4096 + 64;
-const INDEX_POSITION: &[u8] = b"index_pos=";
+/// Kinds of records.
+const MESSAGE: u8 = 2;
+const BAG_HEADER: u8 = 3;
+const CHUNK: u8 = 5;
+const CHUNK_INFO: u8 = 6;
+const CONNECTION: u8 = 7;
+
+/// A record that is used.
+enum Record<'a> {
+    /// What is published on a topic, and by which definition.
+    Connection(Connection),
+    /// Of how many messages of each connection a chunk is.
+    ChunkInfo(&'a [u8]),
+    /// A message of a connection, and when it was recorded, ns.
+    Message { connection: u32, recorded_ns: i64, data: &'a [u8] },
+}
+
+struct Connection {
+    id: u32,
+    topic: String,
+    kind: String,
+    definition: String,
+}
+
+/// What ends the reading.
+enum Stop {
+    /// The consumer's refusal.
+    Refusal(InputError),
+    /// Damage, a limit, or the disk.
+    Reason(Reason),
+}
+
+impl From<Reason> for Stop {
+    fn from(reason: Reason) -> Self {
+        Self::Reason(reason)
+    }
+}
+
+/// Takes the records of a bag.
+type EachRecord<'a> = dyn FnMut(Record) -> Result<(), InputError> + 'a;
 
 /// An open bag.
 pub(crate) struct RosBagSource<'a> {
     file: &'a Path,
-    bag: RosBag,
     topics: Vec<Topic>,
     /// Of each topic.
     layouts: Vec<MessageLayout>,
@@ -29,33 +76,46 @@ pub(crate) struct RosBagSource<'a> {
     budget: Budget,
 }
 
+/// A topic that is found, with the identities of its connections.
+struct FoundTopic {
+    kind: String,
+    definition: String,
+    connections: BTreeSet<u32>,
+}
+
 impl<'a> RosBagSource<'a> {
     pub(crate) fn open(file: &'a Path, budget: Budget) -> Result<Self, InputError> {
         let fail = |reason| InputError::file(file, reason);
-        check_index(file).map_err(fail)?;
-        let bag = RosBag::new(file).map_err(|error| fail(Reason::Io(error)))?;
-        let mut found: BTreeMap<String, (String, String, BTreeSet<u32>)> = BTreeMap::new();
+        let mut found: BTreeMap<String, FoundTopic> = BTreeMap::new();
         let mut counts: BTreeMap<u32, u64> = BTreeMap::new();
-        for record in bag.index_records() {
-            match record.map_err(|error| fail(damaged(error)))? {
-                IndexRecord::Connection(connection) => {
-                    let new = || (connection.tp.to_owned(), connection.message_definition.to_owned(), BTreeSet::new());
-                    let (kind, _, ids) = found.entry(connection.storage_topic.to_owned()).or_insert_with(new);
+        let mut input = BagBytes::open(file).map_err(fail)?;
+        let has_index = input.seek_index().map_err(fail)?;
+        let damage = for_each_record(file, &mut input, budget, &mut |record| {
+            match record {
+                Record::Connection(Connection { id, topic, kind, definition }) => {
+                    let new = || FoundTopic { kind: kind.clone(), definition, connections: BTreeSet::new() };
+                    let known = found.entry(topic).or_insert_with(new);
                     // A topic has one type; of another only the first is read.
-                    if kind == connection.tp {
-                        ids.insert(connection.id);
+                    if known.kind == kind {
+                        known.connections.insert(id);
                     }
                 }
-                IndexRecord::ChunkInfo(chunk) => {
-                    for entry in chunk.entries() {
-                        *counts.entry(entry.conn_id).or_insert(0) += u64::from(entry.count);
+                Record::ChunkInfo(data) => {
+                    for entry in data.chunks_exact(8) {
+                        let [id, count] = [0, 4].map(|at| number(entry.get(at..at + 4).unwrap_or_default()));
+                        *counts.entry(id as u32).or_insert(0) += count;
                     }
                 }
-                IndexRecord::IndexData(_) => {}
+                Record::Message { connection, .. } if !has_index => *counts.entry(connection).or_insert(0) += 1,
+                Record::Message { .. } => {}
             }
+            Ok(())
+        })?;
+        if let Some(damage) = damage.filter(|damage| found.is_empty() || damage.is_limit()) {
+            return Err(fail(damage));
         }
         let (mut topics, mut layouts, mut connections) = (Vec::new(), Vec::new(), Vec::new());
-        for (name, (kind, definition, ids)) in found {
+        for (name, FoundTopic { kind, definition, connections: ids }) in found {
             // A definition that cannot be understood leaves its topic out.
             let Ok(layout) = ros_definition::layout(&kind, &definition, RosVersion::Ros1) else { continue };
             let rows = ids.iter().filter_map(|id| counts.get(id)).sum();
@@ -63,12 +123,8 @@ impl<'a> RosBagSource<'a> {
             layouts.push(layout);
             connections.push(ids);
         }
-        Ok(Self { file, bag, topics, layouts, connections, budget })
+        Ok(Self { file, topics, layouts, connections, budget })
     }
-}
-
-fn damaged(error: rosbag::Error) -> Reason {
-    Reason::Format { format: FORMAT, error: error.to_string().into() }
 }
 
 impl Source for RosBagSource<'_> {
@@ -82,46 +138,306 @@ impl Source for RosBagSource<'_> {
 
     fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError> {
         let mut rows = RosRows::new(&self.layouts[topic], Encoding::Packed, columns);
-        let mut meter = self.budget.meter();
-        let mut damage = None;
-        'chunks: for chunk in self.bag.chunk_records() {
-            let chunk = match chunk {
-                Ok(ChunkRecord::Chunk(chunk)) => chunk,
-                Ok(ChunkRecord::IndexData(_)) => continue,
-                Err(error) => {
-                    damage = Some(damaged(error));
-                    break;
-                }
-            };
-            for message in chunk.messages() {
-                match message {
-                    Ok(MessageRecord::MessageData(message)) => {
-                        let add = meter.add_bytes(message.data.len() as u64);
-                        add.map_err(|reason| InputError::file(self.file, reason))?;
-                        if self.connections[topic].contains(&message.conn_id) {
-                            each(rows.row(message.data, i64::try_from(message.time).ok()))?;
-                        }
-                    }
-                    Ok(_) => {}
-                    Err(error) => {
-                        damage = Some(damaged(error));
-                        break 'chunks;
-                    }
-                }
+        let connections = &self.connections[topic];
+        let mut input = BagBytes::open(self.file).map_err(|reason| InputError::file(self.file, reason))?;
+        let damage = for_each_record(self.file, &mut input, self.budget, &mut |record| match record {
+            Record::Message { connection, recorded_ns, data } if connections.contains(&connection) => {
+                each(rows.row(data, Some(recorded_ns)))
             }
-        }
-        Ok(Ending { damage, notes: rows.notes(), rate_hz: None })
+            _ => Ok(()),
+        })?;
+        Ok(Ending { damage, notes: rows.notes() })
     }
 }
 
-/// Refuses a bag without an index, which the reader of bags does not survive: that of a recording that was interrupted.
-fn check_index(file: &Path) -> Result<(), Reason> {
-    let mut head = Vec::new();
-    let input = File::open(file).map_err(Reason::Io)?;
-    let length = input.metadata().map_err(Reason::Io)?.len();
-    input.take(BAG_HEADER).read_to_end(&mut head).map_err(Reason::Io)?;
-    let at = head.windows(INDEX_POSITION.len()).position(|window| window == INDEX_POSITION);
-    let bytes = at.and_then(|at| head.get(at + INDEX_POSITION.len()..)?.first_chunk::<8>());
-    let position = bytes.map_or(0, |bytes| u64::from_le_bytes(*bytes));
-    if (BAG_HEADER - 64..=length).contains(&position) { Ok(()) } else { Err(Reason::NoIndex) }
+/// The bytes of a bag behind its first line.
+struct BagBytes {
+    input: BufReader<File>,
+}
+
+impl BagBytes {
+    fn open(file: &Path) -> Result<Self, Reason> {
+        let mut input = BufReader::new(File::open(file).map_err(Reason::Io)?);
+        input.seek(SeekFrom::Start(MAGIC.len() as u64)).map_err(Reason::Io)?;
+        Ok(Self { input })
+    }
+
+    /// Goes to the index, if there is one.
+    fn seek_index(&mut self) -> Result<bool, Reason> {
+        let start = MAGIC.len() as u64;
+        let length = self.input.get_ref().metadata().map_err(Reason::Io)?.len();
+        let (mut header, mut data) = (Vec::new(), Vec::new());
+        let is_read = next_record(&mut self.input, &mut header).is_ok_and(|is_one| is_one)
+            && read_data(&mut self.input, &mut data).is_ok();
+        let index = field(&header, b"index_pos").map_or(0, number);
+        let has_index = is_read && kind(&header) == Some(BAG_HEADER) && (start + 1..length).contains(&index);
+        self.input.seek(SeekFrom::Start(if has_index { index } else { start })).map_err(Reason::Io)?;
+        Ok(has_index)
+    }
+}
+
+/// Calls `each` with the records from here on; why there are no more, where the bag is damaged or ends early.
+fn for_each_record(
+    file: &Path,
+    input: &mut BagBytes,
+    budget: Budget,
+    each: &mut EachRecord,
+) -> Result<Option<Reason>, InputError> {
+    let mut meter = budget.meter();
+    match read_records(&mut input.input, &mut meter, true, each) {
+        Ok(()) => Ok(None),
+        Err(Stop::Refusal(error)) => Err(error),
+        Err(Stop::Reason(Reason::Io(error))) => Err(InputError::file(file, Reason::Io(error))),
+        Err(Stop::Reason(reason)) => Ok(Some(reason)),
+    }
+}
+
+fn read_records(input: &mut dyn Read, meter: &mut Meter, has_chunks: bool, each: &mut EachRecord) -> Result<(), Stop> {
+    let (mut header, mut data) = (Vec::new(), Vec::new());
+    while next_record(input, &mut header)? {
+        let kind = kind(&header);
+        if kind == Some(CHUNK) && has_chunks {
+            let mut length = [0; 4];
+            fill(input, &mut length)?;
+            read_chunk(&mut Read::take(&mut *input, number(&length)), &header, meter, each)?;
+            continue;
+        }
+        read_data(input, &mut data)?;
+        let id = field(&header, b"conn").map(|value| number(value) as u32);
+        let record = match (kind, id) {
+            (Some(MESSAGE), Some(connection)) => {
+                let time = field(&header, b"time").unwrap_or_default();
+                let [seconds, nanos] = [0, 4].map(|at| number(time.get(at..at + 4).unwrap_or_default()) as i64);
+                Record::Message { connection, recorded_ns: seconds * 1_000_000_000 + nanos, data: &data }
+            }
+            (Some(CONNECTION), Some(id)) => {
+                let text =
+                    |of: &[u8], name: &[u8]| String::from_utf8_lossy(field(of, name).unwrap_or_default()).into_owned();
+                let [kind, definition] = [&b"type"[..], b"message_definition"].map(|name| text(&data, name));
+                Record::Connection(Connection { id, topic: text(&header, b"topic"), kind, definition })
+            }
+            (Some(CHUNK_INFO), _) => Record::ChunkInfo(&data),
+            _ => continue,
+        };
+        each(record).map_err(Stop::Refusal)?;
+    }
+    Ok(())
+}
+
+/// Reads the records of a chunk, of which `input` has the bytes.
+fn read_chunk(input: &mut dyn Read, header: &[u8], meter: &mut Meter, each: &mut EachRecord) -> Result<(), Stop> {
+    let read = match field(header, b"compression") {
+        Some(b"none") => read_records(input, meter, false, each),
+        Some(b"lz4") => {
+            let expanded = Metered::new(FrameDecoder::new(&mut *input), &mut *meter);
+            read_expanded(expanded, each)
+        }
+        Some(b"bz2") => {
+            let expanded = Metered::new(BzDecoder::new(&mut *input), &mut *meter);
+            read_expanded(expanded, each)
+        }
+        other => {
+            let name = String::from_utf8_lossy(other.unwrap_or_default()).into_owned();
+            Err(damaged(format!("a chunk is compressed by {name:?}")).into())
+        }
+    };
+    read?;
+    // Padding behind the compressed data.
+    io::copy(input, &mut io::sink()).map_err(|error| Stop::Reason(Reason::Io(error)))?;
+    Ok(())
+}
+
+/// The records of decompressed data, which are counted as they come.
+fn read_expanded(expanded: impl Read, each: &mut EachRecord) -> Result<(), Stop> {
+    let mut none = Budget::new(0).meter();
+    read_records(&mut BufReader::new(expanded), &mut none, false, each)
+}
+
+/// Reads the header of the next record; false at the end.
+fn next_record(input: &mut dyn Read, header: &mut Vec<u8>) -> Result<bool, Reason> {
+    let mut length = [0; 4];
+    let read = Read::take(&mut *input, 1).read(&mut length).map_err(refused)?;
+    if read == 0 {
+        return Ok(false);
+    }
+    fill(input, &mut length[1..])?;
+    let length = u32::from_le_bytes(length);
+    if length > MOST_HEADER_BYTES {
+        return Err(damaged(format!("the header of a record has {length} bytes")));
+    }
+    read_exactly(input, length, header)?;
+    Ok(true)
+}
+
+/// Reads the data of a record.
+fn read_data(input: &mut dyn Read, data: &mut Vec<u8>) -> Result<(), Reason> {
+    let mut length = [0; 4];
+    fill(input, &mut length)?;
+    let length = u32::from_le_bytes(length);
+    if length > MOST_DATA_BYTES {
+        return Err(damaged(format!("the data of a record have {length} bytes")));
+    }
+    read_exactly(input, length, data)
+}
+
+/// Reads so many bytes, of which memory is taken as they come.
+fn read_exactly(input: &mut dyn Read, count: u32, bytes: &mut Vec<u8>) -> Result<(), Reason> {
+    bytes.clear();
+    let read = Read::take(&mut *input, u64::from(count)).read_to_end(bytes).map_err(refused)?;
+    if read as u64 == u64::from(count) { Ok(()) } else { Err(Reason::Truncated { format: FORMAT }) }
+}
+
+fn fill(input: &mut dyn Read, bytes: &mut [u8]) -> Result<(), Reason> {
+    input.read_exact(bytes).map_err(refused)
+}
+
+/// What a decompressor or the budget refuses.
+fn refused(error: io::Error) -> Reason {
+    match error.kind() {
+        ErrorKind::UnexpectedEof => Reason::Truncated { format: FORMAT },
+        ErrorKind::InvalidData | ErrorKind::InvalidInput => damaged(format!("a compressed chunk: {error}")),
+        _ => match Reason::from_io(error) {
+            Reason::Io(error) if error.raw_os_error().is_none() => damaged(format!("a compressed chunk: {error}")),
+            reason => reason,
+        },
+    }
+}
+
+fn damaged(error: String) -> Reason {
+    Reason::Format { format: FORMAT, error: error.into() }
+}
+
+/// The value of a field of a header: each has a length, a name, `=` and the value.
+fn field<'a>(mut header: &'a [u8], name: &[u8]) -> Option<&'a [u8]> {
+    while let Some((length, rest)) = header.split_first_chunk::<4>() {
+        let (own, rest) = rest.split_at_checked(u32::from_le_bytes(*length) as usize)?;
+        if let Some(value) = own.strip_prefix(name).and_then(|own| own.strip_prefix(b"=")) {
+            return Some(value);
+        }
+        header = rest;
+    }
+    None
+}
+
+fn kind(header: &[u8]) -> Option<u8> {
+    field(header, b"op").and_then(|op| op.first()).copied()
+}
+
+/// A number, the least byte first.
+fn number(bytes: &[u8]) -> u64 {
+    bytes.iter().take(8).rev().fold(0, |number, byte| number << 8 | u64::from(*byte))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{CHUNK, CONNECTION, MAGIC, MESSAGE, RosBagSource};
+    use crate::formats::topics::Source;
+    use crate::input::budget::Budget;
+    use crate::input::input_error::Reason;
+    use bzip2::Compression;
+    use bzip2::write::BzEncoder;
+    use lz4_flex::frame::FrameEncoder;
+    use std::io::Write;
+    use std::path::PathBuf;
+    use tempfile::{TempDir, tempdir};
+
+    fn fields(fields: &[(&str, &[u8])]) -> Vec<u8> {
+        let one = |(name, value): &(&str, &[u8])| {
+            let text = [name.as_bytes(), b"=", value].concat();
+            [&(text.len() as u32).to_le_bytes()[..], &text].concat()
+        };
+        fields.iter().flat_map(one).collect()
+    }
+
+    fn record(header: &[(&str, &[u8])], data: &[u8]) -> Vec<u8> {
+        let header = fields(header);
+        let [of_header, of_data] = [header.len(), data.len()].map(|length| (length as u32).to_le_bytes());
+        [&of_header[..], &header, &of_data, data].concat()
+    }
+
+    fn chunk(compression: &str, data: &[u8]) -> Vec<u8> {
+        let size = (data.len() as u32).to_le_bytes();
+        record(&[("op", &[CHUNK]), ("compression", compression.as_bytes()), ("size", &size)], data)
+    }
+
+    /// A connection and messages of one float each.
+    fn records(rows: u32) -> Vec<u8> {
+        let definition = fields(&[("type", b"test/Rate"), ("message_definition", b"float64 x\n")]);
+        let id = 0u32.to_le_bytes();
+        let mut bytes = record(&[("op", &[CONNECTION]), ("conn", &id), ("topic", b"/rate")], &definition);
+        for row in 0..rows {
+            let time = [row.to_le_bytes(), [0; 4]].concat();
+            let data = f64::from(row).to_le_bytes();
+            bytes.extend(record(&[("op", &[MESSAGE]), ("conn", &id), ("time", &time)], &data));
+        }
+        bytes
+    }
+
+    fn bag(chunks: &[Vec<u8>]) -> (TempDir, PathBuf) {
+        let dir = tempdir().expect("a folder");
+        let file = dir.path().join("x.bag");
+        std::fs::write(&file, [MAGIC.to_vec(), chunks.concat()].concat()).expect("room");
+        (dir, file)
+    }
+
+    fn compressed(compression: &str, data: &[u8]) -> Vec<u8> {
+        match compression {
+            "lz4" => {
+                let mut encoder = FrameEncoder::new(Vec::new());
+                encoder.write_all(data).expect("memory");
+                encoder.finish().expect("memory")
+            }
+            "bz2" => {
+                let mut encoder = BzEncoder::new(Vec::new(), Compression::default());
+                encoder.write_all(data).expect("memory");
+                encoder.finish().expect("memory")
+            }
+            _ => data.to_vec(),
+        }
+    }
+
+    /// The numbers of the messages, and why there are no more.
+    fn read(source: &mut RosBagSource) -> (Vec<f64>, Option<String>) {
+        let column = source.topics()[0].columns.iter().position(|column| column.name == "x").expect("a column");
+        let mut rows = Vec::new();
+        let ending = source.read(0, &[column], &mut |row| {
+            rows.push(row[0].value());
+            Ok(())
+        });
+        (rows, ending.expect("rows").damage.map(|damage| damage.to_string()))
+    }
+
+    /// As after a recording that was interrupted; every compression.
+    #[test]
+    fn a_bag_without_an_index_is_read_as_far_as_it_goes() {
+        let expected: Vec<f64> = (0..50).map(f64::from).collect();
+        for compression in ["none", "lz4", "bz2"] {
+            let whole = chunk(compression, &compressed(compression, &records(50)));
+            let (_dir, file) = bag(std::slice::from_ref(&whole));
+            let mut source = RosBagSource::open(&file, Budget::new(10_000)).expect("a bag");
+            assert_eq!(source.topics()[0].rows, Some(50), "{compression}");
+            assert_eq!(read(&mut source), (expected.clone(), None), "{compression}");
+            // The second chunk has no end.
+            let (_dir, file) = bag(&[whole.clone(), whole[..whole.len() / 2].to_vec()]);
+            let mut source = RosBagSource::open(&file, Budget::new(10_000)).expect("a bag");
+            let (rows, damage) = read(&mut source);
+            assert_eq!(rows[..50], expected, "{compression}");
+            assert!(damage.is_some_and(|damage| damage.contains(super::FORMAT)), "{compression}");
+        }
+    }
+
+    /// Constants that become a hundred megabytes.
+    #[test]
+    fn a_chunk_that_expands_without_end_is_refused() {
+        let zeros = vec![0; 100 << 20];
+        for compression in ["lz4", "bz2"] {
+            let bytes = chunk(compression, &compressed(compression, &[records(1), zeros.clone()].concat()));
+            let (_dir, file) = bag(&[bytes]);
+            let refused = RosBagSource::open(&file, Budget::new(0)).err().expect("refused").reason;
+            assert!(matches!(refused, Reason::Expands { .. }), "{compression}: {refused}");
+        }
+        // A record that says it has four gigabytes.
+        let (_dir, file) = bag(&[[&8u32.to_le_bytes()[..], &fields(&[("op", &[2])]), &[0xFF; 4]].concat()]);
+        assert!(RosBagSource::open(&file, Budget::new(0)).is_err());
+    }
 }

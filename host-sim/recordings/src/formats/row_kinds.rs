@@ -7,6 +7,21 @@ use crate::input::input_error::Reason;
 const MOST_KINDS: usize = 8;
 /// How often each kind has to be among the first rows.
 const LEAST_ROWS: usize = 2;
+/// Names of columns whose numbers tell devices from each other.
+const NUMBERED: [&str; 12] = [
+    "id",
+    "device",
+    "device_id",
+    "deviceid",
+    "sensor",
+    "sensor_id",
+    "sensorid",
+    "node",
+    "node_id",
+    "imu",
+    "imu_id",
+    "instance",
+];
 /// Fewest numbers in a row of a sensor.
 const LEAST_NUMBERS: usize = 2;
 
@@ -26,7 +41,18 @@ impl RowKinds {
         (0..width).find_map(|at| Self::at(rows, at))
     }
 
+    /// Of the first rows of a file below a heading, in which a column of whole numbers is called as one that tells devices from each other.
+    pub(crate) fn find_by_number(rows: &[Vec<&str>], heading: &[&str]) -> Option<Self> {
+        let is_named = |name: &&str| NUMBERED.contains(&name.to_lowercase().trim_start_matches(['#', '%', ' ']));
+        let at = heading.iter().position(is_named).filter(|at| rows.iter().all(|row| row.len() > *at))?;
+        Self::of_labels(rows, at, |field| field.parse::<u32>().is_ok())
+    }
+
     fn at(rows: &[Vec<&str>], at: usize) -> Option<Self> {
+        Self::of_labels(rows, at, is_label)
+    }
+
+    fn of_labels(rows: &[Vec<&str>], at: usize, is_label: impl Fn(&str) -> bool) -> Option<Self> {
         let mut counts: Vec<(&str, usize)> = Vec::new();
         for field in rows.iter().map(|row| row[at]) {
             if !is_label(field) {
@@ -84,5 +110,14 @@ mod tests {
         assert_eq!(kinds(&["0,1,imu_link", "1,2,imu_link", "2,3,imu_link"]), None);
         assert_eq!(kinds(&["a,1,2", "b,2,3", "c,3,4"]), None);
         assert_eq!(kinds(&["nan,1,2", "nan,2,3", "2.5,3,4"]), None);
+    }
+
+    #[test]
+    fn a_number_that_is_called_an_id_tells_devices() {
+        let rows: Vec<Vec<&str>> =
+            ["1,0,5", "2,3,6", "1,10,7", "2,13,8"].iter().map(|row| row.split(',').collect()).collect();
+        let found = |heading: &[&str]| RowKinds::find_by_number(&rows, heading).map(|kinds| kinds.names);
+        assert_eq!(found(&["id", "t_ms", "gx"]), Some(vec!["1".to_owned(), "2".to_owned()]));
+        assert_eq!(found(&["accuracy", "t_ms", "gx"]), None);
     }
 }

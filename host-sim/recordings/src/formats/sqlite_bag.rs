@@ -139,7 +139,7 @@ impl Source for SqliteSource<'_> {
                 Err(error) => break Some(damaged(error, *budget)),
             }
         };
-        Ok(Ending { damage, notes: rows.notes(), rate_hz: None })
+        Ok(Ending { damage, notes: rows.notes() })
     }
 }
 

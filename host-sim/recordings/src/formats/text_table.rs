@@ -7,11 +7,13 @@ use crate::formats::calendar::{self, CalendarClock, CalendarColumns};
 use crate::formats::labelled_row;
 use crate::formats::nmea::{self, Sentence};
 use crate::formats::row_kinds::RowKinds;
+use crate::input::budget::Budget;
 use crate::input::delimited_text::{self, Lines};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::ReadMonitor;
+use crate::reading::batch::{BatchBuilder, Number, RowFault};
+use crate::reading::row_source::{EachRow, Ending, Refusal, RowSource};
 use crate::tables::any_sensor::ReadOptions;
-use crate::tables::sensor_table::{Number, SensorTable, TableBuilder};
 use crate::tables::whole_table::{WholeTable, most_rows};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
@@ -20,7 +22,14 @@ use std::path::{Path, PathBuf};
 const SEPARATORS: [char; 3] = [';', '\t', ','];
 
 /// Fields that stand for a missing value, in small letters.
-const MISSING: [&str; 6] = ["", "nan", "na", "n/a", "null", "none"];
+const MISSING: [&str; 22] = [
+    "", "nan", "na", "n/a", "null", "none", "nil", "-", "--", "---", "*", "?", "#n/a", "#na", "#value!", "#num!",
+    "#div/0!", "1.#qnan", "-1.#ind", "1.#inf", "ovf", "missing",
+];
+
+/// Part of the rows that may be damaged: a file with more is another one than it is taken for. So many are damaged before that is asked.
+const MOST_DAMAGED: f64 = 0.1;
+const FIRST_DAMAGED: u64 = 64;
 
 /// Lines before the first row of numbers that may be comments or a heading.
 const MAX_PREAMBLE: usize = 64;
@@ -31,30 +40,81 @@ const FIRST_LINES: usize = 64;
 /// What the serial monitor of the Arduino IDE writes between the time of a line and the line.
 const ARROW: &str = " -> ";
 
-/// Reads a table; `monitor` counts the bytes and may stop the reading.
-pub(crate) fn read(file: &Path, options: &ReadOptions, monitor: &ReadMonitor) -> Result<SensorTable, InputError> {
-    let mut table = TextTable::open(file, options, monitor)?;
-    let mut builder = TableBuilder::new(table.chosen().to_vec());
-    while table.add_row(&mut builder)? {}
-    let mut read = builder.finish().map_err(|reason| InputError::file(file, reason))?;
-    read.notes.extend(table.notes());
-    // Time stamps say more than a stated rate.
-    read.rate_hz = table.rate_hz().filter(|_| read.times_s.is_none());
-    Ok(read)
+/// The rows of a table, which can be read again; a monitor counts the bytes and may stop the reading.
+pub(crate) struct TextRows<'a> {
+    file: &'a Path,
+    options: ReadOptions,
+    monitor: ReadMonitor,
+    chosen: Vec<ChosenColumn>,
+    rate_hz: Option<f64>,
+    /// The table before its first reading.
+    opened: Option<TextTable>,
+}
+
+impl<'a> TextRows<'a> {
+    /// Opens a table and chooses its columns.
+    pub(crate) fn open(file: &'a Path, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
+        let table = TextTable::open(file, options, monitor)?;
+        let (chosen, rate_hz) = (table.chosen.clone(), table.rate_hz);
+        let (options, monitor) = (options.clone(), monitor.clone());
+        Ok(Self { file, options, monitor, chosen, rate_hz, opened: Some(table) })
+    }
+}
+
+impl RowSource for TextRows<'_> {
+    fn chosen(&self) -> &[ChosenColumn] {
+        &self.chosen
+    }
+
+    fn rate_hz(&self) -> Option<f64> {
+        self.rate_hz
+    }
+
+    fn budget(&self) -> Option<Budget> {
+        None
+    }
+
+    fn read(&mut self, each: &mut EachRow) -> Result<Ending, InputError> {
+        let mut table = match self.opened.take() {
+            Some(table) => table,
+            None => TextTable::open(self.file, &self.options, &self.monitor)?,
+        };
+        while let Some(line) = table.next_row()? {
+            match each(&table.row) {
+                Ok(()) => table.damaged.rows += 1,
+                Err(Refusal::Fault(fault)) => {
+                    let error = table.fault(line, fault);
+                    table.damaged.add(error)?;
+                }
+                Err(Refusal::Enough) => break,
+            }
+        }
+        table.damaged.check()?;
+        Ok(Ending { damage: None, notes: table.notes() })
+    }
 }
 
 /// Reads all columns of a table; fields that are no numbers are missing.
 pub(crate) fn read_whole(file: &Path, topic: Option<&str>, monitor: &ReadMonitor) -> Result<WholeTable, InputError> {
     let mut table = TextTable::open_with(file, topic, monitor, &|available| Ok(as_they_are(available)))?;
     table.is_lenient = true;
-    let mut builder = TableBuilder::new(table.chosen().to_vec());
-    let most = most_rows(table.chosen().len());
+    let mut builder = BatchBuilder::new(&table.chosen, &[], None);
+    let most = most_rows(table.chosen.len());
     let mut whole = WholeTable { name: topic.unwrap_or_default().to_owned(), ..WholeTable::default() };
     loop {
         whole.is_cut = builder.rows() >= most;
-        match table.add_row(&mut builder) {
-            Ok(true) if !whole.is_cut => {}
-            Ok(_) => break,
+        let row = table.next_row().and_then(|line| {
+            let Some(line) = line.filter(|_| !whole.is_cut) else { return Ok(false) };
+            table.damaged.rows += 1;
+            builder.push(&table.row).map(|()| true).map_err(|fault| table.fault(line, fault))
+        });
+        let row = match row {
+            Ok(false) => table.damaged.check().map(|()| false),
+            row => row,
+        };
+        match row {
+            Ok(true) => {}
+            Ok(false) => break,
             Err(error) if builder.rows() == 0 => return Err(error),
             Err(error) => {
                 whole.notes.push(format!("{error}; the {} rows before that are shown", builder.rows()));
@@ -63,8 +123,8 @@ pub(crate) fn read_whole(file: &Path, topic: Option<&str>, monitor: &ReadMonitor
         }
     }
     whole.notes.extend(table.notes());
-    whole.rate_hz = table.rate_hz();
-    Ok(whole.with_rows(builder))
+    whole.rate_hz = table.rate_hz;
+    Ok(whole.with_rows(table.chosen, builder))
 }
 
 /// Chooses the columns to read of those that there are.
@@ -87,6 +147,41 @@ enum Layout {
     Labelled { names: Vec<String>, calendar: Option<CalendarClock>, others: u64 },
 }
 
+/// Rows that are left out because they cannot be read.
+#[derive(Debug, Default)]
+struct DamagedRows {
+    rows: u64,
+    damaged: u64,
+    first: Option<InputError>,
+    note: String,
+}
+
+impl DamagedRows {
+    /// Leaves out a row.
+    ///
+    /// # Errors
+    /// Too many rows are damaged.
+    fn add(&mut self, error: InputError) -> Result<(), InputError> {
+        self.damaged += 1;
+        if self.first.is_none() {
+            let line = error.line.map_or_else(String::new, |line| format!("line {line}: "));
+            self.note = format!("{line}{}", error.reason);
+            self.first = Some(error);
+        }
+        if self.damaged >= FIRST_DAMAGED { self.check() } else { Ok(()) }
+    }
+
+    fn check(&mut self) -> Result<(), InputError> {
+        let are_many = self.damaged as f64 > MOST_DAMAGED * self.rows as f64;
+        self.first.take_if(|_| are_many).map_or(Ok(()), Err)
+    }
+
+    fn note(&self) -> Option<String> {
+        let Self { damaged, note, .. } = self;
+        (*damaged > 0).then(|| format!("{damaged} damaged rows are left out, the first of them {note}"))
+    }
+}
+
 /// An open table, read row by row.
 pub(crate) struct TextTable {
     file: PathBuf,
@@ -97,7 +192,8 @@ pub(crate) struct TextTable {
     /// The rate that a line before the rows states, Hz.
     rate_hz: Option<f64>,
     /// What the user should know of the columns.
-    note: Option<String>,
+    columns_notes: Vec<String>,
+    damaged: DamagedRows,
     /// Whether a field that is no number is a missing one.
     is_lenient: bool,
     /// Fields of a row.
@@ -112,7 +208,8 @@ impl TextTable {
     pub(crate) fn open(file: &Path, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
         let choose = |available: &[AvailableColumn]| options.choose(available);
         let table = Self::open_with(file, options.topic.as_deref(), monitor, &choose)?;
-        Ok(Self { note: options.selection.left_out(&table.available, &options.sensor), ..table })
+        let columns_notes = options.selection.notes(&table.available, &table.chosen, &options.sensor);
+        Ok(Self { columns_notes, ..table })
     }
 
     fn open_with(file: &Path, topic: Option<&str>, monitor: &ReadMonitor, choose: &Choose) -> Result<Self, InputError> {
@@ -147,8 +244,20 @@ impl TextTable {
             let Some((line, text)) = lines.next()? else { break };
             first.push_back((line, text.to_owned()));
         }
+        let has_kinds = {
+            let rows: Vec<Vec<&str>> = first.iter().map(|(_, text)| split(text, separator).collect()).collect();
+            RowKinds::find(&rows).is_some()
+        };
+        if !has_kinds {
+            leave_preamble(&mut first, &mut preamble);
+        }
+        let separator = first.front().map_or(separator, |(_, text)| separator_of(text));
         let rows: Vec<Vec<&str>> = first.iter().map(|(_, text)| split(text, separator).collect()).collect();
-        let kinds = RowKinds::find(&rows);
+        let of_numbers = || {
+            let heading = split(&preamble.last()?.1, separator).collect::<Vec<_>>();
+            RowKinds::find_by_number(&rows, &heading)
+        };
+        let kinds = RowKinds::find(&rows).or_else(of_numbers);
         let kind = match (&kinds, topic) {
             (None, None) => None,
             (None, Some(topic)) => {
@@ -159,7 +268,7 @@ impl TextTable {
         };
         let is_kind = |row: &&Vec<&str>| kind.as_ref().is_none_or(|(at, name)| row.get(*at) == Some(&name.as_str()));
         let row = rows.iter().find(is_kind).cloned().unwrap_or_default();
-        let (width, calendar) = (row.len(), CalendarColumns::find(&row));
+        let (width, calendar) = (width_of(&row, &preamble, separator), CalendarColumns::find(&row));
         // As `write.table` of R numbers the rows, without a name in the heading.
         let is_numbered = matches!(rows.as_slice(), [first, second, ..] if first[0] == "1" && second[0] == "2");
         // The heading may have one name for a date and a time of day.
@@ -176,13 +285,18 @@ impl TextTable {
         if kind.is_some() && heading.is_none_or(|(_, text)| fields(text) != width) {
             // Rows of several kinds have no common heading.
             heading = None;
-        } else if heading.is_none()
-            && let Some((line, text)) = preamble.iter().rev().find(|(_, text)| !text.starts_with(['#', '%', '/']))
-        {
-            return Err(InputError::line(file, *line, Reason::FieldCount { found: width, expected: fields(text) }));
         }
         let mut available: Vec<AvailableColumn> = match heading {
-            Some((_, text)) => named_columns(names(text, separator, width).into_iter(), units.as_deref()),
+            Some((line, text)) => {
+                let above = preamble.iter().rev().find(|(above, _)| above + 1 == *line);
+                let own = names(text, separator, width);
+                let above = above.map(|(_, text)| names(text, separator, width));
+                let joined = above.and_then(|above| joined_names(&above, &own));
+                match &joined {
+                    Some(joined) => named_columns(joined.iter().map(String::as_str), units.as_deref()),
+                    None => named_columns(own.into_iter(), units.as_deref()),
+                }
+            }
             None => (0..width).map(|number| AvailableColumn { name: number.to_string(), unit: None }).collect(),
         };
         if let Some(calendar) = calendar {
@@ -198,6 +312,7 @@ impl TextTable {
             Some((line, _)) => InputError::line(file, *line, Reason::Selection(Box::new(error))),
             None => InputError::file(file, Reason::Selection(Box::new(error))),
         })?;
+        check_origin(&rows, &chosen).map_err(|reason| InputError::file(file, reason))?;
         let row = Vec::with_capacity(chosen.len());
         let layout = Layout::Columns { separator, calendar: calendar.map(CalendarClock::new), kind, others: 0 };
         Ok(Self {
@@ -207,7 +322,8 @@ impl TextTable {
             chosen,
             layout,
             rate_hz: preamble.iter().find_map(|(_, text)| stated_rate(text)),
-            note: None,
+            columns_notes: Vec::new(),
+            damaged: DamagedRows::default(),
             is_lenient: false,
             width,
             first,
@@ -269,7 +385,8 @@ impl TextTable {
             chosen,
             layout,
             rate_hz: None,
-            note: None,
+            columns_notes: Vec::new(),
+            damaged: DamagedRows::default(),
             is_lenient: false,
             width,
             first,
@@ -302,7 +419,8 @@ impl TextTable {
             chosen,
             layout: Layout::Labelled { names, calendar: calendar.map(CalendarClock::new), others: 0 },
             rate_hz: None,
-            note: None,
+            columns_notes: Vec::new(),
+            damaged: DamagedRows::default(),
             is_lenient: false,
             width,
             first: first.into(),
@@ -310,15 +428,13 @@ impl TextTable {
         })
     }
 
-    /// The columns that are read.
-    pub(crate) fn chosen(&self) -> &[ChosenColumn] {
-        &self.chosen
-    }
-
     /// What the user should know of the rows that were read, one sentence each.
-    pub(crate) fn notes(&self) -> Vec<String> {
+    fn notes(&self) -> Vec<String> {
         let of_rate = self.rate_hz.map(|hz| format!("the file states a rate of {hz} Hz before its rows"));
-        let mut notes: Vec<String> = self.note.iter().cloned().chain(of_rate).collect();
+        let zeros = self.lines.zero_bytes();
+        let of_zeros = (zeros > 0).then(|| format!("{zeros} bytes that are zero are left out"));
+        let mut notes: Vec<String> = self.columns_notes.iter().cloned().chain(of_rate).collect();
+        notes.extend(self.damaged.note().into_iter().chain(of_zeros));
         let (name, damaged, others) = match &self.layout {
             Layout::Columns { others: 0, .. } | Layout::Labelled { others: 0, .. } => return notes,
             Layout::Labelled { others, .. } => {
@@ -339,21 +455,24 @@ impl TextTable {
         notes
     }
 
-    /// The rate that the file states before its rows, Hz.
-    pub(crate) fn rate_hz(&self) -> Option<f64> {
-        self.rate_hz
+    /// An error of a row of a line.
+    fn fault(&self, line: u64, RowFault { column, reason }: RowFault) -> InputError {
+        match column {
+            Some(at) => InputError::field(&self.file, line, &self.chosen[at].label, reason),
+            None => InputError::line(&self.file, line, reason),
+        }
     }
 
-    /// Adds the next row to `builder`; false at the end.
-    pub(crate) fn add_row(&mut self, builder: &mut TableBuilder) -> Result<bool, InputError> {
-        let Self { file, lines, chosen, layout, is_lenient, width, first, row, .. } = self;
+    /// Reads the next row into `row`; its line, or `None` at the end.
+    fn next_row(&mut self) -> Result<Option<u64>, InputError> {
+        let Self { file, lines, chosen, layout, is_lenient, width, first, row, damaged, .. } = self;
         loop {
             let first = first.pop_front();
             let (line, text) = match &first {
                 Some((line, text)) => (*line, text.as_str()),
                 None => match lines.next()? {
                     Some(next) => next,
-                    None => return Ok(false),
+                    None => return Ok(None),
                 },
             };
             let of_layout = match layout {
@@ -363,15 +482,27 @@ impl TextTable {
                     *others += 1;
                     Ok(false)
                 }
-                Layout::Columns { separator, calendar, .. } => {
-                    numbers(split(text, *separator), chosen, *width, calendar.as_mut(), row).map(|()| true)
+                Layout::Columns { separator, calendar, others, .. } => {
+                    // The tabs at the end of a line are blanks too.
+                    let width = RowWidth::new(*width, *separator == Some('\t'), chosen);
+                    let read = numbers(split(text, *separator), chosen, width, calendar.as_mut(), row);
+                    let is_empty = |(column, number): (&ChosenColumn, &Number)| {
+                        !matches!(column.role, Role::Channel(_)) || number.value().is_nan()
+                    };
+                    let is_other = read.is_ok()
+                        && !*is_lenient
+                        && chosen.iter().zip(row.iter()).all(is_empty)
+                        && is_of_other_sensor(split(text, *separator), chosen);
+                    *others += u64::from(is_other);
+                    read.map(|()| !is_other)
                 }
                 Layout::Labelled { names, calendar, others } => {
                     let row_of = labelled_row::parse(text);
                     match row_of.filter(|row_of| row_of.iter().any(|(name, _)| names.contains(name))) {
                         Some(row_of) => {
                             let values = values_of(names, row_of);
-                            numbers(values.iter().map(String::as_str), chosen, *width, calendar.as_mut(), row)
+                            let width = RowWidth::new(*width, false, chosen);
+                            numbers(values.iter().map(String::as_str), chosen, width, calendar.as_mut(), row)
                                 .map(|()| true)
                         }
                         None => {
@@ -389,7 +520,8 @@ impl TextTable {
                         Ok(chosen.iter().all(|column| matches!(column.role, Role::Channel(_))))
                     }
                     Some(Sentence { name: own, fields, .. }) if own == *name => {
-                        numbers(fields.into_iter(), chosen, *width, None, row).map(|()| true)
+                        let width = RowWidth::new(*width, false, chosen);
+                        numbers(fields.into_iter(), chosen, width, None, row).map(|()| true)
                     }
                     _ => {
                         *others += 1;
@@ -402,23 +534,13 @@ impl TextTable {
                 (Some(_), Reason::NotNumber(_) | Reason::NotTime(_)) if *is_lenient => Ok(true),
                 fault => Err(fault),
             });
-            let added = of_layout.and_then(|is_row| {
-                let of_column = |(at, reason)| (Some(at), reason);
-                if is_row { builder.push(row).map(|()| true).map_err(of_column) } else { Ok(false) }
-            });
-            let is_added = added.map_err(|(at, reason)| match at {
-                Some(at) => InputError::field(file, line, &chosen[at].label, reason),
-                None => InputError::line(file, line, reason),
-            })?;
-            if is_added {
-                return Ok(true);
+            match of_layout {
+                Ok(true) => return Ok(Some(line)),
+                Ok(false) => {}
+                Err((Some(at), reason)) => damaged.add(InputError::field(file, line, &chosen[at].label, reason))?,
+                Err((None, reason)) => damaged.add(InputError::line(file, line, reason))?,
             }
         }
-    }
-
-    /// Whether the reading was stopped before the end of the table.
-    pub(crate) fn is_stopped(&self) -> bool {
-        self.lines.is_stopped()
     }
 }
 
@@ -463,28 +585,145 @@ fn is_short(fields: usize, width: usize, calendar: Option<CalendarColumns>) -> b
     fields + 1 == width && matches!(calendar, Some(CalendarColumns::Two(_)))
 }
 
+/// Fields of a row.
+#[derive(Debug, Clone, Copy)]
+struct RowWidth {
+    fields: usize,
+    /// Whether empty fields at the end may be absent.
+    may_be_short: bool,
+    /// A bit for each of the first fields that is read.
+    read: u64,
+}
+
+impl RowWidth {
+    fn new(fields: usize, may_be_short: bool, chosen: &[ChosenColumn]) -> Self {
+        let bits = chosen.iter().filter(|column| column.position < 64).map(|column| 1u64 << column.position);
+        Self { fields, may_be_short, read: bits.fold(0, |read, bit| read | bit) }
+    }
+
+    /// Whether the field at this position may be one that is read.
+    fn is_read(self, position: usize) -> bool {
+        position >= 64 || self.read >> position & 1 == 1
+    }
+}
+
+/// Whether a row has a number, but none of the `chosen` channels: it is of another sensor.
+fn is_of_other_sensor<'a>(fields: impl Iterator<Item = &'a str>, chosen: &[ChosenColumn]) -> bool {
+    let (mut has_other, mut has_own) = (false, false);
+    for (at, field) in fields.enumerate().filter(|(_, field)| !field.is_empty()) {
+        match chosen.iter().find(|column| column.position == at) {
+            Some(column) if matches!(column.role, Role::Channel(_)) => has_own = true,
+            Some(_) => {}
+            None => has_other |= number(field).is_some_and(|number| !number.value().is_nan()),
+        }
+    }
+    has_other && !has_own
+}
+
+/// Refuses rows of two sensors in one table: some have one part of the `chosen` channels, the others the rest.
+fn check_origin(rows: &[Vec<&str>], chosen: &[ChosenColumn]) -> Result<(), Reason> {
+    let channels: Vec<&ChosenColumn> = chosen.iter().filter(|column| matches!(column.role, Role::Channel(_))).collect();
+    let mut parts: Vec<Vec<bool>> = Vec::new();
+    for row in rows {
+        let has = |column: &&ChosenColumn| row.get(column.position).is_some_and(|field| !field.is_empty());
+        let part: Vec<bool> = channels.iter().map(has).collect();
+        if part.contains(&true) && !parts.contains(&part) {
+            parts.push(part);
+        }
+    }
+    let are_apart = |one: &[bool], other: &[bool]| one.iter().zip(other).all(|(one, other)| !(*one && *other));
+    let [one, other] = parts.as_slice() else { return Ok(()) };
+    if !are_apart(one, other) {
+        return Ok(());
+    }
+    let name = |part: &[bool]| {
+        let names = channels.iter().zip(part).filter(|(_, has)| **has).map(|(column, _)| column.label.as_str());
+        names.collect::<Vec<_>>().join(", ")
+    };
+    Err(Reason::SeveralOrigins(Box::new((name(one), name(other)))))
+}
+
+/// Moves the lines before the rows of the most frequent width to the `preamble`.
+fn leave_preamble(first: &mut VecDeque<(u64, String)>, preamble: &mut Vec<(u64, String)>) {
+    let width = |text: &str| trimmed_width(&split(text, separator_of(text)).collect::<Vec<_>>());
+    let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
+    for (_, text) in first.iter().filter(|(_, text)| is_row(text)) {
+        *counts.entry(width(text)).or_insert(0) += 1;
+    }
+    // Of equally frequent widths the widest.
+    let Some((&usual, &count)) = counts.iter().max_by_key(|(_, count)| **count) else { return };
+    if 2 * count <= first.len() {
+        return;
+    }
+    // Of rows between tabs the empty cells at the end are cut.
+    let is_of_table = |text: &str| {
+        let width = width(text);
+        is_row(text) && (width == usual || width > usual && separator_of(text) == Some('\t'))
+    };
+    while first.front().is_some_and(|(_, text)| !is_of_table(text)) {
+        preamble.extend(first.pop_front());
+    }
+}
+
+/// Fields up to the last one that is not empty.
+fn trimmed_width(fields: &[&str]) -> usize {
+    fields.iter().rposition(|field| !field.is_empty()).map_or(0, |at| at + 1)
+}
+
+/// Fields of the rows of a table: those of `row`, but for empty ones at the end that no heading has a name for.
+fn width_of(row: &[&str], preamble: &[(u64, String)], separator: Option<char>) -> usize {
+    let least = trimmed_width(row);
+    let headings = preamble.iter().map(|(_, text)| trimmed_width(&split(text, separator).collect::<Vec<_>>()));
+    headings.filter(|names| (least..row.len()).contains(names)).max().unwrap_or(row.len())
+}
+
+/// The names of a heading in two lines, of which the upper one names groups of columns: `Gyroscope,,` over `X,Y,Z`. `None` for one in a line.
+fn joined_names(above: &[&str], own: &[&str]) -> Option<Vec<String>> {
+    let is_of_groups = above.len() == own.len()
+        && above.iter().any(|name| name.is_empty())
+        && above.iter().any(|name| !name.is_empty())
+        && above.iter().all(|name| number(name).is_none_or(|number| number.value().is_nan()));
+    if !is_of_groups {
+        return None;
+    }
+    let mut group = "";
+    let joined = above.iter().zip(own).map(|(above, own)| {
+        group = if above.is_empty() { group } else { above };
+        format!("{group} {own}").trim().to_owned()
+    });
+    Some(joined.collect())
+}
+
 /// The numbers of the `chosen` columns of a row of `width` fields.
 fn numbers<'a>(
     mut fields: impl Iterator<Item = &'a str>,
     chosen: &[ChosenColumn],
-    width: usize,
+    width: RowWidth,
     mut calendar: Option<&mut CalendarClock>,
     row: &mut Vec<Number>,
 ) -> Result<(), (Option<usize>, Reason)> {
     row.clear();
     row.resize(chosen.len(), Number::Real(f64::NAN));
     let mut found = 0;
+    // Fields up to the last one that is not empty.
+    let mut filled = 0;
     let mut fault: Option<(usize, Reason)> = None;
     let mut after_date = None;
     while let Some(field) = after_date.take().or_else(|| fields.next()) {
         let position = found;
         found += 1;
+        if !field.is_empty() {
+            filled = found;
+        }
         let mut time_ns = None;
         if let Some(clock) = calendar.as_mut().filter(|clock| clock.columns.position() == position) {
             if matches!(clock.columns, CalendarColumns::Two(_)) {
                 after_date = fields.next();
             }
             time_ns = Some(clock.time_ns(field, after_date.unwrap_or_default()));
+        }
+        if !width.is_read(position) {
+            continue;
         }
         for (at, _) in chosen.iter().enumerate().filter(|(_, column)| column.position == position) {
             let (known, reason): (_, fn(String) -> Reason) = match time_ns {
@@ -498,8 +737,9 @@ fn numbers<'a>(
             }
         }
     }
+    let is_complete = found >= width.fields || width.may_be_short && found + 1 >= width.fields.min(2);
     match fault {
-        _ if found != width => Err((None, Reason::FieldCount { found, expected: width })),
+        _ if !is_complete || filled > width.fields => Err((None, Reason::FieldCount { found, expected: width.fields })),
         Some((at, reason)) => Err((Some(at), reason)),
         None => Ok(()),
     }
@@ -527,15 +767,51 @@ fn split(text: &str, separator: Option<char>) -> Box<dyn Iterator<Item = &str> +
         return Box::new(std::iter::once(time.trim()).chain(split(rest, separator)));
     }
     match separator {
+        Some(separator) if text.contains('"') => Box::new(QuotedFields { rest: Some(text), separator }),
         Some(separator) => Box::new(text.split(separator).map(delimited_text::field)),
         None => Box::new(text.split_ascii_whitespace().map(delimited_text::field)),
+    }
+}
+
+/// Fields of which some stand between quotation marks, in which a separator is none (RFC 4180).
+struct QuotedFields<'a> {
+    rest: Option<&'a str>,
+    separator: char,
+}
+
+impl<'a> Iterator for QuotedFields<'a> {
+    type Item = &'a str;
+
+    fn next(&mut self) -> Option<&'a str> {
+        let rest = self.rest.take()?;
+        let quoted = rest.trim_start().strip_prefix('"').and_then(|inner| {
+            // Two marks are one in the text.
+            let mut marks = inner.match_indices('"').map(|(at, _)| at).peekable();
+            while let Some(at) = marks.next() {
+                if marks.next_if_eq(&(at + 1)).is_none() {
+                    return Some((&inner[..at], &inner[at + 1..]));
+                }
+            }
+            None
+        });
+        let Some((field, after)) = quoted else {
+            let (field, after) =
+                rest.split_once(self.separator).map_or((rest, None), |(field, after)| (field, Some(after)));
+            self.rest = after;
+            return Some(delimited_text::field(field));
+        };
+        self.rest = after.split_once(self.separator).map(|(_, after)| after);
+        Some(field.trim())
     }
 }
 
 /// The names in a heading above rows of `width` fields. Between blanks, a unit in brackets belongs to the name before it, and quotation
 /// marks hold a name together.
 fn names(text: &str, separator: Option<char>, width: usize) -> Vec<&str> {
-    let plain: Vec<&str> = split(text, separator).collect();
+    let mut plain: Vec<&str> = split(text, separator).collect();
+    while plain.len() > width && plain.last() == Some(&"") {
+        plain.pop();
+    }
     if separator.is_some() || plain.len() == width {
         return plain;
     }
@@ -593,12 +869,31 @@ fn named_columns<'a>(names: impl Iterator<Item = &'a str>, units: Option<&[Optio
 
 /// A number, with a decimal comma too; NaN for a missing one; `None` for other texts.
 fn number(field: &str) -> Option<Number> {
-    if let Ok(integer) = field.parse() {
+    // Most fields have a point, or are short whole numbers.
+    if let Some(integer) = short_integer(field.as_bytes()) {
+        return Some(Number::Integer(integer));
+    }
+    if !field.contains('.')
+        && let Ok(integer) = field.parse()
+    {
         return Some(Number::Integer(integer));
     }
     let real = field.parse().ok().or_else(|| field.replace(',', ".").parse().ok());
     let missing = || MISSING.contains(&field.to_lowercase().as_str()).then_some(f64::NAN);
     real.or_else(missing).map(Number::Real)
+}
+
+/// A whole number of at most 18 digits; `None` for other texts.
+fn short_integer(field: &[u8]) -> Option<i64> {
+    let (is_negative, digits) = field.strip_prefix(b"-").map_or((false, field), |digits| (true, digits));
+    if digits.is_empty() || digits.len() > 18 {
+        return None;
+    }
+    let mut value = 0_i64;
+    for byte in digits {
+        value = 10 * value + i64::from(byte.checked_sub(b'0').filter(|digit| *digit < 10)?);
+    }
+    Some(if is_negative { -value } else { value })
 }
 
 /// Whether a line is a row and no heading or comment: at least half of its fields are numbers or calendar times, or all are missing. The

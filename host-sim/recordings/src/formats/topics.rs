@@ -7,8 +7,9 @@ use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ColumnSele
 use crate::columns::unit::Unit;
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
+use crate::reading::batch::{BatchBuilder, Number};
+use crate::reading::row_source::{self, Refusal, RowSource};
 use crate::tables::any_sensor::ReadOptions;
-use crate::tables::sensor_table::{Number, SensorTable, TableBuilder};
 use crate::tables::whole_table::{WholeSensor, WholeTable, most_rows};
 use measurement::SensorProfile;
 use std::path::Path;
@@ -89,15 +90,13 @@ pub(crate) struct Ending {
     pub(crate) damage: Option<Reason>,
     /// What the user should know, one sentence each.
     pub(crate) notes: Vec<String>,
-    /// The rate that the file states, Hz.
-    pub(crate) rate_hz: Option<f64>,
 }
 
 /// Takes the numbers of a row, one for each of the columns that were asked for.
 pub(crate) type EachRow<'a> = dyn FnMut(&[Number]) -> Result<(), InputError> + 'a;
 
 /// A file with several sources of rows.
-pub(crate) trait Source {
+pub(crate) trait Source: Send {
     /// Name of the format.
     fn format(&self) -> &'static str;
 
@@ -111,6 +110,11 @@ pub(crate) trait Source {
 
     /// The topic that has the columns of all others.
     fn whole(&self) -> Option<usize> {
+        None
+    }
+
+    /// The rate that the file states for these columns of a topic, Hz.
+    fn rate_hz(&self, _topic: usize, _columns: &[usize]) -> Option<f64> {
         None
     }
 
@@ -253,60 +257,93 @@ fn choose_columns(
     Ok(chosen)
 }
 
-/// The table of the topic that the options choose.
-pub(crate) fn read(
-    file: &Path,
-    source: &mut dyn Source,
-    options: &ReadOptions,
+/// The rows of the topic that the options choose.
+pub(crate) struct TopicRows<'a> {
+    file: &'a Path,
+    source: Box<dyn Source + 'a>,
+    topic: usize,
+    chosen: Vec<ChosenColumn>,
+    notes: Vec<String>,
     budget: Budget,
-) -> Result<SensorTable, InputError> {
-    let fail = |reason| InputError::file(file, reason);
-    let choice = choose(source, options).map_err(fail)?;
-    let topic = &source.topics()[choice.topic];
-    if topic.columns.is_empty() {
-        return Err(fail(match &topic.encoding {
-            _ if source.whole().is_some() => Reason::NoTopic { format: source.format() },
-            Some(encoding) => Reason::Encoding(Box::new((topic.name.clone(), encoding.clone()))),
-            None => Reason::NoDefinition(Box::new((topic.name.clone(), topic.kind.clone()))),
-        }));
-    }
-    let sensor = choice.sensor.map(|at| &topic.sensors[at]);
-    let chosen = choose_columns(topic, sensor, options).map_err(fail)?;
-    let mut notes: Vec<String> = Vec::new();
-    let states_units = |selection: &ColumnSelection| selection.has_units();
-    notes.extend(sensor.and_then(|sensor| sensor.note.clone()).filter(|_| !states_units(&options.selection)));
-    if sensor.is_none() {
-        notes.extend(options.selection.left_out(&topic.columns, &options.sensor));
-    }
-    let name = sensor.map_or_else(|| topic.name.clone(), |sensor| sensor_name(topic, sensor));
-    if options.topic.is_none() && source.preferred() == Some(name.as_str()) {
-        let all = sensors(source.topics());
-        let others: Vec<&str> = all.iter().map(|(name, _)| name.as_str()).filter(|other| *other != name).collect();
-        if !others.is_empty() {
-            notes.push(format!("{name} is read; --topic reads one of the others: {}", others.join(", ")));
+}
+
+impl<'a> TopicRows<'a> {
+    /// Chooses topic and columns of a file.
+    pub(crate) fn open(
+        file: &'a Path,
+        source: Box<dyn Source + 'a>,
+        options: &ReadOptions,
+        budget: Budget,
+    ) -> Result<Self, InputError> {
+        let fail = |reason| InputError::file(file, reason);
+        let choice = choose(source.as_ref(), options).map_err(fail)?;
+        let topic = &source.topics()[choice.topic];
+        if topic.columns.is_empty() {
+            return Err(fail(match &topic.encoding {
+                _ if source.whole().is_some() => Reason::NoTopic { format: source.format() },
+                Some(encoding) => Reason::Encoding(Box::new((topic.name.clone(), encoding.clone()))),
+                None => Reason::NoDefinition(Box::new((topic.name.clone(), topic.kind.clone()))),
+            }));
         }
+        let sensor = choice.sensor.map(|at| &topic.sensors[at]);
+        let chosen = choose_columns(topic, sensor, options).map_err(fail)?;
+        let mut notes: Vec<String> = Vec::new();
+        let states_units = |selection: &ColumnSelection| selection.has_units();
+        notes.extend(sensor.and_then(|sensor| sensor.note.clone()).filter(|_| !states_units(&options.selection)));
+        notes.extend(options.selection.notes(&topic.columns, &chosen, &options.sensor));
+        let name = sensor.map_or_else(|| topic.name.clone(), |sensor| sensor_name(topic, sensor));
+        if options.topic.is_none() && source.preferred() == Some(name.as_str()) {
+            let all = sensors(source.topics());
+            let others: Vec<&str> = all.iter().map(|(name, _)| name.as_str()).filter(|other| *other != name).collect();
+            if !others.is_empty() {
+                notes.push(format!("{name} is read; --topic reads one of the others: {}", others.join(", ")));
+            }
+        }
+        Ok(Self { file, source, topic: choice.topic, chosen, notes, budget })
     }
-    let columns: Vec<usize> = chosen.iter().map(|column| column.position).collect();
-    let mut builder = TableBuilder::new(chosen).within(budget);
-    let mut rows = 0u64;
-    let ending = source.read(choice.topic, &columns, &mut |row| {
-        rows += 1;
-        builder.push(row).map_err(|(at, reason)| {
-            let label = builder.chosen().get(at).map_or("", |column| column.label.as_str());
-            InputError::row(file, rows, label, reason)
-        })
-    })?;
-    let Ending { damage, notes: more, rate_hz } = ending;
-    match damage {
-        Some(reason) if rows == 0 => Err(fail(reason)),
-        damage => {
-            let mut table = builder.finish().map_err(fail)?;
-            // Time stamps say more than a stated rate.
-            table.rate_hz = rate_hz.filter(|_| table.times_s.is_none());
-            table.notes.extend(damage.map(|reason| format!("{reason}; the {rows} rows before that are used")));
-            table.notes.extend(more);
-            table.notes.extend(notes);
-            Ok(table)
+}
+
+impl RowSource for TopicRows<'_> {
+    fn chosen(&self) -> &[ChosenColumn] {
+        &self.chosen
+    }
+
+    fn rate_hz(&self) -> Option<f64> {
+        let columns: Vec<usize> = self.chosen.iter().map(|column| column.position).collect();
+        self.source.rate_hz(self.topic, &columns)
+    }
+
+    fn budget(&self) -> Option<Budget> {
+        Some(self.budget)
+    }
+
+    fn read(&mut self, each: &mut row_source::EachRow) -> Result<row_source::Ending, InputError> {
+        let Self { file, source, topic, chosen, notes, .. } = self;
+        let columns: Vec<usize> = chosen.iter().map(|column| column.position).collect();
+        let (mut rows, mut is_enough) = (0u64, false);
+        let ending = source.read(*topic, &columns, &mut |row| {
+            rows += 1;
+            each(row).map_err(|refusal| match refusal {
+                Refusal::Fault(fault) => {
+                    let label = fault.column.map_or("", |at| chosen[at].label.as_str());
+                    InputError::row(file, rows, label, fault.reason)
+                }
+                Refusal::Enough => {
+                    is_enough = true;
+                    InputError::file(file, Reason::NoData)
+                }
+            })
+        });
+        let Ending { damage, notes: of_rows } = match ending {
+            Err(_) if is_enough => Ending::default(),
+            ending => ending?,
+        };
+        match damage {
+            Some(reason) if rows == 0 || reason.is_limit() => Err(InputError::file(file, reason)),
+            damage => {
+                let notes = of_rows.into_iter().chain(notes.iter().cloned()).collect();
+                Ok(row_source::Ending { damage: damage.map(|reason| reason.to_string()), notes })
+            }
         }
     }
 }
@@ -379,24 +416,25 @@ fn read_columns(
         }
     }
     let most = most_rows(columns.len());
-    let mut builder = TableBuilder::new(as_they_are(&chosen)).within(budget);
+    let chosen = as_they_are(&chosen);
+    let mut builder = BatchBuilder::new(&chosen, &[], Some(budget));
     let mut is_cut = false;
     let ending = source.read(topic, columns, &mut |row| {
         is_cut = builder.rows() >= most;
-        let pushed = if is_cut { Err((0, Reason::TooManySamples)) } else { builder.push(row) };
-        pushed.map_err(|(_, reason)| InputError::file(file, reason))
+        let fail = |reason| InputError::file(file, reason);
+        if is_cut { Err(fail(Reason::TooManySamples)) } else { builder.push(row).map_err(|fault| fail(fault.reason)) }
     });
     whole.is_cut = is_cut;
+    whole.rate_hz = source.rate_hz(topic, columns);
     match ending {
         Err(_) if is_cut => {}
         ending => {
-            let Ending { damage, notes, rate_hz } = ending?;
-            whole.rate_hz = rate_hz;
+            let Ending { damage, notes } = ending?;
             whole
                 .notes
                 .extend(damage.map(|reason| format!("{reason}; the {} rows before that are shown", builder.rows())));
             whole.notes.extend(notes);
         }
     }
-    Ok(whole.with_rows(builder))
+    Ok(whole.with_rows(chosen, builder))
 }

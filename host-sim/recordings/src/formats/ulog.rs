@@ -9,10 +9,10 @@ use crate::formats::message_layout::{Definitions, Encoding, Field, FieldType, Me
 use crate::formats::topics::{EachRow, Ending, Source, Topic, TopicSensor};
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
-use crate::tables::sensor_table::Number;
+use crate::reading::batch::Number;
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 use std::rc::Rc;
 
@@ -288,7 +288,7 @@ impl Source for UlogSource<'_> {
         let name = &self.topics[topic].name;
         let note =
             format!("{alone} samples of {name} have no sample of the other sensor at their time and are left out");
-        Ok(Ending { damage, notes: Some(note).filter(|_| alone > 0).into_iter().collect(), rate_hz: None })
+        Ok(Ending { damage, notes: Some(note).filter(|_| alone > 0).into_iter().collect() })
     }
 }
 
@@ -357,7 +357,9 @@ fn for_each_message(
     mut each: impl FnMut(Message) -> Result<(), InputError>,
 ) -> Result<Option<Reason>, InputError> {
     let fail = |error| InputError::file(file, Reason::Io(error));
-    let mut input = BufReader::new(File::open(file).map_err(fail)?);
+    let mut input = MessageBytes { input: BufReader::new(File::open(file).map_err(fail)?), at: 0 };
+    // Where data were appended, as after a crash: the message before it may have no end.
+    let mut appended: Vec<u64> = Vec::new();
     let mut meter = budget.meter();
     let mut formats: Definitions = HashMap::new();
     let mut layouts: HashMap<String, Rc<MessageLayout>> = HashMap::new();
@@ -365,20 +367,22 @@ fn for_each_message(
     // A format that cannot be understood leaves its messages out.
     let mut refused = None;
     let mut bytes = Vec::new();
-    let mut next = |count: u64, bytes: &mut Vec<u8>| {
-        bytes.clear();
-        input.by_ref().take(count).read_to_end(bytes).map(|read| read as u64 == count).map_err(fail)
-    };
-    next(HEADER_BYTES, &mut bytes)?;
+    input.next(HEADER_BYTES, &mut bytes).map_err(fail)?;
     loop {
-        let is_whole = next(3, &mut bytes)?;
+        let start = input.at;
+        let is_whole = input.next(3, &mut bytes).map_err(fail)?;
         let [low, high, kind] = match bytes.as_slice() {
             [] => return Ok(refused),
             &[low, high, kind] if is_whole => [low, high, kind],
             _ => return Ok(Some(Reason::Truncated { format: FORMAT })),
         };
         let length = u16::from_le_bytes([low, high]);
-        if !next(u64::from(length), &mut bytes)? {
+        let end = start + 3 + u64::from(length);
+        if let Some(offset) = appended.iter().copied().find(|offset| (start + 1..end).contains(offset)) {
+            input.seek(offset).map_err(fail)?;
+            continue;
+        }
+        if !input.next(u64::from(length), &mut bytes).map_err(fail)? {
             return Ok(Some(Reason::Truncated { format: FORMAT }));
         }
         if let Err(reason) = meter.add_bytes(3 + u64::from(length)) {
@@ -411,13 +415,57 @@ fn for_each_message(
                     each(Message { name, instance: *instance, layout, data })?;
                 }
             }
-            b'B' | b'I' | b'M' | b'P' | b'Q' | b'R' | b'L' | b'C' | b'S' | b'O' => {}
+            b'B' => match flag_bits(&bytes) {
+                Ok(offsets) => appended = offsets,
+                Err(reason) => return Ok(Some(reason)),
+            },
+            b'I' | b'M' | b'P' | b'Q' | b'R' | b'L' | b'C' | b'S' | b'O' => {}
             _ => {
                 let error = format!("a message of unknown type {kind:#04x}").into();
                 return Ok(Some(Reason::Format { format: FORMAT, error }));
             }
         }
     }
+}
+
+/// The bytes of a log.
+struct MessageBytes {
+    input: BufReader<File>,
+    at: u64,
+}
+
+impl MessageBytes {
+    /// The next `count` bytes; false where there are fewer.
+    fn next(&mut self, count: u64, bytes: &mut Vec<u8>) -> io::Result<bool> {
+        bytes.clear();
+        let read = self.input.by_ref().take(count).read_to_end(bytes)? as u64;
+        self.at += read;
+        Ok(read == count)
+    }
+
+    fn seek(&mut self, at: u64) -> io::Result<()> {
+        self.at = self.input.seek(SeekFrom::Start(at))?;
+        Ok(())
+    }
+}
+
+/// Where data were appended to a log, by its message of flag bits: 8 compatible ones, 8 incompatible ones, of which the first bit says that data
+/// were appended, and three offsets.
+///
+/// # Errors
+/// It has incompatible flags that are not known.
+fn flag_bits(message: &[u8]) -> Result<Vec<u64>, Reason> {
+    const DATA_APPENDED: u8 = 1;
+    let incompatible = message.get(8..16).unwrap_or_default();
+    let unknown =
+        incompatible.iter().enumerate().any(|(at, flags)| flags & !(if at == 0 { DATA_APPENDED } else { 0 }) != 0);
+    if unknown {
+        let error = "it has features that a reader has to know, and this one does not".into();
+        return Err(Reason::Format { format: FORMAT, error });
+    }
+    let offsets = message.get(16..40).unwrap_or_default().chunks_exact(8);
+    let offsets = offsets.map(|bytes| bytes.iter().rev().fold(0, |offset, byte| offset << 8 | u64::from(*byte)));
+    Ok(offsets.filter(|offset| *offset > 0).collect())
 }
 
 /// Name and fields of a format such as `sensor_gyro:uint64_t timestamp;float[3] xyz;`; `None` for other texts.
@@ -454,7 +502,7 @@ fn format(text: &[u8]) -> Option<(String, Vec<Field>)> {
 #[cfg(test)]
 mod tests {
     use super::{MOST_WAITING, Pairing};
-    use crate::tables::sensor_table::Number;
+    use crate::reading::batch::Number;
 
     fn sample(time_us: i64, value: f64) -> [Number; 4] {
         [Number::Integer(time_us), Number::Real(value), Number::Real(value + 1.0), Number::Real(value + 2.0)]

@@ -1,8 +1,8 @@
-//! What the reading of one file may cost: bytes once they are decompressed, numbers that are held, levels of nesting, and time.
+//! What the reading of one file may cost: bytes once they are decompressed, numbers, and levels of nesting.
 //!
-//! A file of a few kilobytes can ask for gigabytes (compressed constants), for a stack of any depth (definitions within definitions)
-//! or for hours (a query that never ends). Every reader draws from one budget, whose amounts grow with the size of the file, so that
-//! no recording that a sensor made meets it: the noise of a converter does not compress to a fiftieth.
+//! A file of a few kilobytes can ask for gigabytes (compressed constants) or for a stack of any depth (definitions within definitions).
+//! Every reader draws from one budget, whose amounts grow with the size of the file, so that no recording that a sensor made meets it: the
+//! noise of a converter does not compress to a fiftieth. They bound the time as well, but for a query of a database, which has a deadline.
 
 use crate::input::input_error::Reason;
 use std::borrow::BorrowMut;
@@ -16,14 +16,11 @@ const BYTES_OF_ANY: u64 = 1 << 24;
 /// Numbers that a byte of the file may become, and numbers that every file has beside.
 const VALUES_PER_BYTE: u64 = 8;
 const VALUES_OF_ANY: u64 = 1 << 20;
-/// Time for a byte of the file, and for every file.
+/// Time of a query for a byte of the file, and for every file.
 const NANOSECONDS_PER_BYTE: u64 = 1_000;
 const TIME_OF_ANY: Duration = Duration::from_secs(10);
 /// Definitions within definitions, structures within structures, groups within groups.
 const MOST_LEVELS: usize = 32;
-
-/// How many numbers are read before the time is looked at.
-const VALUES_BETWEEN: u64 = 1 << 12;
 
 /// The amounts for one file. A reader that goes through the file twice takes a [`Meter`] for each time.
 #[derive(Debug, Clone, Copy)]
@@ -65,14 +62,9 @@ impl Budget {
         Self { end: Instant::now().checked_add(self.time), ..self }
     }
 
-    /// The same without a limit of time.
-    pub(crate) fn without_time(self) -> Self {
-        Self { end: None, ..self }
-    }
-
     /// Counts from nothing.
     pub(crate) fn meter(self) -> Meter {
-        Meter { budget: self, bytes: 0, values: 0, looked_at: 0 }
+        Meter { budget: self, bytes: 0, values: 0 }
     }
 
     /// Refuses what lies deeper than any recording.
@@ -80,7 +72,7 @@ impl Budget {
         if levels > MOST_LEVELS { Err(Reason::TooDeep { most: MOST_LEVELS }) } else { Ok(()) }
     }
 
-    /// Refuses to go on after the time has passed.
+    /// Refuses to go on with a query after the time has passed.
     pub(crate) fn check_time(self) -> Result<(), Reason> {
         let is_late = self.end.is_some_and(|end| Instant::now() > end);
         if is_late { Err(Reason::TooSlow { seconds: self.time.as_secs() }) } else { Ok(()) }
@@ -93,8 +85,6 @@ pub(crate) struct Meter {
     budget: Budget,
     bytes: u64,
     values: u64,
-    /// Numbers when the time was looked at last.
-    looked_at: u64,
 }
 
 impl Meter {
@@ -108,7 +98,7 @@ impl Meter {
         if self.bytes > self.budget.bytes {
             return Err(Reason::Expands { bytes: self.budget.bytes });
         }
-        self.budget.check_time()
+        Ok(())
     }
 
     /// Adds numbers that are held.
@@ -116,10 +106,6 @@ impl Meter {
         self.values = self.values.saturating_add(values);
         if self.values > self.budget.values {
             return Err(Reason::TooManyValues { values: self.budget.values });
-        }
-        if self.values - self.looked_at >= VALUES_BETWEEN {
-            self.looked_at = self.values;
-            self.budget.check_time()?;
         }
         Ok(())
     }

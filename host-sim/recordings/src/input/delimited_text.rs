@@ -29,9 +29,9 @@ pub(crate) struct Lines {
     is_latin: bool,
     /// Whether the line in `bytes` is read once more.
     again: bool,
+    /// Bytes that are zero, as where a disk was full or a device lost its power.
+    zero_bytes: u64,
     monitor: ReadMonitor,
-    /// Whether the reading was stopped before the end of the file.
-    is_stopped: bool,
 }
 
 impl Lines {
@@ -43,7 +43,7 @@ impl Lines {
         Self::open_monitored(file, &ReadMonitor::default())
     }
 
-    /// As [`open`](Self::open); `monitor` counts the bytes and may stop the reading.
+    /// As [`open`](Self::open); `monitor` counts the bytes.
     pub(crate) fn open_monitored(file: &Path, monitor: &ReadMonitor) -> Result<Self, InputError> {
         let fail = |reason| InputError::file(file, reason);
         let mut raw = File::open(file).map_err(|e| fail(Reason::Io(e)))?;
@@ -61,8 +61,7 @@ impl Lines {
         let counted = Counted::new(Cursor::new(start).chain(raw), monitor);
         let whole = BufReader::with_capacity(BUFFER_BYTES, counted);
         let bytes: Box<dyn Read + Send> = if compressed {
-            // The time is that of the caller, who works on the lines while they are read.
-            let budget = Budget::of_file(file).map_err(|e| fail(Reason::Io(e)))?.without_time();
+            let budget = Budget::of_file(file).map_err(|e| fail(Reason::Io(e)))?;
             let members = Metered::new(GzipMembers::new(whole), budget.meter());
             Box::new(ReadAhead::new(members).map_err(|e| fail(Reason::Io(e)))?)
         } else {
@@ -77,8 +76,8 @@ impl Lines {
             latin: String::new(),
             is_latin: false,
             again: false,
+            zero_bytes: 0,
             monitor: monitor.clone(),
-            is_stopped: false,
         })
     }
 
@@ -89,10 +88,6 @@ impl Lines {
     /// The file cannot be read or decompressed, or the line is longer than 65536 bytes or has control characters.
     pub(crate) fn next(&mut self) -> Result<Option<(u64, &str)>, InputError> {
         while !std::mem::take(&mut self.again) {
-            self.is_stopped |= self.monitor.take_stop();
-            if self.is_stopped {
-                return Ok(None);
-            }
             self.line += 1;
             self.bytes.clear();
             let read = (&mut self.input).take(MAX_LINE_BYTES).read_until(b'\n', &mut self.bytes);
@@ -106,7 +101,13 @@ impl Lines {
                 self.monitor.end();
                 return Ok(None);
             }
-            if read as u64 == MAX_LINE_BYTES && self.bytes.last() != Some(&b'\n') {
+            if self.bytes.contains(&0) {
+                let length = self.bytes.len();
+                self.bytes.retain(|byte| *byte != 0);
+                self.zero_bytes += (length - self.bytes.len()) as u64;
+                // The rest of a line of zeros follows.
+                self.line -= u64::from(self.bytes.is_empty());
+            } else if read as u64 == MAX_LINE_BYTES && self.bytes.last() != Some(&b'\n') {
                 return Err(InputError::line(&self.file, self.line, Reason::LongLine));
             }
             if !self.bytes.trim_ascii().is_empty() {
@@ -128,9 +129,9 @@ impl Lines {
         Ok(Some((self.line, &self.latin)))
     }
 
-    /// Whether the reading was stopped before the end of the file.
-    pub(crate) fn is_stopped(&self) -> bool {
-        self.is_stopped
+    /// Bytes that are zero, which were left out.
+    pub(crate) fn zero_bytes(&self) -> u64 {
+        self.zero_bytes
     }
 
     /// The header without consuming it: what [`next`](Self::next) returns now, and will return once more. `None` for a file of

@@ -84,8 +84,8 @@ pub enum Reason {
     },
     /// A binary format that is not known.
     #[error(
-        "of no known format: it begins with {begins}; known are tables in text, NumPy, MATLAB, HDF5, bags of ROS, MCAP, ULog, DataFlash \
-         and blackbox logs; write its numbers as text or, in Python, with numpy.save(\"FILE.npy\", array)"
+        "of no known format: it begins with {begins}; known are tables in text, NumPy, MATLAB, HDF5, bags of ROS, MCAP, ULog and \
+         DataFlash logs; write its numbers as text or, in Python, with numpy.save(\"FILE.npy\", array)"
     )]
     UnknownBinary {
         /// The first bytes.
@@ -246,9 +246,12 @@ pub enum Reason {
     /// Several topics of which the user names none.
     #[error("several topics: choose one with --topic: {0}")]
     SeveralTopics(String),
-    /// A ROS 1 bag of a recording that was interrupted.
-    #[error("the bag has no index, as after an interrupted recording; make one with `rosbag reindex`")]
-    NoIndex,
+    /// Rows of two sensors in one table: the columns of each.
+    #[error(
+        "some rows have {} and the others {}, as of two sensors; read one of them with --columns, as in --columns gyro_x=NAME",
+        .0.0, .0.1
+    )]
+    SeveralOrigins(Box<(String, String)>),
     /// Arrays that cannot be columns of one table: what each has.
     #[error("{0}; columns of one table have as many rows")]
     UnequalRows(String),
@@ -275,6 +278,18 @@ pub enum Reason {
 }
 
 impl Reason {
+    /// Whether a limit of this program was met: the file need not be damaged.
+    pub(crate) fn is_limit(&self) -> bool {
+        matches!(
+            self,
+            Self::TooManySamples
+                | Self::Expands { .. }
+                | Self::TooManyValues { .. }
+                | Self::TooDeep { .. }
+                | Self::TooSlow { .. }
+        )
+    }
+
     /// Why reading failed: what a [`Metered`](crate::input::budget::Metered) input refused, or the error itself.
     pub(crate) fn from_io(error: io::Error) -> Self {
         match error.downcast::<Self>() {

@@ -79,26 +79,6 @@ impl Read for ReadAhead {
     }
 }
 
-/// Calls `take` with each of the items that `next` gives, while another thread makes the next one, until one of them fails.
-pub(crate) fn for_each_ahead<T: Send, E: Send>(
-    mut next: impl FnMut() -> Result<Option<T>, E> + Send,
-    take: impl FnMut(T) -> Result<(), E>,
-) -> Result<(), E> {
-    let (send, items) = sync_channel(1);
-    thread::scope(|scope| {
-        let reader = scope.spawn(move || {
-            while let Some(item) = next()? {
-                if send.send(item).is_err() {
-                    break;
-                }
-            }
-            Ok(())
-        });
-        let taken = items.into_iter().try_for_each(take);
-        taken.and(reader.join().unwrap_or_else(|panic| resume_unwind(panic)))
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -145,31 +125,5 @@ mod tests {
         drop(reader);
         // The sender is dropped with the thread's input.
         assert!(wait.recv().is_err());
-    }
-
-    #[test]
-    fn items_arrive_in_their_order_and_an_error_ends_them() {
-        let mut number = 0;
-        let mut taken = Vec::new();
-        let next = || {
-            number += 1;
-            if number > 100 { Err("damaged") } else { Ok(Some(number)) }
-        };
-        let take = |item| {
-            taken.push(item);
-            Ok(())
-        };
-        assert_eq!(for_each_ahead(next, take), Err("damaged"));
-        assert_eq!(taken, (1..=100).collect::<Vec<i32>>());
-    }
-
-    #[test]
-    fn an_item_that_cannot_be_taken_ends_the_reading() {
-        let mut number = 0;
-        let next = || {
-            number += 1;
-            Ok(Some(number))
-        };
-        assert_eq!(for_each_ahead(next, |item| if item == 10 { Err("full") } else { Ok(()) }), Err("full"));
     }
 }

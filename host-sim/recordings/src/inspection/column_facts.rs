@@ -3,7 +3,7 @@
 use crate::columns::column_selection::AvailableColumn;
 use crate::columns::unit::Unit;
 use crate::inspection::time_unit::time_unit;
-use crate::tables::quantizer::{difference_noise, step};
+use crate::reading::quantizer::{difference_noise, step};
 use crate::tables::whole_table::WholeColumn;
 
 /// Part of the rows that may be before the row above in a column of times.

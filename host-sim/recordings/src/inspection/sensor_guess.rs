@@ -6,7 +6,7 @@ use crate::columns::unit::{COUNT, SECOND, Unit};
 use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::time_unit::time_unit;
 use crate::inspection::unit_guess::{self, UnitGuess};
-use crate::tables::sensor_table::usual_unit;
+use crate::reading::batch::usual_unit;
 use crate::tables::whole_table::{WholeSensor, WholeTable};
 use measurement::SensorProfile;
 use std::collections::BTreeMap;
@@ -37,6 +37,8 @@ pub struct Proposal {
     pub is_found: bool,
     /// Whether a column or a unit is guessed.
     pub is_guessed: bool,
+    /// `--sensor`, where the names of the columns are those of its registers.
+    pub sensor: Option<&'static str>,
     /// Guesses that are not safe, one sentence each.
     pub doubts: Vec<String>,
 }
@@ -193,8 +195,11 @@ impl SensorGuess {
         let clock = clock.map(|(at, _)| at);
         let counter = (0..facts.len()).find(|at| facts[*at].is_counter() && clock != Some(*at));
         columns.extend(counter.filter(|_| clock.is_none()).map(|at| ("sample", at, None, "it grows by one")));
-        let is_free =
-            |at: usize| facts[at].noise > 0.0 && clock != Some(at) && counter != Some(at) && !facts[at].is_clock();
+        let is_free = |at: usize| {
+            let of = &facts[at];
+            let may_be = may_be_inertial(of.column) && of.noise > 0.0 && !of.is_clock();
+            may_be && clock != Some(at) && counter != Some(at)
+        };
         let Triples { force, others } = Triples::find(facts, is_free);
         let against_noise = |at: usize| {
             let axes = &facts[at..at + 3];
@@ -263,8 +268,10 @@ impl SensorGuess {
         Self { force: force_guess, rate: rate_guess, time: time_guess, ..self }
     }
 
+    /// Whether it has a channel of an inertial sensor, or of a magnetometer.
     fn is_inertial(&self) -> bool {
-        self.columns.iter().any(|(channel, ..)| GYROSCOPE.contains(channel) || ACCELEROMETER.contains(channel))
+        let is_axis = |channel: &str| GYROSCOPE.contains(&channel) || ACCELEROMETER.contains(&channel);
+        self.columns.iter().any(|(channel, ..)| is_axis(channel) || channel.starts_with("magn_"))
     }
 
     /// The position of the column of a channel.
@@ -335,6 +342,39 @@ impl SensorGuess {
         }
         proposal
     }
+}
+
+/// Parts of names that are none of a rate or a specific force.
+const OTHER_NAMES: [&str; 22] = [
+    "lat",
+    "lon",
+    "alt",
+    "easting",
+    "northing",
+    "quality",
+    "yaw",
+    "pitch",
+    "roll",
+    "heading",
+    "speed",
+    "press",
+    "humid",
+    "volt",
+    "current",
+    "batt",
+    "covariance",
+    "orientation",
+    "quat",
+    "magnetic",
+    "position",
+    "temp",
+];
+
+/// Whether the name and the unit of a column leave it to be a rate or a specific force.
+fn may_be_inertial(column: &AvailableColumn) -> bool {
+    let name = column.name.to_lowercase();
+    let unit = column.unit.is_none_or(|unit| ["deg/s", "g", COUNT].contains(&unit.base));
+    unit && !OTHER_NAMES.iter().any(|other| name.contains(other))
 }
 
 /// Largest ratio of the noises of three axes of one sensor.

@@ -2,7 +2,7 @@
 
 use crate::columns::column_selection::{AvailableColumn, ChosenColumn};
 use crate::columns::unit::Unit;
-use crate::tables::sensor_table::TableBuilder;
+use crate::reading::batch::BatchBuilder;
 
 /// Numbers that are held at most, 128 MiB.
 const MOST_VALUES: u64 = 1 << 24;
@@ -52,13 +52,12 @@ pub(crate) struct WholeTable {
 
 impl WholeTable {
     /// The columns that were chosen as they are, with their numbers.
-    pub(crate) fn with_rows(self, builder: TableBuilder) -> Self {
-        let (chosen, values) = builder.into_values();
+    pub(crate) fn with_rows(self, chosen: Vec<ChosenColumn>, mut builder: BatchBuilder) -> Self {
         let column = |(chosen, values): (ChosenColumn, Vec<f64>)| WholeColumn {
             column: AvailableColumn { name: chosen.label, unit: chosen.unit },
             values,
         };
-        Self { columns: chosen.into_iter().zip(values).map(column).collect(), ..self }
+        Self { columns: chosen.into_iter().zip(builder.take_last().values).map(column).collect(), ..self }
     }
 
     /// Number of rows.

@@ -2,7 +2,7 @@
 
 use crate::time_base::indexed_clock::{ClockStep, IndexedClock};
 use crate::time_base::lateness_track::{COARSE, LostStretch};
-use crate::time_base::stamp_alignment::{RateEstimate, uncertain};
+use crate::time_base::stamp_alignment::RateEstimate;
 
 /// What the time stamps of a recording show, and what they cannot show.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -15,6 +15,8 @@ pub struct StampQuality {
     pub width: f64,
     /// Losses that the stamps show, refused samples included; none where the samples have an index.
     pub losses: Vec<LostStretch>,
+    /// Samples in losses that something else may explain.
+    pub uncertain: u64,
     /// Whether losses of single samples are told from the rounding of the stamps.
     pub resolved: bool,
     /// The shortest loss that is told from late delivery, samples: more than 1 where samples come in bursts that differ by as much.
@@ -28,7 +30,7 @@ pub struct StampQuality {
 }
 
 /// What the user should know of a rate that changes.
-pub(crate) fn changing_rate(rate: RateEstimate) -> String {
+fn changing_rate(rate: RateEstimate) -> String {
     format!(
         "the rate of the samples, or of the clock that stamped them, changes from {:.4} to {:.4} Hz; {:.4} Hz is the mean",
         rate.low_hz, rate.high_hz, rate.hz
@@ -92,6 +94,6 @@ impl StampQuality {
 
     /// Samples in losses that something else may explain.
     pub fn uncertain_losses(&self) -> u64 {
-        uncertain(&self.losses, self.resolved)
+        self.uncertain
     }
 }

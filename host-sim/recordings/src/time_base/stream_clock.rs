@@ -6,18 +6,13 @@
 //! of the queue behind it are known. Before that a rate that changes is [followed](crate::time_base::clock_rate).
 
 use crate::time_base::clock_rate::SteadyStream;
-use crate::time_base::indexed_clock::{STEP_PERIODS, STEP_S};
+use crate::time_base::indexed_clock::{ClockStep, STEP_PERIODS, STEP_S};
 use crate::time_base::lateness_track::{CERTAIN, COARSE, LOSS, MEMORY};
 use crate::time_base::lower_envelope::{MinimumBehind, minimum_ahead};
-use crate::time_base::sample_slots::is_too_sparse;
 use crate::time_base::stamp_alignment::MAX_QUEUE;
 use crate::time_base::stamp_alignment::RateEstimate;
-use crate::time_base::stamp_quality::{StampQuality, changing_rate};
-use crate::time_base::time_base_error::{MIN_SAMPLES, TimeBaseError};
-use std::collections::BTreeMap;
-
-/// Rows of a block.
-pub(crate) const BLOCK: usize = 1 << 14;
+use crate::time_base::stamp_quality::StampQuality;
+use crate::time_base::time_base_error::TimeBaseError;
 
 /// What tells the sample periods.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +33,7 @@ pub(crate) struct Stamp {
 }
 
 /// The sample period of a row.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Placed {
     /// Counted from any origin.
     pub(crate) period: u64,
@@ -68,6 +63,9 @@ pub(crate) struct StreamClock {
     uncertain: u64,
     /// Smallest step of the index.
     least_step: u64,
+    /// Where the time leaps against the index, and by how much in all, s.
+    clock_steps: Vec<ClockStep>,
+    leapt_s: f64,
 }
 
 impl StreamClock {
@@ -104,25 +102,21 @@ impl StreamClock {
             late: 0,
             uncertain: 0,
             least_step: u64::MAX,
+            clock_steps: Vec::new(),
+            leapt_s: 0.0,
         })
     }
 
     /// Takes the next rows and returns the periods of those that can be placed now: of all with `is_last`.
-    ///
-    /// # Errors
-    /// The time leaps against the index.
-    pub(crate) fn place(
-        &mut self,
-        rows: impl Iterator<Item = Stamp>,
-        is_last: bool,
-    ) -> Result<Vec<Placed>, TimeBaseError> {
+    pub(crate) fn place(&mut self, rows: impl Iterator<Item = Stamp>, is_last: bool) -> Vec<Placed> {
         match self.source {
-            Source::Rows => Ok(rows
-                .map(|_| {
+            Source::Rows => {
+                let place = |_| {
                     self.placed += 1;
                     Placed { period: self.placed - 1, missing: 0 }
-                })
-                .collect()),
+                };
+                rows.map(place).collect()
+            }
             Source::Index(period_s) => rows.map(|row| self.by_index(row, period_s)).collect(),
             Source::Stamps(period_s) => {
                 let mut origin_s = self.origin_s;
@@ -137,12 +131,12 @@ impl StreamClock {
                     self.ahead.push(steady_s / period_s - number as f64);
                     self.times_s.push(time_s);
                 }
-                Ok(self.by_stamps(is_last))
+                self.by_stamps(is_last)
             }
         }
     }
 
-    fn by_index(&mut self, row: Stamp, period_s: Option<f64>) -> Result<Placed, TimeBaseError> {
+    fn by_index(&mut self, row: Stamp, period_s: Option<f64>) -> Placed {
         let index = row.index.unwrap_or_default();
         if let Some(before) = self.last.index {
             let step = index - before;
@@ -151,18 +145,19 @@ impl StreamClock {
             if let (Some(period_s), Some(before), Some(now)) = (period_s, self.last.time_s, row.time_s) {
                 let excess = (now - before) / period_s - step as f64;
                 if excess.abs() >= STEP_PERIODS.max(STEP_S / period_s) {
-                    let reason = format!("before sample {index} the time leaps against the index");
-                    return Err(TimeBaseError::Irregular(reason));
+                    let seconds = excess * period_s;
+                    self.leapt_s += seconds;
+                    self.clock_steps.push(ClockStep { before: self.placed as usize, seconds });
                 }
             }
         }
         if let Some(time_s) = row.time_s {
             let origin_s = *self.origin_s.get_or_insert(time_s);
-            self.line.add(index as f64, time_s - origin_s);
+            self.line.add(index as f64, time_s - origin_s - self.leapt_s);
         }
         self.last = row;
         self.placed += 1;
-        Ok(Placed { period: index, missing: self.missing })
+        Placed { period: index, missing: self.missing }
     }
 
     fn by_stamps(&mut self, is_last: bool) -> Vec<Placed> {
@@ -193,7 +188,7 @@ impl StreamClock {
     }
 
     /// The sample rate by the stamps of the rows that were placed, Hz.
-    pub(crate) fn rate_hz(&self) -> Option<f64> {
+    fn rate_hz(&self) -> Option<f64> {
         let changing = self.changing_rate().map(|rate| rate.hz);
         changing.or(self.line.slope().map(f64::recip)).filter(|hz| hz.is_finite() && *hz > 0.0)
     }
@@ -205,36 +200,31 @@ impl StreamClock {
         Some(RateEstimate { hz: period as f64 / time_s, low_hz: longest_s.recip(), high_hz: shortest_s.recip() })
     }
 
-    /// What the user should know of the rows that were placed, as of [`StampQuality::notes`].
-    pub(crate) fn note(&self) -> Option<String> {
-        self.changing_rate().map(changing_rate)
+    /// What the stamps of the rows that were placed show; `first_rows` is what those of the first ones show.
+    pub(crate) fn quality(&self, first_rows: &StampQuality) -> StampQuality {
+        let changing = self.changing_rate();
+        let by_line = || {
+            let hz = self.rate_hz()?;
+            // The interval of the first rows holds for all.
+            let of_first = first_rows.rate?;
+            let (low_hz, high_hz) = (hz * of_first.low_hz / of_first.hz, hz * of_first.high_hz / of_first.hz);
+            Some(RateEstimate { hz, low_hz, high_hz })
+        };
+        StampQuality {
+            rate: changing.or_else(by_line),
+            is_rate_changing: changing.is_some(),
+            late: self.late,
+            uncertain: self.uncertain,
+            losses: Vec::new(),
+            clock_steps: self.clock_steps.clone(),
+            ..first_rows.clone()
+        }
     }
 
-    /// Warnings that a report counts, by cause, as those of [`StampQuality::warnings`].
-    pub(crate) fn warnings(&self) -> impl Iterator<Item = (&'static str, u64)> {
-        [("late_delivery", self.late), ("uncertain_loss", self.uncertain)].into_iter().filter(|(_, count)| *count > 0)
-    }
-
-    /// Checks a recording of `samples` usable samples over `periods` periods.
-    ///
-    /// # Errors
-    /// It has fewer than 4 samples, no two neighbours, or gaps that are more than 64 times as long as the samples.
-    pub(crate) fn check(
-        &self,
-        samples: u64,
-        periods: u64,
-        dropped: &BTreeMap<&'static str, u64>,
-    ) -> Result<(), TimeBaseError> {
-        if samples < MIN_SAMPLES {
-            return Err(TimeBaseError::TooShort { used: samples, dropped: dropped.clone() });
-        }
-        if matches!(self.source, Source::Index(_)) && self.least_step > 1 {
-            return Err(TimeBaseError::NoNeighbours(self.least_step));
-        }
-        if is_too_sparse(samples, periods - 1) {
-            return Err(TimeBaseError::TooSparse { samples, periods });
-        }
-        Ok(())
+    /// Smallest step of the index; `None` where there is none, or one row.
+    pub(crate) fn least_step(&self) -> Option<u64> {
+        let has_step = matches!(self.source, Source::Index(_)) && self.placed > 1;
+        has_step.then_some(self.least_step)
     }
 }
 

@@ -26,8 +26,8 @@ pub enum TimeBaseError {
         /// By the time stamps, Hz.
         measured_hz: f64,
     },
-    /// Stamps of a recording that is not held in memory, which need all of them to be understood.
-    #[error("the time stamps are too irregular to be read in blocks ({0}): leave out --quick")]
+    /// Stamps that need all of them to be understood, of too many rows.
+    #[error("the time stamps are too irregular for a recording of this length ({0}): give it in parts")]
     Irregular(String),
     /// No sample follows another one by one sample period.
     #[error("no two neighbouring samples: a step of the column sample is at least {0}")]
@@ -44,7 +44,7 @@ pub enum TimeBaseError {
         periods: u64,
     },
     /// A range without a sample.
-    #[error("no sample from {from_s} to {to_s} s (--from, --to): the recording has {recording_s:.3} s")]
+    #[error("no sample from {} to {} s (--from, --to): the recording has {recording_s:.3} s", short(*.from_s), short(*.to_s))]
     EmptyTimeRange {
         /// Its beginning, s from the first sample.
         from_s: f64,
@@ -78,4 +78,9 @@ pub enum StreamError {
 fn list(dropped: &BTreeMap<&'static str, u64>) -> String {
     let causes: Vec<String> = dropped.iter().map(|(cause, count)| format!("{cause} {count}")).collect();
     if causes.is_empty() { String::new() } else { format!("; left out: {}", causes.join(", ")) }
+}
+
+/// A time in a message: one of many digits with a power of ten.
+fn short(time: f64) -> String {
+    if time.abs() < 1e15 || time.is_infinite() { time.to_string() } else { format!("{time:e}") }
 }

@@ -6,14 +6,15 @@ use flate2::write::GzEncoder;
 use measurement::{MeasuredChannel, Measurement, SensorProfile, adis16405, profile_file};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use recordings::any_sensor::{ReadOptions, SensorRecording};
+use recordings::any_sensor::ReadOptions;
 use recordings::file_format::{FileFormat, InputFile};
 use recordings::inspection::InspectedTable;
 use recordings::recorded_file::RecordedFile;
 use recordings::recording::{Recorder, Recording, TimeStamp};
-use recordings::sample_stream::{KeptInMemory, SampleStream, StreamError};
+use recordings::row_writer::{SensorRows, WriteError};
+use recordings::sample_stream::{KeptInMemory, Reading as WayOfReading, SampleStream, StreamError};
 use recordings::time_base::TimeRange;
-use recordings::{ColumnSelection, InputError, ReadMonitor, count_table};
+use recordings::{ColumnSelection, InputError};
 use std::io::Write;
 use std::path::Path;
 use std::process::Command;
@@ -147,24 +148,13 @@ pub(crate) fn read<T: AsRef<str>>(name: &str, content: &[u8], options: &[T]) -> 
 /// Reads a file.
 pub(crate) fn read_file<T: AsRef<str>>(file: &Path, options: &[T]) -> Result<Reading, StreamError> {
     let options = Options::new(options);
-    let kept = KeptInMemory { rows: ROWS_IN_MEMORY, rows_with_losses: ROWS_IN_MEMORY, most_lost: 1.0, irregular: true };
+    let kept = KeptInMemory { rows: ROWS_IN_MEMORY, rows_with_losses: ROWS_IN_MEMORY, most_lost: 1.0 };
+    let reading = WayOfReading::new(options.rate_hz, kept).of_part(options.part);
     let input = InputFile::open(file)?;
-    let stream = match (input.format(), options.part) {
-        (FileFormat::FrameLog | FileFormat::SpiExport, _) => {
-            SampleStream::recorded(bursts(&input)?, options.rate_hz, kept)?
-        }
-        (FileFormat::CountTable, None) if options.are_of_counts() => {
-            SampleStream::counts(input, options.range, options.rate_hz, kept)?
-        }
-        (FileFormat::CountTable, Some(part)) if options.are_of_counts() => {
-            let part = part.of_recording(count_table::read(file, options.range)?, options.rate_hz)?;
-            SampleStream::recorded(part, options.rate_hz, kept)?
-        }
-        (_, None) => SampleStream::any_sensor(input, options.of_any_sensor(file)?, options.rate_hz, kept)?,
-        (_, Some(part)) => {
-            let part = input.read(&options.of_any_sensor(file)?)?.within(part, options.rate_hz)?;
-            SampleStream::sensor_recording(part, options.rate_hz, &ReadMonitor::default())?
-        }
+    let stream = match input.format() {
+        FileFormat::FrameLog | FileFormat::SpiExport => SampleStream::recorded(bursts(&input)?, reading)?,
+        FileFormat::CountTable if options.are_of_counts() => SampleStream::counts(input, options.range, reading)?,
+        _ => SampleStream::any_sensor(input, options.of_any_sensor(file)?, reading)?,
     };
     assert!(stream.is_in_memory(), "{}: more rows than these tests read", file.display());
     let notes = stream.notes().to_vec();
@@ -185,9 +175,32 @@ fn bursts(input: &InputFile) -> Result<Recording, InputError> {
     Ok(recorder.finish())
 }
 
-/// The rows of any sensor, as they are converted.
-pub(crate) fn rows<T: AsRef<str>>(file: &Path, options: &[T]) -> Result<SensorRecording, InputError> {
-    InputFile::open(file)?.read(&Options::new(options).of_any_sensor(file)?)
+/// The rows of any sensor as a table, as they are converted.
+pub(crate) fn rows<T: AsRef<str>>(file: &Path, options: &[T]) -> Result<String, StreamError> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let table = folder.path().join("table.csv");
+    let input = InputFile::open(file)?;
+    sensor_rows(&input, options)?.write_table(&table).map_err(unwritten)?;
+    Ok(std::fs::read_to_string(&table).expect("a table"))
+}
+
+/// The rows of any sensor as an array in `array`; the names of its columns.
+pub(crate) fn write_array(file: &Path, array: &Path) -> Result<Vec<String>, StreamError> {
+    let input = InputFile::open(file)?;
+    Ok(sensor_rows(&input, &[""; 0])?.write_array(array).map_err(unwritten)?.columns)
+}
+
+fn sensor_rows<'a, T: AsRef<str>>(input: &'a InputFile, options: &[T]) -> Result<SensorRows<'a>, InputError> {
+    let options = Options::new(options);
+    let (part, stated_hz) = (options.part, options.rate_hz);
+    Ok(SensorRows { input, options: options.of_any_sensor(input.path())?, part, stated_hz })
+}
+
+fn unwritten(error: WriteError) -> StreamError {
+    match error {
+        WriteError::Read(error) => error,
+        WriteError::Write(error) => panic!("{error}"),
+    }
 }
 
 /// What is in a file.

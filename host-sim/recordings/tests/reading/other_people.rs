@@ -1,7 +1,7 @@
 //! Recordings of other sensors that other people made: they open as the documentation says, and their Allan deviations are those that other
 //! programs find (`reference_curves.py`).
 
-use super::harness::{Reading, inspect, python, read_file, rows};
+use super::harness::{Reading, inspect, python, read_file};
 use serde_json::Value;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
@@ -146,39 +146,6 @@ fn recordings_of_other_people_have_the_curves_of_other_programs() {
         let Some(reference) = reference(test, reader, &path, argument) else { return };
         assert_eq!(reference["rows"], samples, "{file}");
         compare(&read, &reference);
-    }
-}
-
-/// A log of Betaflight with dropped frames.
-#[test]
-fn a_blackbox_log_has_the_values_that_orangebox_decodes() {
-    let test = "a_blackbox_log_has_the_values_that_orangebox_decodes";
-    let Some(file) = other(test, "betaflight_btfl_001.bbl") else { return };
-    let read = reading(&file, &[]);
-    // A loop of 125 us, of which the controller runs every second time and every second of those is logged.
-    assert!((read.rate_hz() / 2000.0 - 1.0).abs() < 1e-2, "{}", read.rate_hz());
-    let (samples, gaps) = (read.samples.len() as f64, read.missing() as f64);
-    let lost = gaps / (samples + gaps);
-    assert!((0.15..0.21).contains(&lost), "{lost} lost");
-    let Some(reference) = reference(test, "blackbox", &file, "") else { return };
-    assert_eq!(read.samples.len() as u64, reference["rows"]);
-    // Every value: the sums of all rows, each times its number, are those of orangebox up to the rounding of a double.
-    let folder = tempfile::tempdir().expect("a folder");
-    let table = folder.path().join("all.csv");
-    rows(&file, &[""; 0]).expect("rows").write_table(&table).expect("a table");
-    let text = std::fs::read_to_string(&table).expect("a table");
-    let mut lines = text.lines();
-    let heading: Vec<&str> = lines.next().expect("a heading").split(',').collect();
-    let mut sums = vec![0.0; heading.len()];
-    for (row, line) in lines.enumerate() {
-        for (sum, number) in sums.iter_mut().zip(line.split(',')) {
-            *sum += (row + 1) as f64 * number.parse::<f64>().expect("a number");
-        }
-    }
-    for (channel, expected) in reference["sums"].as_object().expect("channels") {
-        let at = heading.iter().position(|name| name.starts_with(channel.as_str())).expect(channel);
-        let expected = expected.as_f64().expect("a number");
-        assert!((sums[at] / expected - 1.0).abs() < 1e-9, "{channel}: {} and {expected}", sums[at]);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Files of every format that other programs wrote, with known noise, rate and losses (`make_samples.py`).
 
-use super::harness::{python, read, read_file, rows};
+use super::harness::{python, read, read_file, rows, write_array};
 use recordings::file_format::{FileFormat, InputFile};
 use recordings::sample_stream::StreamError;
 use serde_json::Value;
@@ -81,24 +81,21 @@ fn samples_of_other_programs_have_their_rate_losses_and_numbers() {
 fn every_format_is_converted() {
     let Some(samples) = samples("every_format_is_converted") else { return };
     let folder = tempfile::tempdir().expect("a folder");
-    let [table, array, back] = ["table.csv", "back.npy", "back.csv"].map(|name| folder.path().join(name));
+    let [array, back] = ["back.npy", "back.csv"].map(|name| folder.path().join(name));
     for Sample { name, file, options, truth } in samples {
         // A log of the bus has no columns.
         if InputFile::open(file).expect(name).format() == FileFormat::SpiExport {
             continue;
         }
-        rows(file, options).expect(name).write_table(&table).expect("a disk");
-        let lines = std::fs::read_to_string(&table).expect("a table").lines().count();
+        let lines = rows(file, options).expect(name).lines().count();
         assert_eq!(lines as u64 - 1, truth["rows"], "{name}");
     }
     let bag = &samples.iter().find(|sample| sample.name == "one.bag").expect("a bag").file;
-    let columns = rows(bag, &[""; 0]).expect("a bag").write_array(&array).expect("a disk");
+    let columns = write_array(bag, &array).expect("a bag");
     assert_eq!(columns[..5], ["time_s", "gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s", "accl_x_m_s2"]);
     let columns = "time=0,gyro_x=1,gyro_y=2,gyro_z=3,accl_x=4,accl_y=5,accl_z=6";
-    rows(&array, &["--columns", columns, "--units", "s,rad/s,m/s^2"])
-        .expect("an array")
-        .write_table(&back)
-        .expect("a disk");
+    let table = rows(&array, &["--columns", columns, "--units", "s,rad/s,m/s^2"]).expect("an array");
+    std::fs::write(&back, table).expect("a disk");
     let [direct, converted] = [bag, &back].map(|file| read_file(file, &[""; 0]).expect("samples"));
     assert_eq!(direct.samples.slots, converted.samples.slots);
     for channel in ["gyro_x", "gyro_y", "gyro_z", "accl_x", "accl_y", "accl_z"] {
@@ -159,4 +156,39 @@ fn a_field_without_a_number_leaves_the_others() {
     }
     let read = read("empty.ulg", &log, &[""; 0]).expect("a log");
     assert_eq!((read.samples.len(), read.samples.channels.len()), (100, 3));
+}
+
+/// A ULog to which data were appended after a crash: the message before them has no end, and what stands there is no sample.
+#[test]
+fn data_that_were_appended_to_a_log_are_no_message() {
+    let record =
+        |kind: u8, body: &[u8]| [&u16::try_from(body.len()).expect("short").to_le_bytes()[..], &[kind], body].concat();
+    let log = |flags: [u8; 8], has_appended: bool| {
+        let mut log = [&b"ULog\x01\x12\x35\x01"[..], &[0; 8]].concat();
+        let at_flags = log.len();
+        log.extend(record(b'B', &[&[0; 8][..], &flags, &[0; 24]].concat()));
+        log.extend(record(b'F', b"sensor_gyro:uint64_t timestamp;float x;float y;float z;"));
+        log.extend(record(b'A', &[&[0, 0, 0][..], b"sensor_gyro"].concat()));
+        for row in 0..100u64 {
+            let values = [1u64, 2, 3].map(|axis| (axis * row * 7919 % 13) as f32 * 0.01).map(f32::to_le_bytes).concat();
+            log.extend(record(b'D', &[&[0, 0][..], &(row * 10_000).to_le_bytes(), &values].concat()));
+        }
+        if has_appended {
+            let cut = record(b'D', &[&[0, 0][..], &1_000_000u64.to_le_bytes(), &[0; 12]].concat());
+            log.extend(&cut[..7]);
+            let offset = (log.len() as u64).to_le_bytes();
+            log[at_flags + 3 + 16..][..8].copy_from_slice(&offset);
+            log.extend(record(b'L', b"6________hardfault"));
+        }
+        log
+    };
+    for appended in [false, true] {
+        let flags = [u8::from(appended), 0, 0, 0, 0, 0, 0, 0];
+        let read = read("crash.ulg", &log(flags, appended), &[""; 0]).expect("a log");
+        assert_eq!(read.samples.len(), 100, "{appended}: {:?}", read.notes);
+        assert!(!read.notes_contain("truncated"), "{:?}", read.notes);
+    }
+    // Features that a reader has to know.
+    let error = read("new.ulg", &log([2, 0, 0, 0, 0, 0, 0, 0], false), &[""; 0]).err().expect("refused").to_string();
+    assert!(error.contains("features"), "{error}");
 }

@@ -3,19 +3,18 @@
 use super::harness::gzip;
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
 use measurement::SampleBlock;
-use recordings::count_table::CountTable;
+use recordings::count_table;
 use recordings::file_format::InputFile;
 use recordings::frame_log::{Frame, FrameLogReader, FrameLogWriter};
 use recordings::recording::{Recorder, TimeStamp};
-use recordings::sample_stream::{KeptInMemory, SampleStream};
+use recordings::sample_stream::{KeptInMemory, Reading, SampleStream};
 use recordings::{Reason, count_table_writer};
 use std::path::Path;
 
 /// What was recorded in memory and the table that is written of it are read in the same blocks.
 #[test]
 fn a_recording_has_the_blocks_of_its_table() {
-    const KEPT: KeptInMemory =
-        KeptInMemory { rows: 1 << 14, rows_with_losses: 1 << 14, most_lost: 1.0, irregular: true };
+    const KEPT: KeptInMemory = KeptInMemory { rows: 1 << 14, rows_with_losses: 1 << 14, most_lost: 1.0 };
     let mut recorder = Recorder::new(vec![Channel::GyroX, Channel::AcclZ], GyroRange::Dps150);
     for row in (0..100_000_u64).filter(|row| row % 1000 < 998) {
         let mut counts = [0; 12];
@@ -30,8 +29,8 @@ fn a_recording_has_the_blocks_of_its_table() {
     count_table_writer::write(&recording, &file).expect("a table");
     let table = InputFile::open(&file).expect("a table");
     let [(recorded, recorded_samples), (read, read_samples)] = [
-        SampleStream::recorded(recording, None, KEPT).expect("a time base"),
-        SampleStream::counts(table, GyroRange::Dps150, None, KEPT).expect("a time base"),
+        SampleStream::recorded(recording, Reading::new(None, KEPT)).expect("a time base"),
+        SampleStream::counts(table, GyroRange::Dps150, Reading::new(None, KEPT)).expect("a time base"),
     ]
     .map(|mut stream| {
         assert!(!stream.is_in_memory());
@@ -91,17 +90,11 @@ fn more_rows_than_are_held_in_memory_are_refused() {
     let file = folder.path().join("ones.csv");
     std::fs::write(&file, &rows).expect("written");
     let refusal = |file: &Path| {
-        let mut table = CountTable::open(file).expect("a table");
-        loop {
-            match table.next() {
-                Ok(row) => assert!(row.is_some(), "all rows are read"),
-                Err(error) => break error,
-            }
-        }
+        count_table::for_each_row(file, GyroRange::default(), |_, _, _| Ok(())).expect_err("too many rows")
     };
     let error = refusal(&file);
     assert!(matches!(error.reason, Reason::TooManySamples), "{error}");
-    assert_eq!(error.line, Some((1 << 25) + 2));
+    assert_eq!(error.row, Some((1 << 25) + 1));
     // Fewer where a small file expands to them.
     let file = folder.path().join("ones.csv.gz");
     std::fs::write(&file, gzip(&rows)).expect("written");

@@ -284,6 +284,61 @@ fn rows_of_several_kinds_are_several_sensors() {
     assert!(refusal(&["--topic", "up"]).contains("it has left, right"));
 }
 
+/// Two devices that a number tells from each other, and two sensors of different rates in one table, with blanks where the other has a row.
+#[test]
+fn rows_of_different_origin_are_no_series() {
+    let mut normal = normal(33);
+    let mut two = "id,t_ms,gx_dps,gy_dps,gz_dps\n".to_owned();
+    let mut merged: Vec<(u32, String)> = Vec::new();
+    for row in 0..ROWS {
+        let [x, y, z] = [(); 3].map(|()| NOISE * normal());
+        two += &format!("1,{},{x:.5},{y:.5},{z:.5}\n2,{},{:.5},{y:.5},{z:.5}\n", 10 * row, 10 * row + 3, x + 9.0);
+        merged.push((10 * row, format!("{},{x:.5},{y:.5},{z:.5},,,\n", 10 * row)));
+        if row < ROWS / 2 {
+            merged.push((20 * row + 7, format!("{},,,,{x:.5},{y:.5},{z:.5}\n", 20 * row + 7)));
+        }
+    }
+    merged.sort();
+    let merged = "t_ms,gx_rad_s,gy_rad_s,gz_rad_s,ax_g,ay_g,az_g\n".to_owned()
+        + &merged.into_iter().map(|(_, row)| row).collect::<String>();
+    let refusal = |text: &str| read("t.csv", text.as_bytes(), &[""; 0]).err().expect("refused").to_string();
+    assert!(refusal(&two).contains("choose one with --topic: 1, 2"), "{}", refusal(&two));
+    assert!(refusal(&merged).contains("as of two sensors"), "{}", refusal(&merged));
+    let one = reading("one device", &two, &["--topic", "2"]);
+    assert_eq!((one.samples.len() as u32, one.missing()), (ROWS, 0));
+    assert!((one.rate_hz() / 100.0 - 1.0).abs() < 1e-6, "{}", one.rate_hz());
+    for (columns, units, rate_hz, rows) in [
+        ("time=t,gyro_x=gx,gyro_y=gy,gyro_z=gz", "rad/s", 100.0, ROWS),
+        ("time=t,accl_x=ax,accl_y=ay,accl_z=az", "g", 50.0, ROWS / 2),
+    ] {
+        let one = reading(columns, &merged, &["--columns", columns, "--units", units]);
+        assert_eq!((one.samples.len() as u32, one.missing()), (rows, 0), "{columns}");
+        assert!((one.rate_hz() / rate_hz - 1.0).abs() < 1e-6, "{columns}: {}", one.rate_hz());
+    }
+}
+
+/// Rows that are all equal at either end: zeros, and a value that is held.
+#[test]
+fn padding_is_named_and_left_out() {
+    let mut normal = normal(34);
+    let rows: Vec<[String; 3]> = (0..ROWS).map(|_| [(); 3].map(|()| format!("{:.5}", NOISE * normal()))).collect();
+    let line = |row: &[String; 3]| row.join(",") + "\n";
+    let noise: String = rows.iter().map(line).collect();
+    let held = line(&rows[rows.len() - 1]);
+    for (name, before, after, samples) in [
+        ("zeros at the end", String::new(), "0,0,0\n".repeat(240), ROWS),
+        ("zeros at the start", "0,0,0\n".repeat(1500), String::new(), ROWS),
+        ("both", "65535,65535,65535\n".repeat(100), "0,0,0\n".repeat(100), ROWS),
+        // The held row is one of them.
+        ("a held value", String::new(), held.repeat(500), ROWS - 1),
+    ] {
+        let text = format!("gx_rad_s,gy_rad_s,gz_rad_s\n{before}{noise}{after}");
+        let read = reading(name, &text, &["--rate", "100"]);
+        assert_eq!((read.samples.len() as u32, read.missing()), (samples, 0), "{name}");
+        assert!(read.notes_contain("are padding and left out"), "{name}: {:?}", read.notes);
+    }
+}
+
 /// A gyroscope that is held at full scale of 16 bits for a while.
 #[test]
 fn samples_at_full_scale_are_counted_and_told() {
@@ -341,6 +396,23 @@ fn a_nominal_rate_that_is_a_little_wrong_is_taken() {
     assert_eq!((read.rate_hz(), read.missing()), (102.4, 0));
 }
 
+/// A stated rate holds against any column of times, and what they show is told.
+#[test]
+fn a_stated_rate_beats_any_time_stamps() {
+    for (rate, hz) in [("30", 30.0), ("300", 300.0), ("819.2", 819.2), ("1000", 1000.0)] {
+        let table = counts("time_s,gyro_x_counts", 20_000, |i| format!("{},", i as f64 / 100.0));
+        let read = read("timed.csv", &table, &["--rate", rate]).expect("a time base");
+        assert_eq!((read.rate_hz(), read.samples.len(), read.missing()), (hz, 20_000, 0));
+        for words in ["ignored", "100.0000 Hz"] {
+            assert!(read.notes_contain(words), "{rate}: {:?}", read.notes);
+        }
+    }
+    // Stamps that show nothing.
+    let table = counts("time_s,gyro_x_counts", 2000, |_| "7,".to_owned());
+    let read = read("frozen.csv", &table, &["--rate", "100"]).expect("a time base");
+    assert_eq!((read.rate_hz(), read.samples.len(), read.missing()), (100.0, 2000, 0));
+}
+
 /// The same samples, whatever is around them.
 #[test]
 fn compression_padding_line_ends_and_quotation_marks_change_nothing() {
@@ -363,5 +435,120 @@ fn compression_padding_line_ends_and_quotation_marks_change_nothing() {
     ] {
         let read = read("rows.csv.gz", &bytes, &[""; 0]).unwrap_or_else(|error| panic!("{case}: {error}"));
         assert!(read.samples == plain, "{case}");
+    }
+}
+
+/// Kinds of damage and of punctuation, each in the same table of noise: every intact row is read, and what is left out is told.
+#[test]
+fn a_damaged_place_costs_its_rows_and_is_told() {
+    let mut normal = normal(31);
+    let intact: Vec<String> = (0..ROWS)
+        .map(|row| {
+            let [x, y, z] = [(); 3].map(|()| format!("{:.5}", NOISE * normal()));
+            format!("{},{x},{y},{z}", seconds(row))
+        })
+        .collect();
+    let table = |change: &dyn Fn(&mut Vec<String>)| {
+        let mut rows = intact.clone();
+        change(&mut rows);
+        format!("t_s,gx_rad_s,gy_rad_s,gz_rad_s\n{}\n", rows.join("\n"))
+    };
+    let replaced = |row: usize, text: &str| {
+        let text = text.to_owned();
+        table(&move |rows| rows[row].clone_from(&text))
+    };
+    let zeros = |row: usize, count: usize| table(&move |rows| rows[row].insert_str(0, &"\0".repeat(count)));
+    for (name, text, lost, note) in [
+        (
+            "a message",
+            replaced(3000, "WARNING: FIFO overflow"),
+            1,
+            "1 damaged rows are left out, the first of them line 3002",
+        ),
+        ("a cut row", replaced(40, "0.40,0.1"), 1, "1 damaged rows"),
+        ("glued rows", replaced(3000, "30.00,0.1,0.230.01,0.1,0.1,0.1"), 1, "1 damaged rows"),
+        (
+            "a heading",
+            table(&|rows| rows.insert(2000, "t_s,gx_rad_s,gy_rad_s,gz_rad_s".to_owned())),
+            0,
+            "1 damaged rows",
+        ),
+        ("zeros", zeros(3000, 4096), 0, "4096 bytes that are zero are left out"),
+        ("many zeros", zeros(3000, 200_000), 0, "200000 bytes that are zero are left out"),
+    ] {
+        let read = reading(name, &text, &[]);
+        assert_eq!(
+            (read.samples.len() as u32, read.missing()),
+            (ROWS - lost, u64::from(lost)),
+            "{name}: {:?}",
+            read.notes
+        );
+        assert!(read.notes_contain(note), "{name}: {:?}", read.notes);
+    }
+    for word in ["-", "#N/A", "1.#QNAN", "ovf", "NaN", ""] {
+        let text = table(&move |rows| {
+            for row in rows.iter_mut().skip(7).step_by(50) {
+                let time = row.split(',').next().expect("a time").to_owned();
+                *row = format!("{time},{word},{word},{word}");
+            }
+        });
+        let read = reading(word, &text, &[]);
+        assert_eq!((read.samples.len() as u32, read.refused("gyro_y", "missing")), (ROWS, 120), "{word}");
+    }
+    // A tenth of the rows is another file.
+    let text = table(&|rows| rows.iter_mut().step_by(8).for_each(|row| row.push_str(",x")));
+    let error = read("damaged.csv", text.as_bytes(), &[""; 0]).err().expect("refused").to_string();
+    assert!(error.contains("line 10") && error.contains("5 fields"), "{error}");
+}
+
+/// Delimiters after the last cell, texts with delimiters, headings in two lines, lines before the table.
+#[test]
+fn a_table_is_found_in_what_is_around_it() {
+    let mut normal = normal(32);
+    let rows: Vec<[String; 4]> = (0..ROWS)
+        .map(|row| {
+            let [x, y, z] = [(); 3].map(|()| format!("{:.5}", NOISE * normal()));
+            [seconds(row), x, y, z]
+        })
+        .collect();
+    let body = |row: &dyn Fn(&[String; 4]) -> String| rows.iter().map(row).collect::<String>();
+    let plain = body(&|row| row.join(",") + "\n");
+    for (name, text, options) in [
+        (
+            "a comma after every row",
+            "t_s,gx_rad_s,gy_rad_s,gz_rad_s\n".to_owned() + &body(&|row| row.join(",") + ",\n"),
+            &[][..],
+        ),
+        ("a comma after the heading", format!("t_s,gx_rad_s,gy_rad_s,gz_rad_s,\n{plain}"), &[]),
+        (
+            "empty cells before tabs are cut",
+            "t_s\tgx_rad_s\tgy_rad_s\tgz_rad_s\tmx_uT\n".to_owned()
+                + &body(&|row| row.join("\t") + if row[0].ends_with('0') { "\t20.1\n" } else { "\t\n" }),
+            &[],
+        ),
+        (
+            "a text with a comma",
+            "t_s,note,gx_rad_s,gy_rad_s,gz_rad_s\n".to_owned()
+                + &body(&|[t, x, y, z]| format!("{t},\"bench, left\",{x},{y},{z}\n")),
+            &[],
+        ),
+        (
+            "units behind commas",
+            format!("\"Time, s\",\"Gyro X, rad/s\",\"Gyro Y, rad/s\",\"Gyro Z, rad/s\"\n{plain}"),
+            &[],
+        ),
+        ("a heading in two lines", format!("Time (s),Gyroscope,,\n,X,Y,Z\n{plain}"), &["--units", "rad/s"]),
+        ("keys and values", format!("rate,100\nrange,250\nn,6000\nt_s,gx_rad_s,gy_rad_s,gz_rad_s\n{plain}"), &[]),
+        (
+            "texts",
+            format!("bus opened\nDevice found\n{plain}"),
+            &["--columns", "time=0,gyro_x=1,gyro_y=2,gyro_z=3", "--units", "s,rad/s"],
+        ),
+    ] {
+        let read = reading(name, &text, options);
+        assert_eq!((read.samples.len() as u32, read.missing()), (ROWS, 0), "{name}: {:?}", read.notes);
+        assert!((read.rate_hz() / 100.0 - 1.0).abs() < 1e-6, "{name}: {}", read.rate_hz());
+        let deviation = read.neighbours("gyro_y") / NOISE.to_degrees();
+        assert!((deviation - 1.0).abs() < 5.0 * 0.011, "{name}: {deviation} of the noise");
     }
 }

@@ -5,8 +5,9 @@ use measurement::{MeasuredChannel, Measurement, SensorProfile};
 use recordings::any_sensor::ReadOptions;
 use recordings::file_format::{FileFormat, InputFile};
 use recordings::inspection::{InspectedTable, SteadyPart};
-use recordings::time_base::{TimeBaseError, TimeRange, measurement};
-use recordings::{ColumnSelection, InputError, count_table};
+use recordings::sample_stream::{KeptInMemory, Reading, SampleStream, StreamError};
+use recordings::time_base::{TimeBaseError, TimeRange};
+use recordings::{ColumnSelection, InputError};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
@@ -51,22 +52,25 @@ impl NoiseRecording {
         let file_name = || file.display().to_string();
         let input = InputFile::open(file)?;
         let samples = if input.format() == FileFormat::CountTable {
-            let recording = count_table::read(input.path(), GyroRange::Dps300).map_err(|error| input.rename(error))?;
-            with_rate(rate_hz, |rate_hz| measurement(&recording, rate_hz))
+            with_rate(rate_hz, |rate_hz| {
+                let reading = Reading::new(rate_hz, KeptInMemory::ALL);
+                SampleStream::counts(InputFile::open(file)?, GyroRange::Dps300, reading)
+            })
         } else {
             let tables = input.inspect(None, &ColumnSelection::default())?;
             let (options, rest) = only_sensor(&tables, rate_hz);
-            let recording = input.read(&options)?;
             if rest.is_some_and(|rest| rest.to_s <= rest.from_s) {
                 return Err(MeasuredNoiseError::Moving(file_name()));
             }
             with_rate(rate_hz, |rate_hz| {
-                let recording = recording.clone();
-                let at_rest = rest.map_or(Ok(recording.clone()), |rest| recording.within(rest, rate_hz))?;
-                at_rest.time_base(rate_hz).map(|(base, _)| base.measurement)
+                let reading = Reading::new(rate_hz, KeptInMemory::ALL).of_part(rest);
+                SampleStream::any_sensor(InputFile::open(file)?, options.clone(), reading)
             })
         };
-        let samples = samples.map_err(|reason| MeasuredNoiseError::TimeBase { file: file_name(), reason })?;
+        let samples = samples.map_err(|error| match error {
+            StreamError::Input(error) => MeasuredNoiseError::Input(error),
+            StreamError::TimeBase(reason) => MeasuredNoiseError::TimeBase { file: file_name(), reason },
+        })?;
         let name = file.file_name().map_or_else(file_name, |name| name.to_string_lossy().into_owned());
         Ok(Self { name, samples })
     }
@@ -95,12 +99,13 @@ fn only_sensor(tables: &[InspectedTable], rate_hz: Option<f64>) -> (ReadOptions,
 /// The samples on the time base of their stamps; without stamps, at `rate_hz`.
 fn with_rate(
     rate_hz: Option<f64>,
-    on_time_base: impl Fn(Option<f64>) -> Result<Measurement, TimeBaseError>,
-) -> Result<Measurement, TimeBaseError> {
-    match on_time_base(None) {
-        Err(TimeBaseError::NoRate) if rate_hz.is_some() => on_time_base(rate_hz),
-        samples => samples,
-    }
+    open: impl Fn(Option<f64>) -> Result<SampleStream, StreamError>,
+) -> Result<Measurement, StreamError> {
+    let opened = match open(None) {
+        Err(StreamError::TimeBase(TimeBaseError::NoRate)) if rate_hz.is_some() => open(rate_hz),
+        opened => opened,
+    };
+    opened.map(SampleStream::into_beginning)
 }
 
 /// The samples in the sample periods `periods`, as a recording of their own.

@@ -36,6 +36,9 @@ pub(crate) struct Quantizer {
 }
 
 impl Quantizer {
+    /// Numbers that are counts.
+    pub(crate) const COUNTS: Self = Self { lsb: 1.0, offset: 0.0, cost: None };
+
     /// The quantizer of `values`; those that are not finite have no influence.
     pub(crate) fn new(values: &[f64]) -> Self {
         let noise = difference_noise(values);

@@ -1,0 +1,160 @@
+//! The rows of any sensor written as a table with units in its header, and as a NumPy array: a batch at a time, as they are read.
+
+use crate::counts::count_table_writer::write_text;
+use crate::counts::numpy_matrix::{MatrixWriter, SiUnit};
+use crate::formats::file_format::InputFile;
+use crate::reading::batch::{Batch, ValueColumn};
+use crate::reading::row_source::{RowsRead, WantedRows};
+use crate::tables::any_sensor::ReadOptions;
+use crate::time_base::TimeRange;
+use crate::time_base::time_base_error::StreamError;
+use std::fmt::Write as _;
+use std::io;
+use std::path::Path;
+
+/// The rows of a file that are written.
+#[derive(Debug)]
+pub struct SensorRows<'a> {
+    /// The file.
+    pub input: &'a InputFile,
+    /// How it is read.
+    pub options: ReadOptions,
+    /// A part by time.
+    pub part: Option<TimeRange>,
+    /// The sample rate of a recording without times, which places the part, Hz.
+    pub stated_hz: Option<f64>,
+}
+
+/// Why rows are not written.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// They cannot be read.
+    #[error(transparent)]
+    Read(#[from] StreamError),
+    /// The file cannot be written.
+    #[error(transparent)]
+    Write(#[from] io::Error),
+}
+
+/// What was written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WrittenRows {
+    /// Names of the columns.
+    pub columns: Vec<String>,
+    /// What the user should know, one sentence each.
+    pub notes: Vec<String>,
+    /// Whether the file was read to its end.
+    pub is_complete: bool,
+}
+
+impl SensorRows<'_> {
+    /// Writes the rows as CSV, gzip if the name of `file` ends in `.gz`: `sample` and `time_s`, where the recording has them, and
+    /// the channels with their units in the header, as in `gyro_x [deg/s]`. Times count from the first sample; a missing value is `NaN`.
+    ///
+    /// # Errors
+    /// The rows cannot be read, or the file not written.
+    pub fn write_table(&self, file: &Path) -> Result<WrittenRows, WriteError> {
+        let mut written = None;
+        let mut failure = None;
+        write_text(file, |out| {
+            let mut text = String::new();
+            let read = self.for_each_batch(|columns, batch, names| {
+                if names.is_empty() {
+                    let stamps = [("sample", !batch.indices.is_empty()), ("time_s", !batch.times.is_empty())];
+                    names.extend(stamps.into_iter().filter(|(_, has)| *has).map(|(name, _)| name.to_owned()));
+                    names.extend(columns.iter().map(|of| format!("{} [{}]", of.profile.name, of.profile.unit)));
+                    writeln!(out, "{}", names.join(","))?;
+                }
+                text.clear();
+                for row in 0..batch.rows {
+                    let start = text.len();
+                    // Writing into a string cannot fail. `{}` of a float is the shortest text that reads back to the same value.
+                    if let Some(index) = batch.indices.get(row) {
+                        let _ = write!(text, ",{index}");
+                    }
+                    if let Some(time) = batch.times.get(row) {
+                        let _ = write!(text, ",{time}");
+                    }
+                    for (column, values) in columns.iter().zip(&batch.values) {
+                        let _ = write!(text, ",{}", values[row] * column.factor);
+                    }
+                    text.remove(start);
+                    text.push('\n');
+                }
+                out.write_all(text.as_bytes())
+            });
+            match read {
+                Ok(read) => written = Some(read),
+                Err(WriteError::Write(error)) => return Err(error),
+                Err(error) => failure = Some(error),
+            }
+            Ok(())
+        })?;
+        failure.map_or_else(|| Ok(written.unwrap_or_else(WrittenRows::none)), Err)
+    }
+
+    /// Writes the rows as a NumPy array of doubles in SI units: the time in s first, if there is one, angular rates in rad/s, specific
+    /// forces in m/s², others in the unit of the analysis.
+    ///
+    /// # Errors
+    /// The rows cannot be read, or the file not written.
+    pub fn write_array(&self, file: &Path) -> Result<WrittenRows, WriteError> {
+        let mut matrix = MatrixWriter::create(file)?;
+        let written = self.for_each_batch(|columns, batch, names| {
+            let units: Vec<SiUnit> = columns.iter().map(|column| SiUnit::of(column.profile.unit)).collect();
+            if names.is_empty() {
+                names.extend(Some("time_s".to_owned()).filter(|_| !batch.times.is_empty()));
+                let channels = columns.iter().zip(&units);
+                names.extend(channels.map(|(column, unit)| format!("{}_{}", column.profile.name, unit.suffix)));
+            }
+            for row in 0..batch.rows {
+                let time = batch.times.get(row).copied();
+                let channels = columns.iter().zip(&batch.values).zip(&units);
+                let channels = channels.map(|((column, values), unit)| values[row] * column.factor * unit.factor);
+                matrix.write_row(time.into_iter().chain(channels))?;
+            }
+            Ok(())
+        })?;
+        matrix.finish(written.columns.len())?;
+        Ok(written)
+    }
+
+    /// Calls `write` with the columns, each batch, and the names of the columns that it wrote.
+    fn for_each_batch(
+        &self,
+        mut write: impl FnMut(&[ValueColumn], &Batch, &mut Vec<String>) -> io::Result<()>,
+    ) -> Result<WrittenRows, WriteError> {
+        let rename = |error: StreamError| match error {
+            StreamError::Input(error) => StreamError::Input(self.input.rename(error)),
+            error => error,
+        };
+        let mut source = self.input.batches(&self.options, None).map_err(|error| rename(error.into()))?;
+        let columns = source.columns().to_vec();
+        let (mut names, mut failure) = (Vec::new(), None);
+        let wanted = WantedRows { part: self.part, ..WantedRows::all(self.stated_hz) };
+        let mut first_s = None;
+        let read = source.for_each_batch(wanted, |mut batch| {
+            if let Some(&first) = batch.times.first() {
+                let first_s = *first_s.get_or_insert(first);
+                batch.times.iter_mut().for_each(|time| *time -= first_s);
+            }
+            if failure.is_none() {
+                failure = write(&columns, &batch, &mut names).err();
+            }
+            Ok(())
+        });
+        if let Some(failure) = failure {
+            return Err(failure.into());
+        }
+        let read = read.map_err(rename)?;
+        let is_complete = read.is_complete();
+        let RowsRead { damage, notes, .. } = read;
+        Ok(WrittenRows { columns: names, notes: notes.into_iter().chain(damage).collect(), is_complete })
+    }
+}
+
+impl WrittenRows {
+    fn none() -> Self {
+        Self { columns: Vec::new(), notes: Vec::new(), is_complete: true }
+    }
+}

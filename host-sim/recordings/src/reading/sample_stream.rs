@@ -1,0 +1,801 @@
+//! The samples of a recording on their time base, read in batches.
+//!
+//! A first reading tells the rate, the length, and the size of a count. The rows of a recording that is short enough are kept from it; a
+//! longer one is read once more for its samples. Both go the same way, so that memory does not depend on the length of a recording, and
+//! nothing else does either.
+
+use crate::counts::recording::Recording;
+use crate::formats::file_format::{FileFormat, InputFile};
+use crate::input::input_error::InputError;
+use crate::input::read_monitor::{ReadMonitor, ReadPass};
+use crate::reading::batch::{Batch, ValueColumn, Verdict};
+use crate::reading::column_survey::{ColumnSurvey, refusal, rounding_note};
+use crate::reading::full_scale::FullScale;
+use crate::reading::padding::{PaddingFinder, Unpadded};
+use crate::reading::quantizer::Quantizer;
+use crate::reading::row_source::{BATCH, BatchSource, RecordedRows, WantedRows};
+use crate::tables::any_sensor::ReadOptions;
+use crate::time_base::clock::{Clock, Place, RowStamp};
+use crate::time_base::stamp_quality::StampQuality;
+use crate::time_base::stream_clock::Placed;
+use crate::time_base::time_base_error::TimeBaseError;
+use crate::time_base::time_range::TimeRange;
+use adis16405_driver::{Faults, GyroRange};
+use measurement::{
+    ChannelProfile, MeasuredChannel, Measurement, RecordingDescription, SampleBlock, SensorProfile, adis16405,
+    lost_part,
+};
+use std::borrow::Cow;
+use std::collections::{BTreeMap, VecDeque};
+
+pub use crate::reading::row_source::RowsRead;
+pub use crate::time_base::time_base_error::StreamError;
+
+/// Sample periods at the start of a recording whose samples are kept.
+const BEGINNING: u64 = 1 << 16;
+/// Rows that are kept of a longer recording, to begin with.
+const ROWS_OF_BEGINNING: usize = 1 << 16;
+/// Numbers that are kept of a file that is slow to be read again: 64 MiB.
+const MOST_KEPT_VALUES: u64 = 1 << 23;
+
+/// Fewest channels whose equal rows may be one sample that was read twice; fewer are equal by chance.
+const MIN_CHANNELS_OF_REPEAT: usize = 3;
+
+/// Which recordings become one measurement in memory, instead of being read in blocks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KeptInMemory {
+    /// Those of at most so many rows.
+    pub rows: u64,
+    /// Those of at most so many rows where a larger part than `most_lost` of the samples never arrived.
+    pub rows_with_losses: u64,
+    /// Part of the samples.
+    pub most_lost: f64,
+}
+
+impl KeptInMemory {
+    /// All of them.
+    pub const ALL: Self = Self { rows: u64::MAX, rows_with_losses: u64::MAX, most_lost: 1.0 };
+
+    /// Whether so many samples in so many sample periods are one measurement.
+    fn has_room(self, samples: u64, periods: u64) -> bool {
+        samples <= if lost_part(samples, periods) > self.most_lost { self.rows_with_losses } else { self.rows }
+    }
+}
+
+/// What is read of a recording.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// The sample rate, Hz, if it is stated: it overrides the one that the time stamps show.
+    pub stated_hz: Option<f64>,
+    /// A part by time.
+    pub part: Option<TimeRange>,
+    /// Which recordings become one measurement.
+    pub kept: KeptInMemory,
+    /// Rows that are read at a time; the result is the same for any number.
+    pub batch_rows: usize,
+}
+
+impl Reading {
+    /// All samples, of which `kept` become one measurement.
+    #[must_use]
+    pub fn new(stated_hz: Option<f64>, kept: KeptInMemory) -> Self {
+        Self { stated_hz, part: None, kept, batch_rows: BATCH }
+    }
+
+    /// The same of a part.
+    #[must_use]
+    pub fn of_part(self, part: Option<TimeRange>) -> Self {
+        Self { part, ..self }
+    }
+
+    fn wanted(self, most_rows: u64) -> WantedRows {
+        WantedRows { part: self.part, stated_hz: self.stated_hz, most_rows, batch_rows: self.batch_rows.max(1) }
+    }
+}
+
+/// An open recording.
+pub struct SampleStream {
+    origin: Origin<'static>,
+    reading: Reading,
+    survey: Survey,
+    samples: SurveyedSamples,
+    monitor: ReadMonitor,
+}
+
+/// What is known of the samples before they are used.
+struct SurveyedSamples {
+    /// The samples at the start, or all of a recording that is held in memory.
+    beginning: Measurement,
+    description: RecordingDescription,
+    notes: Vec<String>,
+    /// Whether `beginning` is all of it.
+    is_in_memory: bool,
+}
+
+/// Where the rows are.
+enum Origin<'a> {
+    File { input: InputFile, options: Box<ReadOptions>, range: Option<GyroRange> },
+    Recording(Cow<'a, Recording>),
+}
+
+impl Origin<'_> {
+    fn open(&self) -> Result<BatchSource<'_>, InputError> {
+        match self {
+            Self::File { input, options, range } => input.batches(options, *range),
+            Self::Recording(recording) => Ok(BatchSource::Recording(RecordedRows::new(recording))),
+        }
+    }
+
+    /// Whether reading the rows once more costs little beside what is done with them.
+    fn is_quick_to_read(&self) -> bool {
+        match self {
+            Self::File { input, .. } => input.format().is_text() || input.format() == FileFormat::Npy,
+            Self::Recording(_) => true,
+        }
+    }
+
+    fn name(&self, error: StreamError) -> StreamError {
+        match (self, error) {
+            (Self::File { input, .. }, StreamError::Input(error)) => input.rename(error).into(),
+            (_, error) => error,
+        }
+    }
+
+    fn sensor(&self) -> SensorProfile {
+        match self {
+            Self::File { options, .. } => options.sensor.clone(),
+            Self::Recording(recording) => adis16405::profile(recording.range.lsb()),
+        }
+    }
+}
+
+impl SampleStream {
+    /// What a simulation or a log of the bus recorded.
+    ///
+    /// # Errors
+    /// It has no time base.
+    pub fn recorded(recording: Recording, reading: Reading) -> Result<Self, TimeBaseError> {
+        let origin = Origin::Recording(Cow::Owned(recording));
+        Self::open(origin, reading, &ReadMonitor::default()).map_err(without_file)
+    }
+
+    /// Opens a table of register counts whose rates were taken in `range`.
+    ///
+    /// # Errors
+    /// The file is damaged, or has no time base: see [`TimeBaseError`].
+    pub fn counts(input: InputFile, range: GyroRange, reading: Reading) -> Result<Self, StreamError> {
+        let options = Box::new(ReadOptions::of_counts(range));
+        let monitor = input.monitor().clone();
+        Self::open(Origin::File { input, options, range: Some(range) }, reading, &monitor)
+    }
+
+    /// Opens a recording of any sensor.
+    ///
+    /// # Errors
+    /// As [`counts`](Self::counts), and where the columns cannot be chosen.
+    pub fn any_sensor(input: InputFile, options: ReadOptions, reading: Reading) -> Result<Self, StreamError> {
+        let monitor = input.monitor().clone();
+        Self::open(Origin::File { input, options: Box::new(options), range: None }, reading, &monitor)
+    }
+
+    fn open(origin: Origin<'static>, reading: Reading, monitor: &ReadMonitor) -> Result<Self, StreamError> {
+        let mut survey = Survey::read(&origin, reading, u64::MAX, monitor).map_err(|error| origin.name(error))?;
+        let samples = survey.samples(reading.kept)?;
+        Ok(Self { origin, reading, survey, samples, monitor: monitor.clone() })
+    }
+
+    /// The samples at the start of the recording with their time stamps: all of one that is held in memory, else those of the first 2¹⁶
+    /// sample periods, of which the size of a count may be that of these samples alone.
+    #[must_use]
+    pub fn beginning(&self) -> &Measurement {
+        &self.samples.beginning
+    }
+
+    /// The same, of a recording that is not read any more.
+    #[must_use]
+    pub fn into_beginning(self) -> Measurement {
+        self.samples.beginning
+    }
+
+    /// What is known of the recording before its samples are used.
+    #[must_use]
+    pub fn description(&self) -> &RecordingDescription {
+        &self.samples.description
+    }
+
+    /// What the user should know, one sentence each.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        &self.samples.notes
+    }
+
+    /// What was read of the file.
+    #[must_use]
+    pub fn rows_read(&self) -> &RowsRead {
+        &self.survey.read
+    }
+
+    /// What the time stamps show; `None` where there are none.
+    #[must_use]
+    pub fn stamps(&self) -> Option<&StampQuality> {
+        self.survey.stamps.as_ref()
+    }
+
+    /// Whether the recording is one measurement in memory: its [beginning](Self::beginning) is all of it.
+    #[must_use]
+    pub fn is_in_memory(&self) -> bool {
+        self.samples.is_in_memory
+    }
+
+    /// Reads the recording once and calls `take` with each block of its samples.
+    ///
+    /// False if what the [description](Self::description) says has changed on the way, so that it has to be read again: a number
+    /// is no multiple of the step of the others, or the reading was stopped. That happens a bounded number of times.
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn read(&mut self, take: impl FnMut(SampleBlock)) -> Result<bool, StreamError> {
+        self.read_pass(take).map_err(|error| self.origin.name(error))
+    }
+
+    fn read_pass(&mut self, mut take: impl FnMut(SampleBlock)) -> Result<bool, StreamError> {
+        let Self { survey, origin, reading, monitor, samples } = self;
+        if samples.is_in_memory {
+            samples.beginning.blocks(BATCH).for_each(take);
+            return Ok(true);
+        }
+        let mut off_step = vec![false; survey.columns.len()];
+        let mut placer = Placer::new(survey.clock.again()?, survey.columns.len());
+        let mut give = |placer: &mut Placer, batch: Option<Batch>| -> Result<(), StreamError> {
+            for rows in placer.place(batch)? {
+                take(survey.block(&rows, &mut off_step));
+            }
+            Ok(())
+        };
+        if survey.has_all_rows {
+            survey.kept.iter().try_for_each(|batch| give(&mut placer, Some(batch.clone())))?;
+        } else {
+            monitor.begin_pass(ReadPass::Samples);
+            let wanted = reading.wanted(survey.read.rows);
+            let mut rows_before = 0;
+            let read = origin.open()?.for_each_batch(wanted, |mut batch| {
+                let rows = batch.rows as u64;
+                survey.unpadded.apply(rows_before, &mut batch);
+                rows_before += rows;
+                give(&mut placer, Some(batch))
+            })?;
+            if read.is_stopped && read.rows < survey.read.rows {
+                *survey = Survey::read(origin, *reading, read.rows, monitor)?;
+                survey.read.is_stopped = true;
+                *samples = survey.samples(reading.kept)?;
+                return Ok(false);
+            }
+        }
+        give(&mut placer, None)?;
+        if !off_step.contains(&true) {
+            return Ok(true);
+        }
+        survey.leave_step(&mut off_step);
+        *samples = survey.samples(reading.kept)?;
+        Ok(false)
+    }
+}
+
+/// The error of a recording in memory.
+fn without_file(error: StreamError) -> TimeBaseError {
+    match error {
+        StreamError::TimeBase(error) => error,
+        StreamError::Input(error) => TimeBaseError::Irregular(error.to_string()),
+    }
+}
+
+/// What was counted of the rows that are placed.
+#[derive(Debug, Clone, Default)]
+struct Totals {
+    /// Place of the first usable sample, and of the last one.
+    first: Option<Placed>,
+    last: Placed,
+    /// Rows that were left out since the last usable one.
+    left_out: u64,
+    samples: u64,
+    never_arrived: u64,
+    /// Rows that were left out, by cause, without those that never arrived.
+    dropped: BTreeMap<&'static str, u64>,
+    flagged: BTreeMap<&'static str, u64>,
+}
+
+/// Cause of rows that are left out because their time goes back.
+const TIME_BACKWARDS: &str = "time_backwards";
+
+impl Totals {
+    fn leave_out(&mut self, cause: &'static str) {
+        *self.dropped.entry(cause).or_insert(0) += 1;
+        self.left_out += 1;
+    }
+
+    /// Counts a row; its sample period from the first usable sample, if it is used.
+    fn add(&mut self, place: Place, verdict: Option<&Verdict>, has_index: bool) -> Option<u64> {
+        if let Some(cause) = verdict.and_then(|verdict| verdict.loss) {
+            self.leave_out(cause);
+            return None;
+        }
+        let Place::At(placed) = place else {
+            self.leave_out("repeated");
+            return None;
+        };
+        for cause in verdict.into_iter().flat_map(|verdict| (verdict.faults & Faults::WARNINGS).causes()) {
+            *self.flagged.entry(cause).or_insert(0) += 1;
+        }
+        let lost = match self.first {
+            None => 0,
+            // A row that is left out has an index too.
+            Some(_) if has_index => (placed.period - self.last.period - 1).saturating_sub(self.left_out),
+            Some(_) => placed.missing - self.last.missing,
+        };
+        self.never_arrived = self.never_arrived.saturating_add(lost);
+        let first = *self.first.get_or_insert(placed);
+        (self.last, self.left_out) = (placed, 0);
+        self.samples += 1;
+        Some(placed.period.saturating_sub(first.period))
+    }
+
+    /// Sample periods from the first usable sample to the last, both included.
+    fn periods(&self) -> u64 {
+        self.first.map_or(0, |first| (self.last.period - first.period).saturating_add(1))
+    }
+
+    /// Samples that are missing or were refused, by cause.
+    fn dropped(&self, has_index: bool) -> BTreeMap<&'static str, u64> {
+        let mut dropped = self.dropped.clone();
+        // By their stamps, rows that were left out are missing between the others.
+        let left_out = dropped.get(TIME_BACKWARDS).copied().filter(|_| !has_index).unwrap_or(0);
+        dropped.insert("gap", self.never_arrived.saturating_sub(left_out));
+        dropped
+    }
+}
+
+/// Finds the sample periods of rows, which may be known only when later rows have come.
+struct Placer {
+    clock: Clock,
+    can_repeat: bool,
+    /// The numbers of the row before.
+    before: Option<Vec<f64>>,
+    /// Batches whose rows are not all placed, and how many of the first one are.
+    waiting: VecDeque<Batch>,
+    placed: usize,
+    totals: Totals,
+    has_index: bool,
+    /// Sample periods of the usable rows of the first batch.
+    periods: Vec<u64>,
+    is_used: Vec<bool>,
+}
+
+impl Placer {
+    fn new(clock: Clock, columns: usize) -> Self {
+        Self {
+            clock,
+            can_repeat: columns >= MIN_CHANNELS_OF_REPEAT,
+            before: None,
+            waiting: VecDeque::new(),
+            placed: 0,
+            totals: Totals::default(),
+            has_index: false,
+            periods: Vec::new(),
+            is_used: Vec::new(),
+        }
+    }
+
+    /// Takes the next rows, or their end. Returns the batches of which all rows are placed now, without the rows that are not used; their
+    /// `indices` are the sample periods from the first usable sample.
+    fn place(&mut self, batch: Option<Batch>) -> Result<Vec<Batch>, TimeBaseError> {
+        let is_last = batch.is_none();
+        let batch = batch.unwrap_or_default();
+        let stamps = self.stamps(&batch);
+        self.has_index |= !batch.indices.is_empty();
+        if !is_last {
+            self.waiting.push_back(batch);
+        }
+        let mut places = self.clock.place(stamps, is_last)?.into_iter();
+        let mut complete = Vec::new();
+        while let Some(batch) = self.waiting.front() {
+            if self.placed == batch.rows {
+                complete.extend(self.complete());
+                continue;
+            }
+            let Some(place) = places.next() else { break };
+            for _ in batch.backwards.iter().filter(|at| **at == self.placed) {
+                self.totals.leave_out(TIME_BACKWARDS);
+            }
+            let period = self.totals.add(place, batch.verdicts.get(self.placed), self.has_index);
+            self.is_used.push(period.is_some());
+            self.periods.extend(period);
+            self.placed += 1;
+        }
+        Ok(complete)
+    }
+
+    /// The first batch, without the rows that are not used.
+    fn complete(&mut self) -> Option<Batch> {
+        let mut batch = self.waiting.pop_front()?;
+        for _ in batch.backwards.iter().filter(|at| **at >= self.placed) {
+            self.totals.leave_out(TIME_BACKWARDS);
+        }
+        self.placed = 0;
+        batch.indices = Vec::new();
+        batch.backwards = Vec::new();
+        batch.retain(&std::mem::take(&mut self.is_used));
+        batch.indices = std::mem::take(&mut self.periods);
+        Some(batch)
+    }
+
+    /// What the clock has to know of the rows.
+    fn stamps(&mut self, batch: &Batch) -> Vec<RowStamp> {
+        let mut stamps = Vec::with_capacity(batch.rows);
+        for row in 0..batch.rows {
+            let is_equal = self.can_repeat
+                && match row.checked_sub(1) {
+                    Some(before) => batch.values.iter().all(|column| column[row] == column[before]),
+                    None => self
+                        .before
+                        .as_ref()
+                        .is_some_and(|before| before.iter().zip(&batch.values).all(|(one, of)| *one == of[row])),
+                };
+            stamps.push(RowStamp {
+                time_s: batch.times.get(row).copied(),
+                index: batch.indices.get(row).copied(),
+                is_equal,
+            });
+        }
+        if let Some(last) = batch.rows.checked_sub(1) {
+            self.before = Some(batch.values.iter().map(|column| column[last]).collect());
+        }
+        stamps
+    }
+}
+
+/// A column whose numbers become counts.
+struct StreamedColumn {
+    column: ValueColumn,
+    survey: ColumnSurvey,
+    /// `None` where no number can be used.
+    quantizer: Option<Quantizer>,
+}
+
+/// What the first reading of a recording has found.
+struct Survey {
+    sensor: SensorProfile,
+    unpadded: Unpadded,
+    columns: Vec<StreamedColumn>,
+    clock: Clock,
+    stamps: Option<StampQuality>,
+    stated_hz: Option<f64>,
+    sample_rate_hz: f64,
+    totals: Totals,
+    has_index: bool,
+    full_scale: u64,
+    full_scale_notes: Vec<String>,
+    read: RowsRead,
+    /// The first rows, or all of them.
+    kept: VecDeque<Batch>,
+    has_all_rows: bool,
+}
+
+impl Survey {
+    /// Reads `most_rows` rows, without the padding at either end of them.
+    fn read(origin: &Origin, reading: Reading, most_rows: u64, monitor: &ReadMonitor) -> Result<Self, StreamError> {
+        let mut padding = PaddingFinder::default();
+        let survey = Self::read_rows(origin, reading, most_rows, monitor, Unpadded::ALL, Some(&mut padding));
+        let Some(unpadded) = padding.finish() else { return survey };
+        let mut survey = Self::read_rows(origin, reading, most_rows, monitor, unpadded, None)?;
+        let before = unpadded.first;
+        let after = padding.rows() - unpadded.end;
+        survey.read.padding = before + after;
+        survey.read.notes.push(format!(
+            "{} rows that are all equal, {before} at the start and {after} at the end, are padding and left out",
+            before + after
+        ));
+        Ok(survey)
+    }
+
+    fn read_rows(
+        origin: &Origin,
+        reading: Reading,
+        most_rows: u64,
+        monitor: &ReadMonitor,
+        unpadded: Unpadded,
+        mut padding: Option<&mut PaddingFinder>,
+    ) -> Result<Self, StreamError> {
+        monitor.begin_pass(ReadPass::FirstRows);
+        let mut source = origin.open()?;
+        let columns: Vec<ValueColumn> = source.columns().to_vec();
+        let stated_hz = reading.stated_hz.or(source.rate_hz());
+        let mut placer = Placer::new(Clock::new(stated_hz)?, columns.len());
+        let mut surveys = vec![ColumnSurvey::new(); columns.len()];
+        let mut full_scale = FullScale::new(&columns);
+        let mut kept = Kept::new(reading.kept, columns.len() as u64, origin.is_quick_to_read());
+        let mut rows_before = 0u64;
+        // The numbers of a batch, NaN where they are refused.
+        let mut usable: Vec<Vec<f64>> = Vec::new();
+        let are_registers = columns.iter().any(|column| column.register.is_some());
+        let read = source.for_each_batch(reading.wanted(most_rows), |mut batch| {
+            let all_rows = batch.rows as u64;
+            unpadded.apply(rows_before, &mut batch);
+            // Registers that do not change are frozen ones, which the burst validator counts.
+            if let Some(padding) = padding.as_deref_mut().filter(|_| !are_registers) {
+                padding.add(&batch);
+            }
+            if kept.add(&batch) {
+                monitor.begin_pass(ReadPass::Survey);
+            }
+            usable.clone_from(&batch.values);
+            for (survey, (column, values)) in surveys.iter_mut().zip(columns.iter().zip(&mut usable)) {
+                survey.add(column, values, &batch.verdicts);
+            }
+            full_scale.add_rows(&columns, rows_before, &usable);
+            rows_before += all_rows;
+            placer.place(Some(batch))?;
+            Ok(())
+        })?;
+        placer.place(None)?;
+        let Placer { totals, clock, has_index, .. } = placer;
+        let quantizers: Vec<Option<Quantizer>> =
+            surveys.iter().zip(&columns).map(|(survey, column)| survey.quantizer(column)).collect();
+        let (full_scale, full_scale_notes) = full_scale.finish(&columns, &quantizers);
+        let mut dropped = totals.dropped(has_index);
+        if quantizers.iter().all(Option::is_none) {
+            for (cause, count) in surveys.iter().flat_map(|survey| &survey.refused) {
+                let most = dropped.entry(*cause).or_insert(0);
+                *most = (*most).max(*count);
+            }
+            return Err(TimeBaseError::TooShort { used: 0, dropped }.into());
+        }
+        dropped.remove("gap");
+        let sample_rate_hz = clock.rate_hz(totals.samples, totals.periods(), &dropped)?;
+        let columns = columns.into_iter().zip(surveys).zip(quantizers);
+        Ok(Self {
+            columns: columns
+                .map(|((column, survey), quantizer)| StreamedColumn { column, survey, quantizer })
+                .collect(),
+            sensor: origin.sensor(),
+            unpadded,
+            stamps: clock.stamps(),
+            clock,
+            stated_hz,
+            sample_rate_hz,
+            totals,
+            has_index,
+            full_scale,
+            full_scale_notes,
+            read,
+            has_all_rows: kept.has_all_rows,
+            kept: kept.batches,
+        })
+    }
+
+    /// Makes the measurement of the rows that are kept.
+    fn samples(&mut self, limit: KeptInMemory) -> Result<SurveyedSamples, StreamError> {
+        let has_room = limit.has_room(self.totals.samples, self.totals.periods());
+        let is_in_memory = self.has_all_rows && has_room;
+        let before = if is_in_memory { u64::MAX } else { BEGINNING };
+        let mut off_step = vec![false; self.columns.len()];
+        let mut beginning = self.measurement(before, &mut off_step)?;
+        // A column leaves its step once.
+        while off_step.contains(&true) {
+            self.leave_step(&mut off_step);
+            beginning = self.measurement(before, &mut off_step)?;
+        }
+        let description = self.description();
+        if is_in_memory {
+            self.kept = VecDeque::new();
+            beginning.dropped.clone_from(&description.dropped);
+            beginning.flagged.clone_from(&description.flagged);
+        }
+        Ok(SurveyedSamples { beginning, description, notes: self.notes(), is_in_memory })
+    }
+
+    fn description(&self) -> RecordingDescription {
+        let dropped = self.totals.dropped(self.has_index);
+        let mut flagged = self.totals.flagged.clone();
+        flagged.extend(Some(("saturated", self.full_scale)).filter(|(_, count)| *count > 0));
+        flagged.extend(self.stamps.iter().flat_map(StampQuality::warnings));
+        RecordingDescription {
+            profile: self.sensor.clone(),
+            sample_rate_hz: self.sample_rate_hz,
+            samples: self.totals.samples,
+            periods: self.totals.periods(),
+            channels: self.columns.iter().filter_map(StreamedColumn::profile).collect(),
+            dropped,
+            flagged,
+        }
+    }
+
+    /// Sentences on the rows, the columns and the clock.
+    fn notes(&self) -> Vec<String> {
+        let mut notes = self.read.notes.clone();
+        notes.extend(self.read.damage.clone());
+        notes.extend(self.full_scale_notes.iter().cloned());
+        for StreamedColumn { column, .. } in self.columns.iter().filter(|of| of.quantizer.is_none()) {
+            notes.push(format!("{} ({}) has no usable value and is left out", column.profile.name, column.label));
+        }
+        let rounded = self.columns.iter().filter_map(|of| Some((&of.column.profile, of.quantizer.as_ref()?)));
+        notes.extend(rounding_note(rounded));
+        notes.extend(self.stamps.iter().flat_map(StampQuality::notes));
+        notes.extend(self.clock.note().map(str::to_owned));
+        notes
+    }
+
+    /// Gives the columns that are set in `off_step` other counts, and unsets them.
+    fn leave_step(&mut self, off_step: &mut [bool]) {
+        for (of, off_step) in self.columns.iter_mut().zip(off_step) {
+            if std::mem::take(off_step) {
+                of.quantizer = Some(of.survey.quantizer_without_step());
+            }
+        }
+    }
+
+    /// The usable samples of rows that are placed.
+    fn block(&self, rows: &Batch, off_step: &mut [bool]) -> SampleBlock {
+        let channels = self.columns.iter().zip(&rows.values).zip(off_step);
+        let channels = channels.filter_map(|((of, values), off_step)| of.channel(values, &rows.verdicts, off_step));
+        SampleBlock { channels: channels.collect(), slots: rows.indices.clone() }
+    }
+
+    /// The samples of the rows that are kept, before the sample period `before`.
+    fn measurement(&self, before: u64, off_step: &mut [bool]) -> Result<Measurement, StreamError> {
+        let mut measurement = Measurement {
+            profile: self.sensor.clone(),
+            sample_rate_hz: self.sample_rate_hz,
+            stated_rate_hz: self.stated_hz,
+            slots: Vec::new(),
+            times_s: Some(Vec::new()),
+            channels: Vec::new(),
+            dropped: BTreeMap::new(),
+            flagged: BTreeMap::new(),
+        };
+        let mut placer = Placer::new(self.clock.again()?, self.columns.len());
+        let end = self.has_all_rows.then_some(None);
+        for batch in self.kept.iter().cloned().map(Some).chain(end) {
+            for rows in placer.place(batch)? {
+                append(&mut measurement, self.block(&rows, off_step), &rows.times);
+            }
+            if measurement.slots.last().is_some_and(|last| *last >= before) {
+                break;
+            }
+        }
+        let samples = measurement.slots.len();
+        measurement.times_s = measurement.times_s.filter(|times| times.len() == samples && samples > 0);
+        Ok(if before == u64::MAX { measurement } else { measurement.before(before) })
+    }
+}
+
+/// Adds the samples of a block at `times_s`.
+fn append(measurement: &mut Measurement, block: SampleBlock, times_s: &[f64]) {
+    let samples = measurement.slots.len();
+    measurement.slots.extend(block.slots);
+    measurement.times_s.iter_mut().for_each(|times| times.extend(times_s));
+    if measurement.channels.is_empty() {
+        measurement.channels = block.channels;
+        return;
+    }
+    for (channel, next) in measurement.channels.iter_mut().zip(block.channels) {
+        channel.counts.extend(next.counts);
+        for (cause, positions) in next.refused {
+            channel.refused.entry(cause).or_default().extend(positions.into_iter().map(|at| at + samples));
+        }
+    }
+}
+
+impl StreamedColumn {
+    /// Its profile with the size of its counts; `None` where no number can be used.
+    fn profile(&self) -> Option<ChannelProfile> {
+        let lsb = self.quantizer.as_ref()?.lsb * self.column.factor;
+        Some(ChannelProfile { lsb, ..self.column.profile })
+    }
+
+    /// Its numbers as counts; `off_step` is set where one is no multiple of the step of the others.
+    fn channel(&self, values: &[f64], verdicts: &[Verdict], off_step: &mut bool) -> Option<MeasuredChannel> {
+        let (quantizer, profile) = (self.quantizer.as_ref()?, self.profile()?);
+        let mut counts = Vec::with_capacity(values.len());
+        let mut refused: BTreeMap<&'static str, Vec<usize>> = BTreeMap::new();
+        for (position, &value) in values.iter().enumerate() {
+            let count = match refusal(&self.column, value, verdicts.get(position)) {
+                // The word of a register that is refused stays as it was read.
+                Some(cause) => {
+                    refused.entry(cause).or_default().push(position);
+                    quantizer.count(value).filter(|_| self.column.register.is_some())
+                }
+                None => {
+                    *off_step |= !quantizer.is_on_step(value);
+                    let count = quantizer.count(value);
+                    if count.is_none() {
+                        refused.entry("out_of_range").or_default().push(position);
+                    }
+                    count
+                }
+            };
+            counts.push(count.unwrap_or_default());
+        }
+        Some(MeasuredChannel { refused, ..MeasuredChannel::new(profile, counts) })
+    }
+}
+
+/// Rows that are kept from the first reading.
+struct Kept {
+    limit: KeptInMemory,
+    columns: u64,
+    is_quick: bool,
+    batches: VecDeque<Batch>,
+    rows: u64,
+    has_all_rows: bool,
+}
+
+impl Kept {
+    fn new(limit: KeptInMemory, columns: u64, is_quick: bool) -> Self {
+        Self { limit, columns, is_quick, batches: VecDeque::new(), rows: 0, has_all_rows: true }
+    }
+
+    /// Keeps a batch; true if from now on not all rows are kept.
+    fn add(&mut self, batch: &Batch) -> bool {
+        let had_all_rows = self.has_all_rows;
+        self.rows += batch.rows as u64;
+        let most_of_slow = if self.is_quick { 0 } else { MOST_KEPT_VALUES / self.columns.max(1) };
+        let most = self.limit.rows_with_losses.max(self.limit.rows).max(most_of_slow);
+        if self.has_all_rows && self.rows > most {
+            self.has_all_rows = false;
+            let mut rows = 0;
+            self.batches.retain(|batch| {
+                rows += batch.rows;
+                rows - batch.rows < ROWS_OF_BEGINNING
+            });
+        }
+        let kept: usize = if self.has_all_rows { 0 } else { self.batches.iter().map(|batch| batch.rows).sum() };
+        if self.has_all_rows || kept < ROWS_OF_BEGINNING {
+            self.batches.push_back(batch.clone());
+        }
+        had_all_rows && !self.has_all_rows
+    }
+}
+
+/// A recording on its time base.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EstimatedTimeBase {
+    /// The usable samples.
+    pub measurement: Measurement,
+    /// What the time stamps show; `None` where the samples have none.
+    pub stamps: Option<StampQuality>,
+}
+
+/// The usable samples of `recording` on their time base, as [`time_base`] gives them.
+///
+/// # Errors
+/// As [`time_base`].
+pub fn measurement(recording: &Recording, rate_hz: Option<f64>) -> Result<Measurement, TimeBaseError> {
+    time_base(recording, rate_hz).map(|base| base.measurement)
+}
+
+/// The usable samples of `recording` on their time base, and what the time stamps show.
+///
+/// `rate_hz` overrides the rate that the time stamps show. Gaps are read from the sample index where there is one, else from
+/// the time stamps; without either only samples that are left out for a fault are missing.
+///
+/// # Errors
+/// There is no usable rate or the given one contradicts the stamps, there are fewer than 4 usable samples, no two of them
+/// are neighbours, or the gaps are more than 64 times as long as the samples.
+pub fn time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<EstimatedTimeBase, TimeBaseError> {
+    let (origin, monitor) = (Origin::Recording(Cow::Borrowed(recording)), ReadMonitor::default());
+    let reading = Reading::new(rate_hz, KeptInMemory::ALL);
+    let mut survey = Survey::read(&origin, reading, u64::MAX, &monitor).map_err(without_file)?;
+    let samples = survey.samples(reading.kept).map_err(without_file)?;
+    Ok(EstimatedTimeBase { measurement: samples.beginning, stamps: survey.stamps })
+}
+
+/// The samples of a recording in a part of its time.
+///
+/// # Errors
+/// There is neither a time nor a rate, or no sample in the part.
+pub fn part_of(mut recording: Recording, part: TimeRange, stated_hz: Option<f64>) -> Result<Recording, TimeBaseError> {
+    let is_inside = RecordedRows::new(&recording).inside(part, stated_hz)?;
+    let mut is_inside = is_inside.into_iter();
+    recording.samples.retain(|_| is_inside.next().unwrap_or(false));
+    Ok(recording)
+}
