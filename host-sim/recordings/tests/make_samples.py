@@ -587,8 +587,6 @@ def other_shapes(folder, truth):
         file.create_dataset("t", data=seconds)
     halves = (gyro * 1000).astype(np.float16).astype(float) / 1000
     truth.add("scaled.h5", both(halves, counts * 0.001 + 0.5), kept=KEPT)
-    scipy.io.savemat(folder / "level4.mat", dict(note="bench", t=seconds, gyro=gyro, acc=accl.T.astype(np.float32)), format="4")
-    truth.add("level4.mat", both(gyro, accl.astype(np.float32)), units, kept=KEPT)
     # Durations of pandas, and objects in lines.
     table = pandas.DataFrame(np.c_[gyro, accl], columns=names)
     table.set_index(pandas.to_timedelta(times - times[0], unit="ns")).to_csv(folder / "durations.csv")

@@ -269,3 +269,19 @@ fn links_and_permissions_of_an_output_stay() {
     assert!(fs::read(&real).expect("a table").starts_with(b"time_s,gyro_x_counts\n"));
     assert_eq!(fs::metadata(&real).expect("a table").permissions().mode() & 0o777, 0o640);
 }
+
+/// Two reports and no file to write: the second one stays.
+#[test]
+fn an_export_does_not_overwrite_a_report() {
+    let dir = tempdir().expect("a folder");
+    let table = table(&dir);
+    let [one, other] = ["one.json", "other.json"].map(|name| dir.path().join(name));
+    for report in [&one, &other] {
+        let arguments = ["analyze", name(&table), "--quiet", "--json", name(report)];
+        assert!(host_sim(&arguments).status.success());
+    }
+    let before = std::fs::read(&other).expect("a report");
+    let line = error_line(&host_sim(&["export", name(&one), name(&other), "--format", "kalibr"]));
+    assert!(line.contains("other.json") && line.contains("is a report"), "{line}");
+    assert_eq!(std::fs::read(&other).expect("a report"), before);
+}

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::io::{Cursor, Write as _};
 
 /// Names of the files that the noise is written to; the first ones are text.
-pub(crate) const FORMS: [&str; 13] = [
+pub(crate) const FORMS: [&str; 12] = [
     "counts.csv",
     "units.csv",
     "comma.csv",
@@ -16,7 +16,6 @@ pub(crate) const FORMS: [&str; 13] = [
     "sentences.txt",
     "matrix.npy",
     "arrays.npz",
-    "level4.mat",
     "log.ulg",
     "log.bin",
     "bag.mcap",
@@ -131,10 +130,6 @@ impl Noise {
             }
             "matrix.npy" => (self.npy(), &["--columns", TEXT, "--units", "us,rad/s"]),
             "arrays.npz" => (zipped(&[("imu.npy", &self.npy())]), &["--columns", TEXT, "--units", "us,rad/s"]),
-            "level4.mat" => {
-                let columns = "time=t,gyro_x=gyro.0,gyro_y=gyro.1,gyro_z=gyro.2";
-                (self.level_4(), &["--columns", columns, "--units", "us,deg/s"])
-            }
             "log.ulg" => (self.ulog(), &[]),
             "log.bin" => (self.dataflash(), &[]),
             _ => (self.mcap(), &["--units", "rad/s"]),
@@ -157,22 +152,6 @@ impl Noise {
         for (at, time) in self.times_us().enumerate() {
             let row = [time as f64].into_iter().chain(self.rates(at).map(f64::to_radians));
             bytes.extend(row.flat_map(f64::to_le_bytes));
-        }
-        bytes
-    }
-
-    /// Two matrices of level 4 (MAT-File Format, chapter 2): times in µs, and rates in deg/s, a column after the other.
-    fn level_4(&self) -> Vec<u8> {
-        let rows = self.kept.len();
-        let header = |columns: usize, name: &str| -> Vec<u8> {
-            let words = [0, rows as u32, columns as u32, 0, name.len() as u32 + 1];
-            words.iter().flat_map(|word| word.to_le_bytes()).chain(name.bytes()).chain([0]).collect()
-        };
-        let mut bytes = header(1, "t");
-        bytes.extend(self.times_us().flat_map(|time| (time as f64).to_le_bytes()));
-        bytes.extend(header(3, "gyro"));
-        for axis in 0..3 {
-            bytes.extend((0..rows).flat_map(|at| self.rates(at)[axis].to_le_bytes()));
         }
         bytes
     }

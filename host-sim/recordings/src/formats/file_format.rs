@@ -6,7 +6,7 @@ use crate::counts::frame_log;
 use crate::counts::{serial, spi_export};
 use crate::formats::ardupilot_log::{self, ArduPilotSource};
 use crate::formats::hdf5::{self, Hdf5Reader};
-use crate::formats::matlab::{self, MatReader};
+use crate::formats::matlab::MatReader;
 use crate::formats::mcap_bag::McapSource;
 use crate::formats::numpy::{NpyReader, NpzReader};
 use crate::formats::ros_bag::RosBagSource;
@@ -55,7 +55,7 @@ pub enum FileFormat {
     Npy,
     /// An archive of arrays of NumPy.
     Npz,
-    /// MATLAB, levels 4 and 5.
+    /// MATLAB, level 5.
     Mat,
     /// A bag of ROS 1.
     RosBag,
@@ -407,9 +407,6 @@ fn head(file: &Path) -> io::Result<Vec<u8>> {
 fn binary_format(head: &[u8]) -> Option<FileFormat> {
     if hdf5::is_hdf5(head) {
         return Some(FileFormat::Hdf5);
-    }
-    if matlab::is_level_4(head) {
-        return Some(FileFormat::Mat);
     }
     MAGICS.iter().find(|(magic, _)| head.starts_with(magic)).map(|(_, format)| *format)
 }

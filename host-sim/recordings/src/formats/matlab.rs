@@ -1,5 +1,5 @@
-//! Arrays of MATLAB: `.mat` files of level 5, which `save` writes without `-v7.3`, with those in structures and cells, and of level 4
-//! (MAT-File Format, chapters 1 and 2). Of the crates that read them, `matfile` knows no structure, and prints to the terminal.
+//! Arrays of MATLAB: `.mat` files of level 5, which `save` writes without `-v7.3`, with those in structures and cells (MAT-File Format,
+//! chapter 1). Of the crates that read them, `matfile` knows no structure, and prints to the terminal.
 
 use crate::counts::recording::MAX_SAMPLES;
 use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray};
@@ -9,7 +9,7 @@ use crate::input::input_error::{InputError, Reason};
 use crate::reading::batch::Number;
 use flate2::read::ZlibDecoder;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 const FORMAT: &str = "MATLAB";
@@ -38,63 +38,6 @@ const COMPRESSED: u32 = 15;
 const CELL: u32 = 1;
 const STRUCTURE: u32 = 2;
 const NUMERIC: std::ops::RangeInclusive<u32> = 6..=15;
-
-/// Bytes before the name of a matrix of level 4.
-const HEADER_4_BYTES: usize = 20;
-
-/// A matrix of level 4.
-struct Matrix4 {
-    is_big_endian: bool,
-    /// `None` of text and of sparse matrices, whose numbers are not read.
-    scalar: Option<Scalar>,
-    bytes: u64,
-    sides: [usize; 2],
-    is_complex: bool,
-    name_bytes: u64,
-}
-
-impl Matrix4 {
-    /// `None` where `header` is none.
-    fn parse(header: &[u8]) -> Option<Self> {
-        let words = |is_big_endian: bool| -> [u32; 5] {
-            std::array::from_fn(|at| number(&header[4 * at..4 * at + 4], is_big_endian) as u32)
-        };
-        header.get(..HEADER_4_BYTES)?;
-        // The thousands of the type say the byte order, its tens the numbers, its ones the kind of matrix.
-        let of_order = |is_big_endian: bool| {
-            let [kind, rows, columns, imaginary, name_bytes] = words(is_big_endian);
-            let own = kind.checked_sub(if is_big_endian { 1000 } else { 0 }).filter(|own| *own < 60 && own % 10 < 3)?;
-            let scalar = [
-                Scalar::Float(8),
-                Scalar::Float(4),
-                Scalar::Signed(4),
-                Scalar::Signed(2),
-                Scalar::Unsigned(2),
-                Scalar::Unsigned(1),
-            ][own as usize / 10];
-            let is_plausible = imaginary < 2 && (2..=MAX_NAME as u32).contains(&name_bytes);
-            is_plausible.then_some(Self {
-                is_big_endian,
-                scalar: Some(scalar).filter(|_| own % 10 == 0),
-                bytes: (u64::from(rows) * u64::from(columns)).checked_mul(scalar.bytes() as u64)?,
-                sides: [rows as usize, columns as usize],
-                is_complex: imaginary == 1,
-                name_bytes: u64::from(name_bytes),
-            })
-        };
-        of_order(false).or_else(|| of_order(true))
-    }
-}
-
-/// Whether the first bytes of a file are those of a matrix of level 4: its header and a name.
-pub(crate) fn is_level_4(head: &[u8]) -> bool {
-    Matrix4::parse(head).is_some_and(|matrix| {
-        let name = head[HEADER_4_BYTES..].get(..matrix.name_bytes as usize);
-        name.and_then(<[u8]>::split_last).is_some_and(|(end, name)| {
-            *end == 0 && name.iter().all(|byte| byte.is_ascii_alphanumeric() || *byte == b'_')
-        })
-    })
-}
 
 /// A matrix of a file, or a field of an array of structures that have a sample each.
 #[derive(Debug, Clone)]
@@ -211,9 +154,6 @@ impl Walk<'_> {
 
     fn file(&mut self, file: &Path) -> Result<(), Reason> {
         let mut input = BufReader::new(File::open(file).map_err(Reason::Io)?);
-        if is_level_4(input.fill_buf().map_err(Reason::Io)?) {
-            return self.matrices_4(input);
-        }
         let mut header = [0; HEADER_BYTES];
         input.read_exact(&mut header).map_err(ended)?;
         self.is_big_endian = header.ends_with(b"MI");
@@ -244,34 +184,6 @@ impl Walk<'_> {
             if self.arrays.len() > MAX_ARRAYS {
                 return Err(Reason::Array(format!("more than {MAX_ARRAYS} arrays")));
             }
-        }
-        Ok(())
-    }
-
-    /// The matrices of a file of level 4.
-    fn matrices_4(&mut self, mut input: BufReader<File>) -> Result<(), Reason> {
-        let mut header = [0; HEADER_4_BYTES];
-        while !self.is_done() && input.read_exact(&mut header).is_ok() {
-            let damaged = || Reason::Format { format: FORMAT, error: "no header of a matrix of level 4".into() };
-            let matrix = Matrix4::parse(&header).ok_or_else(damaged)?;
-            self.is_big_endian = matrix.is_big_endian;
-            let mut name = Vec::new();
-            input.by_ref().take(matrix.name_bytes).read_to_end(&mut name).map_err(ended)?;
-            let name = String::from_utf8_lossy(&name).trim_end_matches('\0').to_owned();
-            let mut element = input.by_ref().take(matrix.bytes);
-            let is_recording = matrix.bytes > 0 && matrix.sides[0].min(matrix.sides[1]) <= MAX_COLUMNS;
-            if let Some(scalar) = matrix.scalar.filter(|_| is_recording) {
-                if self.takes_next() {
-                    self.columns(&mut element, matrix.sides, scalar, matrix.bytes)?;
-                }
-                self.add(String::new(), name, matrix.sides)?;
-            }
-            io::copy(&mut element, &mut io::sink()).map_err(ended)?;
-            if element.limit() > 0 {
-                return Err(Reason::Truncated { format: FORMAT });
-            }
-            let imaginary = if matrix.is_complex { matrix.bytes } else { 0 };
-            io::copy(&mut input.by_ref().take(imaginary), &mut io::sink()).map_err(ended)?;
         }
         Ok(())
     }
