@@ -49,7 +49,7 @@ impl RecordedSample {
     /// What the faults say of the sample.
     pub(crate) fn verdict(&self) -> Verdict {
         let is_lost = self.refused == ChannelMask::ALL;
-        let loss = (self.faults - Faults::WARNINGS).cause().filter(|_| is_lost);
+        let loss = is_lost.then(|| (self.faults - Faults::WARNINGS).cause()).flatten();
         Verdict { loss, faults: self.faults, refused: self.refused }
     }
 }

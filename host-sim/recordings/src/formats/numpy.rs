@@ -84,6 +84,12 @@ impl ArrayReader for NpyReader {
         each: &mut EachArrayRow,
     ) -> Option<Result<(), InputError>> {
         let mut buffers = vec![Vec::new(); if self.layout.by_column { columns.len() } else { 1 }];
+        // Of each column: the buffer with its numbers, where they begin in it, and how they are encoded.
+        let place = |(number, &column): (usize, &usize)| {
+            let FieldLayout { offset, encoding, .. } = &self.layout.fields[column];
+            if self.layout.by_column { (number, 0, encoding.clone()) } else { (0, *offset, encoding.clone()) }
+        };
+        let places: Vec<(usize, usize, Encoding)> = columns.iter().enumerate().map(place).collect();
         let mut row = Vec::with_capacity(columns.len());
         let mut first = 0;
         while first < self.layout.rows {
@@ -93,11 +99,10 @@ impl ArrayReader for NpyReader {
             };
             for at in 0..rows {
                 row.clear();
-                row.extend(columns.iter().enumerate().map(|(number, &column)| {
-                    let field = &self.layout.fields[column];
-                    let (buffer, offset) = if self.layout.by_column { (number, 0) } else { (0, field.offset) };
-                    decode(&field.encoding, &buffers[buffer][at * self.layout.stride + offset..])
-                }));
+                let start = at * self.layout.stride;
+                row.extend(
+                    places.iter().map(|(of, offset, encoding)| decode(encoding, &buffers[*of][start + offset..])),
+                );
                 if let Err(error) = each(Ok(&row)) {
                     return Some(Err(error));
                 }
@@ -327,8 +332,12 @@ fn decode(encoding: &Encoding, bytes: &[u8]) -> Number {
     let size = encoding.bytes;
     let Some(own) = bytes.get(..size).filter(|own| own.len() <= 8) else { return Number::Real(f64::NAN) };
     let mut word = [0; 8];
-    for (at, &byte) in own.iter().enumerate() {
-        word[if encoding.is_big_endian { size - 1 - at } else { at }] = byte;
+    match <[u8; 8]>::try_from(own) {
+        Ok(whole) => word = whole,
+        Err(_) => word[..size].copy_from_slice(own),
+    }
+    if encoding.is_big_endian {
+        word[..size].reverse();
     }
     let bits = u64::from_le_bytes(word);
     let unused = 64 - 8 * size as u32;

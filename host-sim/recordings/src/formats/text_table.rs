@@ -196,8 +196,7 @@ pub(crate) struct TextTable {
     damaged: DamagedRows,
     /// Whether a field that is no number is a missing one.
     is_lenient: bool,
-    /// Fields of a row.
-    width: usize,
+    fields: RowFields,
     /// The first rows, which were read to tell the columns.
     first: VecDeque<(u64, String)>,
     row: Vec<Number>,
@@ -314,6 +313,8 @@ impl TextTable {
         })?;
         check_origin(&rows, &chosen).map_err(|reason| InputError::file(file, reason))?;
         let row = Vec::with_capacity(chosen.len());
+        // The tabs at the end of a line are blanks too.
+        let fields = RowFields::new(width, separator == Some('\t'), &chosen);
         let layout = Layout::Columns { separator, calendar: calendar.map(CalendarClock::new), kind, others: 0 };
         Ok(Self {
             file: file.to_owned(),
@@ -325,7 +326,7 @@ impl TextTable {
             columns_notes: Vec::new(),
             damaged: DamagedRows::default(),
             is_lenient: false,
-            width,
+            fields,
             first,
             row,
         })
@@ -377,6 +378,7 @@ impl TextTable {
         let chosen = choose(&available);
         let chosen = chosen.map_err(|error| InputError::file(file, Reason::Selection(Box::new(error))))?;
         let row = Vec::with_capacity(chosen.len());
+        let fields = RowFields::new(width, false, &chosen);
         let layout = Layout::Sentences { name, damaged: 0, others: 0 };
         Ok(Self {
             file: file.to_owned(),
@@ -388,7 +390,7 @@ impl TextTable {
             columns_notes: Vec::new(),
             damaged: DamagedRows::default(),
             is_lenient: false,
-            width,
+            fields,
             first,
             row,
         })
@@ -411,7 +413,8 @@ impl TextTable {
         }
         let chosen = choose(&available);
         let chosen = chosen.map_err(|error| InputError::file(file, Reason::Selection(Box::new(error))))?;
-        let (row, width) = (Vec::with_capacity(chosen.len()), names.len());
+        let row = Vec::with_capacity(chosen.len());
+        let fields = RowFields::new(names.len(), false, &chosen);
         Ok(Self {
             file: file.to_owned(),
             lines,
@@ -422,7 +425,7 @@ impl TextTable {
             columns_notes: Vec::new(),
             damaged: DamagedRows::default(),
             is_lenient: false,
-            width,
+            fields,
             first: first.into(),
             row,
         })
@@ -465,7 +468,7 @@ impl TextTable {
 
     /// Reads the next row into `row`; its line, or `None` at the end.
     fn next_row(&mut self) -> Result<Option<u64>, InputError> {
-        let Self { file, lines, chosen, layout, is_lenient, width, first, row, damaged, .. } = self;
+        let Self { file, lines, chosen, layout, is_lenient, fields: of_row, first, row, damaged, .. } = self;
         loop {
             let first = first.pop_front();
             let (line, text) = match &first {
@@ -483,9 +486,7 @@ impl TextTable {
                     Ok(false)
                 }
                 Layout::Columns { separator, calendar, others, .. } => {
-                    // The tabs at the end of a line are blanks too.
-                    let width = RowWidth::new(*width, *separator == Some('\t'), chosen);
-                    let read = numbers(split(text, *separator), chosen, width, calendar.as_mut(), row);
+                    let read = of_row.numbers(split(text, *separator), calendar.as_mut(), row);
                     let is_empty = |(column, number): (&ChosenColumn, &Number)| {
                         !matches!(column.role, Role::Channel(_)) || number.value().is_nan()
                     };
@@ -501,9 +502,7 @@ impl TextTable {
                     match row_of.filter(|row_of| row_of.iter().any(|(name, _)| names.contains(name))) {
                         Some(row_of) => {
                             let values = values_of(names, row_of);
-                            let width = RowWidth::new(*width, false, chosen);
-                            numbers(values.iter().map(String::as_str), chosen, width, calendar.as_mut(), row)
-                                .map(|()| true)
+                            of_row.numbers(values.iter().map(String::as_str), calendar.as_mut(), row).map(|()| true)
                         }
                         None => {
                             *others += 1;
@@ -520,8 +519,7 @@ impl TextTable {
                         Ok(chosen.iter().all(|column| matches!(column.role, Role::Channel(_))))
                     }
                     Some(Sentence { name: own, fields, .. }) if own == *name => {
-                        let width = RowWidth::new(*width, false, chosen);
-                        numbers(fields.into_iter(), chosen, width, None, row).map(|()| true)
+                        of_row.numbers(fields.into_iter(), None, row).map(|()| true)
                     }
                     _ => {
                         *others += 1;
@@ -585,25 +583,73 @@ fn is_short(fields: usize, width: usize, calendar: Option<CalendarColumns>) -> b
     fields + 1 == width && matches!(calendar, Some(CalendarColumns::Two(_)))
 }
 
-/// Fields of a row.
-#[derive(Debug, Clone, Copy)]
-struct RowWidth {
-    fields: usize,
+/// The fields of a row, and which of them are read.
+#[derive(Debug)]
+struct RowFields {
+    width: usize,
     /// Whether empty fields at the end may be absent.
     may_be_short: bool,
-    /// A bit for each of the first fields that is read.
-    read: u64,
+    /// Position of each field that is read, in ascending order, and which of the chosen columns it is.
+    read: Vec<(usize, usize)>,
 }
 
-impl RowWidth {
-    fn new(fields: usize, may_be_short: bool, chosen: &[ChosenColumn]) -> Self {
-        let bits = chosen.iter().filter(|column| column.position < 64).map(|column| 1u64 << column.position);
-        Self { fields, may_be_short, read: bits.fold(0, |read, bit| read | bit) }
+impl RowFields {
+    fn new(width: usize, may_be_short: bool, chosen: &[ChosenColumn]) -> Self {
+        let mut read: Vec<(usize, usize)> =
+            chosen.iter().enumerate().map(|(at, column)| (column.position, at)).collect();
+        read.sort_unstable();
+        Self { width, may_be_short, read }
     }
 
-    /// Whether the field at this position may be one that is read.
-    fn is_read(self, position: usize) -> bool {
-        position >= 64 || self.read >> position & 1 == 1
+    /// The numbers of the chosen columns of a row.
+    fn numbers<'a>(
+        &self,
+        mut fields: impl Iterator<Item = &'a str>,
+        mut calendar: Option<&mut CalendarClock>,
+        row: &mut Vec<Number>,
+    ) -> Result<(), (Option<usize>, Reason)> {
+        row.clear();
+        row.resize(self.read.len(), Number::Real(f64::NAN));
+        let mut read = self.read.as_slice();
+        let mut found = 0;
+        // Fields up to the last one that is not empty.
+        let mut filled = 0;
+        let mut fault: Option<(usize, Reason)> = None;
+        let mut after_date = None;
+        while let Some(field) = after_date.take().or_else(|| fields.next()) {
+            let position = found;
+            found += 1;
+            if !field.is_empty() {
+                filled = found;
+            }
+            let mut time_ns = None;
+            if let Some(clock) = calendar.as_mut().filter(|clock| clock.columns.position() == position) {
+                if matches!(clock.columns, CalendarColumns::Two(_)) {
+                    after_date = fields.next();
+                }
+                time_ns = Some(clock.time_ns(field, after_date.unwrap_or_default()));
+            }
+            while let [(next, at), rest @ ..] = read
+                && *next == position
+            {
+                read = rest;
+                let (known, reason): (_, fn(String) -> Reason) = match time_ns {
+                    Some(time_ns) => (time_ns.map(Number::Integer), Reason::NotTime),
+                    None => (number(field), Reason::NotNumber),
+                };
+                match known {
+                    Some(known) => row[*at] = known,
+                    None if fault.as_ref().is_some_and(|(first, _)| first < at) => {}
+                    None => fault = Some((*at, reason(delimited_text::quote(field)))),
+                }
+            }
+        }
+        let is_complete = found >= self.width || self.may_be_short && found + 1 >= self.width.min(2);
+        match fault {
+            _ if !is_complete || filled > self.width => Err((None, Reason::FieldCount { found, expected: self.width })),
+            Some((at, reason)) => Err((Some(at), reason)),
+            None => Ok(()),
+        }
     }
 }
 
@@ -694,57 +740,6 @@ fn joined_names(above: &[&str], own: &[&str]) -> Option<Vec<String>> {
     Some(joined.collect())
 }
 
-/// The numbers of the `chosen` columns of a row of `width` fields.
-fn numbers<'a>(
-    mut fields: impl Iterator<Item = &'a str>,
-    chosen: &[ChosenColumn],
-    width: RowWidth,
-    mut calendar: Option<&mut CalendarClock>,
-    row: &mut Vec<Number>,
-) -> Result<(), (Option<usize>, Reason)> {
-    row.clear();
-    row.resize(chosen.len(), Number::Real(f64::NAN));
-    let mut found = 0;
-    // Fields up to the last one that is not empty.
-    let mut filled = 0;
-    let mut fault: Option<(usize, Reason)> = None;
-    let mut after_date = None;
-    while let Some(field) = after_date.take().or_else(|| fields.next()) {
-        let position = found;
-        found += 1;
-        if !field.is_empty() {
-            filled = found;
-        }
-        let mut time_ns = None;
-        if let Some(clock) = calendar.as_mut().filter(|clock| clock.columns.position() == position) {
-            if matches!(clock.columns, CalendarColumns::Two(_)) {
-                after_date = fields.next();
-            }
-            time_ns = Some(clock.time_ns(field, after_date.unwrap_or_default()));
-        }
-        if !width.is_read(position) {
-            continue;
-        }
-        for (at, _) in chosen.iter().enumerate().filter(|(_, column)| column.position == position) {
-            let (known, reason): (_, fn(String) -> Reason) = match time_ns {
-                Some(time_ns) => (time_ns.map(Number::Integer), Reason::NotTime),
-                None => (number(field), Reason::NotNumber),
-            };
-            match known {
-                Some(known) => row[at] = known,
-                None if fault.as_ref().is_some_and(|(first, _)| *first < at) => {}
-                None => fault = Some((at, reason(delimited_text::quote(field)))),
-            }
-        }
-    }
-    let is_complete = found >= width.fields || width.may_be_short && found + 1 >= width.fields.min(2);
-    match fault {
-        _ if !is_complete || filled > width.fields => Err((None, Reason::FieldCount { found, expected: width.fields })),
-        Some((at, reason)) => Err((Some(at), reason)),
-        None => Ok(()),
-    }
-}
-
 /// The sample rate that a line before the rows states, as in `// Update Rate: 100.0Hz`, Hz.
 fn stated_rate(line: &str) -> Option<f64> {
     const NAMES: [&str; 4] = ["rate", "frequency", "freq", "fs"];
@@ -762,46 +757,68 @@ fn separator_of(text: &str) -> Option<char> {
     SEPARATORS.into_iter().find(|separator| fields.contains(*separator))
 }
 
-fn split(text: &str, separator: Option<char>) -> Box<dyn Iterator<Item = &str> + '_> {
-    if let Some((time, rest)) = text.split_once(ARROW) {
-        return Box::new(std::iter::once(time.trim()).chain(split(rest, separator)));
-    }
-    match separator {
-        Some(separator) if text.contains('"') => Box::new(QuotedFields { rest: Some(text), separator }),
-        Some(separator) => Box::new(text.split(separator).map(delimited_text::field)),
-        None => Box::new(text.split_ascii_whitespace().map(delimited_text::field)),
-    }
+fn split(text: &str, separator: Option<char>) -> Fields<'_> {
+    Fields { rest: Some(text), separator: separator.map(|separator| separator as u8), has_arrow: text.contains(ARROW) }
 }
 
-/// Fields of which some stand between quotation marks, in which a separator is none (RFC 4180).
-struct QuotedFields<'a> {
+/// The fields of a row, of which some may stand between quotation marks, in which a separator is none (RFC 4180).
+struct Fields<'a> {
     rest: Option<&'a str>,
-    separator: char,
+    /// An ASCII character; blanks where there is none.
+    separator: Option<u8>,
+    /// Whether there may be a time of a serial monitor before the row.
+    has_arrow: bool,
 }
 
-impl<'a> Iterator for QuotedFields<'a> {
+impl<'a> Fields<'a> {
+    /// The text before the next separator, and what follows it.
+    fn cut(text: &'a str, separator: u8) -> (&'a str, Option<&'a str>) {
+        let at = text.bytes().position(|byte| byte == separator);
+        at.map_or((text, None), |at| (&text[..at], Some(&text[at + 1..])))
+    }
+
+    /// The next field, if it stands between quotation marks, and what follows them.
+    fn quoted(text: &'a str) -> Option<(&'a str, &'a str)> {
+        if text.bytes().next().is_none_or(|first| first.is_ascii_graphic() && first != b'"') {
+            return None;
+        }
+        let inner = text.trim_start().strip_prefix('"')?;
+        // Two marks are one in the text.
+        let mut marks = inner.match_indices('"').map(|(at, _)| at).peekable();
+        while let Some(at) = marks.next() {
+            if marks.next_if_eq(&(at + 1)).is_none() {
+                return Some((&inner[..at], &inner[at + 1..]));
+            }
+        }
+        None
+    }
+}
+
+impl<'a> Iterator for Fields<'a> {
     type Item = &'a str;
 
     fn next(&mut self) -> Option<&'a str> {
         let rest = self.rest.take()?;
-        let quoted = rest.trim_start().strip_prefix('"').and_then(|inner| {
-            // Two marks are one in the text.
-            let mut marks = inner.match_indices('"').map(|(at, _)| at).peekable();
-            while let Some(at) = marks.next() {
-                if marks.next_if_eq(&(at + 1)).is_none() {
-                    return Some((&inner[..at], &inner[at + 1..]));
-                }
+        if self.has_arrow {
+            if let Some((time, row)) = rest.split_once(ARROW) {
+                self.rest = Some(row);
+                return Some(time.trim());
             }
-            None
-        });
-        let Some((field, after)) = quoted else {
-            let (field, after) =
-                rest.split_once(self.separator).map_or((rest, None), |(field, after)| (field, Some(after)));
-            self.rest = after;
-            return Some(delimited_text::field(field));
+            self.has_arrow = false;
+        }
+        let Some(separator) = self.separator else {
+            let start = rest.trim_ascii_start();
+            let end = start.bytes().position(|byte| byte.is_ascii_whitespace()).unwrap_or(start.len());
+            self.rest = Some(&start[end..]);
+            return Some(delimited_text::field(&start[..end])).filter(|_| end > 0);
         };
-        self.rest = after.split_once(self.separator).map(|(_, after)| after);
-        Some(field.trim())
+        if let Some((field, after)) = Self::quoted(rest) {
+            self.rest = Self::cut(after, separator).1;
+            return Some(field.trim());
+        }
+        let (field, after) = Self::cut(rest, separator);
+        self.rest = after;
+        Some(delimited_text::field(field))
     }
 }
 
@@ -869,9 +886,8 @@ fn named_columns<'a>(names: impl Iterator<Item = &'a str>, units: Option<&[Optio
 
 /// A number, with a decimal comma too; NaN for a missing one; `None` for other texts.
 fn number(field: &str) -> Option<Number> {
-    // Most fields have a point, or are short whole numbers.
-    if let Some(integer) = short_integer(field.as_bytes()) {
-        return Some(Number::Integer(integer));
+    if let Some(number) = short_number(field.as_bytes()) {
+        return Some(number);
     }
     if !field.contains('.')
         && let Ok(integer) = field.parse()
@@ -883,17 +899,34 @@ fn number(field: &str) -> Option<Number> {
     real.or_else(missing).map(Number::Real)
 }
 
-/// A whole number of at most 18 digits; `None` for other texts.
-fn short_integer(field: &[u8]) -> Option<i64> {
-    let (is_negative, digits) = field.strip_prefix(b"-").map_or((false, field), |digits| (true, digits));
-    if digits.is_empty() || digits.len() > 18 {
+/// Digits of a number with decimals whose quotient by their power of ten is the nearest float: both are exact.
+const EXACT_DIGITS: usize = 15;
+
+/// Most numbers: at most 18 digits without decimals, or 15 of which some are decimals; `None` for other texts.
+fn short_number(field: &[u8]) -> Option<Number> {
+    const POWERS: [f64; EXACT_DIGITS + 1] =
+        [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
+    let (is_negative, text) = field.strip_prefix(b"-").map_or((false, field), |text| (true, text));
+    if text.len() > 18 {
         return None;
     }
-    let mut value = 0_i64;
-    for byte in digits {
-        value = 10 * value + i64::from(byte.checked_sub(b'0').filter(|digit| *digit < 10)?);
+    let (mut value, mut point) = (0_i64, None);
+    for (at, byte) in text.iter().enumerate() {
+        match byte.wrapping_sub(b'0') {
+            digit if digit < 10 => value = 10 * value + i64::from(digit),
+            _ if *byte == b'.' && point.is_none() => point = Some(at),
+            _ => return None,
+        }
     }
-    Some(if is_negative { -value } else { value })
+    let Some(point) = point else {
+        return (!text.is_empty()).then_some(Number::Integer(if is_negative { -value } else { value }));
+    };
+    let digits = text.len() - 1;
+    if digits == 0 || digits > EXACT_DIGITS {
+        return None;
+    }
+    let size = value as f64 / POWERS[digits - point];
+    Some(Number::Real(if is_negative { -size } else { size }))
 }
 
 /// Whether a line is a row and no heading or comment: at least half of its fields are numbers or calendar times, or all are missing. The
@@ -916,4 +949,55 @@ fn is_row(text: &str) -> bool {
         }
     }
     numbers > 0 && 2 * numbers >= fields || named > 0 && missing == fields
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MISSING, Number, number, short_number, split};
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn a_short_number_is_the_nearest_float_of_its_text() {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let mut texts: Vec<String> = ["-0.0", "5.", ".5", "-.5", "0.1", "999999999999999.", ".000000000000001"]
+            .into_iter()
+            .map(str::to_owned)
+            .collect();
+        for _ in 0..20_000 {
+            let mut text = random.random_range(0..1_000_000_000_000_000_u64).to_string();
+            text.truncate(random.random_range(1..=15));
+            text.insert(random.random_range(0..=text.len()), '.');
+            texts.extend([format!("-{text}"), text]);
+        }
+        for text in texts {
+            let expected = text.parse::<f64>().expect(&text);
+            let found = short_number(text.as_bytes()).map(|number| number.value().to_bits());
+            assert_eq!(found, Some(expected.to_bits()), "{text}");
+        }
+        assert_eq!(short_number(b"-123456789012345678"), Some(Number::Integer(-123_456_789_012_345_678)));
+        for text in ["", "-", ".", "-.", "1.2.3", "1-2", "--1", "+1", "1e3", "1,5", " 1"] {
+            assert_eq!(short_number(text.as_bytes()), None, "{text}");
+        }
+        for text in ["+1", "1e0", "1,0", "1.0000000000000000"] {
+            assert_eq!(number(text).map(Number::value), Some(1.0), "{text}");
+        }
+        assert!(MISSING.iter().all(|text| number(text).is_some_and(|number| number.value().is_nan())));
+    }
+
+    #[test]
+    fn fields_end_at_their_separator_unless_it_is_between_quotation_marks() {
+        for (text, separator, expected) in [
+            ("", Some(','), &[""][..]),
+            ("1,,2,", Some(','), &["1", "", "2", ""]),
+            (" 1 ;\u{a0}2\u{a0};\"3\"", Some(';'), &["1", "2", "3"]),
+            ("\"a,b\" , \"c\"\"d\",\"", Some(','), &["a,b", "c\"\"d", "\""]),
+            ("12:00:01.5 -> 1,2", Some(','), &["12:00:01.5", "1", "2"]),
+            ("12:00:01.5 -> 1  2 ", None, &["12:00:01.5", "1", "2"]),
+            ("\t1 \"2\"", None, &["1", "2"]),
+            ("1°,2°", Some(','), &["1°", "2°"]),
+        ] {
+            assert_eq!(split(text, separator).collect::<Vec<_>>(), expected, "{text}");
+        }
+    }
 }

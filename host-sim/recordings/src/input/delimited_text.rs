@@ -176,6 +176,11 @@ fn read_failure(error: io::Error) -> Reason {
 
 /// A field without the blanks and the quotation marks around it.
 pub(crate) fn field(raw: &str) -> &str {
+    // Most have neither.
+    let is_bare = |byte: Option<&u8>| byte.is_none_or(|byte| byte.is_ascii_graphic() && *byte != b'"');
+    if is_bare(raw.as_bytes().first()) && is_bare(raw.as_bytes().last()) {
+        return raw;
+    }
     let trimmed = raw.trim();
     trimmed.strip_prefix('"').and_then(|t| t.strip_suffix('"')).unwrap_or(trimmed)
 }

@@ -89,7 +89,9 @@ impl Batch {
     /// The first rows, which are removed.
     fn split_off_front(&mut self, rows: usize) -> Self {
         fn front<T>(values: &mut Vec<T>, rows: usize) -> Vec<T> {
-            let rest = values.split_off(rows.min(values.len()));
+            // As many are likely to follow.
+            let mut rest = Vec::with_capacity(values.capacity());
+            rest.extend(values.drain(rows.min(values.len())..));
             std::mem::replace(values, rest)
         }
         let is_front = |at: &&usize| **at < rows;
@@ -150,12 +152,20 @@ const COUNTERS: [u64; 3] = [1 << 8, 1 << 16, 1 << 32];
 /// Part of a counter that may be missing where it begins anew.
 const MOST_MISSING: u64 = 8;
 
+/// What the number of a column is for.
+#[derive(Debug, Clone, Copy)]
+enum Use {
+    Time,
+    Index,
+    /// A value; of a register with the least and the largest number of its field.
+    Value(Option<(i16, i16)>),
+}
+
 /// Makes batches of the rows of a file.
 #[derive(Debug)]
 pub(crate) struct BatchBuilder {
-    chosen: Vec<ChosenColumn>,
-    /// Of each chosen column, the least and the largest number of its register field.
-    limits: Vec<Option<(i16, i16)>>,
+    /// Of each chosen column.
+    uses: Vec<Use>,
     batch: Batch,
     /// The first time stamp.
     first_time: Option<Number>,
@@ -180,14 +190,14 @@ impl BatchBuilder {
     /// Of rows with these columns; those with a register are checked against their field.
     pub(crate) fn new(chosen: &[ChosenColumn], columns: &[ValueColumn], budget: Option<Budget>) -> Self {
         let mut registers = columns.iter().map(|column| column.register.map(Channel::limits));
-        let limits = chosen.iter().map(|column| match column.role {
-            Role::Channel(_) => registers.next().flatten(),
-            Role::Time | Role::Index => None,
+        let uses = chosen.iter().map(|column| match column.role {
+            Role::Channel(_) => Use::Value(registers.next().flatten()),
+            Role::Time => Use::Time,
+            Role::Index => Use::Index,
         });
         Self {
-            limits: limits.collect(),
+            uses: uses.collect(),
             batch: empty(chosen.iter().filter(|column| matches!(column.role, Role::Channel(_))).count()),
-            chosen: chosen.to_vec(),
             first_time: None,
             order: StampOrder::default(),
             back: Vec::new(),
@@ -226,9 +236,11 @@ impl BatchBuilder {
         }
         // A row at fault leaves nothing behind.
         let (mut time, mut index) = (None, None);
-        for (position, (column, &number)) in self.chosen.iter().zip(row).enumerate() {
-            match column.role {
-                Role::Time => {
+        let mut values = std::mem::take(&mut self.row);
+        values.clear();
+        for (position, (of, &number)) in self.uses.iter().zip(row).enumerate() {
+            match *of {
+                Use::Time => {
                     if !number.value().is_finite() {
                         return fault(position, Reason::NotFinite(number.value().to_string()));
                     }
@@ -236,7 +248,7 @@ impl BatchBuilder {
                     let is_large = first.value().abs() > LARGEST_OWN_TIME;
                     time = Some((first, number.since(if is_large { first } else { Number::Integer(0) })));
                 }
-                Role::Index => match number {
+                Use::Index => match number {
                     Number::Integer(now) if now >= 0 => {
                         let now = now.unsigned_abs() + self.index_offset;
                         let Some(before) = self.last_index.filter(|before| now <= *before) else {
@@ -255,17 +267,14 @@ impl BatchBuilder {
                     Number::Integer(index) => return fault(position, Reason::NotInteger(index.to_string())),
                     Number::Real(index) => return fault(position, Reason::NotInteger(index.to_string())),
                 },
-                Role::Channel(_) => {
-                    if let Some(limits) = self.limits[position] {
+                Use::Value(limits) => {
+                    if let Some(limits) = limits {
                         check_count(number, limits).map_err(|reason| RowFault { column: Some(position), reason })?;
                     }
+                    values.push(number.value());
                 }
             }
         }
-        let mut values = std::mem::take(&mut self.row);
-        values.clear();
-        let channels = self.chosen.iter().zip(row).filter(|(column, _)| matches!(column.role, Role::Channel(_)));
-        values.extend(channels.map(|(_, number)| number.value()));
         self.place(time, index, &values);
         self.row = values;
         Ok(())

@@ -83,17 +83,22 @@ impl ColumnSurvey {
             };
             *own = value;
             self.is_usable |= refused.is_none();
-            if (self.seen / RUN).is_multiple_of(self.stride) {
+            if self.is_kept() {
                 if self.values.len() == MOST_KEPT {
                     self.thin();
                     self.stride *= 2;
                 }
-                if (self.seen / RUN).is_multiple_of(self.stride) {
+                if self.is_kept() {
                     self.values.push(value);
                 }
             }
             self.seen += 1;
         }
+    }
+
+    /// Whether the next number is in a run that is kept. The stride is a power of two.
+    fn is_kept(&self) -> bool {
+        (self.seen / RUN) & (self.stride - 1) == 0
     }
 
     /// Drops every second run.

@@ -64,16 +64,17 @@ impl Quantizer {
         Self { lsb, offset: 0.0, cost: Some(cost) }
     }
 
-    /// Whether `value` is a multiple of the LSB, where all are; else true.
-    pub(crate) fn is_on_step(&self, value: f64) -> bool {
-        let steps = (value - self.offset) / self.lsb;
-        self.cost.is_some() || !value.is_finite() || (steps - steps.round()).abs() <= ON_STEP
-    }
-
     /// The count of `value`; `None` where it is not finite or beyond the range of counts.
     pub(crate) fn count(&self, value: f64) -> Option<i32> {
-        let count = ((value - self.offset) / self.lsb).round();
-        (count.abs() <= MAX_COUNT).then_some(count as i32)
+        self.count_on_step(value).0
+    }
+
+    /// The same, and whether `value` is a multiple of the LSB, where all are; else true.
+    pub(crate) fn count_on_step(&self, value: f64) -> (Option<i32>, bool) {
+        let steps = (value - self.offset) / self.lsb;
+        let count = steps.round();
+        let is_on_step = self.cost.is_some() || !value.is_finite() || (steps - count).abs() <= ON_STEP;
+        ((count.abs() <= MAX_COUNT).then_some(count as i32), is_on_step)
     }
 }
 

@@ -705,8 +705,8 @@ impl StreamedColumn {
                     quantizer.count(value).filter(|_| self.column.register.is_some())
                 }
                 None => {
-                    *off_step |= !quantizer.is_on_step(value);
-                    let count = quantizer.count(value);
+                    let (count, is_on_step) = quantizer.count_on_step(value);
+                    *off_step |= !is_on_step;
                     if count.is_none() {
                         refused.entry("out_of_range").or_default().push(position);
                     }
