@@ -256,7 +256,7 @@ fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor, kept: Kept
         }
         Opened::Replayed(replayed) => SampleStream::recorded(replayed, reading).map_err(StreamError::from),
     };
-    let stream = opened.map_err(|error| named(error, recording))?;
+    let stream = opened.map_err(|error| named(error, &recording.input.file))?;
     Ok(OpenStream { stream, hash })
 }
 
@@ -274,10 +274,10 @@ fn open_measured(recording: &RecordingArguments) -> Result<SampleStream> {
 }
 
 /// An error with the name of the file.
-fn named(error: StreamError, recording: &RecordingArguments) -> anyhow::Error {
+pub(crate) fn named(error: StreamError, file: &Path) -> anyhow::Error {
     match error {
         // The others name the file themselves.
-        StreamError::TimeBase(error) => anyhow::Error::from(error).context(recording.input.file.display().to_string()),
+        StreamError::TimeBase(error) => anyhow::Error::from(error).context(file.display().to_string()),
         error => error.into(),
     }
 }
@@ -357,10 +357,12 @@ pub(crate) fn open_rows(arguments: &RecordingArguments) -> Result<Recorded> {
     Ok(match open(&arguments.input, &ReadMonitor::default())? {
         Opened::Counts(input) => {
             let recording = count_table::read_part(&input, (*range).into(), part, *rate);
-            Recorded::Counts(recording.map_err(|error| named(error, arguments))?)
+            Recorded::Counts(recording.map_err(|error| named(error, &arguments.input.file))?)
         }
         Opened::Replayed(recording) => Recorded::Counts(match part {
-            Some(part) => part_of(recording, part, *rate).map_err(|error| named(error.into(), arguments))?,
+            Some(part) => {
+                part_of(recording, part, *rate).map_err(|error| named(error.into(), &arguments.input.file))?
+            }
             None => recording,
         }),
         Opened::AnySensor(input, options) => Recorded::AnySensor(input, options),

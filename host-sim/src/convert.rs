@@ -1,6 +1,6 @@
 //! `convert`: a recording in another format.
 
-use crate::analyze::{Recorded, open_rows};
+use crate::analyze::{Recorded, named, open_rows};
 use crate::cli::{ConvertArguments, InputArguments, RecordingArguments, RecordingFormat};
 use crate::inspect::read_or_ask;
 use crate::output::{Incomplete, note};
@@ -8,7 +8,6 @@ use crate::output_files::OutputFiles;
 use crate::recording_file;
 use anyhow::{Error, Result, anyhow, bail};
 use recordings::row_writer::{SensorRows, WriteError, WrittenRows};
-use recordings::sample_stream::StreamError;
 use std::path::Path;
 
 /// Reads a recording of any format and writes it anew.
@@ -55,10 +54,7 @@ fn write(rows: &SensorRows, out: &Path, format: RecordingFormat, files: &OutputF
         }
     };
     if let Some(error) = unread {
-        return Err(match error {
-            StreamError::Input(error) => error.into(),
-            StreamError::TimeBase(error) => Error::from(error).context(rows.input.name().display().to_string()),
-        });
+        return Err(named(error, rows.input.name()));
     }
     let written = written?;
     if format == RecordingFormat::Npy {

@@ -4,8 +4,7 @@
 //! test that calls [`generated`] fails if the part is another text. `tests/docs.sh` sets `WRITE_DOCS`, with which the call writes the
 //! part. The name of such a test has the words `in_the_docs`, by which the script finds it.
 
-use crate::{target_folder, workspace};
-use std::fs::File;
+use crate::{one_at_a_time, replace, target_folder, workspace};
 use std::path::Path;
 
 /// Asserts that the part `name` of a page is `text`, or writes it. `page` is the path from the folder of the workspace.
@@ -32,13 +31,6 @@ pub fn writes_docs() -> bool {
     std::env::var_os("WRITE_DOCS").is_some()
 }
 
-/// Replaces a page, of which other tests may be reading the one before.
-fn replace(path: &Path, text: &str) {
-    let partial = path.with_extension(std::process::id().to_string());
-    std::fs::write(&partial, text).expect("room");
-    std::fs::rename(partial, path).expect("the same folder");
-}
-
 struct Part<'a> {
     root: &'a Path,
     page: &'a str,
@@ -50,13 +42,8 @@ impl Part<'_> {
     fn check(&self, text: &str, is_unchanged: impl Fn(&str, &str) -> bool, writes: bool) {
         let Self { root, page: name_of_page, name } = self;
         let path = root.join(name_of_page);
-        // Another test, which may be another process, may write another part of the page.
-        let one_at_a_time = writes.then(|| {
-            let folder = target_folder();
-            std::fs::create_dir_all(&folder).expect("a folder");
-            File::create(folder.join("writing-docs")).expect("a file")
-        });
-        one_at_a_time.iter().for_each(|file| file.lock().expect("a lock"));
+        // Another test may write another part of the page.
+        let _writing = writes.then(|| one_at_a_time(&target_folder().join("writing-docs")));
         let page = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{name_of_page}: {error}"));
         let [begin, end] = ["begin", "end"].map(|side| format!("<!-- {side} {name} -->"));
         for mark in [&begin, &end] {
@@ -83,7 +70,8 @@ impl Part<'_> {
              --- the page has\n{old}\n--- the test makes\n{new}\n---"
         );
         let border = if page[before.len() + begin.len()..].starts_with('\n') { "\n" } else { "" };
-        replace(&path, &format!("{before}{begin}{border}{new}{border}{end}{after}"));
+        let page = format!("{before}{begin}{border}{new}{border}{end}{after}");
+        replace(&path, |partial| std::fs::write(partial, page));
     }
 }
 

@@ -74,10 +74,8 @@ impl Image<'_> {
     /// with other features.
     pub fn build(self, copy: &str) -> PathBuf {
         let folder = image_folder();
-        std::fs::create_dir_all(&folder).expect("a folder");
-        // Another test, which is another process, may build the same program with other features.
-        let one_at_a_time = File::create(folder.join("building")).expect("a file");
-        one_at_a_time.lock().expect("a lock");
+        // Another test may build the same program with other features.
+        let _building = one_at_a_time(&folder.join("building"));
         let status = cargo()
             .args(["build", "--quiet", "--locked", "--package", self.package, "--bin", self.program])
             .args(["--target", self.target, "--profile", self.profile])
@@ -89,12 +87,25 @@ impl Image<'_> {
             .expect("cargo starts");
         assert!(status.success(), "{self:?} does not build; its target comes with `rustup target add`");
         let copy = folder.join(copy).with_extension("elf");
-        // Renamed when it is whole: another test may be reading the one before.
-        let partial = copy.with_extension(std::process::id().to_string());
-        std::fs::copy(folder.join(self.target).join(self.profile).join(self.program), &partial).expect("room");
-        std::fs::rename(partial, &copy).expect("the same folder");
+        let built = folder.join(self.target).join(self.profile).join(self.program);
+        replace(&copy, |partial| std::fs::copy(built, partial).map(drop));
         copy
     }
+}
+
+/// Waits until no other process holds this file, which is made with its folder; it is held until it is dropped. Each test is a process.
+pub fn one_at_a_time(file: &Path) -> File {
+    std::fs::create_dir_all(file.parent().expect("a folder")).expect("a folder");
+    let held = File::create(file).expect("a file");
+    held.lock().expect("a lock");
+    held
+}
+
+/// Writes a file under another name and renames it when it is whole: another test may be reading the one before.
+fn replace(file: &Path, write: impl FnOnce(&Path) -> std::io::Result<()>) {
+    let partial = file.with_extension(std::process::id().to_string());
+    write(&partial).expect("room");
+    std::fs::rename(partial, file).expect("the same folder");
 }
 
 /// The folder of the workspace.

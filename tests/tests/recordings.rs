@@ -21,7 +21,12 @@ fn report(arguments: &[&str], recording: &PathBuf) -> Value {
         .output()
         .expect("host-sim runs");
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    let mut report: Value = serde_json::from_slice(&std::fs::read(json).expect("the report")).expect("JSON");
+    but_reading(&serde_json::from_slice(&std::fs::read(json).expect("the report")).expect("JSON"))
+}
+
+/// The report without the name, the hash and the options of what was read.
+pub(crate) fn but_reading(report: &Value) -> Value {
+    let mut report = report.clone();
     report.as_object_mut().and_then(|fields| fields.remove("reading"));
     report
 }

@@ -9,7 +9,7 @@ mod unit_guess;
 use crate::columns::column_selection::{ColumnSelection, is_output_register};
 use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::sensor_guess::SensorGuess;
-use crate::tables::whole_table::WholeTable;
+use crate::rows::whole_table::WholeTable;
 use crate::time_base::clock::{Clock, Place, RowStamp};
 use crate::time_base::{RateEstimate, StampQuality, TimeBaseError, TimeRange};
 use measurement::SensorProfile;

@@ -11,16 +11,14 @@ mod formats;
 mod input;
 pub mod inspection;
 mod reading;
-mod tables;
+mod rows;
 pub mod time_base;
 
 pub use columns::column_selection::{ColumnSelection, SelectionError};
-pub use counts::{
-    count_table, count_table_writer, frame_log, numpy_matrix, recorded_file, recording, serial, spi_export,
-};
+pub use counts::{count_table_writer, frame_log, numpy_matrix, recorded_file, serial, spi_export};
 pub use formats::file_format;
 pub use input::file_hash::FileHash;
 pub use input::input_error::{InputError, Printable, Reason};
 pub use input::read_monitor::{ReadMonitor, ReadPass};
-pub use reading::{row_writer, sample_stream};
-pub use tables::any_sensor;
+pub use reading::{count_table, row_writer, sample_stream};
+pub use rows::{any_sensor, recording};

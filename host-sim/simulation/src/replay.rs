@@ -11,7 +11,7 @@ use recordings::count_table;
 use recordings::frame_log::{Frame, FrameLogReader};
 use recordings::recorded_file::{FrameReader, RecordedFile};
 use recordings::recording::{MAX_SAMPLES, Recorder, Recording, TimeStamp};
-use recordings::{InputError, Reason};
+use recordings::{InputError, Reason, SelectionError};
 use std::cell::RefCell;
 use std::path::Path;
 use std::rc::Rc;
@@ -50,6 +50,13 @@ pub fn replay_table(file: &Path, range: GyroRange) -> Result<Replay, InputError>
         let burst = player.burst(&BURST_REQUEST, &answer)?;
         recorder.get_or_insert_with(|| Recorder::new(channels.to_vec(), range)).push(time_stamp, &burst);
         Ok(())
+    })
+    .map_err(|error| match &error.reason {
+        // No option says which column is which.
+        Reason::Selection(selection) if matches!(**selection, SelectionError::NoChannel(_)) => {
+            InputError { reason: Reason::NoChannel, ..error }
+        }
+        _ => error,
     })?;
     let recording = recorder.map(Recorder::finish).ok_or_else(|| InputError::file(file, Reason::NoData))?;
     Ok(Replay { recording, other_transactions: 0, timing: CapturedBusTiming::default() })

@@ -107,8 +107,8 @@ fn a_log_is_read_behind_a_byte_order_mark_or_blank_lines() {
 fn what_is_no_burst_of_the_driver_is_refused() {
     let zeros = |digits: usize| "0".repeat(digits);
     for (text, words) in [
-        ("a,b\n1,2\n".to_owned(), &["line 1", "no column is named like a channel"][..]),
-        ("time_s\n0\n".to_owned(), &["line 1"]),
+        ("a,b\n1,2\n".to_owned(), &["line 1", "no known column", "gyro_x_counts"][..]),
+        ("time_s\n0\n".to_owned(), &["line 1", "no known column"]),
         ("time_s,mosi,miso\n0.1,5600,0000\n".to_owned(), &["no burst", "26 bytes", "3E00"]),
         (format!("time_s,mosi,miso\n0.1,3E01{0},3E01{0}\n", zeros(48)), &["no burst", "26 bytes", "3E00"]),
         (

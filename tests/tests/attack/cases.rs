@@ -3,6 +3,7 @@
 use super::program::{Program, Run};
 use super::recordings::{FORMS, Noise, Recorded, TEXTS, zipped};
 use super::report::{baseline_term, contradiction};
+use crate::recordings::but_reading;
 use flate2::Compression;
 use flate2::write::{GzEncoder, ZlibEncoder};
 use rand::seq::IndexedRandom;
@@ -615,13 +616,6 @@ fn mutate(value: &mut Value, rng: &mut ChaCha8Rng) {
             };
         }
     }
-}
-
-/// The report without the name, the hash and the options of what was read.
-fn but_reading(report: &Value) -> Value {
-    let mut report = report.clone();
-    report.as_object_mut().and_then(|fields| fields.remove("reading"));
-    report
 }
 
 /// Counts replayed over the bus give the same report; so do those that were converted, and those in a shorter analysis the same N.

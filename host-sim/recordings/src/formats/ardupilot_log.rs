@@ -7,7 +7,7 @@ use crate::columns::column_selection::AvailableColumn;
 use crate::formats::topics::{EachRow, Ending, Source, Topic, TopicSensor};
 use crate::input::budget::{Budget, Metered};
 use crate::input::input_error::{InputError, Reason};
-use crate::reading::batch::Number;
+use crate::rows::batch::Number;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read};

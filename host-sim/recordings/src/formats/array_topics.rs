@@ -6,7 +6,7 @@ use crate::columns::unit::Unit;
 use crate::formats::topics::{EachRow, Ending, Source, Topic, TopicSensor};
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
-use crate::reading::batch::Number;
+use crate::rows::batch::Number;
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 

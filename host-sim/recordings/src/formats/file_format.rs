@@ -24,9 +24,10 @@ use crate::input::gzip_members::{GZIP_MAGIC, GzipMembers};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::{Counted, ReadMonitor};
 use crate::inspection::InspectedTable;
-use crate::reading::row_source::{BatchSource, FileRows, RowSource};
-use crate::tables::any_sensor::ReadOptions;
-use crate::tables::whole_table::WholeTable;
+use crate::rows::any_sensor::ReadOptions;
+use crate::rows::row_source::{BatchSource, FileRows, RowSource};
+use crate::rows::whole_table::WholeTable;
+use crate::time_base::time_base_error::StreamError;
 use adis16405_driver::GyroRange;
 use measurement::{SensorProfile, adis16405};
 use std::fs::File;
@@ -231,6 +232,14 @@ impl InputFile {
     /// An error of [`path`](Self::path) under the name by which the user knows the file.
     pub fn rename(&self, error: InputError) -> InputError {
         renamed(error, &self.name)
+    }
+
+    /// The same of an error that may be of its time base.
+    pub(crate) fn rename_any(&self, error: StreamError) -> StreamError {
+        match error {
+            StreamError::Input(error) => self.rename(error).into(),
+            StreamError::TimeBase(_) => error,
+        }
     }
 
     /// The rows of any sensor, or of register counts of an ADIS16405 whose rates were taken in `range`.

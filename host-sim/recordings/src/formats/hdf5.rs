@@ -4,12 +4,12 @@
 //! large a dataset is before it is read.
 
 use crate::columns::unit::Unit;
-use crate::counts::recording::MAX_SAMPLES;
 use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray, stated_rate};
 use crate::formats::message_layout::Scalar;
 use crate::input::budget::{Budget, Meter};
 use crate::input::input_error::{InputError, Reason};
-use crate::reading::batch::Number;
+use crate::rows::batch::Number;
+use crate::rows::recording::MAX_SAMPLES;
 use hdf5_pure::{AttrValue, Dataset, Datatype, DatatypeByteOrder, File, Group};
 use std::collections::HashMap;
 use std::path::Path;

@@ -1,12 +1,12 @@
 //! Arrays of MATLAB: `.mat` files of level 5, which `save` writes without `-v7.3`, with those in structures and cells (MAT-File Format,
 //! chapter 1). Of the crates that read them, `matfile` knows no structure, and prints to the terminal.
 
-use crate::counts::recording::MAX_SAMPLES;
 use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray};
 use crate::formats::message_layout::Scalar;
 use crate::input::budget::{Budget, Meter, Metered};
 use crate::input::input_error::{InputError, Reason};
-use crate::reading::batch::Number;
+use crate::rows::batch::Number;
+use crate::rows::recording::MAX_SAMPLES;
 use flate2::read::ZlibDecoder;
 use std::fs::File;
 use std::io::{self, BufReader, Read};

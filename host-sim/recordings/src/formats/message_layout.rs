@@ -6,7 +6,7 @@
 
 use crate::input::budget::Budget;
 use crate::input::input_error::Reason;
-use crate::reading::batch::Number;
+use crate::rows::batch::Number;
 use std::collections::HashMap;
 
 /// Elements of an array that are columns of their own.

@@ -1,14 +1,14 @@
 //! Arrays of NumPy: `.npy` and `.npz`.
 
 use crate::columns::unit::Unit;
-use crate::counts::recording::MAX_SAMPLES;
 use crate::formats::array_topics::{ArrayReader, ArraySource, EachArrayRow, NamedArray};
 use crate::formats::message_layout::Scalar;
 use crate::formats::numpy_header::{ElementType, Encoding, Header};
 use crate::input::budget::{Budget, Meter, Metered};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::{Counted, ReadMonitor};
-use crate::reading::batch::Number;
+use crate::rows::batch::Number;
+use crate::rows::recording::MAX_SAMPLES;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;

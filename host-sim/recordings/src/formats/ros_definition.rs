@@ -124,7 +124,7 @@ fn field_type(kind: &str, owner: &str, version: RosVersion) -> FieldType {
 mod tests {
     use super::{RosVersion, known_layout, layout};
     use crate::formats::message_layout::{Encoding, MessageLayout};
-    use crate::reading::batch::Number;
+    use crate::rows::batch::Number;
 
     /// The doubles of `sensor_msgs/Imu`: orientation and its covariance, rate and its covariance, force and its covariance.
     fn doubles(big: bool) -> Vec<u8> {

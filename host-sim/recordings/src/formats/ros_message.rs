@@ -4,7 +4,7 @@ use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::AvailableColumn;
 use crate::formats::message_layout::{Encoding, MessageColumn, MessageLayout};
 use crate::formats::topics::{Topic, TopicSensor};
-use crate::reading::batch::Number;
+use crate::rows::batch::Number;
 
 /// Names of the fields of an inertial sensor (`sensor_msgs/Imu`), in whatever message, with their channels and units (REP 103).
 const VECTORS: [(&str, [&str; 3], &str); 2] =

@@ -11,10 +11,10 @@ use crate::input::budget::Budget;
 use crate::input::delimited_text::{self, Lines};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::ReadMonitor;
-use crate::reading::batch::{BatchBuilder, Number, RowFault};
-use crate::reading::row_source::{EachRow, Ending, Refusal, RowSource};
-use crate::tables::any_sensor::ReadOptions;
-use crate::tables::whole_table::{WholeTable, most_rows};
+use crate::rows::any_sensor::ReadOptions;
+use crate::rows::batch::{BatchBuilder, Number, RowFault};
+use crate::rows::row_source::{EachRow, Ending, Refusal, RowSource};
+use crate::rows::whole_table::{WholeTable, most_rows};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 

@@ -7,10 +7,10 @@ use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ColumnSele
 use crate::columns::unit::Unit;
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
-use crate::reading::batch::{BatchBuilder, Number};
-use crate::reading::row_source::{self, Refusal, RowSource};
-use crate::tables::any_sensor::ReadOptions;
-use crate::tables::whole_table::{WholeSensor, WholeTable, most_rows};
+use crate::rows::any_sensor::ReadOptions;
+use crate::rows::batch::{BatchBuilder, Number};
+use crate::rows::row_source::{self, Refusal, RowSource};
+use crate::rows::whole_table::{WholeSensor, WholeTable, most_rows};
 use measurement::SensorProfile;
 use std::path::Path;
 

@@ -9,7 +9,7 @@ use crate::formats::message_layout::{Definitions, Encoding, Field, FieldType, Me
 use crate::formats::topics::{EachRow, Ending, Source, Topic, TopicSensor};
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
-use crate::reading::batch::Number;
+use crate::rows::batch::Number;
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
@@ -502,7 +502,7 @@ fn format(text: &[u8]) -> Option<(String, Vec<Field>)> {
 #[cfg(test)]
 mod tests {
     use super::{MOST_WAITING, Pairing};
-    use crate::reading::batch::Number;
+    use crate::rows::batch::Number;
 
     fn sample(time_us: i64, value: f64) -> [Number; 4] {
         [Number::Integer(time_us), Number::Real(value), Number::Real(value + 1.0), Number::Real(value + 2.0)]

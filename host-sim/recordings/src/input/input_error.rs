@@ -100,21 +100,9 @@ pub enum Reason {
     /// The header names no channel of the part.
     #[error("no known column; expected names such as gyro_x_counts")]
     NoChannel,
-    /// Columns that are not separated by commas.
-    #[error("the columns are separated by {0:?}; expected commas")]
-    Separator(char),
-    /// A comma after the last name.
-    #[error("a comma after the last column; leave it out, here and in every row")]
-    TrailingComma,
     /// A frame log where a table of counts is expected.
     #[error("this is an SPI frame log; read it with `replay`")]
     FrameLog,
-    /// A column that is neither a channel nor a time stamp.
-    #[error("unknown column; known are sample, time_s and <channel>_counts")]
-    UnknownColumn,
-    /// A name that occurs twice in the header.
-    #[error("the column occurs twice")]
-    DuplicateColumn,
     /// More or fewer fields than the header has.
     #[error("{found} fields, the header has {expected}")]
     FieldCount {

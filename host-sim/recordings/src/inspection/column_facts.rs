@@ -3,8 +3,8 @@
 use crate::columns::column_selection::AvailableColumn;
 use crate::columns::unit::Unit;
 use crate::inspection::time_unit::time_unit;
-use crate::reading::quantizer::{difference_noise, step};
-use crate::tables::whole_table::WholeColumn;
+use crate::rows::quantizer::{difference_noise, step};
+use crate::rows::whole_table::WholeColumn;
 
 /// Part of the rows that may be before the row above in a column of times.
 const MOST_BACKWARDS: f64 = 0.01;

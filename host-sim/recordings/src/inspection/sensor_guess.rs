@@ -6,8 +6,8 @@ use crate::columns::unit::{COUNT, SECOND, Unit};
 use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::time_unit::time_unit;
 use crate::inspection::unit_guess::{self, UnitGuess};
-use crate::reading::batch::usual_unit;
-use crate::tables::whole_table::{WholeSensor, WholeTable};
+use crate::rows::batch::usual_unit;
+use crate::rows::whole_table::{WholeSensor, WholeTable};
 use measurement::SensorProfile;
 use std::collections::BTreeMap;
 

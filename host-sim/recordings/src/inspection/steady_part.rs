@@ -2,7 +2,7 @@
 
 use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::sensor_guess::SensorGuess;
-use crate::reading::quantizer::{MEDIAN_OF_NORMAL, noise_at_lag};
+use crate::rows::quantizer::{MEDIAN_OF_NORMAL, noise_at_lag};
 use std::ops::Range;
 
 /// Rows of a block whose noise is independent, and most times as many where a filter makes neighbours alike.

@@ -1,7 +1,7 @@
 //! The unit of times that a file does not say, by the sample rate that they give.
 
 use crate::columns::unit::Unit;
-use crate::reading::batch::usual_unit;
+use crate::rows::batch::usual_unit;
 
 /// Sample rates, Hz, that a clock without a unit is taken for, the likeliest first.
 const LIKELY_HZ: [std::ops::RangeInclusive<f64>; 2] = [10.0..=10_000.0, 0.2..=40_000.0];

@@ -1,7 +1,7 @@
 //! What the numbers of a column show before they become counts.
 
-use crate::reading::batch::{ValueColumn, Verdict};
-use crate::reading::quantizer::Quantizer;
+use crate::rows::batch::{ValueColumn, Verdict};
+use crate::rows::quantizer::Quantizer;
 use adis16405_driver::{Channel, Faults};
 use measurement::ChannelProfile;
 use std::collections::BTreeMap;

@@ -1,6 +1,6 @@
 //! Rows at either end of a recording that are all equal: memory that was erased or never written, or a value that was held.
 
-use crate::reading::batch::Batch;
+use crate::rows::batch::{Batch, RowBefore};
 
 /// Fewest equal rows that are padding, and how many times as many as the most equal rows within the recording.
 const LEAST_ROWS: u64 = 64;
@@ -35,32 +35,24 @@ pub(crate) struct PaddingFinder {
     /// Equal rows until now, and most of them within the recording.
     run: u64,
     longest: u64,
-    before: Vec<f64>,
+    before: RowBefore,
 }
 
 impl PaddingFinder {
     /// Looks at the next rows.
     pub(crate) fn add(&mut self, batch: &Batch) {
-        for row in 0..batch.rows {
-            let is_equal = match row.checked_sub(1) {
-                Some(before) => batch.values.iter().all(|column| column[row] == column[before]),
-                None => self.rows > 0 && self.before.iter().zip(&batch.values).all(|(one, of)| *one == of[row]),
-            };
+        for is_equal in self.before.equals(batch) {
             if is_equal {
                 self.run += 1;
-            } else if self.rows > 0 {
+            } else {
                 match self.leading {
+                    _ if self.rows == 0 => {}
                     None => self.leading = Some(self.run),
                     Some(_) => self.longest = self.longest.max(self.run),
                 }
                 self.run = 1;
-            } else {
-                self.run = 1;
             }
             self.rows += 1;
-        }
-        if let Some(last) = batch.rows.checked_sub(1) {
-            self.before = batch.values.iter().map(|column| column[last]).collect();
         }
     }
 
@@ -82,7 +74,7 @@ impl PaddingFinder {
 #[cfg(test)]
 mod tests {
     use super::{PaddingFinder, Unpadded};
-    use crate::reading::batch::Batch;
+    use crate::rows::batch::Batch;
 
     fn found(values: &[f64], batch_rows: usize) -> Option<Unpadded> {
         let mut finder = PaddingFinder::default();

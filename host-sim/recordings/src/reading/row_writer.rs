@@ -3,9 +3,9 @@
 use crate::counts::count_table_writer::write_text;
 use crate::counts::numpy_matrix::{MatrixWriter, SiUnit};
 use crate::formats::file_format::InputFile;
-use crate::reading::batch::{Batch, ValueColumn};
-use crate::reading::row_source::{RowsRead, WantedRows};
-use crate::tables::any_sensor::ReadOptions;
+use crate::rows::any_sensor::ReadOptions;
+use crate::rows::batch::{Batch, ValueColumn};
+use crate::rows::row_source::{RowsRead, WantedRows};
 use crate::time_base::TimeRange;
 use crate::time_base::time_base_error::StreamError;
 use std::fmt::Write as _;
@@ -124,11 +124,8 @@ impl SensorRows<'_> {
         &self,
         mut write: impl FnMut(&[ValueColumn], &Batch, &mut Vec<String>) -> io::Result<()>,
     ) -> Result<WrittenRows, WriteError> {
-        let rename = |error: StreamError| match error {
-            StreamError::Input(error) => StreamError::Input(self.input.rename(error)),
-            error => error,
-        };
-        let mut source = self.input.batches(&self.options, None).map_err(|error| rename(error.into()))?;
+        let mut source =
+            self.input.batches(&self.options, None).map_err(|error| self.input.rename_any(error.into()))?;
         let columns = source.columns().to_vec();
         let (mut names, mut failure) = (Vec::new(), None);
         let wanted = WantedRows { part: self.part, ..WantedRows::all(self.stated_hz) };
@@ -146,7 +143,7 @@ impl SensorRows<'_> {
         if let Some(failure) = failure {
             return Err(failure.into());
         }
-        let read = read.map_err(rename)?;
+        let read = read.map_err(|error| self.input.rename_any(error))?;
         let is_complete = read.is_complete();
         let RowsRead { damage, notes, .. } = read;
         Ok(WrittenRows { columns: names, notes: notes.into_iter().chain(damage).collect(), is_complete })

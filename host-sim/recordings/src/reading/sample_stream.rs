@@ -4,17 +4,17 @@
 //! longer one is read once more for its samples. Both go the same way, so that memory does not depend on the length of a recording, and
 //! nothing else does either.
 
-use crate::counts::recording::Recording;
 use crate::formats::file_format::{FileFormat, InputFile};
 use crate::input::input_error::InputError;
 use crate::input::read_monitor::{ReadMonitor, ReadPass};
-use crate::reading::batch::{Batch, ValueColumn, Verdict};
 use crate::reading::column_survey::{ColumnSurvey, refusal, rounding_note};
 use crate::reading::full_scale::FullScale;
 use crate::reading::padding::{PaddingFinder, Unpadded};
-use crate::reading::quantizer::Quantizer;
-use crate::reading::row_source::{BATCH, BatchSource, RecordedRows, WantedRows};
-use crate::tables::any_sensor::ReadOptions;
+use crate::rows::any_sensor::ReadOptions;
+use crate::rows::batch::{Batch, RowBefore, ValueColumn, Verdict};
+use crate::rows::quantizer::Quantizer;
+use crate::rows::recording::Recording;
+use crate::rows::row_source::{BATCH, BatchSource, RecordedRows, WantedRows};
 use crate::time_base::clock::{Clock, Place, RowStamp};
 use crate::time_base::stamp_quality::StampQuality;
 use crate::time_base::stream_clock::Placed;
@@ -28,7 +28,7 @@ use measurement::{
 use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
 
-pub use crate::reading::row_source::RowsRead;
+pub use crate::rows::row_source::RowsRead;
 pub use crate::time_base::time_base_error::StreamError;
 
 /// Sample periods at the start of a recording whose samples are kept.
@@ -135,9 +135,9 @@ impl Origin<'_> {
     }
 
     fn name(&self, error: StreamError) -> StreamError {
-        match (self, error) {
-            (Self::File { input, .. }, StreamError::Input(error)) => input.rename(error).into(),
-            (_, error) => error,
+        match self {
+            Self::File { input, .. } => input.rename_any(error),
+            Self::Recording(_) => error,
         }
     }
 
@@ -358,8 +358,7 @@ impl Totals {
 struct Placer {
     clock: Clock,
     can_repeat: bool,
-    /// The numbers of the row before.
-    before: Option<Vec<f64>>,
+    before: RowBefore,
     /// Batches whose rows are not all placed, and how many of the first one are.
     waiting: VecDeque<Batch>,
     placed: usize,
@@ -375,7 +374,7 @@ impl Placer {
         Self {
             clock,
             can_repeat: columns >= MIN_CHANNELS_OF_REPEAT,
-            before: None,
+            before: RowBefore::default(),
             waiting: VecDeque::new(),
             placed: 0,
             totals: Totals::default(),
@@ -430,26 +429,13 @@ impl Placer {
 
     /// What the clock has to know of the rows.
     fn stamps(&mut self, batch: &Batch) -> Vec<RowStamp> {
-        let mut stamps = Vec::with_capacity(batch.rows);
-        for row in 0..batch.rows {
-            let is_equal = self.can_repeat
-                && match row.checked_sub(1) {
-                    Some(before) => batch.values.iter().all(|column| column[row] == column[before]),
-                    None => self
-                        .before
-                        .as_ref()
-                        .is_some_and(|before| before.iter().zip(&batch.values).all(|(one, of)| *one == of[row])),
-                };
-            stamps.push(RowStamp {
-                time_s: batch.times.get(row).copied(),
-                index: batch.indices.get(row).copied(),
-                is_equal,
-            });
-        }
-        if let Some(last) = batch.rows.checked_sub(1) {
-            self.before = Some(batch.values.iter().map(|column| column[last]).collect());
-        }
-        stamps
+        let equals = if self.can_repeat { self.before.equals(batch) } else { vec![false; batch.rows] };
+        let stamp = |(row, is_equal)| RowStamp {
+            time_s: batch.times.get(row).copied(),
+            index: batch.indices.get(row).copied(),
+            is_equal,
+        };
+        equals.into_iter().enumerate().map(stamp).collect()
     }
 }
 

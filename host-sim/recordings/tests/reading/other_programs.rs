@@ -4,9 +4,9 @@ use super::harness::{python, read, read_file, rows, write_array};
 use recordings::file_format::{FileFormat, InputFile};
 use recordings::sample_stream::StreamError;
 use serde_json::Value;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
+use system_tests::one_at_a_time;
 
 /// A file, and what is known of it.
 pub(crate) struct Sample {
@@ -23,9 +23,8 @@ pub(crate) fn samples(test: &str) -> Option<&'static [Sample]> {
         let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/make_samples.py");
         let script = std::fs::read(script).expect("the script");
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("samples");
-        // Each test is a process: the first one writes the files, for as long as the script is the same.
-        let one_at_a_time = File::create(folder.with_extension("lock")).expect("a file");
-        one_at_a_time.lock().expect("a lock");
+        // The first test writes the files, for as long as the script is the same.
+        let _writing = one_at_a_time(&folder.with_extension("lock"));
         let written_by = folder.join("written-by.py");
         if std::fs::read(&written_by).ok().as_ref() != Some(&script) {
             // The writers of bags refuse a file that exists.

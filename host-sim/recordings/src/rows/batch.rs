@@ -128,6 +128,22 @@ impl Batch {
     }
 }
 
+/// The last row of the batches that were compared.
+#[derive(Debug, Default)]
+pub(crate) struct RowBefore(Option<Vec<f64>>);
+
+impl RowBefore {
+    /// Whether each row of the next batch has the numbers of the row before it; the first row of all has none before it.
+    pub(crate) fn equals(&mut self, batch: &Batch) -> Vec<bool> {
+        let Some(last) = batch.rows.checked_sub(1) else { return Vec::new() };
+        let first =
+            self.0.as_ref().is_some_and(|before| before.iter().zip(&batch.values).all(|(one, of)| *one == of[0]));
+        let is_equal = |row: usize| batch.values.iter().all(|column| column[row] == column[row - 1]);
+        self.0 = Some(batch.values.iter().map(|column| column[last]).collect());
+        std::iter::once(first).chain((1..batch.rows).map(is_equal)).collect()
+    }
+}
+
 /// Why a row cannot be used: the column at fault, by its position among the chosen ones, and the reason.
 #[derive(Debug)]
 pub(crate) struct RowFault {

@@ -1,13 +1,13 @@
 //! Tables of register counts of an ADIS16405: text tables whose numbers fit their registers.
 
-use crate::counts::recording::{MAX_SAMPLES, NOT_RECORDED, Recorder, Recording, TimeStamp};
 use crate::formats::file_format::InputFile;
 use crate::formats::text_table::TextRows;
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::ReadMonitor;
-use crate::reading::batch::Batch;
-use crate::reading::row_source::{BatchSource, FileRows, WantedRows};
-use crate::tables::any_sensor::ReadOptions;
+use crate::rows::any_sensor::ReadOptions;
+use crate::rows::batch::Batch;
+use crate::rows::recording::{MAX_SAMPLES, NOT_RECORDED, Recorder, Recording, TimeStamp};
+use crate::rows::row_source::{BatchSource, FileRows, WantedRows};
 use crate::time_base::TimeRange;
 use crate::time_base::time_base_error::StreamError;
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
@@ -21,13 +21,31 @@ use std::path::Path;
 /// # Errors
 /// The file cannot be read, or a row is at fault.
 pub fn read(file: &Path, range: GyroRange) -> Result<Recording, InputError> {
-    let mut recorder: Option<Recorder> = None;
-    for_each_row(file, range, |channels, row, counts| {
-        let recorder = recorder.get_or_insert_with(|| Recorder::new(channels.to_vec(), range));
+    let mut rows = RecordedCounts::new(range);
+    for_each_row(file, range, |channels, row, counts| rows.push(channels, row, counts))?;
+    rows.finish(file)
+}
+
+/// The rows of a table of counts as a recording, whose channels are known with the first row.
+struct RecordedCounts {
+    range: GyroRange,
+    recorder: Option<Recorder>,
+}
+
+impl RecordedCounts {
+    fn new(range: GyroRange) -> Self {
+        Self { range, recorder: None }
+    }
+
+    fn push(&mut self, channels: &[Channel], row: TimeStamp, counts: Counts) -> Result<(), Reason> {
+        let recorder = self.recorder.get_or_insert_with(|| Recorder::new(channels.to_vec(), self.range));
         recorder.push(row, &Burst::from_counts(&counts));
         Ok(())
-    })?;
-    recorder.map(Recorder::finish).ok_or_else(|| InputError::file(file, Reason::NoData))
+    }
+
+    fn finish(self, file: &Path) -> Result<Recording, InputError> {
+        self.recorder.map(Recorder::finish).ok_or_else(|| InputError::file(file, Reason::NoData))
+    }
 }
 
 /// Calls `take` with the channels of a table, and each row: when its sample was taken, and counts in the range of their register fields;
@@ -51,7 +69,7 @@ pub fn for_each_row(
     }
 }
 
-/// The part of a table of counts, as [`read`]; with what the user should know of it.
+/// The part of a table of counts, as [`read`].
 ///
 /// # Errors
 /// As [`read`], or there is neither a time nor a rate, or no row in the part.
@@ -61,19 +79,14 @@ pub fn read_part(
     part: Option<TimeRange>,
     stated_hz: Option<f64>,
 ) -> Result<Recording, StreamError> {
-    let source = input.batches(&ReadOptions::of_counts(range), Some(range)).map_err(|error| input.rename(error))?;
-    let wanted = WantedRows { part, ..WantedRows::all(stated_hz) };
-    let mut recorder: Option<Recorder> = None;
-    let read = for_each_row_of(source, wanted, input.path(), |channels, row, counts| {
-        let recorder = recorder.get_or_insert_with(|| Recorder::new(channels.to_vec(), range));
-        recorder.push(row, &Burst::from_counts(&counts));
-        Ok(())
-    });
-    read.map_err(|error| match error {
-        StreamError::Input(error) => input.rename(error).into(),
-        error => error,
-    })?;
-    Ok(recorder.map(Recorder::finish).ok_or_else(|| input.rename(InputError::file(input.path(), Reason::NoData)))?)
+    let read = || -> Result<Recording, StreamError> {
+        let source = input.batches(&ReadOptions::of_counts(range), Some(range))?;
+        let mut rows = RecordedCounts::new(range);
+        let wanted = WantedRows { part, ..WantedRows::all(stated_hz) };
+        for_each_row_of(source, wanted, input.path(), |channels, row, counts| rows.push(channels, row, counts))?;
+        Ok(rows.finish(input.path())?)
+    };
+    read().map_err(|error| input.rename_any(error))
 }
 
 fn for_each_row_of(

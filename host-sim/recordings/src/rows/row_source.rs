@@ -1,11 +1,11 @@
 //! Rows of a file of any format, and of a recording in memory, as batches of columns.
 
 use crate::columns::column_selection::{ChosenColumn, Role};
-use crate::counts::recording::{NOT_RECORDED, RecordedSample, Recorder, Recording, TimeStamp};
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::ReadMonitor;
-use crate::reading::batch::{Batch, BatchBuilder, HELD_ROWS, Number, RowFault, ValueColumn, Verdict, usual_unit};
+use crate::rows::batch::{Batch, BatchBuilder, HELD_ROWS, Number, RowFault, ValueColumn, Verdict, usual_unit};
+use crate::rows::recording::{NOT_RECORDED, RecordedSample, Recorder, Recording, TimeStamp};
 use crate::time_base::time_base_error::{StreamError, TimeBaseError};
 use crate::time_base::time_range::TimeRange;
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};

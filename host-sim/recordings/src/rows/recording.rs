@@ -3,7 +3,7 @@
 //! [`Recorder`] takes the rows of a table and the bursts from the bus alike and checks both with the driver's
 //! [`BurstValidator`], so that the same words give the same recording either way.
 
-use crate::reading::batch::Verdict;
+use crate::rows::batch::Verdict;
 use adis16405_driver::{Burst, BurstValidator, Channel, ChannelMask, Counts, Faults, GyroRange};
 
 /// Counts that stand for the channels that a table lacks: 0, and a supply of 5 V (2068 counts of 2.418 mV).

@@ -2,7 +2,7 @@
 
 use crate::columns::column_selection::{AvailableColumn, ChosenColumn};
 use crate::columns::unit::Unit;
-use crate::reading::batch::BatchBuilder;
+use crate::rows::batch::BatchBuilder;
 
 /// Numbers that are held at most, 128 MiB.
 const MOST_VALUES: u64 = 1 << 24;
