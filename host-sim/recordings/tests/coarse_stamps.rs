@@ -59,7 +59,8 @@ fn record(host: Host, seed: u64) -> (Recording, u64) {
         }
         // The draws are made for every sample: with and without a fault the other faults are the same.
         let (late, lost, again): (f64, f64, f64) = (rng.random(), rng.random(), rng.random());
-        let counts: [i16; 12] = std::array::from_fn(|_| rng.random_range(-40..40));
+        let differing: u64 = rng.random();
+        let counts: [i16; 12] = std::array::from_fn(|channel| (differing >> (5 * channel) & 63) as i16 - 32);
         if lost < host.loss || sample < outage_until {
             continue;
         }
@@ -68,7 +69,7 @@ fn record(host: Host, seed: u64) -> (Recording, u64) {
         last = read;
         let clock = read + host.drift * 100.0 / std::f64::consts::TAU * (read * std::f64::consts::TAU / 100.0).sin();
         let stamp = if host.tick_s > 0.0 { (clock / host.tick_s).floor() * host.tick_s } else { clock };
-        let mut counts = counts.map(|count| count);
+        let mut counts = counts;
         counts[Channel::Supply as usize] = 2068;
         counts[Channel::AuxAdc as usize] = 0;
         let copies = if again < host.repeats { 2 } else { 1 };
