@@ -112,19 +112,12 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
             let report = analyze::analyze_replay(&arguments)?;
             output::write_report(&report.into(), Some(&output::source_name(file)), output, &files)
         }
-        Some(Command::Record { out, port, baud, simulate, output }) => {
+        Some(Command::Record { out, port, baud, seconds, output }) => {
             OutputFiles::default().check(&out)?;
             // The log is read again: nothing else is written to it.
             let files = OutputFiles::beside([out.as_path()]);
             output::check(&output, &files)?;
-            let report = match port {
-                Some(port) => record::record_device(&out, &port, baud, simulate.seconds.unwrap_or(record::DEFAULT_S))?,
-                None => {
-                    let report = record::record_simulation(&out, &simulate.simulation(record::DEFAULT_S))?;
-                    output::note(format_args!("without --port this is the virtual sensor, and no measurement"));
-                    report
-                }
-            };
+            let report = record::record_device(&out, &port, baud, seconds)?;
             output::write_report(&report.into(), Some(&output::source_name(&out)), &output, &files)
         }
         Some(Command::Export(arguments)) => export::run(&arguments),

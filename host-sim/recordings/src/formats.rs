@@ -3,6 +3,7 @@
 mod ardupilot_log;
 mod array_topics;
 mod calendar;
+mod fields;
 pub mod file_format;
 mod foreign_format;
 mod hdf5;
@@ -19,6 +20,7 @@ mod ros_definition;
 mod ros_message;
 mod row_kinds;
 mod sqlite_bag;
+mod table_head;
 pub(crate) mod text_table;
 mod topics;
 mod ulog;

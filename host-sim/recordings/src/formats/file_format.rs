@@ -18,7 +18,7 @@ use crate::formats::topics::{self, Source, TopicRows};
 use crate::formats::ulog::UlogSource;
 use crate::formats::{foreign_format, text_table};
 use crate::input::budget::{Budget, Metered};
-use crate::input::delimited_text::Lines;
+use crate::input::delimited_text::{Lines, is_utf16};
 use crate::input::file_hash::FileHash;
 use crate::input::gzip_members::{GZIP_MAGIC, GzipMembers};
 use crate::input::input_error::{InputError, Reason};
@@ -191,7 +191,9 @@ impl InputFile {
             None if foreign_format::is_json_document(&head) => {
                 return Err(InputError::file(name, foreign_format::JSON_DOCUMENT));
             }
-            None if foreign_format::is_binary(text.as_ref().unwrap_or(&head)) => {
+            None if foreign_format::is_binary(text.as_ref().unwrap_or(&head))
+                && !(text.is_none() && is_utf16(&head)) =>
+            {
                 return Err(InputError::file(name, foreign_format::refusal(text.as_ref().unwrap_or(&head))));
             }
             None => {

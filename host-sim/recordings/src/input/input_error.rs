@@ -234,12 +234,6 @@ pub enum Reason {
     /// Several topics of which the user names none.
     #[error("several topics: choose one with --topic: {0}")]
     SeveralTopics(String),
-    /// Rows of two sensors in one table: the columns of each.
-    #[error(
-        "some rows have {} and the others {}, as of two sensors; read one of them with --columns, as in --columns gyro_x=NAME",
-        .0.0, .0.1
-    )]
-    SeveralOrigins(Box<(String, String)>),
     /// Arrays that cannot be columns of one table: what each has.
     #[error("{0}; columns of one table have as many rows")]
     UnequalRows(String),

@@ -4,14 +4,15 @@
 //! longer one is read once more for its samples. Both go the same way, so that memory does not depend on the length of a recording, and
 //! nothing else does either.
 
+use crate::columns::axes::{ACCELEROMETER, GYROSCOPE, MAGNETOMETER};
 use crate::formats::file_format::{FileFormat, InputFile};
 use crate::input::input_error::InputError;
 use crate::input::read_monitor::{ReadMonitor, ReadPass};
 use crate::reading::column_survey::{ColumnSurvey, refusal, rounding_note};
 use crate::reading::full_scale::FullScale;
-use crate::reading::padding::{PaddingFinder, Unpadded};
 use crate::rows::any_sensor::ReadOptions;
 use crate::rows::batch::{Batch, RowBefore, ValueColumn, Verdict};
+use crate::rows::padding::{PaddingFinder, Unpadded};
 use crate::rows::quantizer::Quantizer;
 use crate::rows::recording::Recording;
 use crate::rows::row_source::{BATCH, BatchSource, RecordedRows, WantedRows};
@@ -524,8 +525,11 @@ impl Survey {
         })?;
         placer.place(None)?;
         let Placer { totals, clock, has_index, .. } = placer;
-        let quantizers: Vec<Option<Quantizer>> =
-            surveys.iter().zip(&columns).map(|(survey, column)| survey.quantizer(column)).collect();
+        let unfilled = never_filled(&columns, &surveys);
+        let quantizer = |(at, (survey, column)): (usize, (&ColumnSurvey, &ValueColumn))| {
+            survey.quantizer(column).filter(|_| !unfilled.contains(&at))
+        };
+        let quantizers: Vec<Option<Quantizer>> = surveys.iter().zip(&columns).enumerate().map(quantizer).collect();
         let (full_scale, full_scale_notes) = full_scale.finish(&columns, &quantizers);
         let mut dropped = totals.dropped(has_index);
         if quantizers.iter().all(Option::is_none) {
@@ -598,10 +602,14 @@ impl Survey {
     /// Sentences on the rows, the columns and the clock.
     fn notes(&self) -> Vec<String> {
         let mut notes = self.read.notes.clone();
-        notes.extend(self.read.damage.clone());
         notes.extend(self.full_scale_notes.iter().cloned());
-        for StreamedColumn { column, .. } in self.columns.iter().filter(|of| of.quantizer.is_none()) {
-            notes.push(format!("{} ({}) has no usable value and is left out", column.profile.name, column.label));
+        for StreamedColumn { column, survey, .. } in self.columns.iter().filter(|of| of.quantizer.is_none()) {
+            let what = if survey.is_zero() {
+                "is never filled: it is zero in every row, as its other axes are"
+            } else {
+                "has no usable value"
+            };
+            notes.push(format!("{} ({}) {what}, and is left out", column.profile.name, column.label));
         }
         let rounded = self.columns.iter().filter_map(|of| Some((&of.column.profile, of.quantizer.as_ref()?)));
         notes.extend(rounding_note(rounded));
@@ -652,6 +660,17 @@ impl Survey {
         measurement.times_s = measurement.times_s.filter(|times| times.len() == samples && samples > 0);
         Ok(if before == u64::MAX { measurement } else { measurement.before(before) })
     }
+}
+
+/// The columns of vectors that are zero in every row, beside others that are not: messages have fields that a program never fills.
+fn never_filled(columns: &[ValueColumn], surveys: &[ColumnSurvey]) -> Vec<usize> {
+    let of_group = |group: &[&str; 3]| -> Vec<usize> {
+        let is_own = |at: &usize| group.contains(&columns[*at].profile.name) && columns[*at].register.is_none();
+        let own: Vec<usize> = (0..columns.len()).filter(is_own).collect();
+        if own.len() == group.len() && own.iter().all(|at| surveys[*at].is_zero()) { own } else { Vec::new() }
+    };
+    let unfilled: Vec<usize> = [GYROSCOPE, ACCELEROMETER, MAGNETOMETER].iter().flat_map(of_group).collect();
+    if unfilled.len() < columns.len() { unfilled } else { Vec::new() }
 }
 
 /// Adds the samples of a block at `times_s`.
