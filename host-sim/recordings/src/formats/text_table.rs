@@ -550,10 +550,8 @@ impl RowFields {
                 filled = found;
             }
             let mut time_ns = None;
-            if let Some(clock) = calendar.as_deref_mut() {
-                if let Some(part) = clock.part_ns(position, field) {
-                    parts_ns = parts_ns.zip(part).and_then(|(sum, part)| sum.checked_add(part));
-                }
+            if let Some(part) = calendar.as_ref().and_then(|clock| clock.part_ns(position, field)) {
+                parts_ns = parts_ns.zip(part).and_then(|(sum, part)| sum.checked_add(part));
             }
             if let Some(clock) = calendar.as_deref_mut().filter(|clock| clock.is_at(position)) {
                 if matches!(clock.columns, CalendarColumns::Two(_)) {
@@ -576,10 +574,10 @@ impl RowFields {
                 }
             }
         }
-        if let Some(start) = calendar.as_deref().and_then(CalendarClock::start_of_parts)
+        if let Some(start) = calendar.as_ref().and_then(|clock| clock.start_of_parts())
             && let Some((_, at)) = self.read.iter().find(|(position, _)| *position == start)
         {
-            let time_ns = parts_ns.and_then(|sum| calendar.as_deref_mut()?.sum_ns(sum));
+            let time_ns = parts_ns.and_then(|sum| calendar.as_mut()?.sum_ns(sum));
             row[*at] = time_ns.map_or(Number::Real(f64::NAN), Number::Integer);
         }
         let is_complete = found >= self.width || self.may_be_short && found + 1 >= self.width.min(2);
