@@ -195,7 +195,10 @@ mod tests {
         let text = export(&known, ExportFormat::Kalibr, AxisChoice::Worst).expect("a file").text;
         // 0.05 and 0.01 deg in rad.
         assert!(text.contains("gyro_x: 8.727e-4, an upper bound\n") && text.contains("gyro_y: 1.745e-4\n"), "{text}");
-        assert!(text.contains("gyroscope_noise_density: 8.727e-4  # rad/s/sqrt(Hz), an upper bound, worst axis of"), "{text}");
+        assert!(
+            text.contains("gyroscope_noise_density: 8.727e-4  # rad/s/sqrt(Hz), an upper bound, worst axis of"),
+            "{text}"
+        );
         assert!(text.contains("# m/s^2/sqrt(Hz), worst axis of"), "{text}");
     }
 

@@ -277,7 +277,10 @@ fn the_parts_of_a_sensor_are_exported_as_one() {
     for row in 0..4000 {
         let [x, y, z] = [0, 1, 2].map(|axis| noise(row, axis));
         rows.push((10 * row, format!("{},{:.5},{:.5},{:.5},,,\n", 10 * row, 0.2 * x, 0.2 * y, 0.2 * z)));
-        rows.push((16 * row + 3, format!("{},,,,{:.5},{:.5},{:.5}\n", 16 * row + 3, 0.01 * x, 0.01 * y, 1.0 + 0.01 * z)));
+        rows.push((
+            16 * row + 3,
+            format!("{},,,,{:.5},{:.5},{:.5}\n", 16 * row + 3, 0.01 * x, 0.01 * y, 1.0 + 0.01 * z),
+        ));
     }
     rows.sort();
     let rows: String = rows.into_iter().map(|(_, row)| row).collect();

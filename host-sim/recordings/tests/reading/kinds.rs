@@ -345,7 +345,8 @@ fn a_vector_that_is_never_filled_is_left_out_with_a_note() {
     let mut table = |zeros: usize| {
         let row = |row: u32| {
             let [x, y, z] = [(); 3].map(|()| RATE * normal());
-            let force = [0, 1, 2].map(|axis| if axis < zeros { 0.0 } else { FORCE * normal() }).map(|of| of.to_string());
+            let force =
+                [0, 1, 2].map(|axis| if axis < zeros { 0.0 } else { FORCE * normal() }).map(|of| of.to_string());
             format!("{:.2},{x:.4},{y:.4},{z:.4},{}\n", f64::from(row) / 100.0, force.join(","))
         };
         let content = "t_s,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g\n".to_owned() + &(0..ROWS).map(row).collect::<String>();
