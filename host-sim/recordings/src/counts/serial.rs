@@ -3,6 +3,7 @@
 use crate::counts::frame_log::{Frame, FrameLogWriter};
 use adis16405_driver::{BURST_REQUEST, Register};
 use link::{Decoder, DecoderCounters, Message, RawMessage, Received};
+#[cfg(feature = "serial")]
 use serial2::SerialPort;
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind, Read, Write};
@@ -25,6 +26,7 @@ const ASK_AGAIN: Duration = Duration::from_secs(2);
 ///
 /// # Errors
 /// There is no such port, or it cannot be set up.
+#[cfg(feature = "serial")]
 pub fn open(port: &str, baud: u32) -> io::Result<SerialPort> {
     let mut port = SerialPort::open(port, baud)?;
     port.set_read_timeout(READ_TIMEOUT)?;
@@ -32,6 +34,7 @@ pub fn open(port: &str, baud: u32) -> io::Result<SerialPort> {
 }
 
 /// Names of the serial ports of this machine, as far as the system says them.
+#[cfg(feature = "serial")]
 #[must_use]
 pub fn ports() -> Vec<String> {
     let ports = SerialPort::available_ports().unwrap_or_default();

@@ -74,6 +74,9 @@ pub enum Reason {
         /// Time for a file of this size, s.
         seconds: u64,
     },
+    /// A format whose reader this program was built without.
+    #[error("{0}, which this program was built without; build it with the features hdf5 and sqlite")]
+    NotBuilt(&'static str),
     /// A binary format that is known and not read.
     #[error("{what}, which is not read; {how}")]
     Foreign {

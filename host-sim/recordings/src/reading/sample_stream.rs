@@ -5,7 +5,7 @@
 //! nothing else does either.
 
 use crate::columns::axes::{ACCELEROMETER, GYROSCOPE, MAGNETOMETER};
-use crate::formats::file_format::{FileFormat, InputFile};
+use crate::formats::file_format::InputFile;
 use crate::input::input_error::InputError;
 use crate::input::read_monitor::{ReadMonitor, ReadPass};
 use crate::reading::column_survey::{ColumnSurvey, refusal, rounding_note};
@@ -36,7 +36,7 @@ pub use crate::time_base::time_base_error::StreamError;
 const BEGINNING: u64 = 1 << 16;
 /// Rows that are kept of a longer recording, to begin with.
 const ROWS_OF_BEGINNING: usize = 1 << 16;
-/// Numbers that are kept of a file that is slow to be read again: 64 MiB.
+/// Numbers that are kept, so that the file is not read again: 64 MiB.
 const MOST_KEPT_VALUES: u64 = 1 << 23;
 
 /// Fewest channels whose equal rows may be one sample that was read twice; fewer are equal by chance.
@@ -124,14 +124,6 @@ impl Origin<'_> {
         match self {
             Self::File { input, options, range } => input.batches(options, *range),
             Self::Recording(recording) => Ok(BatchSource::Recording(RecordedRows::new(recording))),
-        }
-    }
-
-    /// Whether reading the rows once more costs little beside what is done with them.
-    fn is_quick_to_read(&self) -> bool {
-        match self {
-            Self::File { input, .. } => input.format().is_text() || input.format() == FileFormat::Npy,
-            Self::Recording(_) => true,
         }
     }
 
@@ -499,7 +491,7 @@ impl Survey {
         let mut placer = Placer::new(Clock::new(stated_hz)?, columns.len());
         let mut surveys = vec![ColumnSurvey::new(); columns.len()];
         let mut full_scale = FullScale::new(&columns);
-        let mut kept = Kept::new(reading.kept, columns.len() as u64, origin.is_quick_to_read());
+        let mut kept = Kept::new(reading.kept, columns.len() as u64);
         let mut rows_before = 0u64;
         // The numbers of a batch, NaN where they are refused.
         let mut usable: Vec<Vec<f64>> = Vec::new();
@@ -728,23 +720,21 @@ impl StreamedColumn {
 struct Kept {
     limit: KeptInMemory,
     columns: u64,
-    is_quick: bool,
     batches: VecDeque<Batch>,
     rows: u64,
     has_all_rows: bool,
 }
 
 impl Kept {
-    fn new(limit: KeptInMemory, columns: u64, is_quick: bool) -> Self {
-        Self { limit, columns, is_quick, batches: VecDeque::new(), rows: 0, has_all_rows: true }
+    fn new(limit: KeptInMemory, columns: u64) -> Self {
+        Self { limit, columns, batches: VecDeque::new(), rows: 0, has_all_rows: true }
     }
 
     /// Keeps a batch; true if from now on not all rows are kept.
     fn add(&mut self, batch: &Batch) -> bool {
         let had_all_rows = self.has_all_rows;
         self.rows += batch.rows as u64;
-        let most_of_slow = if self.is_quick { 0 } else { MOST_KEPT_VALUES / self.columns.max(1) };
-        let most = self.limit.rows_with_losses.max(self.limit.rows).max(most_of_slow);
+        let most = self.limit.rows_with_losses.max(self.limit.rows).max(MOST_KEPT_VALUES / self.columns.max(1));
         if self.has_all_rows && self.rows > most {
             self.has_all_rows = false;
             let mut rows = 0;
