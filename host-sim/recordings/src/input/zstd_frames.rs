@@ -71,8 +71,7 @@ mod tests {
     #[test]
     fn frames_one_after_the_other_are_one_text() {
         let parts = ["t,gx\n".repeat(3000), "0.01,2\n".repeat(9000)];
-        let [one, other] =
-            parts.each_ref().map(|part| compress_to_vec(part.as_bytes(), CompressionLevel::Fastest));
+        let [one, other] = parts.each_ref().map(|part| compress_to_vec(part.as_bytes(), CompressionLevel::Fastest));
         // A frame of three bytes that is skipped.
         let skipped = [&[0x53, 0x2A, 0x4D, 0x18, 3, 0, 0, 0][..], b"abc"].concat();
         let all = [&skipped[..], &one, &skipped, &other].concat();
