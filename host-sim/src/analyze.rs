@@ -1,6 +1,9 @@
 //! `analyze` and `replay`: the report of a recording in a file, and the summary of several.
 
-use crate::cli::{AnalyzeArguments, GyroRangeArgument, InputArguments, RecordingArguments, ReplayArguments};
+use crate::cli::{
+    AnalyzeArguments, ExportTarget, GyroRangeArgument, InputArguments, OutputArguments, RecordingArguments,
+    ReplayArguments,
+};
 use crate::inspect::{self, read_or_ask};
 use crate::output::{self, Analysed, Incomplete, note};
 use crate::output_files::{OutputFiles, is_standard_stream};
@@ -22,6 +25,7 @@ use recordings::sample_stream::{KeptInMemory, Reading, SampleStream, StreamError
 use recordings::time_base::TimeRange;
 use recordings::{ColumnSelection, FileHash, Printable, ReadMonitor, count_table};
 use reports::reading::ReadingRecord;
+use reports::saved_report::SavedReport;
 use reports::summary::longest_at_rest;
 use serde::Serialize;
 use simulation::Replay;
@@ -73,12 +77,13 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
         ("--pictures", output.pictures.is_some()),
         ("--full", output.full),
         ("--explain", output.explain),
-        ("--export", !output.exports.is_empty()),
+        ("--export", !*each_sensor && !output.exports.is_empty()),
     ];
     let refused: Vec<&str> = refused.into_iter().filter(|(_, is_given)| *is_given).map(|(option, _)| option).collect();
     if !refused.is_empty() {
         bail!("several recordings have a summary and no report: leave out {}", refused.join(", "));
     }
+    let names: Vec<String> = recordings.iter().map(sensor_name).collect();
     let mut is_complete = true;
     let mut read = |recording: &RecordingArguments| -> Result<Measurement> {
         let read = read_or_ask(recording, open_measured)?;
@@ -87,8 +92,14 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
     };
     let still: Vec<Measurement> = recordings.iter().map(&mut read).collect::<Result<_>>()?;
     if *each_sensor {
-        let names: Vec<String> = recordings.iter().map(sensor_name).collect();
         note(format_args!("recordings: {}", Printable(&names.join(", "))));
+        if are_parts(&still) {
+            write_parts(still, &names, output, &outputs)?;
+            return Incomplete::check(is_complete);
+        }
+        if !output.exports.is_empty() {
+            bail!("--export: these sensors have the same channels; export one of them, with --topic or --columns");
+        }
     }
     let agreement = (still.len() > 1).then(|| several::compare(&still)).transpose()?;
     let inflation = match against {
@@ -107,6 +118,37 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
         inflation.as_ref().map_or(Ok(()), |inflation| reports::several::write_inflation(inflation, out))
     })?;
     Incomplete::check(is_complete)
+}
+
+/// Whether recordings of one file are parts of one sensor: no two have a channel in common.
+fn are_parts(recordings: &[Measurement]) -> bool {
+    let names = |of: &Measurement| of.channels.iter().map(|channel| channel.profile.name).collect::<Vec<_>>();
+    let all: Vec<Vec<&str>> = recordings.iter().map(names).collect();
+    let is_apart = |at: usize| !all[..at].iter().flatten().any(|name| all[at].contains(name));
+    recordings.len() > 1 && (0..all.len()).all(is_apart)
+}
+
+/// Analyses the parts of one sensor, prints their reports one after the other, and exports them as one.
+fn write_parts(
+    parts: Vec<Measurement>,
+    names: &[String],
+    output: &OutputArguments,
+    outputs: &OutputFiles,
+) -> Result<()> {
+    if output.json.is_some() {
+        bail!("--json: the parts of a sensor have a report each; --reports DIR writes them");
+    }
+    let mut saved = Vec::new();
+    for (part, name) in parts.into_iter().zip(names) {
+        let report = progress::analysing(|watch| analyze_and_release(part, watch));
+        if !output.quiet {
+            output::show_screen(&report, Some(name))?;
+        }
+        saved.push(SavedReport::from(&report));
+    }
+    let Some(joined) = SavedReport::joined(saved)? else { return Ok(()) };
+    let write = |target: &ExportTarget| output::write_export(&joined, target, output.axis, outputs);
+    output.exports.iter().map(write).fold(Ok(()), Result::and)
 }
 
 /// What tells a sensor from the others of its file: its topic, or its columns.
@@ -270,6 +312,7 @@ struct OpenStream {
 fn open_measured(recording: &RecordingArguments) -> Result<SampleStream> {
     let OpenStream { stream, .. } = open_stream(recording, &ReadMonitor::default(), KeptInMemory::ALL)?;
     note_all(stream.notes());
+    note_all(stream.rows_read().damage.as_slice());
     Ok(stream)
 }
 

@@ -66,7 +66,10 @@ Examples:
 const EXAMPLES_OF_RECORD: &str = "\
 Examples:
   host-sim record cable.csv.gz --port /dev/ttyACM0 --seconds 3600
-  host-sim record virtual.csv.gz --page report";
+  host-sim record night.csv.gz --port COM4 --seconds 28800 --page report";
+
+/// Length of a recording of a device if none is given, s.
+const DEFAULT_S: f64 = 60.0;
 
 /// Below the options of `replay`.
 const EXAMPLES_OF_REPLAY: &str = "\
@@ -125,20 +128,20 @@ pub(crate) enum Command {
     /// Show a device or a recording live, while its record grows
     #[command(after_help = EXAMPLES_OF_MONITOR)]
     Monitor(MonitorArguments),
-    /// Record the SPI bus of a device or the virtual sensor; analyse it
+    /// Record the bursts of a device on a serial port; analyse them
     #[command(after_help = EXAMPLES_OF_RECORD)]
     Record {
         /// The SPI frame log to write; gzip if it ends in .gz.
         out: PathBuf,
         /// Serial port of a device, such as /dev/ttyUSB0.
-        #[arg(long, help_heading = INPUT, conflicts_with_all = ["seed", "plain"])]
-        port: Option<String>,
+        #[arg(long, help_heading = INPUT)]
+        port: String,
         /// Baud rate of the port.
-        #[arg(long, help_heading = INPUT, default_value_t = serial::BAUD, requires = "port")]
+        #[arg(long, help_heading = INPUT, default_value_t = serial::BAUD)]
         baud: u32,
-        /// What to simulate.
-        #[command(flatten)]
-        simulate: SimulationArguments,
+        /// Length of the recording, s.
+        #[arg(long, help_heading = INPUT, default_value_t = DEFAULT_S, allow_negative_numbers = true)]
+        seconds: f64,
         /// Where the report goes besides the terminal.
         #[command(flatten)]
         output: OutputArguments,
@@ -335,10 +338,39 @@ pub(crate) struct ExportArguments {
     /// One number for three axes: rms or worst.
     #[arg(long, help_heading = OUTPUT, value_enum, default_value_t, hide_possible_values = true)]
     pub(crate) axis: AxisChoice,
-    /// A report that `analyze --json` wrote.
-    pub(crate) report: PathBuf,
-    /// The file to write.
-    pub(crate) out: PathBuf,
+    /// Reports of `analyze --json`, and the file to write.
+    #[arg(required = true, num_args = 2.., value_names = ["REPORT", "OUT"])]
+    pub(crate) files: Vec<PathBuf>,
+}
+
+/// Options of `analyze` that a proposed command states itself, and those without a value.
+const PROPOSED: [&str; 9] =
+    ["--topic", "--columns", "--units", "--rate", "--sensor", "--range", "--from", "--to", "--against"];
+const FLAGS: [&str; 6] = ["--quick", "--full", "--explain", "--quiet", "--each-sensor", "--yes"];
+
+/// The options that were typed for `analyze`, without those that a proposed command states itself.
+pub(crate) fn other_options() -> Vec<String> {
+    let mut words = std::env::args().skip(1).skip_while(|word| word.starts_with("--"));
+    if words.next().as_deref() != Some("analyze") {
+        return Vec::new();
+    }
+    let mut options = Vec::new();
+    while let Some(word) = words.next() {
+        let name = word.split('=').next().unwrap_or_default().to_owned();
+        let value = if word.starts_with("--") && !word.contains('=') && !FLAGS.contains(&name.as_str()) {
+            words.next()
+        } else {
+            None
+        };
+        if word.starts_with("--")
+            && !PROPOSED.contains(&name.as_str())
+            && !["--yes", "--each-sensor"].contains(&name.as_str())
+        {
+            options.push(word);
+            options.extend(value);
+        }
+    }
+    options
 }
 
 /// A recording and its sample rate.
@@ -513,7 +545,7 @@ impl From<GyroRangeArgument> for GyroRange {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Virtual sensor")]
 pub(crate) struct SimulationArguments {
-    /// Time, s [default: 60 for `record`, else 3600].
+    /// Virtual time, s [default: 3600].
     #[arg(long, allow_negative_numbers = true)]
     pub(crate) seconds: Option<f64>,
     /// Seed of the noise.

@@ -1,21 +1,25 @@
-//! `export`: the noise of a report in the file format of another program.
+//! `export`: the noise of a report, or of those of the parts of one sensor, in the file format of another program.
 
 use crate::cli::{ExportArguments, ExportTarget};
 use crate::input_file::read_report;
 use crate::output::write_export;
 use crate::output_files::OutputFiles;
 use anyhow::{Context, Result, bail};
+use reports::saved_report::SavedReport;
+use std::path::PathBuf;
 
-/// Reads the report and writes the file.
+/// Reads the reports and writes the file.
 pub(crate) fn run(arguments: &ExportArguments) -> Result<()> {
-    let ExportArguments { report: from, out, format, axis } = arguments;
-    let files = OutputFiles::beside([from.as_path()]);
-    files.check(out)?;
+    let ExportArguments { files, format, axis } = arguments;
+    let [reports @ .., out] = files.as_slice() else { bail!("no report") };
+    let outputs = OutputFiles::beside(reports.iter().map(PathBuf::as_path));
+    outputs.check(out)?;
     // A pipe or a device is not read.
     if out.is_file() && read_report(out).is_ok() {
-        bail!("{}: is a report, which would be overwritten; name a file for {}", out.display(), from.display());
+        bail!("{}: is a report, which would be overwritten; name a file to write after the reports", out.display());
     }
-    let report = read_report(from)?;
-    write_export(&report, &ExportTarget { format: *format, file: out.clone() }, *axis, &files)
-        .with_context(|| from.display().to_string())
+    let names = || reports.iter().map(|file| file.display().to_string()).collect::<Vec<_>>().join(", ");
+    let read: Vec<SavedReport> = reports.iter().map(|file| read_report(file)).collect::<Result<_>>()?;
+    let joined = SavedReport::joined(read).with_context(names)?.context("no report")?;
+    write_export(&joined, &ExportTarget { format: *format, file: out.clone() }, *axis, &outputs).with_context(names)
 }

@@ -12,5 +12,6 @@ use std::path::Path;
 /// Names the file.
 pub(crate) fn read_report(file: &Path) -> Result<SavedReport> {
     let text = fs::read_to_string(file).map_err(|error| InputError::file(file, Reason::Io(error)))?;
-    SavedReport::from_json(&text).map_err(|error| Error::from(error).context(file.display().to_string()))
+    let checked = SavedReport::from_json(&text).and_then(|report| report.check().map(|()| report));
+    checked.map_err(|error| Error::from(error).context(file.display().to_string()))
 }

@@ -1,6 +1,6 @@
 //! `inspect`: what is in a file, without an analysis; and the command that would analyse a file which does not say all that is needed.
 
-use crate::cli::{InputArguments, InspectArguments, RecordingArguments};
+use crate::cli::{self, InputArguments, InspectArguments, RecordingArguments};
 use crate::output::{self, note};
 use crate::output_files::is_standard_stream;
 use anyhow::{Result, anyhow};
@@ -139,29 +139,23 @@ impl Contents {
         arguments.input.columns.clone_from(&proposal.columns);
         arguments.input.units.clone_from(&proposal.units);
         arguments.input.sensor = self.given.input.sensor.clone().or(proposal.sensor.map(str::to_owned));
+        if let (None, Some(part)) = (self.given.time_range(), proposal.part) {
+            let TimeRange { from_s, to_s } = whole_tenths(part);
+            (arguments.from, arguments.to) = (Some(from_s), Some(to_s));
+        }
         arguments
     }
 
+    /// The command that analyses a sensor, with what was typed beside it.
     fn command(&self, proposal: &Proposal) -> String {
-        let Proposal { topic, columns, units, lacks_rate, .. } = proposal;
-        let RecordingArguments { input: InputArguments { file, sensor, .. }, from, to, .. } = &self.given;
-        let list = |texts: &[String]| Some(texts.join(",")).filter(|text| !text.is_empty());
-        let number = |number: &Option<f64>| number.map(|number| number.to_string());
-        let rate = number(&self.given.rate).or_else(|| lacks_rate.then(|| "HZ".to_owned()));
+        let mut arguments = self.arguments(proposal);
         // An only sensor that the format knows is found without its name.
         let is_only = self.proposals().count() == 1 && self.several.is_empty() && proposal.is_found;
-        let topic = topic.clone().filter(|_| !is_only || self.given.input.topic.is_some());
-        let options = [
-            ("--topic", topic),
-            ("--columns", list(columns)),
-            ("--units", list(units)),
-            ("--rate", rate),
-            ("--sensor", sensor.clone().or(proposal.sensor.map(str::to_owned))),
-            ("--from", number(from)),
-            ("--to", number(to)),
-        ];
-        let options = options.into_iter().filter_map(|(name, value)| Some(format!(" {name} {}", quoted(&value?))));
-        format!("host-sim analyze {}{}", quoted(&file.display().to_string()), options.collect::<String>())
+        arguments.input.topic = arguments.input.topic.filter(|_| !is_only || self.given.input.topic.is_some());
+        let file = self.given.input.file.display().to_string();
+        let rate = ["--rate", "HZ"].into_iter().filter(|_| proposal.lacks_rate).map(str::to_owned);
+        let words = [file].into_iter().chain(arguments.options(false)).chain(rate).chain(cli::other_options());
+        format!("host-sim analyze {}", words.map(|word| quoted(&word)).collect::<Vec<_>>().join(" "))
     }
 }
 
@@ -189,13 +183,8 @@ impl Display for Contents {
             return writeln!(f, "\nno topic can be read without its definition; {how}");
         }
         if self.proposals().next().is_none() {
-            writeln!(f, "\nno column is known to be one of an inertial sensor; say which, as in")?;
-            let example = Proposal {
-                columns: vec!["gyro_x=COLUMN".to_owned()],
-                units: vec!["rad/s".to_owned()],
-                ..Proposal::default()
-            };
-            return writeln!(f, "  {}", self.command(&example));
+            let how = "say which with --columns and --units, as in --columns gyro_x=COLUMN --units rad/s";
+            return writeln!(f, "\nno column is known to be one of an inertial sensor; {how}");
         }
         writeln!(f, "\nto analyse it:")?;
         for proposal in self.proposals() {
@@ -317,6 +306,13 @@ fn rounded(value: f64, digits: i32) -> String {
     } else {
         format!("{value:.*e}", digits as usize - 1)
     }
+}
+
+/// The part between tenths of a second inside of it.
+fn whole_tenths(TimeRange { from_s, to_s }: TimeRange) -> TimeRange {
+    // A tenth is none in binary; what rounds up to 0 from below is −0, which the sum is not.
+    const ROUNDING: f64 = 1e-6;
+    TimeRange { from_s: (10.0 * from_s - ROUNDING).ceil() / 10.0 + 0.0, to_s: (10.0 * to_s + ROUNDING).floor() / 10.0 }
 }
 
 /// A text as one word of a shell, without what a terminal obeys.

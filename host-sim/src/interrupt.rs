@@ -4,12 +4,15 @@
 //! the program.
 
 use anyhow::{Context, Result};
+#[cfg(unix)]
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+#[cfg(unix)]
 use signal_hook::iterator::Signals;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process;
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+#[cfg(unix)]
 use std::thread;
 
 /// Exit status of a program that a signal has ended, as shells have it, less the number of the signal.
@@ -29,25 +32,38 @@ fn lock<T>(shared: &'static Mutex<T>) -> MutexGuard<'static, T> {
 ///
 /// # Errors
 /// The system refuses.
+#[cfg(unix)]
 pub(crate) fn watch() -> Result<()> {
     let signals = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| *signal != SIGHUP || !is_ignored(SIGHUP));
     let mut signals = Signals::new(signals.collect::<Vec<_>>()).context("signals")?;
-    thread::spawn(move || {
-        for signal in signals.forever() {
-            let is_taken_up = lock(&ACTION).as_mut().is_some_and(|action| action());
-            if !is_taken_up {
-                lock(&INCOMPLETE).iter().for_each(|file| {
-                    // The program ends: a file that cannot be removed stays.
-                    let _ = fs::remove_file(file);
-                });
-                process::exit(ENDED_BY_SIGNAL + signal);
-            }
-        }
-    });
+    thread::spawn(move || signals.forever().for_each(take));
     Ok(())
 }
 
+/// Begins to wait for an interrupt of the terminal, the only signal that the system has.
+///
+/// # Errors
+/// The system refuses.
+#[cfg(not(unix))]
+pub(crate) fn watch() -> Result<()> {
+    const SIGINT: i32 = 2;
+    ctrlc::set_handler(|| take(SIGINT)).context("signals")
+}
+
+/// Has the action take a signal up, or ends the program.
+fn take(signal: i32) {
+    let is_taken_up = lock(&ACTION).as_mut().is_some_and(|action| action());
+    if !is_taken_up {
+        lock(&INCOMPLETE).iter().for_each(|file| {
+            // The program ends: a file that cannot be removed stays.
+            let _ = fs::remove_file(file);
+        });
+        process::exit(ENDED_BY_SIGNAL + signal);
+    }
+}
+
 /// Whether the program was started with `signal` ignored, where the system says it.
+#[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

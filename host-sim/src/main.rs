@@ -1,5 +1,7 @@
 //! The command `host-sim`: runs a subcommand, prints its error, sets the exit code.
 
+#[cfg(feature = "mimalloc")]
+mod allocator;
 mod analyze;
 mod cli;
 mod compare;
@@ -25,37 +27,13 @@ use cli::{Cli, Command, MonitorArguments, ReplayArguments};
 use host_sim::monitor;
 use inspect::Question;
 use live::{DeviceSource, GrowingRecording};
-use mimalloc::MiMalloc;
 use output::Incomplete;
 use output_files::OutputFiles;
 use recordings::Printable;
-use std::ffi::c_long;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
-
-#[global_allocator]
-static ALLOCATOR: MiMalloc = MiMalloc;
-
-/// `mi_option_arena_eager_commit` of mimalloc 2 and 3: with 0 memory is taken from the system where it is used, not by the region, of
-/// which an analysis uses three quarters.
-const EAGER_COMMIT: (libmimalloc_sys::mi_option_t, c_long) = (4, 0);
-/// `mi_option_purge_delay` of mimalloc 2 and 3: released memory is returned to the system after so many ms.
-const PURGE_DELAY: libmimalloc_sys::mi_option_t = 15;
-/// An analysis takes and releases the memory of a series many times a second: 10⁶ rows of six channels take a tenth longer with 10 ms,
-/// and half as much memory again with the 1,000 ms of mimalloc 3.
-const PURGE_DELAY_OF_ANALYSIS_MS: c_long = 60;
-/// What a simulation recorded is released block by block while it is condensed: with 60 ms an hour of it takes a quarter more memory.
-const PURGE_DELAY_OF_SIMULATION_MS: c_long = 10;
-
-/// Before the first allocation, which takes the region.
-#[ctor::ctor(unsafe)]
-fn set_eager_commit() {
-    let (option, value) = EAGER_COMMIT;
-    // SAFETY: no thread runs yet, and an option that mimalloc does not know has no effect.
-    unsafe { libmimalloc_sys::mi_option_set(option, value) };
-}
 
 /// Folder of the page if none is named.
 const DEFAULT_PAGE: &str = "report";
@@ -70,9 +48,8 @@ fn main() -> ExitCode {
         tip::suggest(&mut error);
         error.exit()
     });
-    let delay_ms = if cli.command.is_none() { PURGE_DELAY_OF_SIMULATION_MS } else { PURGE_DELAY_OF_ANALYSIS_MS };
-    // SAFETY: no other thread runs yet, and an option that mimalloc does not know has no effect.
-    unsafe { libmimalloc_sys::mi_option_set(PURGE_DELAY, delay_ms) };
+    #[cfg(feature = "mimalloc")]
+    allocator::prepare(cli.command.is_none());
     match interrupt::watch().and_then(|()| run(cli)) {
         Ok(()) => ExitCode::SUCCESS,
         // The reader of standard output has closed it, as `head` does.
@@ -112,19 +89,12 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
             let report = analyze::analyze_replay(&arguments)?;
             output::write_report(&report.into(), Some(&output::source_name(file)), output, &files)
         }
-        Some(Command::Record { out, port, baud, simulate, output }) => {
+        Some(Command::Record { out, port, baud, seconds, output }) => {
             OutputFiles::default().check(&out)?;
             // The log is read again: nothing else is written to it.
             let files = OutputFiles::beside([out.as_path()]);
             output::check(&output, &files)?;
-            let report = match port {
-                Some(port) => record::record_device(&out, &port, baud, simulate.seconds.unwrap_or(record::DEFAULT_S))?,
-                None => {
-                    let report = record::record_simulation(&out, &simulate.simulation(record::DEFAULT_S))?;
-                    output::note(format_args!("without --port this is the virtual sensor, and no measurement"));
-                    report
-                }
-            };
+            let report = record::record_device(&out, &port, baud, seconds)?;
             output::write_report(&report.into(), Some(&output::source_name(&out)), &output, &files)
         }
         Some(Command::Export(arguments)) => export::run(&arguments),

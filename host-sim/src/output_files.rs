@@ -2,41 +2,49 @@
 
 use crate::interrupt::IncompleteFile;
 use anyhow::{Context, Result, bail};
-use std::fs::{self, File, OpenOptions, Permissions};
-use std::io::{self, BufWriter, Write};
-use std::os::fd::AsFd;
-use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::fs::{self, File, OpenOptions};
+#[cfg(unix)]
+use std::io;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
-/// Permissions of a new file, less those that the user's mask takes.
-const NEW_FILE: u32 = 0o666;
 /// Longest ending of the name of a file that the one beside it keeps, bytes: writers choose the compression by it.
 const LONGEST_ENDING: usize = 32;
 
-/// What a name stands for.
+/// What a name stands for: a file that exists, or one that does not.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum FileIdentity {
-    /// A file that exists: device and inode, which all its names and links have in common.
+    /// Device and inode, which all names and links of a file have in common. No file is held open for it.
+    #[cfg(unix)]
     Inode(u64, u64),
-    /// A file that does not exist.
+    /// The path without links.
     Name(PathBuf),
 }
 
 impl FileIdentity {
     fn new(file: &Path) -> Self {
+        #[cfg(unix)]
+        if let Some(identity) = Self::of_existing(file) {
+            return identity;
+        }
+        let name = || {
+            let folder = fs::canonicalize(folder_of(file));
+            folder.map_or(file.to_owned(), |folder| folder.join(file.file_name().unwrap_or_default()))
+        };
+        Self::Name(fs::canonicalize(file).unwrap_or_else(|_| name()))
+    }
+
+    #[cfg(unix)]
+    fn of_existing(file: &Path) -> Option<Self> {
+        use std::os::fd::AsFd;
+        use std::os::unix::fs::MetadataExt;
         let metadata = if is_standard_stream(file) {
             io::stdin().as_fd().try_clone_to_owned().and_then(|stdin| File::from(stdin).metadata())
         } else {
             fs::metadata(file)
         };
-        match metadata {
-            Ok(metadata) => Self::Inode(metadata.dev(), metadata.ino()),
-            Err(_) => {
-                let folder = fs::canonicalize(folder_of(file));
-                Self::Name(folder.map_or(file.to_owned(), |folder| folder.join(file.file_name().unwrap_or_default())))
-            }
-        }
+        metadata.ok().map(|metadata| Self::Inode(metadata.dev(), metadata.ino()))
     }
 }
 
@@ -171,11 +179,17 @@ fn target(file: &Path) -> PathBuf {
 
 /// An empty file beside `file`, with its ending, and its permissions if it exists.
 fn file_beside(file: &Path) -> Result<NamedTempFile> {
-    let permissions = fs::metadata(file).map_or(NEW_FILE, |metadata| metadata.permissions().mode());
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let start = (name.len().saturating_sub(LONGEST_ENDING)..=name.len()).find(|at| name.is_char_boundary(*at));
     let ending = start.map_or("", |start| &name[start..]);
     let mut beside = tempfile::Builder::new();
-    beside.prefix(".").suffix(ending).permissions(Permissions::from_mode(permissions));
+    beside.prefix(".").suffix(ending);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // Those of a new file, less what the user's mask takes.
+        let mode = fs::metadata(file).map_or(0o666, |metadata| metadata.permissions().mode());
+        beside.permissions(fs::Permissions::from_mode(mode));
+    }
     Ok(beside.tempfile_in(folder_of(file))?)
 }

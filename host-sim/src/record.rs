@@ -1,4 +1,4 @@
-//! `record`, and the command without a subcommand: recordings of the virtual sensor or of a device, and their reports.
+//! `record`, and the command without a subcommand: the report of a device, of which a recording is left, or of the virtual sensor.
 
 use crate::analyze::analyze_recording;
 use crate::interrupt;
@@ -8,7 +8,6 @@ use adis16405_driver::GyroRange;
 use anyhow::{Context, Error, Result};
 use host_sim::monitor;
 use noise_analysis::report::Report;
-use recordings::recording::Recording;
 use recordings::serial::{self, SerialLink};
 use simulation::Simulation;
 use std::io::{ErrorKind, Read, Write};
@@ -16,29 +15,13 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Length of a recording if none is given, s.
-pub(crate) const DEFAULT_S: f64 = 60.0;
-
 /// The report of the virtual sensor.
 pub(crate) fn simulate(simulation: &Simulation) -> Result<Report> {
-    analyze_recording(run(simulation, None)?, None).context("virtual sensor")
-}
-
-/// The same; every bus transaction is written to the frame log `log`.
-pub(crate) fn record_simulation(log: &Path, simulation: &Simulation) -> Result<Report> {
-    analyze_recording(run(simulation, Some(log))?, None).context("virtual sensor")
-}
-
-fn run(simulation: &Simulation, log: Option<&Path>) -> Result<Recording> {
     let bar = progress_bar(simulation.samples()?, "{msg} {wide_bar} {pos}/{len} samples, {eta} left");
     bar.set_message("virtual ADIS16405");
-    let progress = |taken| bar.set_position(taken);
-    let recording = match log {
-        Some(file) => simulation.run_logged(file, progress),
-        None => simulation.run(progress),
-    };
+    let recording = simulation.run(|taken| bar.set_position(taken));
     bar.finish_and_clear();
-    Ok(recording?)
+    analyze_recording(recording?, None).context("virtual sensor")
 }
 
 /// A link to the device on a serial port. If there is no such port, the error leads to the names of those that there are.

@@ -3,8 +3,10 @@
 mod ardupilot_log;
 mod array_topics;
 mod calendar;
+mod fields;
 pub mod file_format;
 mod foreign_format;
+#[cfg(feature = "hdf5")]
 mod hdf5;
 mod labelled_row;
 pub(crate) mod matlab;
@@ -18,7 +20,9 @@ mod ros_bag;
 mod ros_definition;
 mod ros_message;
 mod row_kinds;
+#[cfg(feature = "sqlite")]
 mod sqlite_bag;
+mod table_head;
 pub(crate) mod text_table;
 mod topics;
 mod ulog;

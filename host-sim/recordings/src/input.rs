@@ -7,3 +7,4 @@ pub(crate) mod gzip_members;
 pub(crate) mod input_error;
 pub(crate) mod read_ahead;
 pub(crate) mod read_monitor;
+pub(crate) mod zstd_frames;

@@ -9,6 +9,9 @@ mod unit_guess;
 use crate::columns::column_selection::{ColumnSelection, is_output_register};
 use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::sensor_guess::SensorGuess;
+use crate::rows::batch::Batch;
+use crate::rows::padding::{PaddingFinder, Unpadded};
+use crate::rows::row_source::BATCH;
 use crate::rows::whole_table::WholeTable;
 use crate::time_base::clock::{Clock, Place, RowStamp};
 use crate::time_base::{RateEstimate, StampQuality, TimeBaseError, TimeRange};
@@ -38,6 +41,8 @@ pub struct InspectedColumn {
     pub guess: Option<ColumnGuess>,
 }
 
+/// Largest part of the rows at rest with which a sensor was moved.
+const MOVED: f64 = 0.9;
 /// First values of a column that are shown.
 const SHOWN: usize = 3;
 
@@ -91,6 +96,7 @@ pub struct InspectedTable {
 impl InspectedTable {
     /// Looks at the rows; `sensor` says how large counts are, `selection` what the user says of the columns.
     pub(crate) fn new(table: WholeTable, sensor: &SensorProfile, selection: &ColumnSelection) -> Self {
+        let (table, before) = without_padding(table);
         let facts: Vec<ColumnFacts> = table.columns.iter().map(ColumnFacts::new).collect();
         let sensors = SensorGuess::all(&table, &facts, sensor, selection);
         let place = |channel: &str| sensors.iter().find_map(|sensor| sensor.position(channel));
@@ -127,9 +133,14 @@ impl InspectedTable {
             inspected.gaps = placed.gaps;
             inspected.notes.extend(placed.stamps.iter().flat_map(StampQuality::notes));
         }
-        if let Some(SteadyPart { rows, .. }) = &inspected.steady {
+        if let Some(SteadyPart { rows, .. }) = &mut inspected.steady {
             let rate_hz = inspected.rate.map(|rate| rate.hz).or(table.rate_hz);
-            inspected.steady_s = time_of(rows, inspected.rows, times_s, indices.as_deref(), rate_hz);
+            let part = time_of(rows, inspected.rows, times_s, indices.as_deref(), rate_hz);
+            inspected.steady_s = part.map(|TimeRange { from_s, to_s }| {
+                let before_s = rate_hz.map_or(0.0, |hz| before as f64 / hz);
+                TimeRange { from_s: from_s + before_s, to_s: to_s + before_s }
+            });
+            *rows = rows.start + before..rows.end + before;
         }
         let has_rate = inspected.rate.is_some() || table.rate_hz.is_some();
         inspected.proposals = sensors.iter().map(|sensor| sensor.proposal(&table, &facts, has_rate)).collect();
@@ -138,6 +149,8 @@ impl InspectedTable {
             proposal.sensor = Some("adis16405");
             proposal.is_guessed = true;
         }
+        let part = inspected.part_at_rest().filter(|_| inspected.is_moved());
+        inspected.proposals.iter_mut().for_each(|proposal| proposal.part = part);
         let guess = |at: usize| sensors.iter().find_map(|sensor| sensor.guess(at));
         inspected.columns =
             facts.iter().enumerate().map(|(at, facts)| InspectedColumn::new(facts, guess(at))).collect();
@@ -152,11 +165,43 @@ impl InspectedTable {
         self.steady_s.filter(|_| is_part)
     }
 
+    /// Whether the part at rest is so short that the sensor was moved, and not touched alone.
+    fn is_moved(&self) -> bool {
+        self.steady.as_ref().is_some_and(|steady| (steady.rows.len() as f64) < MOVED * self.rows as f64)
+    }
+
     /// Whether a column is taken for `channel`, which is a channel's name, `time` or `sample`.
     #[must_use]
     pub fn has(&self, channel: &str) -> bool {
         self.columns.iter().any(|column| column.guess.as_ref().is_some_and(|guess| guess.channel == channel))
     }
+}
+
+/// The table without the rows at either end that are padding, and how many of them are before its first row.
+fn without_padding(mut table: WholeTable) -> (WholeTable, usize) {
+    let facts: Vec<ColumnFacts> = table.columns.iter().map(ColumnFacts::new).collect();
+    // Times may go on where the values do not.
+    let is_value = |of: &&ColumnFacts| of.values.windows(2).any(|pair| pair[1] < pair[0]);
+    let values: Vec<&[f64]> = facts.iter().filter(is_value).map(|of| of.values).collect();
+    let mut finder = PaddingFinder::default();
+    let rows = if values.is_empty() { 0 } else { table.rows() };
+    for start in (0..rows).step_by(BATCH) {
+        let part = start..(start + BATCH).min(rows);
+        let values = values.iter().map(|column| column[part.clone()].to_vec()).collect();
+        finder.add(&Batch { rows: part.len(), values, ..Batch::default() });
+    }
+    drop(facts);
+    let Some(Unpadded { first, end }) = finder.finish() else { return (table, 0) };
+    let (before, after) = (first as usize, rows - end as usize);
+    for column in &mut table.columns {
+        column.values.truncate(end as usize);
+        column.values.drain(..before);
+    }
+    table.notes.push(format!(
+        "{} rows that are all equal, {before} at the start and {after} at the end, are padding and left out",
+        before + after
+    ));
+    (table, before)
 }
 
 /// The rows of a table on their time base.

@@ -3,6 +3,5 @@
 pub(crate) mod column_survey;
 pub mod count_table;
 pub(crate) mod full_scale;
-pub(crate) mod padding;
 pub mod row_writer;
 pub mod sample_stream;

@@ -2,6 +2,7 @@
 
 pub mod any_sensor;
 pub(crate) mod batch;
+pub(crate) mod padding;
 pub(crate) mod quantizer;
 pub mod recording;
 pub(crate) mod row_source;

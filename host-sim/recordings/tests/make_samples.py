@@ -355,22 +355,17 @@ def spi_captures(folder, truth):
     if shutil.which(command[0]):
         (folder / "sigrok.json").write_bytes(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
         add("sigrok.json")
-    # Saleae has no writer outside its program: its columns, as Logic 2 and Logic 1.2 name them.
-    with open(folder / "saleae_table.csv", "w") as table, open(folder / "saleae_words.csv", "w") as words:
+    # Saleae has no writer outside its program: its columns, as Logic 2 names them.
+    with open(folder / "saleae_table.csv", "w") as table:
         print('name,type,start_time,duration,"mosi","miso"', file=table)
-        print("Time [s],Packet ID,MOSI,MISO", file=words)
-        for packet, (time, out, back) in enumerate(frames):
+        for time, out, back in frames:
             start = time / 1e6
             print(f'"SPI","enable",{start:.9f},8e-09,,', file=table)
             for at, (sent, received) in enumerate(zip(out, back)):
                 byte = start + 1e-6 + at * 16e-6
                 print(f'"SPI","result",{byte:.9f},1.5e-05,0x{sent:02X},0x{received:02X}', file=table)
-                if at % 2 == 0:
-                    pair = [int.from_bytes(data[at : at + 2], "big") for data in (out, back)]
-                    print(f"{byte:.9f},{packet},0x{pair[0]:04X},0x{pair[1]:04X}", file=words)
             print(f'"SPI","disable",{start + 420e-6:.9f},8e-09,,', file=table)
     add("saleae_table.csv")
-    add("saleae_words.csv")
 
 
 def drawn_messages(folder, truth):

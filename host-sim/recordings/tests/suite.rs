@@ -2,6 +2,7 @@
 
 mod clocks;
 mod coarse_stamps;
+mod irregular_stamps;
 mod one_path;
 #[path = "reading/main.rs"]
 mod reading;

@@ -48,6 +48,12 @@ pub enum ExportFormat {
 /// See [`ExportError`].
 pub fn export(report: &SavedReport, format: ExportFormat, axes: AxisChoice) -> Result<Export, ExportError> {
     check(report)?;
+    // Densities belong to no rate.
+    let is_of_samples =
+        !matches!(format, ExportFormat::Kalibr | ExportFormat::OpenVins | ExportFormat::OrbSlam3 | ExportFormat::Csv);
+    if is_of_samples && let Some(other) = report.other_rates_hz.first() {
+        return Err(ExportError::SeveralRates(format!("{} and {other}", report.sample_rate_hz)));
+    }
     let export = match format {
         ExportFormat::Kalibr => visual_inertial::kalibr(report, axes),
         ExportFormat::OpenVins => visual_inertial::openvins(report, axes),
@@ -176,6 +182,24 @@ mod tests {
             assert!(is_told == (*format != ExportFormat::Csv) && !after.contains("gyro_y 1"), "{after}");
             assert_eq!(before.lines().next(), after.lines().next());
         }
+    }
+
+    /// As on the screen: where the interval begins at zero, nothing but its end is known.
+    #[test]
+    fn a_coefficient_whose_interval_begins_at_zero_is_an_upper_bound() {
+        let mut known = report("0.01", "gyro_w");
+        for channel in &mut known.channels {
+            let of = channel.refitted.terms[0].parameters.get_mut("value").expect("a coefficient");
+            (of.low, of.high) = if channel.name == "gyro_x" { (0.0, 0.05) } else { (0.009, 0.011) };
+        }
+        let text = export(&known, ExportFormat::Kalibr, AxisChoice::Worst).expect("a file").text;
+        // 0.05 and 0.01 deg in rad.
+        assert!(text.contains("gyro_x: 8.727e-4, an upper bound\n") && text.contains("gyro_y: 1.745e-4\n"), "{text}");
+        assert!(
+            text.contains("gyroscope_noise_density: 8.727e-4  # rad/s/sqrt(Hz), an upper bound, worst axis of"),
+            "{text}"
+        );
+        assert!(text.contains("# m/s^2/sqrt(Hz), worst axis of"), "{text}");
     }
 
     /// A report may have been changed by hand. What no file can hold as what it is ends in an error of every format.

@@ -522,13 +522,16 @@ pub(crate) fn channel_name(channel: &ChannelReport) -> String {
     channel_list(std::slice::from_ref(&channel.name))
 }
 
+/// Gyros and accelerometers, in a list of channels.
+pub(crate) const ALL_CHANNELS: &str = "all channels";
+
 /// The channels of a list in few words: `gyros` for all three, `accel x y` for two.
 #[must_use]
 pub fn channel_list(names: &[String]) -> String {
     let axes = |prefix: &str| -> Vec<&str> { names.iter().filter_map(|name| name.strip_prefix(prefix)).collect() };
     let (gyros, accelerometers, magnetometers) = (axes("gyro_"), axes("accl_"), axes("magn_"));
     if gyros.len() == 3 && accelerometers.len() == 3 {
-        return "all channels".to_owned();
+        return ALL_CHANNELS.to_owned();
     }
     let group = |axes: &[&str], one: &str, all: &str| match axes {
         [] => None,

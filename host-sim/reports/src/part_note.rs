@@ -40,6 +40,10 @@ pub(crate) fn sentence(note: &PartNote) -> String {
              it is the stated {} Hz. {SCALES}",
             plain(*sample_rate_hz, 6)
         ),
+        // Of a part without a data sheet no clock is known.
+        PartNote::NoTimeStamps { nominal_hz, stated_hz, .. } if *nominal_hz <= 0.0 => {
+            format!("Without time stamps the sample rate is the stated {} Hz. {SCALES}", plain(*stated_hz, 6))
+        }
         PartNote::NoTimeStamps { nominal_hz, sample_rate_hz, stated_hz } => format!(
             "Without time stamps the sample rate is the stated {} Hz; by the part's nominal clock of {} Hz it \
              would be {} Hz. {SCALES}",
@@ -76,8 +80,8 @@ pub(crate) fn in_short(notes: &[PartNote]) -> Vec<String> {
         PartNote::StatedClock { .. } => {
             Some(format!("Without time stamps the sample rate is the stated one. {SCALES}"))
         }
-        PartNote::NoTimeStamps { sample_rate_hz: of, stated_hz, .. } => {
-            (!(of.low..=of.high).contains(stated_hz)).then(|| sentence(note))
+        PartNote::NoTimeStamps { sample_rate_hz: of, stated_hz, nominal_hz } => {
+            (*nominal_hz <= 0.0 || !(of.low..=of.high).contains(stated_hz)).then(|| sentence(note))
         }
         PartNote::NotSought
         | PartNote::Minority(_)

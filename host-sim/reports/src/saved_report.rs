@@ -17,6 +17,9 @@ pub struct SavedReport {
     pub sample_rate_hz: f64,
     /// In the order of the burst.
     pub channels: Vec<SavedChannel>,
+    /// Of a sensor whose parts were analysed one by one, the rates of the others that differ from it, Hz.
+    #[serde(skip)]
+    pub other_rates_hz: Vec<f64>,
 }
 
 /// One output of the sensor.
@@ -106,6 +109,17 @@ pub enum SavedReportError {
         /// What was expected.
         reason: serde_json::Error,
     },
+    /// It says two things that cannot both be true, or a number that is none.
+    #[error("{0}: the report contradicts itself; make it anew with `analyze --json`")]
+    Contradiction(String),
+    /// Reports that are no parts of one sensor.
+    #[error("{0} is in both reports; those of one sensor's parts have different channels")]
+    SameChannel(String),
+}
+
+/// Whether rates differ by no more than two clocks do.
+fn is_same_rate(one: f64, other: f64) -> bool {
+    (one / other - 1.0).abs() < 0.01
 }
 
 /// JSON has no infinity: the report writes `null`.
@@ -147,6 +161,54 @@ impl SavedReport {
             };
             SavedReportError::Field { path, reason: error.into_inner() }
         })
+    }
+
+    /// Checks what another program will rely on: a rate, a name for each channel, and coefficients inside of their intervals.
+    ///
+    /// # Errors
+    /// Names the first contradiction.
+    pub fn check(&self) -> Result<(), SavedReportError> {
+        let contradiction = |text: String| Err(SavedReportError::Contradiction(text));
+        if !(self.sample_rate_hz.is_normal() && self.sample_rate_hz > 0.0) {
+            return contradiction(format!("a sample rate of {} Hz", self.sample_rate_hz));
+        }
+        for (at, channel) in self.channels.iter().enumerate() {
+            if self.channels[..at].iter().any(|other| other.name == channel.name) {
+                return contradiction(format!("the channel {} is there twice", channel.name));
+            }
+            for term in &channel.refitted.terms {
+                let Some(SavedParameter { value, low, high, .. }) = term.parameters.get("value") else { continue };
+                let is_number = |of: &f64| *of == 0.0 || of.is_normal() || *of == f64::INFINITY;
+                let are_numbers = [value, low, high].into_iter().all(is_number);
+                // Numbers that were rounded to be read.
+                let margin = 1e-6 * value.abs();
+                if !are_numbers || *low > value + margin || *high < value - margin {
+                    let (name, kind) = (&channel.name, &term.kind);
+                    return contradiction(format!("{name}: {kind} of {value:e} in the interval {low:e} to {high:e}"));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The parts of one sensor, which were analysed one by one, as one report; its rate is that of the first.
+    ///
+    /// # Errors
+    /// Two of them have a channel in common.
+    pub fn joined(reports: impl IntoIterator<Item = Self>) -> Result<Option<Self>, SavedReportError> {
+        let mut joined: Option<Self> = None;
+        for report in reports {
+            let Some(all) = &mut joined else {
+                joined = Some(report);
+                continue;
+            };
+            if let Some(same) = report.channels.iter().find(|channel| all.channel(&channel.name).is_some()) {
+                return Err(SavedReportError::SameChannel(same.name.clone()));
+            }
+            all.other_rates_hz.extend(Some(report.sample_rate_hz).filter(|hz| !is_same_rate(*hz, all.sample_rate_hz)));
+            all.channels.extend(report.channels);
+        }
+        Ok(joined)
     }
 
     /// The channel of this name.
@@ -191,6 +253,7 @@ impl From<&Report> for SavedReport {
         Self {
             sample_rate_hz: report.sample_rate_hz,
             channels: report.channels.iter().map(SavedChannel::from).collect(),
+            other_rates_hz: Vec::new(),
         }
     }
 }
@@ -260,6 +323,37 @@ mod tests {
         };
         assert_eq!(n(process(parameter("white_noise", 0.3, "deg/sqrt(s)"))), Some(0.5));
         assert_eq!(n(process(String::new())), Some(0.4));
+    }
+
+    /// A report may have been changed by hand.
+    #[test]
+    fn a_report_that_contradicts_itself_is_none() {
+        let term = |value: &str, low: &str, high: &str| {
+            format!(
+                r#"{{"kind":"angle_random_walk","parameters":{{"value":{{"value":{value},"low":{low},"high":{high},"unit":"deg/sqrt(s)"}}}}}}"#
+            )
+        };
+        let checked =
+            |text: &str| SavedReport::from_json(text).expect("complete").check().map_err(|error| error.to_string());
+        for (value, low, high, is_right) in [
+            ("1.0", "0.9", "1.1", true),
+            ("0.0", "0.0", "1.1", true),
+            ("1.0", "0.0", "null", true),
+            ("1e-6", "0.9", "1.1", false),
+            ("1.0", "1.1", "0.9", false),
+            ("1e-320", "1e-320", "1e-320", false),
+        ] {
+            assert_eq!(checked(&report(&term(value, low, high))).is_ok(), is_right, "{value} {low} {high}");
+        }
+        let sound = report(&term("1.0", "0.9", "1.1"));
+        for rate in ["0.0", "-5.0", "1e-320"] {
+            let error = checked(&sound.replace("100.0", rate)).expect_err(rate);
+            assert!(error.contains("a sample rate of"), "{error}");
+        }
+        let mut twice = SavedReport::from_json(&sound).expect("complete");
+        twice.channels.push(twice.channels[0].clone());
+        assert!(twice.check().is_err());
+        assert!(SavedReport::joined([twice.clone(), twice]).is_err());
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! the coefficients in the units of their users, what the data contradicts, and what to do next.
 
 use crate::coefficients;
-use crate::finding_text::{FindingText, channel_list, departure, describe};
+use crate::finding_text::{ALL_CHANNELS, FindingText, channel_list, departure, describe};
 use crate::formatting::{count, enumerated, words};
 use crate::part_note;
 use crate::rounding::{
@@ -276,17 +276,32 @@ fn report_length_s(report: &Report) -> f64 {
 const QUICK: &str = "Quick report, of the curves alone: spectra, spikes, steps, motion, temperature and other causes that channels \
                      have in common, and changes of the noise were not looked for.";
 
-/// What is said where nothing was found.
+/// What is said where nothing was found, and of which channels.
 #[must_use]
-pub fn nothing_found(report: &Report) -> &'static str {
-    if !contradictions(report).is_empty() {
-        "Nothing with a name, but N, B and K do not describe every channel."
+pub fn nothing_found(report: &Report) -> String {
+    let is_sensed = |channel: &&ChannelReport| {
+        ["gyro_", "accl_", "magn_"].iter().any(|prefix| channel.name.starts_with(prefix)) && !is_constant(channel)
+    };
+    let sensed = || report.channels.iter().filter(is_sensed);
+    let named = |channels: Vec<&ChannelReport>| match channel_list(
+        &channels.iter().map(|channel| channel.name.clone()).collect::<Vec<_>>(),
+    ) {
+        all if all == ALL_CHANNELS => "gyros and accelerometers".to_owned(),
+        names => names,
+    };
+    let failing: Vec<&ChannelReport> = sensed().filter(|channel| is_high(channel)).collect();
+    let described: Vec<&ChannelReport> = sensed().filter(|channel| !is_high(channel)).collect();
+    if !failing.is_empty() || !contradictions(report).is_empty() {
+        let names = if failing.is_empty() { format!("all of {}", named(described)) } else { named(failing) };
+        format!("Nothing with a name, but N, B and K do not describe {names}.")
     } else if is_short(report) {
-        "Nothing: a record as short as this one shows strong effects only."
+        "Nothing: a record as short as this one shows strong effects only.".to_owned()
+    } else if described.is_empty() {
+        "Nothing.".to_owned()
     } else if report.quick {
-        "Nothing in the curves: N, B and K describe those of every channel."
+        format!("Nothing in the curves: N, B and K describe those of {}.", named(described))
     } else {
-        "Nothing: N, B and K describe every channel."
+        format!("Nothing: N, B and K describe {}.", named(described))
     }
 }
 
@@ -313,6 +328,10 @@ const SAMPLES_FOR_FILTER: u64 = 1000;
 /// The part's notes, without that of no filter where none could have shown or where one was found in some channels.
 fn told_notes(report: &Report) -> Vec<PartNote> {
     let is_filter = |finding: &Finding| matches!(finding.effect, Effect::OutputFilter(_) | Effect::LowPassFilter(_));
+    // The filter is that of the gyros and accelerometers.
+    if inertial(report).next().is_none() {
+        return Vec::new();
+    }
     let is_sought = report.samples >= SAMPLES_FOR_FILTER && !report.findings.iter().any(is_filter);
     let is_told = |note: &&PartNote| is_sought || !matches!(note, PartNote::NotCorrelated { .. });
     report.part.notes.iter().filter(is_told).cloned().collect()

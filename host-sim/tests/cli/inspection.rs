@@ -8,6 +8,7 @@ use std::path::Path;
 use std::process::Output;
 use tempfile::tempdir;
 
+const PROGRAM: &str = env!("CARGO_BIN_EXE_host-sim");
 const ROWS: u32 = 6000;
 
 fn name(file: &Path) -> &str {
@@ -115,4 +116,97 @@ fn the_part_at_rest_is_the_same_in_inspect_and_analyze() {
         let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(text.contains(&format!("for the longest part at rest, add {offered}.")), "{part:?}: {text}");
     }
+}
+
+/// Tables of the kinds that need options: each command that `inspect` prints runs as it is, once the rate is filled in.
+#[test]
+fn every_printed_command_runs() {
+    let mut rng = ChaCha8Rng::seed_from_u64(17);
+    let mut three = |deviation: f64, of: [f64; 3], separator: &str| {
+        of.map(|value| format!("{:.5}", value + deviation * normal(&mut rng))).join(separator)
+    };
+    let gravity = [0.0, 0.0, 9.80665];
+    let mut files: Vec<(&str, String)> = Vec::new();
+    let rows = |heading: &str, row: &mut dyn FnMut(u32) -> String| {
+        heading.to_owned() + &(0..ROWS).map(|at| row(at) + "\n").collect::<String>()
+    };
+    files.push((
+        "numbers.txt",
+        rows("", &mut |at| {
+            format!("{:.2} {} {}", f64::from(at) / 100.0, three(0.01, gravity, " "), three(0.002, [0.0; 3], " "))
+        }),
+    ));
+    files.push(("no time.csv", rows("gx,gy,gz\n", &mut |_| three(0.2, [0.0; 3], ","))));
+    files.push((
+        "merged.csv",
+        rows("t_ms,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g\n", &mut |at| {
+            let (time, is_rate) = (10 * at, at % 3 != 0);
+            if is_rate {
+                format!("{time},{},,,", three(0.1, [0.0; 3], ","))
+            } else {
+                format!("{time},,,,{}", three(0.001, [0.0, 0.0, 1.0], ","))
+            }
+        }),
+    ));
+    files.push((
+        "labels.txt",
+        rows("", &mut |at| {
+            let time = 10 * (at / 2);
+            if at % 2 == 0 {
+                format!("acc {time} {}", three(0.001, [0.0, 0.0, 1.0], " "))
+            } else {
+                format!("gyro {time} {}", three(0.1, [0.0; 3], " "))
+            }
+        }),
+    ));
+    files.push((
+        "devices.csv",
+        rows("id,t_ms,gx_dps,gy_dps,gz_dps\n", &mut |at| {
+            format!("{},{},{}", at % 2, 5 * at, three(0.1, [0.0; 3], ","))
+        }),
+    ));
+    files.push((
+        "packets.csv",
+        rows("Packet number,Gyroscope X (deg/s),Gyroscope Y (deg/s),Gyroscope Z (deg/s)\n", &mut |at| {
+            format!("{at},{}", three(0.1, [0.0; 3], ","))
+        }),
+    ));
+    files.push((
+        "warm.csv",
+        rows("t_s,wx,wy,wz,temp\n", &mut |at| {
+            format!("{:.2},{},31.{}", f64::from(at) / 100.0, three(0.2, [0.0; 3], ","), at % 10)
+        }),
+    ));
+    files.push((
+        "moved.csv",
+        rows("t_s,gx_dps,gy_dps,gz_dps\n", &mut |at| {
+            let turned = if at < 2000 { 30.0 } else { 0.0 };
+            format!("{:.2},{}", f64::from(at) / 100.0, three(0.05, [turned; 3], ","))
+        }),
+    ));
+    let dir = tempdir().expect("a folder");
+    let mut run = 0;
+    for (file, content) in files {
+        let file = write(&dir, file, content.as_bytes());
+        let shown = inspected(&file);
+        let commands: Vec<&str> = shown.lines().filter_map(|line| line.trim().strip_prefix("host-sim ")).collect();
+        assert!(!commands.is_empty(), "{shown}");
+        for command in commands {
+            let words = format!("{PROGRAM} {} --quiet", command.replace("--rate HZ", "--rate 100"));
+            let output = std::process::Command::new("sh").args(["-c", &words]).output().expect("a shell");
+            assert!(output.status.success(), "{words}: {}\n{shown}", String::from_utf8_lossy(&output.stderr));
+            run += 1;
+        }
+        if file.ends_with("warm.csv") {
+            assert!(shown.contains("degC"), "{shown}");
+        }
+        if file.ends_with("moved.csv") {
+            assert!(
+                shown.contains("analyze")
+                    && shown.lines().any(|line| line.contains("host-sim") && line.contains("--from 2")),
+                "{shown}"
+            );
+        }
+    }
+    assert!(run >= 12, "{run} commands");
 }

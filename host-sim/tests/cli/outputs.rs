@@ -1,7 +1,6 @@
 //! Files that the program writes: none is a file that it reads, under whatever name, and each is complete or as it was.
 
 use crate::program::{counts as table, error_line, host_sim, signal, wait_until, with_default_signals, write};
-use recordings::frame_log::FrameLogReader;
 use std::fs::{self, File};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
@@ -155,72 +154,29 @@ fn a_hang_up_that_is_ignored_ends_nothing() {
     program.wait().expect("an end");
 }
 
-/// The bursts of a log up to its end, or to the line that a kill has torn, and the error about that.
-fn bursts(log: &Path) -> (u32, Option<String>) {
-    let mut reader = match FrameLogReader::open(log) {
-        Ok(reader) => reader,
-        Err(error) => return (0, Some(error.to_string())),
-    };
-    let mut bursts = 0;
-    loop {
-        match reader.next() {
-            Ok(Some(frame)) => bursts += u32::from(frame.mosi.len() == 26),
-            Ok(None) => return (bursts, None),
-            Err(error) => return (bursts, Some(error.to_string())),
-        }
-    }
-}
-
-/// A long simulation that is interrupted, hung up or killed leaves a log whose bursts can be read up to then, plain or gzip.
-#[test]
-fn an_interrupted_simulation_leaves_a_log_that_can_be_read() {
-    let dir = tempdir().expect("a folder");
-    for (name_of_signal, file) in [("INT", "a.csv.gz"), ("HUP", "b.csv.gz"), ("KILL", "c.csv")] {
-        let log = dir.path().join(file);
-        let mut record = with_default_signals()
-            .args(["record", name(&log), "--seconds", "50000"])
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("the program starts");
-        wait_until("bursts are in the log", || bursts(&log).0 > 100);
-        signal(&record, name_of_signal);
-        assert!(!record.wait().expect("an end").success(), "{name_of_signal}: it ended by itself");
-        let (bursts, torn) = bursts(&log);
-        assert!(bursts > 100, "{name_of_signal}: {bursts} bursts");
-        if let Some(error) = torn {
-            // A kill may end the program within a write to the disk, so that its last line is torn.
-            let last = fs::read_to_string(&log).map_or(0, |text| text.lines().count());
-            let is_last = name_of_signal == "KILL" && error.contains(&format!("line {last}"));
-            assert!(is_last, "{name_of_signal}: {error}");
-        }
-    }
-}
-
 #[test]
 fn a_full_disk_is_named() {
     for arguments in [
-        &["record", "/dev/full", "--seconds", "5"][..],
-        &["simulate", "/dev/full", "--seconds", "5"],
+        &["simulate", "/dev/full", "--seconds", "5"][..],
         &["simulate", "/dev/full", "--seconds", "5", "--format", "frames"],
     ] {
         let line = error_line(&host_sim(arguments));
         assert!(line.contains("/dev/full") && line.contains("No space left"), "{arguments:?}: {line}");
     }
     // The report is printed all the same.
-    let output = host_sim(&["record", "/dev/null", "--seconds", "2", "--export", "csv=/dev/full"]);
+    let dir = tempdir().expect("a folder");
+    let output = host_sim(&["analyze", name(&table(&dir)), "--export", "csv=/dev/full"]);
     let error = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code() == Some(1) && error.contains("No space left"), "{error}");
     assert!(String::from_utf8_lossy(&output.stdout).contains("angle random walk"));
 }
 
-/// A simulation of hours is not begun: its log is not there.
 #[test]
 fn outputs_are_checked_before_the_work_and_never_overwrite_the_input() {
     let dir = tempdir().expect("a folder");
     let file = table(&dir);
     let rows = fs::read(&file).expect("rows");
-    let [link, log, blocked] = ["link.csv", "log.csv", "blocked"].map(|name| dir.path().join(name));
+    let [link, blocked] = ["link.csv", "blocked"].map(|name| dir.path().join(name));
     std::os::unix::fs::symlink(&file, &link).expect("a link");
     let nowhere = dir.path().join("missing").join("out");
     // Folders whose files cannot be written: a file is in the way, or a folder of the name of the page or of the figure.
@@ -232,12 +188,12 @@ fn outputs_are_checked_before_the_work_and_never_overwrite_the_input() {
         for same in [&file, &link] {
             is_refused(&host_sim(&["analyze", name(&file), option, &value(same)]));
         }
-        let line = error_line(&host_sim(&["record", name(&log), "--seconds", "20000", option, &value(&nowhere)]));
-        assert!(line.contains("No such file") && !log.exists(), "{line}");
+        let line = error_line(&host_sim(&["analyze", name(&file), option, &value(&nowhere)]));
+        assert!(line.contains("No such file"), "{line}");
     }
     for (option, folder) in [("--page", &file), ("--pictures", &file), ("--page", &blocked), ("--pictures", &blocked)] {
-        let line = error_line(&host_sim(&["record", name(&log), "--seconds", "20000", option, name(folder)]));
-        assert!(line.contains(name(folder)) && !log.exists(), "{option}: {line}");
+        let line = error_line(&host_sim(&["analyze", name(&file), option, name(folder)]));
+        assert!(line.contains(name(folder)), "{option}: {line}");
     }
     let twice = dir.path().join("twice");
     let export = format!("csv={}", name(&twice));
@@ -284,4 +240,53 @@ fn an_export_does_not_overwrite_a_report() {
     let line = error_line(&host_sim(&["export", name(&one), name(&other), "--format", "kalibr"]));
     assert!(line.contains("other.json") && line.contains("is a report"), "{line}");
     assert_eq!(std::fs::read(&other).expect("a report"), before);
+}
+
+/// Gyros and accelerometers in two files, as a phone writes them, or in one of two rates: one file for a filter has both.
+#[test]
+fn the_parts_of_a_sensor_are_exported_as_one() {
+    let dir = tempdir().expect("a folder");
+    let noise = |row: u32, axis: u32| f64::from((row * 7919 + axis * 104_729) % 2003) / 2003.0 - 0.5;
+    let part = |file: &str, heading: &str, hz: f64, size: f64| {
+        let rows = (0..4000).map(|row| {
+            let [x, y, z] = [0, 1, 2].map(|axis| format!("{:.6}", size * noise(row, axis)));
+            format!("{:.6},{x},{y},{z}\n", f64::from(row) / hz)
+        });
+        write(&dir, file, format!("{heading}\n{}", rows.collect::<String>()).as_bytes())
+    };
+    let gyro = part("gyro.csv", "t_s,gx_dps,gy_dps,gz_dps", 100.0, 0.2);
+    let accl = part("accl.csv", "t_s,ax_g,ay_g,az_g", 62.5, 0.01);
+    let [gyro_json, accl_json, yaml] = ["gyro.json", "accl.json", "imu.yaml"].map(|file| dir.path().join(file));
+    for (file, json) in [(&gyro, &gyro_json), (&accl, &accl_json)] {
+        assert!(host_sim(&["analyze", name(file), "--quick", "--quiet", "--json", name(json)]).status.success());
+    }
+    let has_both = |file: &Path| {
+        let text = fs::read_to_string(file).expect("a file");
+        ["gyroscope_noise_density: ", "accelerometer_noise_density: "].iter().all(|key| text.contains(key))
+    };
+    let exported = host_sim(&["export", "--format", "kalibr", name(&gyro_json), name(&accl_json), name(&yaml)]);
+    assert!(exported.status.success() && has_both(&yaml), "{}", String::from_utf8_lossy(&exported.stderr));
+    // Without a file to write nothing is overwritten, and a format of samples has one rate.
+    let before = fs::read(&accl_json).expect("a report");
+    let line = error_line(&host_sim(&["export", "--format", "kalibr", name(&gyro_json), name(&accl_json)]));
+    assert!(line.contains("is a report") && fs::read(&accl_json).expect("a report") == before, "{line}");
+    let line = error_line(&host_sim(&["export", "--format", "vins", name(&gyro_json), name(&accl_json), name(&yaml)]));
+    assert!(line.contains("parts at 100"), "{line}");
+    // The same in one table with blanks.
+    let mut rows: Vec<(u32, String)> = Vec::new();
+    for row in 0..4000 {
+        let [x, y, z] = [0, 1, 2].map(|axis| noise(row, axis));
+        rows.push((10 * row, format!("{},{:.5},{:.5},{:.5},,,\n", 10 * row, 0.2 * x, 0.2 * y, 0.2 * z)));
+        rows.push((
+            16 * row + 3,
+            format!("{},,,,{:.5},{:.5},{:.5}\n", 16 * row + 3, 0.01 * x, 0.01 * y, 1.0 + 0.01 * z),
+        ));
+    }
+    rows.sort();
+    let rows: String = rows.into_iter().map(|(_, row)| row).collect();
+    let merged = write(&dir, "merged.csv", format!("t_ms,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g\n{rows}").as_bytes());
+    let both = dir.path().join("both.yaml");
+    let target = format!("kalibr={}", name(&both));
+    let output = host_sim(&["analyze", name(&merged), "--each-sensor", "--quiet", "--export", &target]);
+    assert!(output.status.success() && has_both(&both), "{}", String::from_utf8_lossy(&output.stderr));
 }

@@ -7,8 +7,12 @@ use tempfile::TempDir;
 /// What the program prints for half a minute of the virtual sensor.
 fn run(dir: &TempDir, arguments: &[&str]) -> String {
     let log = dir.path().join("bus.csv");
-    let record = ["record", log.to_str().expect("UTF-8"), "--plain", "--seconds", "30"];
-    let output = host_sim(&[&record, arguments].concat());
+    let file = log.to_str().expect("UTF-8");
+    if !log.exists() {
+        let simulated = host_sim(&["simulate", file, "--format", "frames", "--seconds", "30"]);
+        assert!(simulated.status.success(), "{}", String::from_utf8_lossy(&simulated.stderr));
+    }
+    let output = host_sim(&[&["analyze", file], arguments].concat());
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).expect("text")
 }

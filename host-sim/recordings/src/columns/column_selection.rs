@@ -378,7 +378,7 @@ impl AvailableColumn {
         for (open, close) in [('[', ']'), ('(', ')')] {
             let bracketed = heading.strip_suffix(close).and_then(|text| text.rsplit_once(open));
             if let Some((name, unit)) = bracketed
-                && let Some(unit) = Unit::parse(unit)
+                && let Some(unit) = Unit::parse(unit).map(|known| gauss_of_field(name, unit).unwrap_or(known))
             {
                 return Self { name: name.trim().to_owned(), unit: Some(unit) };
             }
@@ -450,6 +450,12 @@ fn some_of(names: &[&str]) -> String {
     if names.len() > SHOWN { format!("{shown}, … ({} columns)", names.len()) } else { shown }
 }
 
+/// The unit of a magnetic field in `G`, which is gauss and not gravity.
+fn gauss_of_field(name: &str, unit: &str) -> Option<Unit> {
+    let is_field = matches!(role_of(name), Some(NamedRole::Channel(channel)) if channel.starts_with("magn"));
+    Unit::parse("gauss").filter(|_| is_field && unit.trim() == "G")
+}
+
 /// Whether a heading is the name of an output register in the data sheets of the ADIS164xx.
 pub(crate) fn is_output_register(heading: &str) -> bool {
     const OF_PART: [&str; 3] = ["SUPPLY_OUT", "TEMP_OUT", "AUX_ADC"];
@@ -500,6 +506,9 @@ fn by_name(available: &[AvailableColumn], sensor: &SensorProfile) -> Result<Vec<
                     named.retain(|(known, _)| *known != Role::Time);
                     named.push((role, position));
                 }
+                continue;
+            }
+            if role == Role::Index {
                 continue;
             }
             let (one, other) = (available[*other].name.clone(), column.name.clone());
@@ -608,7 +617,7 @@ const AXES: [(&str, [&str; 3]); 3] = [
 /// Whether a time column has the times of the samples by its name, where a file has several.
 fn is_time_of_sample(name: &str) -> bool {
     let name = name.to_lowercase();
-    name.ends_with("stamp_sample") || name.ends_with("header.stamp")
+    name.ends_with("stamp_sample") || name.ends_with("header.stamp") || name.starts_with("sensor")
 }
 
 fn role_of(name: &str) -> Option<NamedRole> {
@@ -621,15 +630,18 @@ fn role_of(name: &str) -> Option<NamedRole> {
         ["_raw", "_out", "_input", "_lsb"].iter().find_map(|ending| plain.strip_suffix(ending)).unwrap_or(plain);
     match plain {
         "time" | "times" | "t" | "timestamp" | "timestamps" | "time_stamp" | "stamp" | "timestamp_sample"
-        | "timeus" | "elapsed" | "elapsed_time" => {
+        | "timeus" | "elapsed" | "elapsed_time" | "x_value" => {
             return Some(NamedRole::Time);
         }
         // A column that is called by its unit.
         _ if plain.len() > 1 && Unit::parse(plain).is_some_and(|unit| unit.base == SECOND) => {
             return Some(NamedRole::Time);
         }
-        _ if plain.ends_with("header_stamp") => return Some(NamedRole::Time),
-        "sample" => return Some(NamedRole::Index),
+        _ if plain.ends_with("header_stamp") || plain.ends_with("timestamp") => return Some(NamedRole::Time),
+        "sample" | "packet" | "packet_counter" | "packetcounter" | "packet_number" | "packetnumber"
+        | "sample_number" | "samplenumber" | "sample_index" | "sample_counter" | "samplecounter" => {
+            return Some(NamedRole::Index);
+        }
         "temp" | "tmp" | "temperature" => return Some(NamedRole::Channel("temp")),
         "supply" | "vdd" => return Some(NamedRole::Channel("supply")),
         "aux_adc" => return Some(NamedRole::Channel("aux_adc")),

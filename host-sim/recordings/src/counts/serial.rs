@@ -3,6 +3,8 @@
 use crate::counts::frame_log::{Frame, FrameLogWriter};
 use adis16405_driver::{BURST_REQUEST, Register};
 use link::{Decoder, DecoderCounters, Message, RawMessage, Received};
+#[cfg(feature = "serial")]
+use serial2::SerialPort;
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::Path;
@@ -24,18 +26,19 @@ const ASK_AGAIN: Duration = Duration::from_secs(2);
 ///
 /// # Errors
 /// There is no such port, or it cannot be set up.
-pub fn open(port: &str, baud: u32) -> io::Result<Box<dyn serialport::SerialPort>> {
-    serialport::new(port, baud).timeout(READ_TIMEOUT).open().map_err(io::Error::from)
+#[cfg(feature = "serial")]
+pub fn open(port: &str, baud: u32) -> io::Result<SerialPort> {
+    let mut port = SerialPort::open(port, baud)?;
+    port.set_read_timeout(READ_TIMEOUT)?;
+    Ok(port)
 }
 
 /// Names of the serial ports of this machine, as far as the system says them.
+#[cfg(feature = "serial")]
 #[must_use]
 pub fn ports() -> Vec<String> {
-    // The crate panics where Linux does not have this folder.
-    if cfg!(target_os = "linux") && !Path::new("/sys/class/tty").is_dir() {
-        return Vec::new();
-    }
-    serialport::available_ports().unwrap_or_default().into_iter().map(|port| port.port_name).collect()
+    let ports = SerialPort::available_ports().unwrap_or_default();
+    ports.into_iter().map(|port| port.display().to_string()).collect()
 }
 
 /// Receives the messages and text lines of a device and sends it commands.

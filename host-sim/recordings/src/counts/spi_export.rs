@@ -1,7 +1,6 @@
 //! Exports of logic analyzers' SPI decoders: what was on the bus, transaction by transaction, with its times.
 //!
 //! - Saleae Logic 2, data table: `name,type,start_time,duration,…,mosi,miso` with rows of type `enable`, `result` and `disable`.
-//! - Saleae, analyzer export: `Time [s],Packet ID,MOSI,MISO`, one row a word.
 //! - sigrok-cli: `-A spi=mosi-transfer:miso-transfer --protocol-decoder-jsontrace`, one line an event.
 
 use crate::counts::frame_log::Frame;
@@ -34,7 +33,6 @@ enum Layout {
         mosi: usize,
         miso: usize,
     },
-    SaleaeWords,
     SigrokTrace,
 }
 
@@ -43,9 +41,6 @@ impl Layout {
     fn of_header(header: &str) -> Option<Self> {
         let names: Vec<String> = header.split(',').map(|name| delimited_text::field(name).to_lowercase()).collect();
         let position = |wanted: &str| names.iter().position(|name| name == wanted);
-        if names.iter().map(String::as_str).eq(["time [s]", "packet id", "mosi", "miso"]) {
-            return Some(Self::SaleaeWords);
-        }
         if header.starts_with("{\"traceEvents\"") {
             return Some(Self::SigrokTrace);
         }
@@ -71,9 +66,8 @@ pub struct SpiExportReader {
     layout: Layout,
     line: u64,
     last_s: f64,
-    /// The transaction that is being read, and the packet that its words belong to.
+    /// The transaction that is being read.
     open: Option<CapturedFrame>,
-    packet: String,
     /// Transactions of sigrok whose other line has not come yet.
     waiting: VecDeque<(bool, CapturedFrame)>,
 }
@@ -90,7 +84,6 @@ impl SpiExportReader {
             line,
             last_s: f64::NEG_INFINITY,
             open: None,
-            packet: String::new(),
             waiting: VecDeque::new(),
         })
     }
@@ -119,7 +112,6 @@ impl SpiExportReader {
                 Layout::SaleaeTable { kind, start, duration, mosi, miso } => {
                     self.table_row(&text, [kind, start, duration, mosi, miso])
                 }
-                Layout::SaleaeWords => self.word_row(&text),
                 Layout::SigrokTrace => self.event(&text),
             };
             match step {
@@ -171,22 +163,6 @@ impl SpiExportReader {
             "disable" => Ok(self.open.take().map(|frame| CapturedFrame { end_s: Some(start_s), ..frame })),
             _ => Ok(None),
         }
-    }
-
-    /// A row of Saleae's analyzer export: words of one packet belong to one transaction.
-    fn word_row(&mut self, text: &str) -> Result<Option<CapturedFrame>, Reason> {
-        let fields: Vec<&str> = text.split(',').map(delimited_text::field).collect();
-        let [time, packet, mosi, miso] = fields[..] else {
-            return Err(Reason::FieldCount { found: fields.len(), expected: 4 });
-        };
-        let (time_s, mosi, miso) = (delimited_text::time(time)?, word(mosi)?, word(miso)?);
-        let is_next = self.open.is_some() && packet != self.packet;
-        let done = if is_next { self.open.take() } else { None };
-        packet.clone_into(&mut self.packet);
-        let frame = self.open.get_or_insert_with(|| starting_at(time_s));
-        frame.frame.mosi.extend(mosi);
-        frame.frame.miso.extend(miso);
-        Ok(done)
     }
 
     /// An event of sigrok: the begin and the end of the bytes of one line; MISO and MOSI of a transaction begin together.

@@ -1,4 +1,9 @@
-//! Calendar times, as people's loggers write them: dates, times of day, and both in one text.
+//! Calendar times, as people's loggers write them: dates, times of day, both in one text, and the parts of a time in several columns.
+
+use crate::columns::column_selection::AvailableColumn;
+use crate::formats::fields::number;
+use crate::rows::batch::Number;
+use jiff::civil::Date;
 
 /// Nanoseconds of a second, a day and half a day.
 const SECOND_NS: i64 = 1_000_000_000;
@@ -9,6 +14,11 @@ const MONTHS: [&str; 12] = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "au
 /// Nanoseconds from 1970 to a date and a time of day in one text: ISO 8601, or any [`date`] and [`time_of_day`] with a blank or a T
 /// between them; or of a duration as `0 days 00:00:01.5`.
 pub(crate) fn date_time(text: &str) -> Option<i64> {
+    date_time_with(text, date)
+}
+
+/// The same, whose date is read by `date`.
+fn date_time_with(text: &str, date: impl FnOnce(&str) -> Option<i64>) -> Option<i64> {
     let at = text.find(|c: char| c == 'T' || c == 't' || c.is_ascii_whitespace())?;
     let (first, rest) = (&text[..at], text[at + 1..].trim_start());
     if let Some(clock) = rest.strip_prefix("days ").or_else(|| rest.strip_prefix("day ")) {
@@ -18,34 +28,103 @@ pub(crate) fn date_time(text: &str) -> Option<i64> {
     date(first)?.checked_mul(DAY_NS)?.checked_add(time_of_day(rest)?)
 }
 
-/// Days from 1970 to a date: 2018-04-25, 2018/04/25, 25.04.2018, 25-Apr-2018, 04/25/2018, and 25/04/2018 where there is no such month.
+/// Days from 1970 to a date: 2018-04-25, 2018/04/25, 25.04.2018, 25-Apr-2018, 04/25/2018 and 25/04/2018. Where day and month cannot be told
+/// apart, the month is first between strokes and the day elsewhere.
 pub(crate) fn date(text: &str) -> Option<i64> {
-    let sign = text.chars().find(|c| ['-', '/', '.'].contains(c))?;
-    let parts: Vec<&str> = text.split(sign).collect();
-    let number = |text: &str| text.bytes().all(|b| b.is_ascii_digit()).then(|| text.parse::<i64>().ok()).flatten();
-    let month = |text: &str| {
-        let named = MONTHS.iter().position(|name| text.to_lowercase().starts_with(name)).map(|at| at as i64 + 1);
-        number(text).or(named)
-    };
-    let (year, month, day) = match parts[..] {
-        [year, of_year, day] if year.len() == 4 => (number(year)?, month(of_year)?, number(day)?),
-        [one, other, year] if year.len() == 4 => {
-            let is_month_first = sign == '/' && number(one)? <= 12;
-            let (of_year, day) = if is_month_first { (one, other) } else { (other, one) };
-            (number(year)?, month(of_year)?, number(day)?)
+    let date = WrittenDate::parse(text)?;
+    date.days(Order::MonthFirst).filter(|_| date.is_stroked).or_else(|| date.days(Order::DayFirst))
+}
+
+/// Which of day and month comes first in dates whose year is last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Order {
+    DayFirst,
+    MonthFirst,
+}
+
+/// A date whose order may not be known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct WrittenDate {
+    year: i64,
+    /// Month and day; where the year is last, as they are written.
+    parts: [i64; 2],
+    /// Whether the order is that of the file.
+    is_open: bool,
+    is_stroked: bool,
+}
+
+impl WrittenDate {
+    fn parse(text: &str) -> Option<Self> {
+        let sign = text.chars().find(|c| ['-', '/', '.'].contains(c))?;
+        let parts: Vec<&str> = text.split(sign).collect();
+        let number = |text: &str| text.bytes().all(|b| b.is_ascii_digit()).then(|| text.parse::<i64>().ok()).flatten();
+        let named = |text: &str| {
+            let is_letters = text.starts_with(|letter: char| letter.is_ascii_alphabetic());
+            let plain = text.to_lowercase();
+            MONTHS.iter().position(|name| is_letters && plain.starts_with(name)).map(|at| at as i64 + 1)
+        };
+        let is_stroked = sign == '/';
+        match parts[..] {
+            [year, month, day] if year.len() == 4 => {
+                let month = number(month).or_else(|| named(month))?;
+                Some(Self { year: number(year)?, parts: [month, number(day)?], is_open: false, is_stroked })
+            }
+            [one, other, year] if year.len() == 4 => match named(other) {
+                Some(month) => {
+                    Some(Self { year: number(year)?, parts: [month, number(one)?], is_open: false, is_stroked })
+                }
+                None => {
+                    Some(Self { year: number(year)?, parts: [number(one)?, number(other)?], is_open: true, is_stroked })
+                }
+            },
+            _ => None,
         }
-        _ => return None,
-    };
-    let is_leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
-    let days = [31, if is_leap { 29 } else { 28 }, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
-    let length = *days.get(usize::try_from(month - 1).ok()?)?;
-    if !(1..=length).contains(&day) {
-        return None;
     }
-    // Leap years before the first day of the year, in the Gregorian calendar.
-    let leap_years = |year: i64| (year - 1).div_euclid(4) - (year - 1).div_euclid(100) + (year - 1).div_euclid(400);
-    let before: i64 = days[..(month - 1) as usize].iter().sum();
-    Some(365 * (year - 1970) + leap_years(year) - leap_years(1970) + before + day - 1)
+
+    /// Days from 1970; `None` where there is no such day.
+    fn days(self, order: Order) -> Option<i64> {
+        let [month, day] = match (self.is_open, order) {
+            (true, Order::DayFirst) => [self.parts[1], self.parts[0]],
+            _ => self.parts,
+        };
+        let date = Date::new(self.year.try_into().ok()?, month.try_into().ok()?, day.try_into().ok()?).ok()?;
+        Some(i64::from(date.since(Date::new(1970, 1, 1).ok()?).ok()?.get_days()))
+    }
+}
+
+/// The order of day and month of a file, which its dates tell in the end: by a day that is no month, else by the first change of the date, which
+/// is a day and no month later. Until then it does not matter, as times are differences.
+#[derive(Debug, Clone, Default)]
+struct DateOrder {
+    known: Option<Order>,
+    /// The date before, and days that were added since to go on from it.
+    before: Option<WrittenDate>,
+    shift: i64,
+}
+
+impl DateOrder {
+    fn days(&mut self, text: &str) -> Option<i64> {
+        let date = WrittenDate::parse(text)?;
+        if !date.is_open {
+            return date.days(Order::MonthFirst);
+        }
+        let provisional = if date.is_stroked { Order::MonthFirst } else { Order::DayFirst };
+        if let (None, Some(before)) = (self.known, self.before.filter(|before| *before != date)) {
+            let step = |order: Order| Some((date.days(order)? - before.days(order)?).unsigned_abs());
+            let steps = [Order::DayFirst, Order::MonthFirst].map(|order| (step(order), order));
+            let least =
+                steps.into_iter().filter_map(|(step, order)| Some((step?, order))).min_by_key(|(step, _)| *step);
+            let order = least.map_or(provisional, |(_, order)| order);
+            let days_before = before.days(provisional).or_else(|| before.days(order))?;
+            self.shift = days_before - before.days(order)?;
+            self.known = Some(order);
+        }
+        self.before = Some(date);
+        let order = self.known.unwrap_or(provisional);
+        let other = if order == Order::DayFirst { Order::MonthFirst } else { Order::DayFirst };
+        let days = date.days(order).or_else(|| date.days(other).filter(|_| self.known.is_none()))?;
+        Some(days + self.shift)
+    }
 }
 
 /// Nanoseconds from midnight to a time of day, in UTC where it says its offset: 10:00, 10:00:13, 10:00:13.25, 10:00:13Z,
@@ -105,7 +184,7 @@ fn offset(text: &str) -> Option<i64> {
 }
 
 /// Where the calendar times of a row are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum CalendarColumns {
     /// Date and time of day in one field.
     One(usize),
@@ -113,7 +192,26 @@ pub(crate) enum CalendarColumns {
     Two(usize),
     /// A time of day without a date.
     TimeOfDay(usize),
+    /// Whole numbers that are one time together, with the nanoseconds of each unit: seconds and nanoseconds, or hours, minutes and seconds.
+    Parts(Vec<(usize, i64)>),
 }
+
+/// Endings of names of parts of a time, in small letters, the nanoseconds of their units, and the numbers below which they are.
+const PARTS: [(&[&str], i64, i64); 7] = [
+    (&["hour", "hours", "hh"], 3600 * SECOND_NS, 24),
+    (&["minute", "minutes", "min", "mins", "mm"], 60 * SECOND_NS, 60),
+    (&["second", "seconds", "sec", "secs", "tv_sec", "ss", "s"], SECOND_NS, i64::MAX),
+    (&["ms", "msec", "msecs", "millis", "millisecond", "milliseconds"], 1_000_000, 1000),
+    (&["us", "usec", "usecs", "tv_usec", "micros", "microsecond", "microseconds"], 1000, 1_000_000),
+    (
+        &["ns", "nsec", "nsecs", "nanosec", "nanosecs", "tv_nsec", "nanos", "nanosecond", "nanoseconds"],
+        1,
+        1_000_000_000,
+    ),
+    (&["centisecond", "centiseconds"], 10_000_000, 100),
+];
+/// The place of the seconds among them.
+const SECONDS: usize = 2;
 
 impl CalendarColumns {
     /// The first of `fields` with a calendar time.
@@ -130,10 +228,45 @@ impl CalendarColumns {
         })
     }
 
+    /// The columns whose names are those of the parts of a time, as `secs` and `nsecs`, with whole numbers in `rows` that fit them. The seconds
+    /// are one of them.
+    pub(crate) fn parts(available: &[AvailableColumn], rows: &[Vec<&str>]) -> Option<Self> {
+        // Beginning of the name, place among the parts, position.
+        let mut named: Vec<(String, usize, usize)> = Vec::new();
+        for (position, column) in available.iter().enumerate() {
+            let plain: String = column.name.to_lowercase().replace([' ', '-'], "_");
+            let start = plain.rfind(['.', '_', '/']).map_or(0, |at| at + 1);
+            let (prefix, ending) = match plain.strip_suffix("tv_sec").or_else(|| plain.strip_suffix("tv_nsec")) {
+                Some(prefix) => (prefix, &plain[prefix.len()..]),
+                None => (&plain[..start], &plain[start..]),
+            };
+            if let Some(part) = PARTS.iter().position(|(endings, ..)| endings.contains(&ending)) {
+                let is_new = !named.iter().any(|(known, other, _)| known == prefix && *other == part);
+                let fits = rows.iter().all(|row| {
+                    let value = row.get(position).and_then(|field| number(field));
+                    matches!(value, Some(Number::Integer(value)) if (0..PARTS[part].2).contains(&value))
+                });
+                if is_new && fits {
+                    named.push((prefix.to_owned(), part, position));
+                }
+            }
+        }
+        let prefix = named.iter().find(|(_, part, _)| *part == SECONDS).map(|(prefix, ..)| prefix.clone())?;
+        named.retain(|(own, ..)| *own == prefix);
+        let has = |part: usize| named.iter().any(|(_, own, _)| *own == part);
+        // Hours without minutes are no time of day; of several fractions one is a part.
+        let is_time = named.len() > 1 && has(0) <= has(1) && !rows.is_empty();
+        let of_part = |(_, part, position): &(String, usize, usize)| (*position, PARTS[*part].1);
+        let mut parts: Vec<(usize, i64)> = named.iter().map(of_part).collect();
+        parts.sort_unstable();
+        is_time.then_some(Self::Parts(parts))
+    }
+
     /// Number of the field in which it begins.
-    pub(crate) fn position(self) -> usize {
+    pub(crate) fn position(&self) -> usize {
         match self {
-            Self::One(at) | Self::Two(at) | Self::TimeOfDay(at) => at,
+            Self::One(at) | Self::Two(at) | Self::TimeOfDay(at) => *at,
+            Self::Parts(parts) => parts.first().map_or(0, |(at, _)| *at),
         }
     }
 }
@@ -142,6 +275,7 @@ impl CalendarColumns {
 #[derive(Debug, Clone)]
 pub(crate) struct CalendarClock {
     pub(crate) columns: CalendarColumns,
+    order: DateOrder,
     /// Time of day of the row before, and midnights since the first row, for times without a date.
     before_ns: Option<i64>,
     midnights: i64,
@@ -149,14 +283,14 @@ pub(crate) struct CalendarClock {
 
 impl CalendarClock {
     pub(crate) fn new(columns: CalendarColumns) -> Self {
-        Self { columns, before_ns: None, midnights: 0 }
+        Self { columns, order: DateOrder::default(), before_ns: None, midnights: 0 }
     }
 
     /// The time of a row, ns; `field` is the one at the position of the columns, and `next` the one after it.
     pub(crate) fn time_ns(&mut self, field: &str, next: &str) -> Option<i64> {
         match self.columns {
-            CalendarColumns::One(_) => date_time(field),
-            CalendarColumns::Two(_) => date(field)?.checked_mul(DAY_NS)?.checked_add(time_of_day(next)?),
+            CalendarColumns::One(_) => date_time_with(field, |date| self.order.days(date)),
+            CalendarColumns::Two(_) => self.order.days(field)?.checked_mul(DAY_NS)?.checked_add(time_of_day(next)?),
             CalendarColumns::TimeOfDay(_) => {
                 let now = time_of_day(field)?;
                 // A time that goes back by more than half a day is that of the next one.
@@ -164,7 +298,40 @@ impl CalendarClock {
                 self.before_ns = Some(now);
                 Some(now + self.midnights * DAY_NS)
             }
+            CalendarColumns::Parts(_) => None,
         }
+    }
+
+    /// Whether the time, or its date, is in the field at `position`.
+    pub(crate) fn is_at(&self, position: usize) -> bool {
+        !matches!(self.columns, CalendarColumns::Parts(_)) && self.columns.position() == position
+    }
+
+    /// The position of the first part of a time.
+    pub(crate) fn start_of_parts(&self) -> Option<usize> {
+        matches!(self.columns, CalendarColumns::Parts(_)).then(|| self.columns.position())
+    }
+
+    /// The time that the sum of the parts of a row is, ns, after as many midnights, or full hours without hours, as were passed.
+    pub(crate) fn sum_ns(&mut self, sum: i64) -> Option<i64> {
+        let CalendarColumns::Parts(parts) = &self.columns else { return None };
+        let has = |part: usize| parts.iter().any(|(_, unit)| *unit == PARTS[part].1);
+        let modulus = if has(0) { DAY_NS } else { 3600 * SECOND_NS };
+        if has(1) {
+            self.midnights += i64::from(self.before_ns.is_some_and(|before| sum < before - modulus / 2));
+            self.before_ns = Some(sum);
+        }
+        sum.checked_add(self.midnights.checked_mul(modulus)?)
+    }
+
+    /// The nanoseconds of the part of a time in the field at `position`; `None` where that is none.
+    pub(crate) fn part_ns(&self, position: usize, field: &str) -> Option<Option<i64>> {
+        let CalendarColumns::Parts(parts) = &self.columns else { return None };
+        let (_, unit) = parts.iter().find(|(at, _)| *at == position)?;
+        Some(match number(field) {
+            Some(Number::Integer(value)) => value.checked_mul(*unit),
+            _ => None,
+        })
     }
 }
 
@@ -205,6 +372,31 @@ mod tests {
             ["25:00:00", "10:61:00", "10", "10:00:13.", "10:00:00:00", "a:b", "1:2:3.4.5", "+1:00", "1:2:3.12345678é"]
         {
             assert_eq!(time_of_day(text), None, "{text}");
+        }
+    }
+
+    /// The evenings before and the nights after a change of the date, in either order of day and month.
+    #[test]
+    fn one_order_of_day_and_month_is_that_of_the_whole_file() {
+        for (month, day) in [(5, 11), (11, 5), (12, 12), (1, 31), (2, 28), (9, 30), (12, 31)] {
+            let last = jiff::civil::date(2026, month, day);
+            let next = last.tomorrow().expect("a day");
+            for (sign, is_day_first) in [("/", true), ("/", false), ("-", true), ("-", false), (".", true)] {
+                let written = |date: jiff::civil::Date| {
+                    let (one, other) =
+                        if is_day_first { (date.day(), date.month()) } else { (date.month(), date.day()) };
+                    format!("{one:02}{sign}{other:02}{sign}{}", date.year())
+                };
+                let mut clock = CalendarClock::new(CalendarColumns::One(0));
+                let texts = [(last, "23:59:59.9"), (last, "23:59:59.95"), (next, "00:00:00.0"), (next, "12:00:00.0")];
+                let times: Vec<i64> = texts
+                    .iter()
+                    .map(|(date, time)| format!("{} {time}", written(*date)))
+                    .map(|text| clock.time_ns(&text, "").unwrap_or_else(|| panic!("{text}")))
+                    .collect();
+                let steps: Vec<i64> = times.windows(2).map(|pair| (pair[1] - pair[0]) / 1_000_000).collect();
+                assert_eq!(steps, [50, 50, 43_200_000], "{} then {}", written(last), written(next));
+            }
         }
     }
 

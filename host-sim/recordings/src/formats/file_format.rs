@@ -5,24 +5,26 @@ use crate::counts::count_table_writer;
 use crate::counts::frame_log;
 use crate::counts::{serial, spi_export};
 use crate::formats::ardupilot_log::{self, ArduPilotSource};
-use crate::formats::hdf5::{self, Hdf5Reader};
+#[cfg(feature = "hdf5")]
+use crate::formats::hdf5::Hdf5Reader;
 use crate::formats::matlab::MatReader;
 use crate::formats::mcap_bag::McapSource;
 use crate::formats::numpy::{NpyReader, NpzReader};
 use crate::formats::ros_bag::RosBagSource;
+#[cfg(feature = "sqlite")]
 use crate::formats::sqlite_bag::SqliteSource;
-use crate::formats::sqlite_bag::ZSTD_MAGIC;
 use crate::formats::text_table::TextRows;
 pub use crate::formats::topics::TopicDescription;
 use crate::formats::topics::{self, Source, TopicRows};
 use crate::formats::ulog::UlogSource;
 use crate::formats::{foreign_format, text_table};
 use crate::input::budget::{Budget, Metered};
-use crate::input::delimited_text::Lines;
+use crate::input::delimited_text::{Lines, is_utf16};
 use crate::input::file_hash::FileHash;
 use crate::input::gzip_members::{GZIP_MAGIC, GzipMembers};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::{Counted, ReadMonitor};
+use crate::input::zstd_frames::{ZSTD_MAGIC, ZstdFrames};
 use crate::inspection::InspectedTable;
 use crate::rows::any_sensor::ReadOptions;
 use crate::rows::row_source::{BatchSource, FileRows, RowSource};
@@ -170,7 +172,7 @@ impl InputFile {
         }
         if head.starts_with(&ZSTD_MAGIC) {
             let compressed = File::open(copy.as_ref().map_or(name, NamedTempFile::path)).map_err(fail)?;
-            let whole = zstd::Decoder::new(compressed).map_err(fail)?;
+            let whole = ZstdFrames::new(BufReader::new(compressed));
             let expanded = copied(Metered::new(whole, budget.meter()));
             let expanded = expanded.map_err(|error| InputError::file(name, Reason::from_io(error)))?;
             head = self::head(expanded.path()).map_err(fail)?;
@@ -191,7 +193,9 @@ impl InputFile {
             None if foreign_format::is_json_document(&head) => {
                 return Err(InputError::file(name, foreign_format::JSON_DOCUMENT));
             }
-            None if foreign_format::is_binary(text.as_ref().unwrap_or(&head)) => {
+            None if foreign_format::is_binary(text.as_ref().unwrap_or(&head))
+                && !(text.is_none() && is_utf16(&head)) =>
+            {
                 return Err(InputError::file(name, foreign_format::refusal(text.as_ref().unwrap_or(&head))));
             }
             None => {
@@ -337,10 +341,14 @@ impl InputFile {
             FileFormat::Mat => Box::new(MatReader::open(path, budget)?),
             FileFormat::RosBag => Box::new(RosBagSource::open(path, budget)?),
             FileFormat::Mcap => Box::new(McapSource::open(path, budget)?),
+            #[cfg(feature = "sqlite")]
             FileFormat::Sqlite => Box::new(SqliteSource::open(path, budget)?),
             FileFormat::Ulog => Box::new(UlogSource::open(path, budget)?),
             FileFormat::ArduPilot => Box::new(ArduPilotSource::open(path, budget)?),
+            #[cfg(feature = "hdf5")]
             FileFormat::Hdf5 => Box::new(Hdf5Reader::open(path, budget)?),
+            #[cfg(not(all(feature = "hdf5", feature = "sqlite")))]
+            format => return Err(InputError::file(path, Reason::NotBuilt(format.name()))),
         })
     }
 }
@@ -413,8 +421,15 @@ fn head(file: &Path) -> io::Result<Vec<u8>> {
     Ok(head)
 }
 
+/// Whether the first bytes are those of HDF5, whose signature may come behind 512 bytes, or 1024, and so on.
+fn is_hdf5(head: &[u8]) -> bool {
+    let mut starts =
+        std::iter::once(0).chain((9..).map(|power| 1usize << power).take_while(|start| *start < head.len()));
+    starts.any(|start| head[start..].starts_with(b"\x89HDF\r\n\x1A\n"))
+}
+
 fn binary_format(head: &[u8]) -> Option<FileFormat> {
-    if hdf5::is_hdf5(head) {
+    if is_hdf5(head) {
         return Some(FileFormat::Hdf5);
     }
     MAGICS.iter().find(|(magic, _)| head.starts_with(magic)).map(|(_, format)| *format)

@@ -20,8 +20,6 @@ const FOREIGN: &[(&[u8], &str, &str)] = &[
     (b"BZh", "compressed by bzip2", "bunzip2 FILE, and give the result; if it is an R workspace, write.csv in R"),
     (b"7z\xBC\xAF\x27\x1C", "a 7-Zip archive", "unpack it, and give the recording in it"),
     (b"Rar!\x1A\x07", "a RAR archive", "unpack it, and give the recording in it"),
-    (b"\xFF\xFE", "text in UTF-16", "iconv -f UTF-16 -t UTF-8 FILE > FILE.csv"),
-    (b"\xFE\xFF", "text in UTF-16", "iconv -f UTF-16 -t UTF-8 FILE > FILE.csv"),
     (b"\x80\x04\x95", PICKLE, IN_PANDAS),
     (b"\x80\x05\x95", PICKLE, IN_PANDAS),
     (
@@ -142,7 +140,6 @@ mod tests {
         for (head, words) in [
             (&b"RDX3\nX\n\0\0\0\x03"[..], ["R workspace", "write.csv"]),
             (b"PAR1\x15\x04", ["Parquet", "read_parquet"]),
-            (b"\xFF\xFEt\0,\0", ["UTF-16", "iconv"]),
             (b"\x80\x05\x95\xAA\0\0", ["pickle", "read_pickle"]),
             (
                 b"\0\x06\x0A\x24\x18\x1E\x40\0\xFE\0\0\x01\x01\x69\0\0\0\x06\x0A\x24\x18\x1E\x40\0\xFE\0\0",

@@ -16,10 +16,6 @@ use std::path::Path;
 
 const FORMAT: &str = "HDF5";
 
-/// First bytes of the format, at the start of a file or after a user block of 512 bytes or a power of two more (HDF5 File Format
-/// Specification, II.A).
-const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
-
 /// Columns of a matrix beyond which it is no recording.
 const MAX_COLUMNS: usize = 1024;
 /// Groups and datasets of a file.
@@ -35,13 +31,6 @@ const OFFSET: &str = "add_offset";
 /// The attribute by which MATLAB says what an array was, and what of it are no numbers.
 const MATLAB_CLASS: &str = "MATLAB_class";
 const NO_NUMBERS: [&str; 4] = ["char", "cell", "string", "function_handle"];
-
-/// Whether the first bytes of a file are those of HDF5.
-pub(crate) fn is_hdf5(head: &[u8]) -> bool {
-    let mut starts =
-        std::iter::once(0).chain((9..).map(|power| 1usize << power).take_while(|start| *start < head.len()));
-    starts.any(|start| head[start..].starts_with(SIGNATURE))
-}
 
 /// A number in a record or an element.
 #[derive(Debug, Clone, Copy)]

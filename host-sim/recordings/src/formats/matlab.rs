@@ -37,6 +37,8 @@ const COMPRESSED: u32 = 15;
 /// Classes of arrays: cells, structures, and numbers from double to uint64.
 const CELL: u32 = 1;
 const STRUCTURE: u32 = 2;
+/// Class of an object of MATLAB, whose numbers are in a nameless array of bytes that has no public description.
+const OBJECT: u32 = 17;
 const NUMERIC: std::ops::RangeInclusive<u32> = 6..=15;
 
 /// A matrix of a file, or a field of an array of structures that have a sample each.
@@ -79,6 +81,15 @@ impl ListedArray {
     }
 }
 
+/// What writes the columns of an object that is no table as plain arrays.
+const OTHER_COMMANDS: &str = "copy its numbers into matrices and save these";
+
+/// What writes a table of MATLAB as text.
+fn table_commands(name: &str, class: &str) -> String {
+    let table = if class == "timetable" { format!("timetable2table({name})") } else { name.to_owned() };
+    format!("writetable({table}, \"{name}.csv\")")
+}
+
 /// An open `.mat` file, which is read from its beginning for each array.
 pub(crate) struct MatReader {
     file: PathBuf,
@@ -91,6 +102,16 @@ impl MatReader {
         let fail = |reason| InputError::file(file, reason);
         let mut listing = Walk::new(budget);
         listing.file(file).map_err(fail)?;
+        if let ([], Some((name, class))) = (listing.arrays.as_slice(), listing.objects.first()) {
+            let how = if ["table", "timetable"].contains(&class.as_str()) {
+                table_commands(name, class)
+            } else {
+                OTHER_COMMANDS.to_owned()
+            };
+            return Err(fail(Reason::Array(format!(
+                "it holds a MATLAB object ({name}, a {class}), which is not read; in MATLAB: {how}"
+            ))));
+        }
         let array = |array: &ListedArray| {
             let [rows, columns] = array.shape();
             NamedArray::matrix(&array.group, &array.name, rows, columns)
@@ -128,6 +149,8 @@ struct Walk<'a> {
     /// What is read, and its columns.
     wanted: Option<(Parts, &'a [usize])>,
     arrays: Vec<ListedArray>,
+    /// Names and classes of objects.
+    objects: Vec<(String, String)>,
     /// Matrices until now, and those of them that were read.
     walked: usize,
     taken: usize,
@@ -139,7 +162,16 @@ struct Walk<'a> {
 impl Walk<'_> {
     fn new(budget: Budget) -> Self {
         let meter = budget.meter();
-        Self { wanted: None, arrays: Vec::new(), walked: 0, taken: 0, values: Vec::new(), is_big_endian: false, meter }
+        Self {
+            wanted: None,
+            arrays: Vec::new(),
+            objects: Vec::new(),
+            walked: 0,
+            taken: 0,
+            values: Vec::new(),
+            is_big_endian: false,
+            meter,
+        }
     }
 
     /// Whether all that is wanted has been read.
@@ -244,6 +276,13 @@ impl Walk<'_> {
         }
         let flags = self.small(input, 8)?;
         let class = flags.first().copied().map_or(0, |word| word & 0xFF);
+        if class == OBJECT {
+            let own = self.text(input)?;
+            self.text(input)?;
+            let class = self.text(input)?;
+            self.objects.push((name.unwrap_or(own), class));
+            return input.skip(end.saturating_sub(input.at));
+        }
         let dimensions = self.small(input, 64)?;
         let own = self.text(input)?;
         let name = name.unwrap_or(own);
@@ -251,7 +290,10 @@ impl Walk<'_> {
         let elements = sides.iter().try_fold(1usize, |product, side| product.checked_mul(*side)).unwrap_or(usize::MAX);
         match (class, sides.as_slice()) {
             (class, &[rows, columns])
-                if NUMERIC.contains(&class) && rows.min(columns) <= MAX_COLUMNS && elements > 0 =>
+                if NUMERIC.contains(&class)
+                    && rows.min(columns) <= MAX_COLUMNS
+                    && elements > 0
+                    && !(name.is_empty() && level == 0) =>
             {
                 if self.takes_next() {
                     self.numbers(input, [rows, columns])?;

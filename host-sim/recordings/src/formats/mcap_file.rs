@@ -1,14 +1,14 @@
 //! Records of an MCAP file, those in chunks included, in the memory of one record.
 //!
-//! The crate `mcap` decompresses the chunks. Its own reader is not used for the rest because damaged lengths make it allocate gigabytes
-//! before it reads a byte, and overflow where a record ends after its chunk.
+//! The crate `mcap` is not used: its decompression needs a compiler of C.
 
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
-use mcap::records::op;
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use crate::input::zstd_frames::ZstdFrames;
+use flate2::Crc;
+use lz4_flex::frame::FrameDecoder;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{self, BufReader, Read};
 use std::path::Path;
 
 pub(crate) const FORMAT: &str = "MCAP";
@@ -19,8 +19,17 @@ const MAX_RECORD: usize = 1 << 28;
 const MAGIC_BYTES: u64 = 8;
 /// Type and length before each record.
 const HEADER_BYTES: usize = 1 + 8;
-/// Position of the name of the compression in a chunk: after its times, its uncompressed size and its CRC.
-const COMPRESSION_AT: usize = 8 + 8 + 8 + 4;
+/// Position of the CRC of a chunk, and after it the name of its compression: after its times and its uncompressed size.
+const CRC_AT: usize = 8 + 8 + 8;
+
+/// Types of records.
+mod op {
+    pub(super) const FOOTER: u8 = 2;
+    pub(super) const SCHEMA: u8 = 3;
+    pub(super) const CHANNEL: u8 = 4;
+    pub(super) const MESSAGE: u8 = 5;
+    pub(super) const CHUNK: u8 = 6;
+}
 
 /// The records that tell what messages there are, and the messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -166,7 +175,7 @@ fn read(file: &Path, each: &mut EachRecord) -> Result<(), Stop> {
         next(length as u64, &mut data)?;
         let is_whole = data.len() == length;
         match opcode {
-            op::CHUNK => chunk(header, &data, each)?,
+            op::CHUNK => chunk(&data, each)?,
             op::FOOTER => return Ok(()),
             _ if is_whole => each(opcode, &data)?,
             _ => {}
@@ -177,44 +186,53 @@ fn read(file: &Path, each: &mut EachRecord) -> Result<(), Stop> {
     }
 }
 
-/// The records of a chunk, which may be cut off, with the header of its own record.
-fn chunk(header: [u8; HEADER_BYTES], data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
+/// The records of a chunk, which may be cut off.
+fn chunk(data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
     let cut_off = || damaged("a chunk is cut off");
-    let length_of_name = data.get(COMPRESSION_AT..).and_then(|rest| rest.first_chunk()).ok_or_else(cut_off)?;
-    if u32::from_le_bytes(*length_of_name) != 0 {
-        return compressed(header, data, each);
+    let mut fields = Fields(data.get(CRC_AT..).ok_or_else(cut_off)?);
+    let crc = fields.take(4).and_then(|bytes| bytes.first_chunk().copied()).map(u32::from_le_bytes);
+    let (crc, compression) = crc.zip(fields.text()).ok_or_else(cut_off)?;
+    // The length of the records, which follow.
+    fields.take(8).ok_or_else(cut_off)?;
+    let packed = fields.0;
+    let unpacked: Box<dyn Read + '_> = match compression {
+        "" => Box::new(packed),
+        "lz4" => Box::new(FrameDecoder::new(packed)),
+        "zstd" => Box::new(ZstdFrames::new(packed)),
+        other => return Err(damaged(&format!("a chunk is compressed by {other}, which is not known")).into()),
+    };
+    let mut input = Summed { input: unpacked, crc: Crc::new() };
+    let failed = |error: io::Error| Stop::Damage(damaged(&format!("a chunk is damaged: {error}")));
+    let mut record = Vec::new();
+    loop {
+        record.clear();
+        input.by_ref().take(HEADER_BYTES as u64).read_to_end(&mut record).map_err(failed)?;
+        let Some(&header) = record.first_chunk() else { break };
+        let (opcode, length) = type_and_length(header)?;
+        record.clear();
+        input.by_ref().take(length as u64).read_to_end(&mut record).map_err(failed)?;
+        if record.len() < length {
+            return Err(cut_off().into());
+        }
+        each(opcode, &record)?;
     }
-    // An empty name, then the length of the records.
-    let mut rest = data.get(COMPRESSION_AT + 4 + 8..).ok_or_else(cut_off)?;
-    while let Some((header, after)) = rest.split_first_chunk() {
-        let (opcode, length) = type_and_length(*header)?;
-        let (record, after) = after.split_at_checked(length).ok_or_else(cut_off)?;
-        each(opcode, record)?;
-        rest = after;
-    }
-    if rest.is_empty() { Ok(()) } else { Err(cut_off().into()) }
+    // Less than a header may be left of a chunk that is cut off.
+    let is_right = record.is_empty() && (crc == 0 || crc == input.crc.sum());
+    if is_right { Ok(()) } else { Err(damaged("the checksum of a chunk is wrong").into()) }
 }
 
-/// The records of a compressed chunk.
-fn compressed(header: [u8; HEADER_BYTES], data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
-    let options = LinearReaderOptions::default()
-        .with_skip_start_magic(true)
-        .with_skip_end_magic(true)
-        .with_validate_chunk_crcs(true)
-        .with_record_length_limit(MAX_RECORD);
-    let mut reader = LinearReader::new_with_options(options);
-    let mut input = header.as_slice().chain(data);
-    while let Some(event) = reader.next_event() {
-        match event.map_err(|error| damaged(&error.to_string()))? {
-            LinearReadEvent::ReadRequest(bytes) => {
-                let bytes = bytes.min(HEADER_BYTES + data.len());
-                let read = input.read(reader.insert(bytes)).map_err(|error| damaged(&error.to_string()))?;
-                reader.notify_read(read);
-            }
-            LinearReadEvent::Record { data, opcode } => each(opcode, data)?,
-        }
+/// An input, and the checksum of what was read of it.
+struct Summed<'a> {
+    input: Box<dyn Read + 'a>,
+    crc: Crc,
+}
+
+impl Read for Summed<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = self.input.read(buffer)?;
+        self.crc.update(&buffer[..read]);
+        Ok(read)
     }
-    Ok(())
 }
 
 #[cfg(test)]

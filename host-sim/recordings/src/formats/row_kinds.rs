@@ -1,6 +1,8 @@
-//! Rows of several kinds in one text, such as `ACC,…` and `GYR,…` in turn: a field says which kind a row is.
+//! Rows of several kinds in one text, such as `ACC,…` and `GYR,…` in turn: a field says which kind a row is, or the blanks in the others.
 
+use crate::columns::column_selection::AvailableColumn;
 use crate::formats::calendar;
+use crate::formats::fields::number;
 use crate::input::input_error::Reason;
 
 /// Most kinds; names of frames or states may be many.
@@ -25,20 +27,43 @@ const NUMBERED: [&str; 12] = [
 /// Fewest numbers in a row of a sensor.
 const LEAST_NUMBERS: usize = 2;
 
-/// The kinds of rows.
+/// A kind of rows.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct RowKinds {
-    /// Position of the field that says the kind.
-    at: usize,
-    /// The kinds whose rows have numbers, in the order in which they come.
-    names: Vec<String>,
+pub(crate) enum RowKind {
+    /// With this name in the field at `at`.
+    Labelled { at: usize, name: String },
+    /// With numbers in these fields, where the rows of the other kinds have none.
+    Filled { own: Vec<usize>, others: Vec<usize>, name: String },
 }
+
+impl RowKind {
+    fn name(&self) -> &str {
+        match self {
+            Self::Labelled { name, .. } | Self::Filled { name, .. } => name,
+        }
+    }
+
+    /// Whether these are the fields of a row of this kind.
+    pub(crate) fn has(&self, row: &[&str]) -> bool {
+        match self {
+            Self::Labelled { at, name } => row.get(*at) == Some(&name.as_str()),
+            Self::Filled { own, .. } => own.iter().any(|at| row.get(*at).is_some_and(|field| !field.is_empty())),
+        }
+    }
+}
+
+/// The kinds of rows of a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct RowKinds(
+    /// Those whose rows have numbers, in the order in which they come.
+    Vec<RowKind>,
+);
 
 impl RowKinds {
     /// Of the first rows of a file; `None` where all are of one kind.
     pub(crate) fn find(rows: &[Vec<&str>]) -> Option<Self> {
         let width = rows.iter().map(Vec::len).min()?;
-        (0..width).find_map(|at| Self::at(rows, at))
+        (0..width).find_map(|at| Self::of_labels(rows, at, is_label))
     }
 
     /// Of the first rows of a file below a heading, in which a column of whole numbers is called as one that tells devices from each other.
@@ -48,8 +73,43 @@ impl RowKinds {
         Self::of_labels(rows, at, |field| field.parse::<u32>().is_ok())
     }
 
-    fn at(rows: &[Vec<&str>], at: usize) -> Option<Self> {
-        Self::of_labels(rows, at, is_label)
+    /// Of the first rows of a table that was merged of several: each row has the numbers of one of them, and blanks for the others.
+    pub(crate) fn find_by_blanks(rows: &[Vec<&str>], columns: &[AvailableColumn]) -> Option<Self> {
+        let has_number = |row: &[&str], at: usize| {
+            row.get(at).is_some_and(|field| !field.is_empty() && number(field).is_some_and(|it| !it.value().is_nan()))
+        };
+        let is_common = |at: &usize| rows.iter().all(|row| has_number(row, *at));
+        let parted: Vec<usize> = (0..columns.len()).filter(|at| !is_common(at)).collect();
+        let mut parts: Vec<(Vec<usize>, usize)> = Vec::new();
+        for row in rows {
+            let part: Vec<usize> = parted.iter().copied().filter(|at| has_number(row, *at)).collect();
+            match parts.iter_mut().find(|(known, _)| *known == part) {
+                Some((_, count)) => *count += 1,
+                // A row without any number is of no kind.
+                None if part.is_empty() => {}
+                None => parts.push((part, 1)),
+            }
+        }
+        let are_apart = |one: usize, other: usize| !parts[one].0.iter().any(|at| parts[other].0.contains(at));
+        let all_apart = (0..parts.len()).all(|one| (0..one).all(|other| are_apart(one, other)));
+        let is_often = parts.iter().all(|(_, count)| *count >= LEAST_ROWS);
+        if !(2..=MOST_KINDS).contains(&parts.len()) || !all_apart || !is_often {
+            return None;
+        }
+        let group = |part: &[usize]| {
+            let (_, channel) = columns[*part.first()?].prefix_and_channel()?;
+            Some(channel.split('_').next().unwrap_or(channel).to_owned())
+        };
+        let groups: Vec<Option<String>> = parts.iter().map(|(part, _)| group(part)).collect();
+        let is_unique =
+            |name: &Option<String>| name.is_some() && groups.iter().filter(|other| *other == name).count() == 1;
+        let are_unique = groups.iter().all(is_unique);
+        let kind = |(at, (part, _)): (usize, &(Vec<usize>, usize))| RowKind::Filled {
+            own: part.clone(),
+            others: parted.iter().copied().filter(|at| !part.contains(at)).collect(),
+            name: groups[at].clone().filter(|_| are_unique).unwrap_or_else(|| columns[part[0]].name.clone()),
+        };
+        Some(Self(parts.iter().enumerate().map(kind).collect()))
     }
 
     fn of_labels(rows: &[Vec<&str>], at: usize, is_label: impl Fn(&str) -> bool) -> Option<Self> {
@@ -69,20 +129,28 @@ impl RowKinds {
             row.is_some_and(|row| row.iter().filter(|field| field.parse::<f64>().is_ok()).count() >= LEAST_NUMBERS)
         };
         let names = counts.iter().filter(|(name, count)| *count >= LEAST_ROWS && has_numbers(name));
-        let names: Vec<String> = names.map(|(name, _)| (*name).to_owned()).collect();
-        (is_several && !names.is_empty()).then_some(Self { at, names })
+        let kinds: Vec<RowKind> = names.map(|(name, _)| RowKind::Labelled { at, name: (*name).to_owned() }).collect();
+        (is_several && !kinds.is_empty()).then_some(Self(kinds))
     }
 
-    /// The position of the field, and the kind that is read: that which is named, or the only one.
-    pub(crate) fn choose(&self, wanted: Option<&str>) -> Result<(usize, String), Reason> {
-        let all = || self.names.join(", ");
-        let name = match (wanted, self.names.as_slice()) {
-            (Some(wanted), names) => names.iter().find(|name| *name == wanted),
-            (None, [name]) => Some(name),
+    /// The kind whose rows have numbers in all of these fields.
+    pub(crate) fn filled_at(&self, positions: &[usize]) -> Option<&RowKind> {
+        self.0.iter().find(|kind| match kind {
+            RowKind::Filled { own, .. } => !positions.is_empty() && positions.iter().all(|at| own.contains(at)),
+            RowKind::Labelled { .. } => false,
+        })
+    }
+
+    /// The kind that is read: that which is named, or the only one.
+    pub(crate) fn choose(&self, wanted: Option<&str>) -> Result<RowKind, Reason> {
+        let all = || self.0.iter().map(RowKind::name).collect::<Vec<_>>().join(", ");
+        let kind = match (wanted, self.0.as_slice()) {
+            (Some(wanted), kinds) => kinds.iter().find(|kind| kind.name() == wanted),
+            (None, [kind]) => Some(kind),
             (None, _) => return Err(Reason::SeveralTopics(all())),
         };
         let unknown = || Reason::UnknownTopic(Box::new((wanted.unwrap_or_default().to_owned(), all())));
-        Ok((self.at, name.ok_or_else(unknown)?.clone()))
+        kind.cloned().ok_or_else(unknown)
     }
 }
 
@@ -97,9 +165,13 @@ fn is_label(field: &str) -> bool {
 mod tests {
     use super::RowKinds;
 
+    fn names(kinds: RowKinds) -> Vec<String> {
+        kinds.0.iter().map(|kind| kind.name().to_owned()).collect()
+    }
+
     fn kinds(rows: &[&str]) -> Option<Vec<String>> {
         let rows: Vec<Vec<&str>> = rows.iter().map(|row| row.split(',').collect()).collect();
-        RowKinds::find(&rows).map(|kinds| kinds.names)
+        RowKinds::find(&rows).map(names)
     }
 
     #[test]
@@ -116,7 +188,7 @@ mod tests {
     fn a_number_that_is_called_an_id_tells_devices() {
         let rows: Vec<Vec<&str>> =
             ["1,0,5", "2,3,6", "1,10,7", "2,13,8"].iter().map(|row| row.split(',').collect()).collect();
-        let found = |heading: &[&str]| RowKinds::find_by_number(&rows, heading).map(|kinds| kinds.names);
+        let found = |heading: &[&str]| RowKinds::find_by_number(&rows, heading).map(names);
         assert_eq!(found(&["id", "t_ms", "gx"]), Some(vec!["1".to_owned(), "2".to_owned()]));
         assert_eq!(found(&["accuracy", "t_ms", "gx"]), None);
     }

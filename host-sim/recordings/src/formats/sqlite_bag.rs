@@ -7,15 +7,13 @@ use crate::formats::ros_message::{self, RosRows};
 use crate::formats::topics::{EachRow, Ending, Source, Topic};
 use crate::input::budget::{Budget, Metered};
 use crate::input::input_error::{InputError, Reason};
+use crate::input::zstd_frames::{ZSTD_MAGIC, ZstdFrames};
 use rusqlite::{Connection, OpenFlags};
 use std::collections::HashMap;
 use std::io::{self, Read};
 use std::path::Path;
 
 const FORMAT: &str = "ROS 2 SQLite bag";
-
-/// First bytes of what Zstandard has compressed (RFC 8878, 3.1.1).
-pub(crate) const ZSTD_MAGIC: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
 
 /// Instructions of the database between two looks at the clock.
 const INSTRUCTIONS: i32 = 100_000;
@@ -128,8 +126,7 @@ impl Source for SqliteSource<'_> {
                     }
                     // `ros2 bag record --compression-mode message`.
                     let mut expanded = Vec::new();
-                    let read = zstd::Decoder::with_buffer(data)
-                        .and_then(|input| Metered::new(input, &mut meter).read_to_end(&mut expanded));
+                    let read = Metered::new(ZstdFrames::new(data), &mut meter).read_to_end(&mut expanded);
                     match read {
                         Ok(_) => each(rows.row(&expanded, recorded_ns))?,
                         Err(error) => break Some(damaged_message(error)),

@@ -29,6 +29,7 @@ pub(crate) struct Budget {
     values: u64,
     time: Duration,
     /// `None` without a limit.
+    #[cfg_attr(not(feature = "sqlite"), expect(dead_code, reason = "a query alone may never end"))]
     end: Option<Instant>,
 }
 
@@ -73,6 +74,7 @@ impl Budget {
     }
 
     /// Refuses to go on with a query after the time has passed.
+    #[cfg(any(feature = "sqlite", test))]
     pub(crate) fn check_time(self) -> Result<(), Reason> {
         let is_late = self.end.is_some_and(|end| Instant::now() > end);
         if is_late { Err(Reason::TooSlow { seconds: self.time.as_secs() }) } else { Ok(()) }

@@ -8,6 +8,7 @@ use crate::input::gzip_members::{GZIP_MAGIC, GzipMembers};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_ahead::ReadAhead;
 use crate::input::read_monitor::{Counted, ReadMonitor};
+use encoding_rs_io::DecodeReaderBytes;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
@@ -57,6 +58,7 @@ impl Lines {
             return Err(fail(Reason::Empty));
         }
         let compressed = start == GZIP_MAGIC;
+        let is_utf16 = is_utf16(&start);
         monitor.begin();
         let counted = Counted::new(Cursor::new(start).chain(raw), monitor);
         let whole = BufReader::with_capacity(BUFFER_BYTES, counted);
@@ -64,6 +66,9 @@ impl Lines {
             let budget = Budget::of_file(file).map_err(|e| fail(Reason::Io(e)))?;
             let members = Metered::new(GzipMembers::new(whole), budget.meter());
             Box::new(ReadAhead::new(members).map_err(|e| fail(Reason::Io(e)))?)
+        } else if is_utf16 {
+            // As programs for Windows write it.
+            Box::new(DecodeReaderBytes::new(whole))
         } else {
             Box::new(whole)
         };
@@ -144,6 +149,11 @@ impl Lines {
         self.again = found;
         Ok(found.then_some(if self.is_latin { self.latin.as_str() } else { text(&self.bytes).unwrap_or_default() }))
     }
+}
+
+/// Whether a file begins as text in UTF-16, in either order of the bytes.
+pub(crate) fn is_utf16(start: &[u8]) -> bool {
+    start.starts_with(b"\xFF\xFE") || start.starts_with(b"\xFE\xFF")
 }
 
 impl Drop for Lines {

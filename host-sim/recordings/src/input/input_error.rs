@@ -74,6 +74,9 @@ pub enum Reason {
         /// Time for a file of this size, s.
         seconds: u64,
     },
+    /// A format whose reader this program was built without.
+    #[error("{0}, which this program was built without; build it with the features hdf5 and sqlite")]
+    NotBuilt(&'static str),
     /// A binary format that is known and not read.
     #[error("{what}, which is not read; {how}")]
     Foreign {
@@ -234,12 +237,6 @@ pub enum Reason {
     /// Several topics of which the user names none.
     #[error("several topics: choose one with --topic: {0}")]
     SeveralTopics(String),
-    /// Rows of two sensors in one table: the columns of each.
-    #[error(
-        "some rows have {} and the others {}, as of two sensors; read one of them with --columns, as in --columns gyro_x=NAME",
-        .0.0, .0.1
-    )]
-    SeveralOrigins(Box<(String, String)>),
     /// Arrays that cannot be columns of one table: what each has.
     #[error("{0}; columns of one table have as many rows")]
     UnequalRows(String),

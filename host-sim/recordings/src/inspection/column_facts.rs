@@ -11,12 +11,20 @@ const MOST_BACKWARDS: f64 = 0.01;
 /// How many times as fast a clock may be in one half of a recording as in the other: gaps are in one of them.
 const MOST_UNEVEN: f64 = 8.0;
 
+/// Rows of a block, in which a sensor is at rest or is not; of short tables fewer.
+const BLOCK: usize = 128;
+const LEAST_BLOCKS: usize = 8;
+/// Least part of the rows in which a counter grows by one.
+const COUNTS_BY_ONE: f64 = 0.9;
+
 /// A column and what its numbers show.
 pub(crate) struct ColumnFacts<'a> {
     pub(crate) column: &'a AvailableColumn,
     pub(crate) values: &'a [f64],
     /// Of the finite values.
     pub(crate) mean: f64,
+    /// The means of blocks of rows.
+    pub(crate) blocks: Vec<f64>,
     /// Standard deviation of the noise, by the differences of neighbours.
     pub(crate) noise: f64,
     pub(crate) step: Option<f64>,
@@ -36,14 +44,20 @@ impl RowTimes {
     }
 }
 
+/// The mean of the finite values.
+fn mean(values: &[f64]) -> f64 {
+    let finite = || values.iter().filter(|value| value.is_finite());
+    finite().sum::<f64>() / finite().count() as f64
+}
+
 impl<'a> ColumnFacts<'a> {
     pub(crate) fn new(of: &'a WholeColumn) -> Self {
         let WholeColumn { column, values } = of;
-        let finite = || values.iter().copied().filter(|value| value.is_finite());
         Self {
             column,
             values,
-            mean: finite().sum::<f64>() / finite().count() as f64,
+            mean: mean(values),
+            blocks: values.chunks((values.len() / LEAST_BLOCKS).clamp(1, BLOCK)).map(mean).collect(),
             noise: difference_noise(values),
             step: step(values).map(|(step, _)| step),
         }
@@ -54,10 +68,12 @@ impl<'a> ColumnFacts<'a> {
         self.noise > 0.0 && self.values.iter().all(|value| value.is_nan() || value.fract() == 0.0)
     }
 
-    /// Whether the values are a running number: each is larger than the one before by one.
+    /// Whether the values are a running number: whole, and nearly each is larger than the one before by one.
     pub(crate) fn is_counter(&self) -> bool {
-        let is_next = |pair: &[f64]| pair[1] - pair[0] == 1.0;
-        self.values.len() > 2 && self.values.windows(2).all(is_next)
+        let by_one = self.values.windows(2).filter(|pair| pair[1] - pair[0] == 1.0).count();
+        let is_most = by_one as f64 >= COUNTS_BY_ONE * (self.values.len().max(1) - 1) as f64;
+        let is_growing = self.values.windows(2).all(|pair| pair[1] > pair[0]);
+        self.values.len() > 2 && is_most && is_growing && self.values.iter().all(|value| value.fract() == 0.0)
     }
 
     /// Whether the values may be times: they grow evenly, and hardly one is smaller than the one before.

@@ -8,6 +8,7 @@ use crate::inspection::time_unit::time_unit;
 use crate::inspection::unit_guess::{self, UnitGuess};
 use crate::rows::batch::usual_unit;
 use crate::rows::whole_table::{WholeSensor, WholeTable};
+use crate::time_base::TimeRange;
 use measurement::SensorProfile;
 use std::collections::BTreeMap;
 
@@ -31,6 +32,8 @@ pub struct Proposal {
     pub columns: Vec<String>,
     /// `--units`; empty where the file tells them.
     pub units: Vec<String>,
+    /// `--from` and `--to`: the part at rest, where the sensor was moved before or after it.
+    pub part: Option<TimeRange>,
     /// Whether `--rate` is needed.
     pub lacks_rate: bool,
     /// Whether the sensor is found without its topic, if it is the only one.
@@ -86,7 +89,13 @@ pub(crate) struct SensorGuess {
     force: Option<UnitGuess>,
     rate: Option<UnitGuess>,
     time: Option<(Unit, String)>,
+    /// Whether a temperature without a unit is taken to be in °C.
+    is_celsius: bool,
 }
+
+/// The unit that a temperature without one is taken to have, and the temperatures of sensors.
+const CELSIUS: &str = "degC";
+const TEMPERATURES: std::ops::RangeInclusive<f64> = -40.0..=125.0;
 
 impl SensorGuess {
     /// The sensors of a table; none where no column is one of a gyroscope or an accelerometer.
@@ -106,7 +115,7 @@ impl SensorGuess {
             found = if by_format.is_empty() || is_more { by_names } else { by_format };
         }
         if found.is_empty() {
-            found = Self::by_numbers(facts).into_iter().collect();
+            found = Self::by_numbers(facts, &table.name).into_iter().collect();
         } else if table.rate_hz.is_none() {
             found.iter_mut().for_each(|sensor| sensor.add_clock(facts));
         }
@@ -114,7 +123,7 @@ impl SensorGuess {
     }
 
     fn new(name: &str, evidence: Evidence, columns: Columns) -> Self {
-        Self { name: name.to_owned(), evidence, columns, force: None, rate: None, time: None }
+        Self { name: name.to_owned(), evidence, columns, force: None, rate: None, time: None, is_celsius: false }
     }
 
     /// What the user says, and the time, which is seldom named.
@@ -185,9 +194,9 @@ impl SensorGuess {
         }
     }
 
-    /// By the numbers: a column that grows is the time, three neighbours whose mean is gravity are the accelerometer, and of the others
-    /// those three whose mean is smallest against their noise are the gyroscope.
-    fn by_numbers(facts: &[ColumnFacts]) -> Option<Self> {
+    /// By the numbers: a column that grows is the time, three neighbours that are as long as gravity are the accelerometer, and of the others
+    /// those three whose mean is smallest against their noise are the gyroscope. Rows that are called as one of these have no other.
+    fn by_numbers(facts: &[ColumnFacts], topic: &str) -> Option<Self> {
         let mut columns: Columns = Vec::new();
         let unit = |at: usize| facts[at].column.unit;
         let clock = Self::clock(facts);
@@ -201,13 +210,20 @@ impl SensorGuess {
             may_be && clock != Some(at) && counter != Some(at)
         };
         let Triples { force, others } = Triples::find(facts, is_free);
+        let first = force.into_iter().chain(others.iter().copied()).min();
+        let (force, others) = match RowLabel::of(topic) {
+            Some(RowLabel::Force) => (force.or(first), Vec::new()),
+            Some(RowLabel::Rate) => (None, first.into_iter().collect()),
+            Some(RowLabel::Other) => (None, Vec::new()),
+            None => (force, others),
+        };
         let against_noise = |at: usize| {
             let axes = &facts[at..at + 3];
             let norm = axes.iter().map(|axis| axis.mean * axis.mean).sum::<f64>().sqrt();
             norm / axes.iter().map(|axis| axis.noise).fold(0.0, f64::max)
         };
         let rate = others.into_iter().min_by(|one, other| against_noise(*one).total_cmp(&against_noise(*other)));
-        let reason = "the mean of the three is not gravity";
+        let reason = "the three are not gravity";
         for (channels, first, reason) in [(GYROSCOPE, rate, reason), (ACCELEROMETER, force, "")] {
             let Some(first) = first else { continue };
             // The names may say the order of the axes.
@@ -250,7 +266,7 @@ impl SensorGuess {
         let (force, rate) = (of(ACCELEROMETER), of(GYROSCOPE));
         let force_guess = unit_guess::force_unit(&force).filter(|_| lacks_unit(ACCELEROMETER));
         let force_guess = force_guess.or_else(|| {
-            let reason = "the mean of the accelerometer is not gravity in any unit; m/s^2 is taken".to_owned();
+            let reason = "the accelerometer does not show gravity in any unit; m/s^2 is taken".to_owned();
             lacks_unit(ACCELEROMETER).then_some(UnitGuess { unit: "m/s^2", reason, is_safe: false })
         });
         let own_force = self.columns.iter().find(|(channel, ..)| ACCELEROMETER.contains(channel));
@@ -265,7 +281,10 @@ impl SensorGuess {
             let is_missing = !unit.is_some_and(|unit| unit.is_time()) && usual_unit(&since, origin).is_none();
             time_unit(values).filter(|_| is_missing)
         });
-        Self { force: force_guess, rate: rate_guess, time: time_guess, ..self }
+        let is_celsius = self.columns.iter().any(|(channel, at, unit, _)| {
+            *channel == "temp" && unit.is_none() && TEMPERATURES.contains(&facts[*at].mean)
+        });
+        Self { force: force_guess, rate: rate_guess, time: time_guess, is_celsius, ..self }
     }
 
     /// Whether it has a channel of an inertial sensor, or of a magnetometer.
@@ -307,6 +326,7 @@ impl SensorGuess {
         let (guessed, reason) = match (self.unit_guess(channel).flatten(), &self.time) {
             (Some(UnitGuess { unit: guessed, reason, .. }), _) if unit.is_none() => (Some(*guessed), reason.clone()),
             (_, Some((guessed, reason))) if channel == "time" => (Some(guessed.name), reason.clone()),
+            _ if channel == "temp" && self.is_celsius => (Some(CELSIUS), "a temperature of a sensor".to_owned()),
             _ => (None, String::new()),
         };
         let reason = [why, reason.as_str()].into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join("; ");
@@ -315,13 +335,15 @@ impl SensorGuess {
 
     /// The options with which this sensor of `table` is analysed.
     pub(crate) fn proposal(&self, table: &WholeTable, facts: &[ColumnFacts], has_rate: bool) -> Proposal {
-        let is_needed = |channel: &str| {
-            GYROSCOPE.contains(&channel) || ACCELEROMETER.contains(&channel) || matches!(channel, "time" | "sample")
+        let is_needed = |(channel, _, unit, _): &(&str, usize, Option<Unit>, &str)| {
+            let is_axis = GYROSCOPE.contains(channel) || ACCELEROMETER.contains(channel);
+            let is_known = unit.is_some() || *channel == "temp" && self.is_celsius;
+            is_axis || matches!(*channel, "time" | "sample") || is_known
         };
         let mut proposal = Proposal { lacks_rate: !has_rate, ..Proposal::default() };
         let is_part = table.is_of_arrays && self.evidence == Evidence::Names;
         if matches!(self.evidence, Evidence::Prefix | Evidence::Numbers) || is_part {
-            let assigned = self.columns.iter().filter(|(channel, ..)| is_needed(channel));
+            let assigned = self.columns.iter().filter(|column| is_needed(column));
             let assignment =
                 |(channel, at, ..): &(&str, usize, Option<Unit>, &str)| format!("{channel}={}", facts[*at].column.name);
             proposal.columns = assigned.map(assignment).collect();
@@ -333,14 +355,40 @@ impl SensorGuess {
         proposal.is_guessed = has_guess || self.evidence == Evidence::Numbers;
         proposal.units.extend(self.time.as_ref().map(|(unit, _)| unit.name.to_owned()));
         let lacks_force = self.position(ACCELEROMETER[0]).is_none();
-        if self.evidence == Evidence::Numbers && lacks_force && self.rate.as_ref().is_none_or(|rate| rate.is_safe) {
+        let is_told = matches!(RowLabel::of(&table.name), Some(RowLabel::Rate));
+        if self.evidence == Evidence::Numbers
+            && lacks_force
+            && !is_told
+            && self.rate.as_ref().is_none_or(|rate| rate.is_safe)
+        {
             proposal.doubts.push("nothing but their place says that the three columns are rates".to_owned());
         }
+        proposal.units.extend(self.is_celsius.then(|| CELSIUS.to_owned()));
         for guess in self.rate.iter().chain(&self.force) {
             proposal.units.push(guess.unit.to_owned());
             proposal.doubts.extend(Some(guess.reason.clone()).filter(|_| !guess.is_safe));
         }
         proposal
+    }
+}
+
+/// What the name of a kind of rows says of their numbers.
+enum RowLabel {
+    Force,
+    Rate,
+    Other,
+}
+
+impl RowLabel {
+    fn of(topic: &str) -> Option<Self> {
+        let plain = topic.to_lowercase();
+        let begins = |names: &[&str]| names.iter().any(|name| plain.starts_with(name));
+        match () {
+            () if begins(&["acc", "lin_acc", "linacc"]) => Some(Self::Force),
+            () if begins(&["gyr", "ang", "rate", "rot"]) => Some(Self::Rate),
+            () if begins(&["mag", "gps", "gnss", "baro", "pres", "temp", "light", "ori", "ahrs"]) => Some(Self::Other),
+            () => None,
+        }
     }
 }
 
@@ -377,12 +425,14 @@ fn may_be_inertial(column: &AvailableColumn) -> bool {
     unit && !OTHER_NAMES.iter().any(|other| name.contains(other))
 }
 
+/// Least length of threes that may be the accelerometer, in that of the longest.
+const LONGEST: f64 = 0.9;
 /// Largest ratio of the noises of three axes of one sensor.
 const MOST_UNLIKE: f64 = 10.0;
 
 /// First positions of threes of neighbours that may be the axes of a sensor.
 struct Triples {
-    /// Those whose mean is gravity.
+    /// Those that are as long as gravity.
     force: Option<usize>,
     others: Vec<usize>,
 }
@@ -406,11 +456,23 @@ impl Triples {
                 .collect::<Vec<_>>()
         };
         let axes = |at: usize| [&facts[at], &facts[at + 1], &facts[at + 2]];
-        let norm = |at: usize| axes(at).iter().map(|axis| axis.mean * axis.mean).sum::<f64>().sqrt();
+        let length = |at: usize| unit_guess::usual_length(&axes(at));
         let is_gravity = |at: &usize| unit_guess::force_unit(&axes(*at)).is_some();
-        // The largest of several: a mean of 9.8 is no bias, one of 1 may be.
-        let gravity = runs.iter().flat_map(all).filter(is_gravity);
-        let force = gravity.max_by(|one, other| norm(*one).total_cmp(&norm(*other)));
+        let gravity: Vec<usize> = runs.iter().flat_map(all).filter(is_gravity).collect();
+        // The longest of several: 9.8 is no bias, 1 may be.
+        let longest = gravity.iter().map(|at| length(*at)).fold(0.0, f64::max);
+        // Of those that share a column the one that leaves the most threes of axes beside it, and those the most alike.
+        let division = |at: usize| {
+            let run = runs.iter().find(|run| run.contains(&at)).cloned().unwrap_or_default();
+            let threes: Vec<usize> =
+                (run.start..(run.end + 1).saturating_sub(3)).filter(|other| other.abs_diff(at) % 3 == 0).collect();
+            let unlike: f64 = threes.iter().map(|at| unlike(*at).ln()).sum();
+            (threes.len(), unlike / threes.len().max(1) as f64)
+        };
+        let force = gravity.into_iter().filter(|at| length(*at) > LONGEST * longest).min_by(|one, other| {
+            let (one, other) = (division(*one), division(*other));
+            other.0.cmp(&one.0).then(one.1.total_cmp(&other.1))
+        });
         let mut others = Vec::new();
         for run in runs {
             let parts = match force.filter(|at| run.contains(at)) {

@@ -1,6 +1,7 @@
 //! Units that a file does not say, by the numbers: gravity and the sensitivities of common gyroscopes.
 
 use crate::inspection::column_facts::ColumnFacts;
+use crate::time_base::lateness_track::quantile;
 use std::f64::consts::PI;
 
 /// Largest relative difference of the mean specific force from gravity: the bias and the scale error of a cheap sensor.
@@ -40,21 +41,24 @@ pub(crate) struct UnitGuess {
     pub(crate) is_safe: bool,
 }
 
-/// The norm of the mean of some axes.
-fn mean_norm(axes: &[&ColumnFacts]) -> f64 {
-    axes.iter().map(|axis| axis.mean * axis.mean).sum::<f64>().sqrt()
+/// The usual length of the vector of some axes: of the means of blocks, so that the sensor may be turned between rests.
+pub(crate) fn usual_length(axes: &[&ColumnFacts]) -> f64 {
+    let blocks = axes.iter().map(|axis| axis.blocks.len()).min().unwrap_or(0);
+    let length = |block: usize| axes.iter().map(|axis| axis.blocks[block].powi(2)).sum::<f64>().sqrt();
+    let mut lengths: Vec<f64> = (0..blocks).map(length).filter(|length| length.is_finite()).collect();
+    quantile(&mut lengths, 1, 2)
 }
 
-/// The unit of specific forces in which the mean of three axes is gravity.
+/// The unit of specific forces in which the length of three axes is gravity.
 pub(crate) fn force_unit(axes: &[&ColumnFacts]) -> Option<UnitGuess> {
-    let norm = mean_norm(axes);
+    let length = usual_length(axes);
     let are_whole = axes.iter().all(|axis| axis.is_whole());
     let known = GRAVITY.iter().chain(GRAVITY_IN_COUNTS.iter().filter(|_| are_whole));
     let (_, unit) =
-        known.filter(|_| axes.len() == 3).find(|(size, _)| (norm / size - 1.0).abs() < GRAVITY_TOLERANCE)?;
+        known.filter(|_| axes.len() == 3).find(|(size, _)| (length / size - 1.0).abs() < GRAVITY_TOLERANCE)?;
     Some(UnitGuess {
         unit,
-        reason: format!("the mean of the three is {norm:.4}, which is gravity in {unit}"),
+        reason: format!("the three are {length:.4} long together, which is gravity in {unit}"),
         is_safe: true,
     })
 }

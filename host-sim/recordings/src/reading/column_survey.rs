@@ -58,15 +58,23 @@ pub(crate) struct ColumnSurvey {
     /// Numbers seen, and how many runs there are for one that is kept.
     seen: usize,
     stride: usize,
-    /// Whether a number can be used.
+    /// Whether a number can be used, and whether one is not zero.
     is_usable: bool,
+    has_other_than_zero: bool,
     /// Numbers that are refused, by cause.
     pub(crate) refused: BTreeMap<&'static str, u64>,
 }
 
 impl ColumnSurvey {
     pub(crate) fn new() -> Self {
-        Self { values: Vec::new(), seen: 0, stride: 1, is_usable: false, refused: BTreeMap::new() }
+        Self {
+            values: Vec::new(),
+            seen: 0,
+            stride: 1,
+            is_usable: false,
+            has_other_than_zero: false,
+            refused: BTreeMap::new(),
+        }
     }
 
     /// Adds the numbers of rows that arrived, and makes those that are refused NaN.
@@ -83,6 +91,7 @@ impl ColumnSurvey {
             };
             *own = value;
             self.is_usable |= refused.is_none();
+            self.has_other_than_zero |= value != 0.0 && !value.is_nan();
             if self.is_kept() {
                 if self.values.len() == MOST_KEPT {
                     self.thin();
@@ -94,6 +103,11 @@ impl ColumnSurvey {
             }
             self.seen += 1;
         }
+    }
+
+    /// Whether all numbers that can be used are zero.
+    pub(crate) fn is_zero(&self) -> bool {
+        self.is_usable && !self.has_other_than_zero
     }
 
     /// Whether the next number is in a run that is kept. The stride is a power of two.

@@ -4,14 +4,15 @@
 //! longer one is read once more for its samples. Both go the same way, so that memory does not depend on the length of a recording, and
 //! nothing else does either.
 
-use crate::formats::file_format::{FileFormat, InputFile};
+use crate::columns::axes::{ACCELEROMETER, GYROSCOPE, MAGNETOMETER};
+use crate::formats::file_format::InputFile;
 use crate::input::input_error::InputError;
 use crate::input::read_monitor::{ReadMonitor, ReadPass};
 use crate::reading::column_survey::{ColumnSurvey, refusal, rounding_note};
 use crate::reading::full_scale::FullScale;
-use crate::reading::padding::{PaddingFinder, Unpadded};
 use crate::rows::any_sensor::ReadOptions;
 use crate::rows::batch::{Batch, RowBefore, ValueColumn, Verdict};
+use crate::rows::padding::{PaddingFinder, Unpadded};
 use crate::rows::quantizer::Quantizer;
 use crate::rows::recording::Recording;
 use crate::rows::row_source::{BATCH, BatchSource, RecordedRows, WantedRows};
@@ -35,7 +36,7 @@ pub use crate::time_base::time_base_error::StreamError;
 const BEGINNING: u64 = 1 << 16;
 /// Rows that are kept of a longer recording, to begin with.
 const ROWS_OF_BEGINNING: usize = 1 << 16;
-/// Numbers that are kept of a file that is slow to be read again: 64 MiB.
+/// Numbers that are kept, so that the file is not read again: 64 MiB.
 const MOST_KEPT_VALUES: u64 = 1 << 23;
 
 /// Fewest channels whose equal rows may be one sample that was read twice; fewer are equal by chance.
@@ -123,14 +124,6 @@ impl Origin<'_> {
         match self {
             Self::File { input, options, range } => input.batches(options, *range),
             Self::Recording(recording) => Ok(BatchSource::Recording(RecordedRows::new(recording))),
-        }
-    }
-
-    /// Whether reading the rows once more costs little beside what is done with them.
-    fn is_quick_to_read(&self) -> bool {
-        match self {
-            Self::File { input, .. } => input.format().is_text() || input.format() == FileFormat::Npy,
-            Self::Recording(_) => true,
         }
     }
 
@@ -498,7 +491,7 @@ impl Survey {
         let mut placer = Placer::new(Clock::new(stated_hz)?, columns.len());
         let mut surveys = vec![ColumnSurvey::new(); columns.len()];
         let mut full_scale = FullScale::new(&columns);
-        let mut kept = Kept::new(reading.kept, columns.len() as u64, origin.is_quick_to_read());
+        let mut kept = Kept::new(reading.kept, columns.len() as u64);
         let mut rows_before = 0u64;
         // The numbers of a batch, NaN where they are refused.
         let mut usable: Vec<Vec<f64>> = Vec::new();
@@ -524,8 +517,11 @@ impl Survey {
         })?;
         placer.place(None)?;
         let Placer { totals, clock, has_index, .. } = placer;
-        let quantizers: Vec<Option<Quantizer>> =
-            surveys.iter().zip(&columns).map(|(survey, column)| survey.quantizer(column)).collect();
+        let unfilled = never_filled(&columns, &surveys);
+        let quantizer = |(at, (survey, column)): (usize, (&ColumnSurvey, &ValueColumn))| {
+            survey.quantizer(column).filter(|_| !unfilled.contains(&at))
+        };
+        let quantizers: Vec<Option<Quantizer>> = surveys.iter().zip(&columns).enumerate().map(quantizer).collect();
         let (full_scale, full_scale_notes) = full_scale.finish(&columns, &quantizers);
         let mut dropped = totals.dropped(has_index);
         if quantizers.iter().all(Option::is_none) {
@@ -598,10 +594,14 @@ impl Survey {
     /// Sentences on the rows, the columns and the clock.
     fn notes(&self) -> Vec<String> {
         let mut notes = self.read.notes.clone();
-        notes.extend(self.read.damage.clone());
         notes.extend(self.full_scale_notes.iter().cloned());
-        for StreamedColumn { column, .. } in self.columns.iter().filter(|of| of.quantizer.is_none()) {
-            notes.push(format!("{} ({}) has no usable value and is left out", column.profile.name, column.label));
+        for StreamedColumn { column, survey, .. } in self.columns.iter().filter(|of| of.quantizer.is_none()) {
+            let what = if survey.is_zero() {
+                "is never filled: it is zero in every row, as its other axes are"
+            } else {
+                "has no usable value"
+            };
+            notes.push(format!("{} ({}) {what}, and is left out", column.profile.name, column.label));
         }
         let rounded = self.columns.iter().filter_map(|of| Some((&of.column.profile, of.quantizer.as_ref()?)));
         notes.extend(rounding_note(rounded));
@@ -652,6 +652,17 @@ impl Survey {
         measurement.times_s = measurement.times_s.filter(|times| times.len() == samples && samples > 0);
         Ok(if before == u64::MAX { measurement } else { measurement.before(before) })
     }
+}
+
+/// The columns of vectors that are zero in every row, beside others that are not: messages have fields that a program never fills.
+fn never_filled(columns: &[ValueColumn], surveys: &[ColumnSurvey]) -> Vec<usize> {
+    let of_group = |group: &[&str; 3]| -> Vec<usize> {
+        let is_own = |at: &usize| group.contains(&columns[*at].profile.name) && columns[*at].register.is_none();
+        let own: Vec<usize> = (0..columns.len()).filter(is_own).collect();
+        if own.len() == group.len() && own.iter().all(|at| surveys[*at].is_zero()) { own } else { Vec::new() }
+    };
+    let unfilled: Vec<usize> = [GYROSCOPE, ACCELEROMETER, MAGNETOMETER].iter().flat_map(of_group).collect();
+    if unfilled.len() < columns.len() { unfilled } else { Vec::new() }
 }
 
 /// Adds the samples of a block at `times_s`.
@@ -709,23 +720,21 @@ impl StreamedColumn {
 struct Kept {
     limit: KeptInMemory,
     columns: u64,
-    is_quick: bool,
     batches: VecDeque<Batch>,
     rows: u64,
     has_all_rows: bool,
 }
 
 impl Kept {
-    fn new(limit: KeptInMemory, columns: u64, is_quick: bool) -> Self {
-        Self { limit, columns, is_quick, batches: VecDeque::new(), rows: 0, has_all_rows: true }
+    fn new(limit: KeptInMemory, columns: u64) -> Self {
+        Self { limit, columns, batches: VecDeque::new(), rows: 0, has_all_rows: true }
     }
 
     /// Keeps a batch; true if from now on not all rows are kept.
     fn add(&mut self, batch: &Batch) -> bool {
         let had_all_rows = self.has_all_rows;
         self.rows += batch.rows as u64;
-        let most_of_slow = if self.is_quick { 0 } else { MOST_KEPT_VALUES / self.columns.max(1) };
-        let most = self.limit.rows_with_losses.max(self.limit.rows).max(most_of_slow);
+        let most = self.limit.rows_with_losses.max(self.limit.rows).max(MOST_KEPT_VALUES / self.columns.max(1));
         if self.has_all_rows && self.rows > most {
             self.has_all_rows = false;
             let mut rows = 0;

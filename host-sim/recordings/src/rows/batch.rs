@@ -315,6 +315,14 @@ impl BatchBuilder {
                 self.order.forget_last();
                 self.add(Some(time), index, values);
             }
+            Order::AfterSet(time, by) => {
+                self.leave_out_back();
+                if let Some(last) = self.batch.times.last_mut() {
+                    *last -= by;
+                }
+                self.add(Some(time), index, values);
+                self.check_first();
+            }
             Order::Back(time) => {
                 if self.back.last().is_some_and(|before| time < before.time) {
                     self.leave_out_back();

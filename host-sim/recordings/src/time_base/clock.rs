@@ -4,8 +4,10 @@
 //! are placed when all of them are known. A recording that ends within the first rows is placed with all of them known.
 //! A recording can be read again: its rows then have the same places.
 
+use crate::time_base::aligned_stamps::AlignedStamps;
+use crate::time_base::irregular_stamps::of_few_digits;
 use crate::time_base::lateness_track::COARSE;
-use crate::time_base::stamp_alignment::{StampAlignment, uncertain};
+use crate::time_base::stamp_alignment::uncertain;
 use crate::time_base::stamp_quality::StampQuality;
 use crate::time_base::stream_clock::{Placed, Stamp, StreamClock};
 use crate::time_base::time_base_error::{MIN_SAMPLES, TimeBaseError};
@@ -320,15 +322,19 @@ fn begin(rows: &[RowStamp], stated_hz: Option<f64>, is_all: bool) -> Result<Stat
         let clock = StreamClock::new(true, Some(&quality))?;
         return Ok(stream(clock, Some(quality.clone()), Some(quality).filter(|_| is_all)));
     }
-    let places = align(&times, repeated, stated_hz)?;
+    let coarse = State::Coarse(Coarse { repeats, times_s: Vec::new(), repeated: Vec::new() });
+    let places = match align(&times, repeated, stated_hz) {
+        // More rows may tell it.
+        Err(TimeBaseError::NoPeriod) if !is_all => return Ok(coarse),
+        places => places?,
+    };
     if is_all {
         return Ok(State::Known(Known { places: Arc::new(places), next_row: 0, next_arrived: 0 }));
     }
     match StreamClock::new(false, Some(&places.stamps)) {
         Ok(clock) => Ok(stream(clock, Some(places.stamps), None)),
-        Err(TimeBaseError::Irregular(_)) => {
-            Ok(State::Coarse(Coarse { repeats, times_s: Vec::new(), repeated: Vec::new() }))
-        }
+        _ if of_few_digits(&times).is_some() => Ok(coarse),
+        Err(TimeBaseError::Irregular(_)) => Ok(coarse),
         Err(error) => Err(error),
     }
 }
@@ -415,20 +421,30 @@ fn align(times: &[f64], mut repeated: Vec<usize>, stated_hz: Option<f64>) -> Res
     let times_at = |positions: &[usize]| -> Vec<f64> { positions.iter().map(|&at| times[at]).collect() };
     let mut positions = arrived(&repeated);
     let mut arrived_s = times_at(&positions);
-    let mut alignment = StampAlignment::new(&arrived_s, stated_hz).ok_or(TimeBaseError::NoPeriod)?;
+    let mut alignment = AlignedStamps::new(&arrived_s, stated_hz).ok_or(TimeBaseError::NoPeriod)?;
     // Coarse stamps do not tell a sample that was read twice from one that equals the one before by chance; the number of samples does.
     if alignment.width >= COARSE && take_back(&mut repeated, &positions, &alignment) {
         positions = arrived(&repeated);
         arrived_s = times_at(&positions);
-        alignment = StampAlignment::new(&arrived_s, stated_hz).ok_or(TimeBaseError::NoPeriod)?;
+        alignment = AlignedStamps::new(&arrived_s, stated_hz).ok_or(TimeBaseError::NoPeriod)?;
     }
     match stated_hz {
         Some(stated_hz) => contradiction(&arrived_s, &alignment, stated_hz)?,
         None if alignment.rate.is_none() => return Err(TimeBaseError::NoPeriod),
         None => {}
     }
-    let StampAlignment { periods, late, mut losses, rate, tick_s, width, resolved, least_loss, is_rate_changing } =
-        alignment;
+    let AlignedStamps {
+        periods,
+        late,
+        mut losses,
+        rate,
+        tick_s,
+        width,
+        resolved,
+        least_loss,
+        is_rate_changing,
+        is_of_loop,
+    } = alignment;
     losses.iter_mut().for_each(|loss| loss.before = positions[loss.before]);
     let stamps = StampQuality {
         rate,
@@ -439,6 +455,7 @@ fn align(times: &[f64], mut repeated: Vec<usize>, stated_hz: Option<f64>) -> Res
         resolved,
         least_loss,
         is_rate_changing,
+        is_of_loop,
         late: late.into_iter().filter(|late| *late).count() as u64,
         clock_steps: Vec::new(),
     };
@@ -452,7 +469,7 @@ fn align(times: &[f64], mut repeated: Vec<usize>, stated_hz: Option<f64>) -> Res
 
 /// Takes rows back that equal the one before by chance: where the coarse stamps of the others, which are at `arrived`, show that as many
 /// samples are missing. Returns whether there are any.
-fn take_back(repeated: &mut Vec<usize>, arrived: &[usize], alignment: &StampAlignment) -> bool {
+fn take_back(repeated: &mut Vec<usize>, arrived: &[usize], alignment: &AlignedStamps) -> bool {
     let reach = (SEARCHED_WIDTHS * alignment.width).ceil() as usize;
     let mut taken = Vec::new();
     let mut candidates = repeated.iter().copied().peekable();
@@ -481,16 +498,14 @@ fn usual_interval(times: &[f64]) -> Option<f64> {
 }
 
 /// Checks a stated rate against the stamps.
-fn contradiction(times: &[f64], alignment: &StampAlignment, stated_hz: f64) -> Result<(), TimeBaseError> {
+fn contradiction(times: &[f64], alignment: &AlignedStamps, stated_hz: f64) -> Result<(), TimeBaseError> {
     let differs = |measured_hz: f64| (measured_hz / stated_hz - 1.0).abs() > MAX_RATE_CONTRADICTION;
     let few_neighbours = (alignment.losses.len() as f64) > (1.0 - MIN_NEIGHBOURS) * times.len() as f64;
     if !few_neighbours && !alignment.rate.is_some_and(|rate| differs(rate.hz)) {
         return Ok(());
     }
-    match StampAlignment::new(times, None) {
-        Some(StampAlignment { rate: Some(rate), losses, .. })
-            if differs(rate.hz) && losses.len() <= times.len() / 4 =>
-        {
+    match AlignedStamps::new(times, None) {
+        Some(AlignedStamps { rate: Some(rate), losses, .. }) if differs(rate.hz) && losses.len() <= times.len() / 4 => {
             Err(TimeBaseError::RateContradictsStamps { stated_hz, measured_hz: rate.hz })
         }
         _ => Ok(()),

@@ -1,8 +1,8 @@
 //! Time stamps beside the index of the samples: the rate, and where index and time contradict each other.
 
+use crate::time_base::aligned_stamps::RateEstimate;
 use crate::time_base::lateness_track::slope;
 use crate::time_base::lower_envelope::minimum_ahead;
-use crate::time_base::stamp_alignment::RateEstimate;
 
 /// Samples over which the lower envelope of the lateness is sought, as deep a queue as is read late.
 const MAX_QUEUE: usize = 64;

@@ -16,6 +16,8 @@ pub(crate) const COARSE: f64 = 0.6;
 /// ticks are nearly an odd number of periods.
 pub(crate) const LOSS: f64 = 0.5;
 const COARSE_LOSS: f64 = 0.7;
+/// Interval, in periods, that a lost sample makes at least.
+pub(crate) const LONG: f64 = 1.5;
 /// Distance of a rise from a whole number of periods below which nothing but a loss explains it.
 pub(crate) const CERTAIN: f64 = 0.3;
 /// Times that an estimate of the period is improved by the alignment that it gives.
@@ -60,6 +62,8 @@ pub(crate) struct Track {
     above: Vec<f64>,
     pub(crate) losses: Vec<LostStretch>,
     pub(crate) width: f64,
+    /// Rises of the envelope without a long interval near them, which are no losses.
+    pub(crate) gentle_rises: usize,
 }
 
 impl Track {
@@ -106,6 +110,9 @@ impl Track {
     fn of_lateness(lateness: Vec<f64>, period_s: f64, tick_s: Option<f64>, (queue, least): (usize, u64)) -> Self {
         let samples = lateness.len();
         let near = minimum_ahead(&lateness, SEARCH_QUEUE);
+        // A lost sample makes an interval long, in whatever order and however late the others are read; rounding takes a tick of it.
+        let long = LONG - 1.0 - tick_s.map_or(0.0, |tick| tick / period_s);
+        let is_long: Vec<bool> = lateness.windows(2).map(|pair| pair[1] - pair[0] >= long).collect();
         let mut above: Vec<f64> = lateness.iter().zip(&near).map(|(late, least)| late - least).collect();
         // Of a uniform lateness three quarters are below 3/4 of its width; late deliveries are fewer than the fourth.
         let quartile = quantile(&mut above, 3, 4) * 4.0 / 3.0;
@@ -118,6 +125,10 @@ impl Track {
             (MEMORY, LOSS)
         };
         let threshold = threshold + least.saturating_sub(1) as f64;
+        let is_abrupt = |at: usize| {
+            let near = at.saturating_sub(memory)..(at + 1).min(is_long.len());
+            is_long[near].contains(&true)
+        };
         let envelope = if queue.max(memory) == SEARCH_QUEUE {
             near
         } else {
@@ -128,7 +139,8 @@ impl Track {
         let undecided = if is_coarse { (2.0 * width).ceil() as usize + 1 } else { 0 };
         let last = samples.saturating_sub(undecided + 1);
         let periods = Vec::with_capacity(samples);
-        let mut track = Self { period_s, periods, above: lateness, losses: Vec::new(), width };
+        let mut track = Self { period_s, periods, above: lateness, losses: Vec::new(), width, gentle_rises: 0 };
+        let mut gentle_until = 0;
         let mut level = MinimumBehind::new(memory);
         let mut missing = 0u64;
         for at in 0..samples {
@@ -136,7 +148,10 @@ impl Track {
             let excess = level.minimum().map_or(0.0, |level| lowest - missing as f64 - level);
             // Towards the end the envelope is that of fewer ticks, and may rise by a period without a loss.
             let threshold = if is_coarse && at + memory > samples { threshold + 1.0 } else { threshold };
-            if excess >= threshold {
+            if excess >= threshold && !is_abrupt(at) {
+                track.gentle_rises += usize::from(at >= gentle_until);
+                gentle_until = at + memory;
+            } else if excess >= threshold {
                 // A float beyond the range of u64 saturates.
                 let lost = (excess.round() as u64).max(1);
                 missing = missing.saturating_add(lost);
@@ -181,6 +196,7 @@ impl Track {
             above: vec![0.0; above.len()],
             losses: Vec::new(),
             width: other.width.max(1.0),
+            gentle_rises: 0,
         }
     }
 

@@ -10,7 +10,9 @@
 //! one that needs the shortest description wins: the scatter of the lateness, no part of it below the tick of the stamps
 //! being worth anything, and the losses.
 
+pub(crate) use crate::time_base::aligned_stamps::{AlignedStamps, RateEstimate};
 use crate::time_base::clock_rate::{SteadiedStamps, steadied};
+use crate::time_base::irregular_stamps::{by_ticks, is_of_many, of_few_digits, of_loop};
 use crate::time_base::lateness_track::{COARSE, LostStretch, SEARCH_QUEUE, Track, persistent_variance, quantile};
 use crate::time_base::stamp_tick::tick;
 
@@ -35,6 +37,12 @@ const MAX_CLOCK_ERROR: f64 = 0.1;
 
 /// Rises of the envelope, in its falls, that are losses and not late deliveries; and fewest of them where there is no fall.
 const TELLING: usize = 8;
+/// Ratio of the third to the first quartile of intervals that are of any length.
+const UNLIKE: f64 = 1.5;
+/// Ticks in an interval that may be the tick itself.
+const FEW_TICKS: f64 = 2.5;
+/// Fewest rises of the envelope without a long interval that show a loop, and no clock.
+const GENTLE: usize = 3;
 /// Probability that the longest rise by chance is taken for a loss.
 const FALSE_ALARM: f64 = 1e-3;
 
@@ -54,46 +62,23 @@ const MIN_TICKS_BETWEEN_LOSSES: f64 = 16.0;
 /// Losses that may have been overlooked there for each one that was found.
 const OVERLOOKED: f64 = 4.0;
 
-/// A sample rate with the interval that the time stamps leave it, by the clock that stamped them.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RateEstimate {
-    /// Least-squares slope of the sample periods over the time stamps, Hz.
-    pub hz: f64,
-    /// Lower end, Hz.
-    pub low_hz: f64,
-    /// Upper end, Hz.
-    pub high_hz: f64,
-}
-
-/// Time stamps on sample periods.
-pub(crate) struct StampAlignment {
-    /// Period of each sample, counted from the first; grows by at least one a sample.
-    pub(crate) periods: Vec<u64>,
-    /// Samples that were read a period or more after the others.
-    pub(crate) late: Vec<bool>,
-    /// The losses, in their order.
-    pub(crate) losses: Vec<LostStretch>,
-    /// The rate; `None` if the samples span no time.
-    pub(crate) rate: Option<RateEstimate>,
-    /// Smallest step of the stamps that all of them are multiples of, s; `None` where it is far below the period.
-    pub(crate) tick_s: Option<f64>,
-    /// Width of the lateness of ordinary samples, periods.
-    pub(crate) width: f64,
-    /// Whether single losses are told from the rounding of the stamps.
-    pub(crate) resolved: bool,
-    /// The shortest loss that is told from late delivery, samples.
-    pub(crate) least_loss: u64,
-    /// Whether the rate changes by more than a track follows; its interval is then the range that it takes.
-    pub(crate) is_rate_changing: bool,
-}
-
-impl StampAlignment {
+impl AlignedStamps {
     /// Aligns `times` (s, not decreasing). A stated rate in Hz is believed to within 10 %.
     ///
     /// `None` where no period in this range can be seen in them.
     pub(crate) fn new(times: &[f64], stated_hz: Option<f64>) -> Option<Self> {
+        let tick_s = tick(times);
+        if let Some(tick_s) = tick_s.filter(|tick_s| is_of_many(times, *tick_s)) {
+            return by_ticks(times, tick_s, stated_hz);
+        }
+        if let Some(rounded) = of_few_digits(times) {
+            return Self::of_steady(&rounded, stated_hz);
+        }
         let Some(SteadiedStamps { times: steady, shortest_s, longest_s }) = steadied(times) else {
-            return Self::of_steady(times, stated_hz);
+            let alignment = Self::of_steady(times, stated_hz)?;
+            // A stated rate has its own periods.
+            let is_free = alignment.is_of_loop && stated_hz.is_none();
+            return if is_free { of_loop(times, tick_s) } else { Some(alignment) };
         };
         let mut alignment = Self::of_steady(&steady, stated_hz)?;
         let hz = *alignment.periods.last()? as f64 / (times.last()? - times.first()?);
@@ -110,6 +95,7 @@ impl StampAlignment {
         let persistent = persistent_variance(times);
         let period_s = search(times, stated_s, tick_s)?;
         let (_, mut track) = Track::refined(times, period_s, tick_s, (MAX_QUEUE, 1));
+        let is_of_loop = track.gentle_rises >= GENTLE.max(track.losses.len());
         let ticks_per_period = tick_s.map(|tick| tick / track.period_s);
         let mut least_loss = 1;
         if !track.losses.is_empty() && track.width >= COARSE + 2.0 * ticks_per_period.unwrap_or(0.0) {
@@ -136,6 +122,7 @@ impl StampAlignment {
         let mut alignment = Self::from_track(track, times, tick_s);
         alignment.rate.iter_mut().for_each(|rate| rate.high_hz *= 1.0 + hidden);
         alignment.least_loss = least_loss;
+        alignment.is_of_loop = is_of_loop;
         Some(alignment)
     }
 
@@ -163,8 +150,8 @@ impl StampAlignment {
         });
         let late = (0..times.len()).map(|at| track.is_late(at)).collect();
         let Track { periods, losses, width, .. } = track;
-        let (least_loss, is_rate_changing) = (1, false);
-        Self { periods, late, losses, rate, tick_s, width, resolved, least_loss, is_rate_changing }
+        let (least_loss, is_rate_changing, is_of_loop) = (1, false, false);
+        Self { periods, late, losses, rate, tick_s, width, resolved, least_loss, is_rate_changing, is_of_loop }
     }
 }
 
@@ -185,8 +172,9 @@ fn search(times: &[f64], stated_s: Option<f64>, tick_s: Option<f64>) -> Option<f
     let mut tried: Vec<f64> = Vec::new();
     let mut best: Option<(f64, Track)> = None;
     let estimates = period_estimates(first, tick_s);
-    // The tick is the period of stamps that are whole numbers of it with samples lost between them.
-    for period_s in stated_s.into_iter().chain(estimates.iter().copied()).chain(tick_s) {
+    // The tick is the period of stamps that are whole numbers of it with samples lost between them, at intervals of any length.
+    let tick_as_period = tick_s.filter(|tick_s| are_unlike_or_ticks(first, *tick_s));
+    for period_s in stated_s.into_iter().chain(estimates.iter().copied()).chain(tick_as_period) {
         if !is_plausible(period_s) || tried.iter().any(|other| (period_s / other - 1.0).abs() < 1e-4) {
             continue;
         }
@@ -225,6 +213,13 @@ fn search(times: &[f64], stated_s: Option<f64>, tick_s: Option<f64>) -> Option<f
         |(cost, track)| *cost < found_cost && is_plausible(track.period_s) && track.are_losses_independent(persistent),
     );
     Some(better.map_or(found.period_s, |(_, track)| track.period_s))
+}
+
+/// Whether a quarter of the intervals is far longer than another quarter, or a quarter is as short as a tick or two.
+fn are_unlike_or_ticks(times: &[f64], tick_s: f64) -> bool {
+    let mut intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let [short, long] = [1, 3].map(|parts| quantile(&mut intervals, parts, 4));
+    long > UNLIKE * short || short < FEW_TICKS * tick_s
 }
 
 /// The shortest loss that stamps which come in bursts tell from late delivery, which lifts the envelope of an alignment without losses as

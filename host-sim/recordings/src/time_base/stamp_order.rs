@@ -16,6 +16,8 @@ const FIRST_WRONG: f64 = 1e4;
 /// Rows that go on by themselves after a clock was set; and rows that are needed to doubt the first one.
 pub(crate) const ROWS_OF_SET_CLOCK: usize = 32;
 pub(crate) const ROWS_OF_FIRST: usize = 8;
+/// Rows before which a clock may be set forward.
+const ROWS_BEFORE_SET: u64 = 256;
 /// Usual intervals that stand for the unknown time until a clock began anew.
 const RESTART: f64 = 64.0;
 
@@ -35,6 +37,8 @@ pub(crate) enum Order {
     Next(f64),
     /// It follows the row before the last one, at this time: the last stamp is wrong.
     AfterWrong(f64),
+    /// It follows the last one, at this time, with which the clock was set forward by so much.
+    AfterSet(f64, f64),
     /// It is before the last one.
     Back(f64),
 }
@@ -55,6 +59,9 @@ pub(crate) struct StampOrder {
     /// How often the clock was set back, or began anew, and the first row after that.
     sets: u64,
     first_set: u64,
+    /// The same of a clock that was set forward.
+    sets_forward: u64,
+    first_set_forward: u64,
     wrong: u64,
 }
 
@@ -67,7 +74,12 @@ impl StampOrder {
     /// Judges the stamp of the next row.
     pub(crate) fn judge(&mut self, stamp: f64) -> Order {
         let time = stamp + self.offset;
-        let Some(last) = self.last.filter(|last| time < *last) else { return Order::Next(time) };
+        let Some(last) = self.last.filter(|last| time < *last) else {
+            return match self.set_forward(time) {
+                Some(by) => Order::AfterSet(time - by, by),
+                None => Order::Next(time),
+            };
+        };
         let Some(usual) = self.usual() else { return Order::Back(time) };
         let last_stamp = last - self.offset;
         let is_passed = |modulus: &f64| {
@@ -90,6 +102,26 @@ impl StampOrder {
             }
             _ => Order::Back(time),
         }
+    }
+
+    /// By how much the clock was set with the last row, where only few rows are before it: a clock is set soon after it begins, and no recording
+    /// begins with so few samples before such a gap.
+    fn set_forward(&mut self, time: f64) -> Option<f64> {
+        if self.accepted > ROWS_BEFORE_SET {
+            return None;
+        }
+        let (before, last, usual) = (self.before_last?, self.last?, self.usual()?);
+        if last - before <= FIRST_WRONG * usual || time - last > LONGEST_STEP * usual {
+            return None;
+        }
+        let by = last - before - usual;
+        if self.sets_forward == 0 {
+            self.first_set_forward = self.accepted;
+        }
+        self.sets_forward += 1;
+        self.offset -= by;
+        self.last = Some(last - by);
+        Some(by)
     }
 
     /// Takes the time of a row that is used.
@@ -159,13 +191,19 @@ impl StampOrder {
 
     /// What a reader of the analysis has to know, one sentence each.
     pub(crate) fn notes(&self) -> Vec<String> {
-        let Self { wraps, modulus, sets, first_set, wrong, .. } = self;
+        let Self { wraps, modulus, sets, first_set, sets_forward, first_set_forward, wrong, .. } = self;
         let sentences = [
             (*wraps, format!("the time stamps begin anew at {modulus} and go on ({wraps} times)")),
             (
                 *sets,
                 format!(
                     "the clock was set back {sets} times, first before row {first_set}; how long that took is not known"
+                ),
+            ),
+            (
+                *sets_forward,
+                format!(
+                    "the clock was set forward before row {first_set_forward}, and no sample is taken to be missing there"
                 ),
             ),
             (*wrong, format!("{wrong} rows whose time is far from that of the rows around them are left out")),

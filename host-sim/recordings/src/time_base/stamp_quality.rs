@@ -1,8 +1,8 @@
 //! What the time stamps of a recording show, and what they cannot show.
 
+use crate::time_base::aligned_stamps::RateEstimate;
 use crate::time_base::indexed_clock::{ClockStep, IndexedClock};
 use crate::time_base::lateness_track::{COARSE, LostStretch};
-use crate::time_base::stamp_alignment::RateEstimate;
 
 /// What the time stamps of a recording show, and what they cannot show.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -23,6 +23,8 @@ pub struct StampQuality {
     pub least_loss: u64,
     /// Whether the rate changes in the course of the record; the interval of [`rate`](Self::rate) is then the range that it takes.
     pub is_rate_changing: bool,
+    /// Whether a loop wrote them that asks for samples when it has time: its periods are as long as it takes.
+    pub is_of_loop: bool,
     /// Samples that were read at least a period later than the others.
     pub late: u64,
     /// Where the index and the stamps contradict each other.
@@ -71,7 +73,14 @@ impl StampQuality {
                 "{uncertain} lost samples are uncertain: the rounding of the time stamps may show the same"
             ));
         }
-        notes.extend(self.rate.filter(|_| self.is_rate_changing).map(changing_rate));
+        if let (Some(rate), true) = (self.rate, self.is_of_loop) {
+            notes.push(format!(
+                "no clock takes the samples: a loop asks for them when it has time, {:.4} to {:.4} times a second, {:.4} on average; where no \
+                 interval is long, none is lost",
+                rate.low_hz, rate.high_hz, rate.hz
+            ));
+        }
+        notes.extend(self.rate.filter(|_| self.is_rate_changing && !self.is_of_loop).map(changing_rate));
         if let (Some(rate), true) = (self.rate, self.least_loss > 1) {
             notes.push(format!(
                 "samples come in bursts: losses of fewer than {} samples cannot be told from late delivery, and none is counted; the \

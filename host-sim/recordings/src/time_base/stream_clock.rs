@@ -5,14 +5,15 @@
 //! period is that of the first rows, and the envelope is sought over as many rows as there, so that a row is placed when those
 //! of the queue behind it are known. Before that a rate that changes is [followed](crate::time_base::clock_rate).
 
+use crate::time_base::aligned_stamps::RateEstimate;
 use crate::time_base::clock_rate::SteadyStream;
 use crate::time_base::indexed_clock::{ClockStep, STEP_PERIODS, STEP_S};
-use crate::time_base::lateness_track::{CERTAIN, COARSE, LOSS, MEMORY};
+use crate::time_base::lateness_track::{CERTAIN, COARSE, LONG, LOSS, MEMORY};
 use crate::time_base::lower_envelope::{MinimumBehind, minimum_ahead};
 use crate::time_base::stamp_alignment::MAX_QUEUE;
-use crate::time_base::stamp_alignment::RateEstimate;
 use crate::time_base::stamp_quality::StampQuality;
 use crate::time_base::time_base_error::TimeBaseError;
+use std::collections::VecDeque;
 
 /// What tells the sample periods.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,6 +54,10 @@ pub(crate) struct StreamClock {
     /// Lateness of the rows that are not placed yet, and their times, s.
     ahead: Vec<f64>,
     times_s: Vec<f64>,
+    /// Growth of the lateness in an interval that a lost sample makes at least; rounding takes a tick of it.
+    long: f64,
+    /// Lateness of the last rows that were placed.
+    recent: VecDeque<f64>,
     /// The stamps as a steady clock would have written them; `None` where they do not tell the sample periods.
     steady: Option<SteadyStream>,
     level: MinimumBehind,
@@ -82,6 +87,9 @@ impl StreamClock {
                 let reason = format!("they are {:.1} sample periods wide", head.width);
                 return Err(TimeBaseError::Irregular(reason));
             }
+            (false, Some(head)) if head.is_of_loop => {
+                return Err(TimeBaseError::Irregular("a loop asks for the samples when it has time".to_owned()));
+            }
             (false, Some(head)) if head.least_loss > 1 => {
                 return Err(TimeBaseError::Irregular("they come in bursts".to_owned()));
             }
@@ -95,6 +103,10 @@ impl StreamClock {
             last: Stamp::default(),
             ahead: Vec::new(),
             times_s: Vec::new(),
+            long: LONG
+                - 1.0
+                - head.and_then(|head| head.tick_s).zip(period_s).map_or(0.0, |(tick, period)| tick / period),
+            recent: VecDeque::new(),
             steady: if let Source::Stamps(period_s) = source { Some(SteadyStream::new(period_s)) } else { None },
             end: (0, 0.0),
             level: MinimumBehind::new(MEMORY),
@@ -166,7 +178,11 @@ impl StreamClock {
         let mut placed = Vec::with_capacity(ready);
         for ((&late, &least), &time_s) in self.ahead.iter().zip(&envelope).zip(&self.times_s).take(ready) {
             let excess = self.level.minimum().map_or(0.0, |level| least - self.missing as f64 - level);
-            if excess >= LOSS {
+            self.recent.push_back(late);
+            if self.recent.len() > MEMORY + 1 {
+                self.recent.pop_front();
+            }
+            if excess >= LOSS && self.has_long_interval() {
                 // A float beyond the range of u64 saturates.
                 self.missing = self.missing.saturating_add((excess.round() as u64).max(1));
                 self.uncertain += u64::from((excess - excess.round()).abs() >= CERTAIN);
@@ -185,6 +201,11 @@ impl StreamClock {
         self.ahead.drain(..ready);
         self.times_s.drain(..ready);
         placed
+    }
+
+    /// Whether one of the last intervals is as long as a lost sample makes it.
+    fn has_long_interval(&self) -> bool {
+        self.recent.iter().zip(self.recent.iter().skip(1)).any(|(one, next)| next - one >= self.long)
     }
 
     /// The sample rate by the stamps of the rows that were placed, Hz.

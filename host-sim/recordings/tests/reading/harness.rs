@@ -157,7 +157,7 @@ pub(crate) fn read_file<T: AsRef<str>>(file: &Path, options: &[T]) -> Result<Rea
         _ => SampleStream::any_sensor(input, options.of_any_sensor(file)?, reading)?,
     };
     assert!(stream.is_in_memory(), "{}: more rows than these tests read", file.display());
-    let notes = stream.notes().to_vec();
+    let notes = stream.notes().iter().cloned().chain(stream.rows_read().damage.clone()).collect();
     Ok(Reading { samples: stream.into_beginning(), notes })
 }
 

@@ -5,6 +5,7 @@
 mod damage;
 mod harness;
 mod inspection;
+mod kinds;
 mod other_people;
 mod other_programs;
 mod parts;

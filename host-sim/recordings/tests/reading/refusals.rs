@@ -62,7 +62,6 @@ fn files_that_are_no_recordings_are_refused() {
         ("workspace.rda", &workspace, &[], &["R workspace", "write.csv("]),
         ("binary.dat", b"\x01\x02\x03\x04\x05\0\0\0sensor", &[], &["01 02 03 04 05 00", "HDF5", "numpy.save"]),
         ("binary.csv", &[0xF1, 0x02, 0x00], &[], &["F1 02 00", "no known format"]),
-        ("wide.csv", b"\xFF\xFEt\0,\0x\0\n\0", &[], &["UTF-16", "iconv"]),
         ("pickle.pkl", b"\x80\x05\x95\xAA\0\0\0", &[], &["pickle", "read_pickle"]),
         ("list.json", b"[{\"gx\": 1}, {\"gx\": 2}]", &[], &["JSON document", "lines=True"]),
         ("columns.json", b"{\n \"gx\": [1, 2, 3]\n}\n", &[], &["JSON document", "lines=True"]),

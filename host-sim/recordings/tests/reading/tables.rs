@@ -124,6 +124,22 @@ const TABLES: &[Case] = &[
         tolerance: 1e-6,
     },
     Case {
+        name: "degrees in UTF-16",
+        heading: "\u{feff}t [s],gx [\u{b0}/s]\r\n",
+        row: |row, value| format!("{},{:.5}\r\n", seconds(row), value.to_degrees()),
+        options: &[],
+        rate_hz: 100.0,
+        tolerance: 1e-6,
+    },
+    Case {
+        name: "UTF-16, big end first",
+        heading: "\u{feff}t [s]\tgx [\u{b0}/s]\n",
+        row: |row, value| format!("{}\t{:.5}\n", seconds(row), value.to_degrees()),
+        options: &[],
+        rate_hz: 100.0,
+        tolerance: 1e-6,
+    },
+    Case {
         name: "quotation marks",
         heading: "\"Time (s)\",\"Gyroscope x (rad/s)\"\n",
         row: |row, value| format!("\"{}\",\"{value:.6E}\"\n", seconds(row)),
@@ -195,7 +211,12 @@ fn a_table_of_any_country_and_program_has_its_rate_and_every_row() {
     for Case { name, heading, row, options, rate_hz, tolerance } in TABLES {
         let mut normal = normal(21);
         let text = (*heading).to_owned() + &(0..ROWS).map(|at| row(at, NOISE * normal())).collect::<String>();
-        let bytes = if name.ends_with("Latin-1") { text.chars().map(|c| c as u8).collect() } else { text.into_bytes() };
+        let bytes = match name {
+            name if name.ends_with("Latin-1") => text.chars().map(|c| c as u8).collect(),
+            name if name.ends_with("UTF-16") => text.encode_utf16().flat_map(u16::to_le_bytes).collect(),
+            name if name.ends_with("big end first") => text.encode_utf16().flat_map(u16::to_be_bytes).collect(),
+            _ => text.into_bytes(),
+        };
         let read = read("table.txt", &bytes, options).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!((read.samples.len() as u32, read.missing()), (ROWS, 0), "{name}");
         let rate = read.rate_hz() / rate_hz;
@@ -303,7 +324,7 @@ fn rows_of_different_origin_are_no_series() {
         + &merged.into_iter().map(|(_, row)| row).collect::<String>();
     let refusal = |text: &str| read("t.csv", text.as_bytes(), &[""; 0]).err().expect("refused").to_string();
     assert!(refusal(&two).contains("choose one with --topic: 1, 2"), "{}", refusal(&two));
-    assert!(refusal(&merged).contains("as of two sensors"), "{}", refusal(&merged));
+    assert!(refusal(&merged).contains("choose one with --topic: gyro, accl"), "{}", refusal(&merged));
     let one = reading("one device", &two, &["--topic", "2"]);
     assert_eq!((one.samples.len() as u32, one.missing()), (ROWS, 0));
     assert!((one.rate_hz() / 100.0 - 1.0).abs() < 1e-6, "{}", one.rate_hz());

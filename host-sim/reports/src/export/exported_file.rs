@@ -41,6 +41,11 @@ pub enum ExportError {
         /// As the report has it.
         value: String,
     },
+    /// Parts of a sensor with different rates, in a format with the noise of samples at one rate.
+    #[error(
+        "parts at {0} Hz: the format has noise of samples at one rate; kalibr, openvins, orbslam3 and csv have densities"
+    )]
+    SeveralRates(String),
     /// A name that could be read as something else: it has characters such as a comma, a quotation mark or a control character.
     #[error("{0:?} is no name of a channel, a term or a unit: the report is damaged")]
     NoName(String),

@@ -107,7 +107,7 @@ pub(super) fn kf_gins(report: &SavedReport) -> Result<Export, ExportError> {
     Ok(Export { text, missing: Vec::new() })
 }
 
-const NOTHING: Coefficient = Coefficient { value: 0.0, estimate: 0.0 };
+const NOTHING: Coefficient = Coefficient { value: 0.0, is_bound: false, estimate: 0.0 };
 const WHITE: fn(&AxisNoise<'_>) -> Coefficient = |axis| axis.white.unwrap_or(NOTHING);
 const WALK: fn(&AxisNoise<'_>) -> Coefficient = |axis| axis.walk.unwrap_or(NOTHING);
 
@@ -127,7 +127,7 @@ fn six_axes<'a>(gyroscope: &[AxisNoise<'a>; 3], accelerometer: &[AxisNoise<'a>; 
 
 /// A remark on the axes whose number is an upper bound.
 fn bounds(axes: &[AxisNoise<'_>; 3], values: &[Coefficient; 3]) -> String {
-    let bounded = axes.iter().zip(values).filter(|(_, of)| of.estimate <= 0.0 && of.value > 0.0);
+    let bounded = axes.iter().zip(values).filter(|(_, of)| of.is_bound);
     let names: Vec<&str> = bounded.map(|(axis, _)| axis.channel.name.as_str()).collect();
     if names.is_empty() { String::new() } else { format!("; an upper bound: {}", names.join(", ")) }
 }

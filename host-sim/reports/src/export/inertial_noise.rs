@@ -1,6 +1,7 @@
 //! The noise of gyroscopes and accelerometers in SI units, axis by axis.
 
 use super::exported_file::{AxisChoice, ExportError};
+use crate::rounding::is_upper_bound;
 use crate::saved_report::{SavedChannel, SavedParameter, SavedPoint, SavedReport, SavedTerm};
 use allan_core::model::FittedTerm;
 use allan_core::term::Markov;
@@ -23,8 +24,10 @@ pub(super) enum Sensor {
 /// A coefficient of one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Coefficient {
-    /// The estimate, or its upper 95 % bound where the estimate is 0, in SI units.
+    /// The estimate, or its upper 95 % bound where nothing else is known, in SI units.
     pub value: f64,
+    /// Whether it is the bound, by the rule of the screen.
+    pub is_bound: bool,
     /// The estimate in SI units.
     pub estimate: f64,
 }
@@ -97,9 +100,11 @@ impl Sensor {
 
 /// A coefficient, unless its upper bound is zero.
 fn coefficient(channel: &SavedChannel, kind: &str, to_si: f64) -> Option<Coefficient> {
-    let SavedParameter { value, high, .. } = channel.coefficient(kind)?;
-    let shown = if value > 0.0 { value } else { high };
-    (shown > 0.0 && shown.is_finite()).then_some(Coefficient { value: shown * to_si, estimate: value * to_si })
+    let SavedParameter { value, low, high, .. } = channel.coefficient(kind)?;
+    let is_bound = is_upper_bound(value, low) && high.is_finite();
+    let shown = if is_bound { high } else { value };
+    let is_number = shown > 0.0 && shown.is_finite();
+    is_number.then_some(Coefficient { value: shown * to_si, is_bound, estimate: value * to_si })
 }
 
 /// The number that stands for all axes, of those that have one.

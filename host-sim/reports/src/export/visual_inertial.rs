@@ -102,7 +102,7 @@ pub(super) fn orbslam3(report: &SavedReport, axes: AxisChoice) -> Result<Export,
 
 /// `head`, then every field with the numbers of its axes in comments.
 ///
-/// These programs divide by every number, so the upper bound stands for a term whose estimate is zero.
+/// These programs divide by every number, so the upper bound stands for a term of which nothing else is known.
 fn fields(
     head: &str,
     fields: &[Field],
@@ -127,9 +127,11 @@ fn fields(
             AxisChoice::Rms => "root mean square",
             AxisChoice::Worst => "worst axis",
         };
-        let _ = writeln!(text, "{indent}{key}: {}  # {unit}, {how} of", scientific(value * factor));
+        let has_bound = shown.clone().any(|(_, of)| of.is_bound);
+        let at_most = if has_bound { "an upper bound, " } else { "" };
+        let _ = writeln!(text, "{indent}{key}: {}  # {unit}, {at_most}{how} of", scientific(value * factor));
         for (channel, of) in shown {
-            let bound = if of.estimate > 0.0 { "" } else { ", an upper bound" };
+            let bound = if of.is_bound { ", an upper bound" } else { "" };
             let _ = writeln!(text, "{indent}#   {channel}: {}{bound}", scientific(of.value * factor));
         }
     }

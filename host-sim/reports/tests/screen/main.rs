@@ -396,7 +396,7 @@ fn a_record_too_short_for_a_model_says_what_it_is_good_for() {
     let mut contradicted = rough.clone();
     let error = &mut contradicted.channels[0].after.unseen;
     (error.worst_sigma, error.worst_tau_s, error.worst_ratio) = (Some(46.0), Some(0.01), Some(1.3));
-    assert!(reports::summary::nothing_found(&contradicted).contains("do not describe every channel"));
+    assert!(reports::summary::nothing_found(&contradicted).contains("N, B and K do not describe"));
     assert_eq!(reports::summary::next_steps(&rough), ["For a filter: record at rest for hours."]);
 }
 

@@ -1,0 +1,243 @@
+//! The fields of a row of text, and the numbers in them.
+
+use crate::input::delimited_text;
+use crate::rows::batch::Number;
+
+/// Separators of columns, the first that occurs; blanks where none does.
+const SEPARATORS: [char; 3] = [';', '\t', ','];
+
+/// Fields that stand for a missing value, in small letters.
+const MISSING: [&str; 22] = [
+    "", "nan", "na", "n/a", "null", "none", "nil", "-", "--", "---", "*", "?", "#n/a", "#na", "#value!", "#num!",
+    "#div/0!", "1.#qnan", "-1.#ind", "1.#inf", "ovf", "missing",
+];
+
+/// What the serial monitor of the Arduino IDE writes between the time of a line and the line.
+pub(crate) const ARROW: &str = " -> ";
+
+/// The sign between the fields of a row, without the time that a serial monitor writes before it.
+pub(crate) fn separator_of(text: &str) -> Option<char> {
+    let fields = text.split_once(ARROW).map_or(text, |(_, rest)| rest);
+    if fields.contains('"') {
+        // Every second part is between quotation marks.
+        let is_outside = |separator: &char| fields.split('"').step_by(2).any(|part| part.contains(*separator));
+        return SEPARATORS.into_iter().find(is_outside);
+    }
+    SEPARATORS.into_iter().find(|separator| fields.contains(*separator))
+}
+
+pub(crate) fn split(text: &str, separator: Option<char>) -> Fields<'_> {
+    let separator = separator.map(|separator| separator as u8);
+    Fields { rest: Some(text), separator, has_arrow: text.contains(ARROW), list: None }
+}
+
+/// How many numbers each cell of a row has: one, or those of a list in brackets.
+pub(crate) fn list_lengths(text: &str, separator: Option<char>) -> Vec<usize> {
+    let mut fields = split(text, separator);
+    let mut lengths = Vec::new();
+    while fields.next().is_some() {
+        lengths.push(1);
+        while fields.list.is_some() && fields.next().is_some() {
+            *lengths.last_mut().expect("a cell") += 1;
+        }
+    }
+    lengths
+}
+
+/// The fields of a row, of which some may stand between quotation marks, in which a separator is none (RFC 4180). The numbers of a list in
+/// brackets are fields of their own.
+pub(crate) struct Fields<'a> {
+    rest: Option<&'a str>,
+    /// An ASCII character; blanks where there is none.
+    separator: Option<u8>,
+    /// Whether there may be a time of a serial monitor before the row.
+    has_arrow: bool,
+    /// What follows in a list.
+    list: Option<&'a str>,
+}
+
+impl<'a> Fields<'a> {
+    /// The text before the next separator, and what follows it.
+    fn cut(text: &'a str, separator: u8) -> (&'a str, Option<&'a str>) {
+        let at = text.bytes().position(|byte| byte == separator);
+        at.map_or((text, None), |at| (&text[..at], Some(&text[at + 1..])))
+    }
+
+    /// The field, or the first number of the list that it is.
+    fn first_of_list(&mut self, field: &'a str) -> &'a str {
+        if field.as_bytes().first() != Some(&b'[') {
+            return field;
+        }
+        let inner = field.strip_prefix('[').and_then(|field| field.strip_suffix(']')).map(str::trim);
+        let is_list = |inner: &&str| {
+            let mut elements = inner.split([',', ' ']).filter(|element| !element.is_empty());
+            elements.clone().count() > 1 && elements.all(|element| number(element).is_some())
+        };
+        inner.filter(is_list).map_or(field, |inner| self.next_of_list(inner))
+    }
+
+    fn next_of_list(&mut self, list: &'a str) -> &'a str {
+        let list = list.trim_start_matches([',', ' ']);
+        let (element, rest) = list.split_at(list.find([',', ' ']).unwrap_or(list.len()));
+        self.list = Some(rest).filter(|rest| !rest.trim_matches([',', ' ']).is_empty());
+        element
+    }
+
+    /// The next field, if it stands between quotation marks, and what follows them.
+    fn quoted(text: &'a str) -> Option<(&'a str, &'a str)> {
+        if text.bytes().next().is_none_or(|first| first.is_ascii_graphic() && first != b'"') {
+            return None;
+        }
+        let inner = text.trim_start().strip_prefix('"')?;
+        // Two marks are one in the text.
+        let mut marks = inner.match_indices('"').map(|(at, _)| at).peekable();
+        while let Some(at) = marks.next() {
+            if marks.next_if_eq(&(at + 1)).is_none() {
+                return Some((&inner[..at], &inner[at + 1..]));
+            }
+        }
+        None
+    }
+}
+
+impl<'a> Iterator for Fields<'a> {
+    type Item = &'a str;
+
+    fn next(&mut self) -> Option<&'a str> {
+        if let Some(list) = self.list.take() {
+            return Some(self.next_of_list(list));
+        }
+        let rest = self.rest.take()?;
+        if self.has_arrow {
+            if let Some((time, row)) = rest.split_once(ARROW) {
+                self.rest = Some(row);
+                return Some(time.trim());
+            }
+            self.has_arrow = false;
+        }
+        let Some(separator) = self.separator else {
+            let start = rest.trim_ascii_start();
+            let end = start.bytes().position(|byte| byte.is_ascii_whitespace()).unwrap_or(start.len());
+            self.rest = Some(&start[end..]);
+            return Some(delimited_text::field(&start[..end])).filter(|_| end > 0);
+        };
+        if let Some((field, after)) = Self::quoted(rest) {
+            self.rest = Self::cut(after, separator).1;
+            return Some(self.first_of_list(field.trim()));
+        }
+        let (field, after) = Self::cut(rest, separator);
+        self.rest = after;
+        Some(self.first_of_list(delimited_text::field(field)))
+    }
+}
+
+/// A number, with a decimal comma too; NaN for a missing one; `None` for other texts.
+pub(crate) fn number(field: &str) -> Option<Number> {
+    if let Some(number) = short_number(field.as_bytes()) {
+        return Some(number);
+    }
+    if !field.contains('.')
+        && let Ok(integer) = field.parse()
+    {
+        return Some(Number::Integer(integer));
+    }
+    let real = field.parse().ok().or_else(|| field.replace(',', ".").parse().ok());
+    let missing = || MISSING.contains(&field.to_lowercase().as_str()).then_some(f64::NAN);
+    real.or_else(missing).map(Number::Real)
+}
+
+/// Digits of a number with decimals whose quotient by their power of ten is the nearest float: both are exact.
+const EXACT_DIGITS: usize = 15;
+
+/// Most numbers: at most 18 digits without decimals, or 15 of which some are decimals; `None` for other texts.
+fn short_number(field: &[u8]) -> Option<Number> {
+    const POWERS: [f64; EXACT_DIGITS + 1] =
+        [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
+    let (is_negative, text) = field.strip_prefix(b"-").map_or((false, field), |text| (true, text));
+    if text.len() > 18 {
+        return None;
+    }
+    let (mut value, mut point) = (0_i64, None);
+    for (at, byte) in text.iter().enumerate() {
+        match byte.wrapping_sub(b'0') {
+            digit if digit < 10 => value = 10 * value + i64::from(digit),
+            _ if *byte == b'.' && point.is_none() => point = Some(at),
+            _ => return None,
+        }
+    }
+    let Some(point) = point else {
+        return (!text.is_empty()).then_some(Number::Integer(if is_negative { -value } else { value }));
+    };
+    let digits = text.len() - 1;
+    if digits == 0 || digits > EXACT_DIGITS {
+        return None;
+    }
+    let size = value as f64 / POWERS[digits - point];
+    Some(Number::Real(if is_negative { -size } else { size }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MISSING, Number, list_lengths, number, separator_of, short_number, split};
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn a_short_number_is_the_nearest_float_of_its_text() {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let mut texts: Vec<String> = ["-0.0", "5.", ".5", "-.5", "0.1", "999999999999999.", ".000000000000001"]
+            .into_iter()
+            .map(str::to_owned)
+            .collect();
+        for _ in 0..20_000 {
+            let mut text = random.random_range(0..1_000_000_000_000_000_u64).to_string();
+            text.truncate(random.random_range(1..=15));
+            text.insert(random.random_range(0..=text.len()), '.');
+            texts.extend([format!("-{text}"), text]);
+        }
+        for text in texts {
+            let expected = text.parse::<f64>().expect(&text);
+            let found = short_number(text.as_bytes()).map(|number| number.value().to_bits());
+            assert_eq!(found, Some(expected.to_bits()), "{text}");
+        }
+        assert_eq!(short_number(b"-123456789012345678"), Some(Number::Integer(-123_456_789_012_345_678)));
+        for text in ["", "-", ".", "-.", "1.2.3", "1-2", "--1", "+1", "1e3", "1,5", " 1"] {
+            assert_eq!(short_number(text.as_bytes()), None, "{text}");
+        }
+        for text in ["+1", "1e0", "1,0", "1.0000000000000000"] {
+            assert_eq!(number(text).map(Number::value), Some(1.0), "{text}");
+        }
+        assert!(MISSING.iter().all(|text| number(text).is_some_and(|number| number.value().is_nan())));
+    }
+
+    #[test]
+    fn fields_end_at_their_separator_unless_it_is_between_quotation_marks() {
+        for (text, separator, expected) in [
+            ("", Some(','), &[""][..]),
+            ("1,,2,", Some(','), &["1", "", "2", ""]),
+            (" 1 ;\u{a0}2\u{a0};\"3\"", Some(';'), &["1", "2", "3"]),
+            ("\"a,b\" , \"c\"\"d\",\"", Some(','), &["a,b", "c\"\"d", "\""]),
+            ("12:00:01.5 -> 1,2", Some(','), &["12:00:01.5", "1", "2"]),
+            ("12:00:01.5 -> 1  2 ", None, &["12:00:01.5", "1", "2"]),
+            ("\t1 \"2\"", None, &["1", "2"]),
+            ("1°,2°", Some(','), &["1°", "2°"]),
+            ("5,\"[0.1, -2, nan]\",[7]", Some(','), &["5", "0.1", "-2", "nan", "[7]"]),
+            ("[s];[1 2];x", Some(';'), &["[s]", "1", "2", "x"]),
+        ] {
+            assert_eq!(split(text, separator).collect::<Vec<_>>(), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_separator_in_a_cell_or_a_list_separates_no_columns() {
+        for (text, separator, lengths) in [
+            ("\"Time; s\",\"Gyro X; deg/s\"", Some(','), &[1, 1][..]),
+            ("0.5,\"[1, 2, 3]\",7", Some(','), &[1, 3, 1]),
+            ("0.5;[1, 2, 3];7", Some(';'), &[1, 3, 1]),
+            ("1 2", None, &[1, 1]),
+        ] {
+            assert_eq!(separator_of(text), separator, "{text}");
+            assert_eq!(list_lengths(text, separator), lengths, "{text}");
+        }
+    }
+}

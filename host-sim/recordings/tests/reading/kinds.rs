@@ -1,0 +1,359 @@
+//! Kinds of files that people have, drawn anew: where a table begins in its file, whose rows it has, what its columns are, and what its times
+//! mean.
+
+use super::harness::{Reading, inspect, normal, read, read_file};
+use rand::seq::SliceRandom;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use recordings::inspection::{InspectedTable, Proposal};
+use std::path::Path;
+
+const ROWS: u32 = 3000;
+/// Deviation of the rates, deg/s, of the forces, g, and their ratio to what is read.
+const RATE: f64 = 0.1;
+const FORCE: f64 = 0.001;
+const TOLERANCE: f64 = 0.06;
+
+fn options(proposal: &Proposal) -> Vec<String> {
+    let [columns, units] = [&proposal.columns, &proposal.units].map(|list| list.join(","));
+    let topic = proposal.topic.clone().unwrap_or_default();
+    let options = [("--topic", topic), ("--columns", columns), ("--units", units)];
+    let options = options.into_iter().filter(|(_, value)| !value.is_empty());
+    options.flat_map(|(name, value)| [name.to_owned(), value]).collect()
+}
+
+fn text(name: &str, content: &str, options: &[&str]) -> Reading {
+    read(name, content.as_bytes(), options)
+        .unwrap_or_else(|error| panic!("{error}\n{}", &content[..content.len().min(600)]))
+}
+
+/// Writes a file, and gives what is found in it and what each proposal reads.
+fn as_proposed(content: &[u8], more: &[&str]) -> (Vec<InspectedTable>, Vec<(Proposal, Reading)>) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("rows.csv");
+    std::fs::write(&file, content).expect("written");
+    let tables = inspect(&file);
+    let proposals: Vec<Proposal> = tables.iter().flat_map(|table| table.proposals.clone()).collect();
+    let read = |proposal: Proposal| {
+        let all: Vec<String> = options(&proposal).into_iter().chain(more.iter().map(|of| (*of).to_owned())).collect();
+        let read = read_file(Path::new(&file), &all).unwrap_or_else(|error| panic!("{all:?}: {error}"));
+        (proposal, read)
+    };
+    (tables, proposals.into_iter().map(read).collect())
+}
+
+fn is_near(read: &Reading, channel: &str, deviation: f64) -> bool {
+    (read.neighbours(channel) / deviation - 1.0).abs() < TOLERANCE
+}
+
+/// Lines that loggers write before a table; none is a row of four numbers.
+fn preamble(random: &mut ChaCha8Rng) -> String {
+    let mut lines = vec![
+        "GPIO initialized.".to_owned(),
+        format!("rate,{}", random.random_range(1..500)),
+        "range,250".to_owned(),
+        "version,1.3".to_owned(),
+        "Device: bench sensor".to_owned(),
+        "sep=,".to_owned(),
+        "________________________".to_owned(),
+        "DeviceTag:,A1".to_owned(),
+        String::new(),
+        "Channels,3,,,".to_owned(),
+        "StartTime:,2021-06-01_10-00-00".to_owned(),
+        "Samples,1,1,1,".to_owned(),
+        "% formats:".to_owned(),
+    ];
+    lines.shuffle(random);
+    lines.truncate(random.random_range(1..=lines.len()));
+    lines.into_iter().map(|line| line + "\n").collect()
+}
+
+#[test]
+fn a_table_is_found_behind_whatever_lines_are_before_it() {
+    for seed in 0..40 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut normal = normal(seed);
+        let mut content = preamble(&mut random) + "t,gx_dps,gy_dps,gz_dps\n";
+        let damaged = random.random_range(3..ROWS - 3);
+        for row in 0..ROWS {
+            let [x, y, z] = [(); 3].map(|()| RATE * normal());
+            if row == damaged {
+                content += ["WARNING: FIFO overflow\n", "12.00,0.1\n"][random.random_range(0..2)];
+            } else {
+                content += &format!("{:.2},{x:.4},{y:.4},{z:.4}\n", f64::from(row) / 100.0);
+            }
+        }
+        let read = text("log.csv", &content, &[]);
+        assert_eq!((read.samples.len() as u32, read.missing()), (ROWS - 1, 1), "{seed}");
+        assert!((read.rate_hz() / 100.0 - 1.0).abs() < 1e-6 && is_near(&read, "gyro_y", RATE), "{seed}");
+        assert!(read.notes_contain("1 damaged rows are left out"), "{seed}: {:?}", read.notes);
+    }
+}
+
+/// The scales of a log for video stabilisation, the units of a measurement file, and names for some of the columns.
+#[test]
+fn what_the_lines_before_a_table_say_is_read() {
+    for (seed, scale) in [(1, 1e-4), (2, 5e-4), (3, 2e-5)] {
+        let mut normal = normal(seed);
+        let head = format!(
+            "GYROFLOW IMU LOG\nversion,1.3\ntscale,0.001\ngscale,{scale}\nascale,{scale}\nt,gx,gy,gz,ax,ay,az\n"
+        );
+        let row = |row: u32| {
+            let rate = [(); 3].map(|()| (RATE.to_radians() * normal() / scale).round());
+            let force = [0.0, 0.0, 1.0].map(|of: f64| ((of + FORCE * normal()) / scale).round());
+            format!("{},{},{},{},{},{},{}\n", row * 10, rate[0], rate[1], rate[2], force[0], force[1], force[2])
+        };
+        let read = text("motion.gcsv", &(head + &(0..ROWS).map(row).collect::<String>()), &[]);
+        assert!((read.rate_hz() / 100.0 - 1.0).abs() < 1e-6);
+        assert!(is_near(&read, "gyro_x", RATE) && is_near(&read, "accl_z", FORCE), "{scale}");
+    }
+    let mut normal = normal(4);
+    let head = "Writer_Version\t2\nX_Columns\tOne\n***End_of_Header***\t\nChannels\t3\t\t\t\nSamples\t1\t1\t1\t\n\
+                Y_Unit_Label\tdeg/s\tdeg/s\tdeg/s\t\nDelta_X\t0,010000\t0,010000\t0,010000\t\n***End_of_Header***\t\t\t\t\n\
+                X_Value\tgyro_x\tgyro_y\tgyro_z\tComment\n";
+    let row = |row: u32| {
+        let [x, y, z] = [(); 3].map(|()| RATE * normal());
+        format!("{:.6}\t{x:.6}\t{y:.6}\t{z:.6}\n", f64::from(row) / 100.0).replace('.', ",")
+    };
+    let read = text("measurement.lvm", &(head.to_owned() + &(0..ROWS).map(row).collect::<String>()), &[]);
+    assert_eq!(read.samples.len() as u32, ROWS);
+    assert!((read.rate_hz() / 100.0 - 1.0).abs() < 1e-6 && is_near(&read, "gyro_z", RATE));
+    // Names for the first columns alone.
+    let row = |row: u32| {
+        format!(
+            "{:.2},{:.5},{:.5},{:.5},0.1,0.2\n",
+            f64::from(row) / 50.0,
+            RATE * normal(),
+            RATE * normal(),
+            RATE * normal()
+        )
+    };
+    let content = "time_s,gx [deg/s],gy [deg/s],gz [deg/s]\n".to_owned() + &(0..ROWS).map(row).collect::<String>();
+    let read = text("wide.csv", &content, &[]);
+    assert!((read.rate_hz() / 50.0 - 1.0).abs() < 1e-6 && is_near(&read, "gyro_x", RATE));
+}
+
+/// Two sensors in one table: rows with blanks for the other, a label, a heading for each kind, or a number of the device.
+#[test]
+fn rows_of_different_origin_are_several_sensors() {
+    for seed in 0..12 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut normal = normal(seed);
+        let hz = [random.random_range(80.0..220.0_f64).round(), random.random_range(20.0..75.0_f64).round()];
+        let mut events: Vec<(u64, usize)> = Vec::new();
+        for (sensor, hz) in hz.iter().enumerate() {
+            events.extend((0..ROWS).map(|row| ((f64::from(row) / hz * 1e6) as u64 + 137 * sensor as u64, sensor)));
+        }
+        events.sort_unstable();
+        for way in 0..3 {
+            let mut content = match way {
+                0 => "t_us,gx_rad_s,gy_rad_s,gz_rad_s,ax_m_s2,ay_m_s2,az_m_s2\n".to_owned(),
+                1 => "% written by an app\n% forces: \t'ACCE;time (us);Acc_X(m/s^2);Acc_Y(m/s^2);Acc_Z(m/s^2)'\n\
+                      % rates: \t'GYRO;time (us);Gyr_X(rad/s);Gyr_Y(rad/s);Gyr_Z(rad/s)'\n"
+                    .to_owned(),
+                _ => String::new(),
+            };
+            for &(time, sensor) in &events {
+                let rate = [(); 3].map(|()| RATE.to_radians() * normal());
+                let force = [0.0, 0.0, 9.80665].map(|of: f64| of + 9.80665 * FORCE * normal());
+                let [x, y, z] = if sensor == 0 { rate } else { force };
+                content += &match (way, sensor) {
+                    (0, 0) => format!("{time},{x:.6},{y:.6},{z:.6},,,\n"),
+                    (0, _) => format!("{time},,,,{x:.6},{y:.6},{z:.6}\n"),
+                    (1, 0) => format!("GYRO;{time};{x:.6};{y:.6};{z:.6}\n"),
+                    (1, _) => format!("ACCE;{time};{x:.6};{y:.6};{z:.6}\n"),
+                    // The one in deg/s, the other in g.
+                    (_, 0) => {
+                        format!("gyro {time} {:.6} {:.6} {:.6}\n", x.to_degrees(), y.to_degrees(), z.to_degrees())
+                    }
+                    (_, _) => format!("acc {time} {:.6} {:.6} {:.6}\n", x / 9.80665, y / 9.80665, z / 9.80665),
+                };
+            }
+            let (_, found) = as_proposed(content.as_bytes(), &[]);
+            assert_eq!(
+                found.len(),
+                2,
+                "{seed} {way}: {:?}",
+                found.iter().map(|(proposal, _)| proposal).collect::<Vec<_>>()
+            );
+            for (proposal, read) in &found {
+                let is_rate = read.samples.channels.iter().any(|of| of.profile.name == "gyro_x");
+                let (hz, channel, deviation) = if is_rate { (hz[0], "gyro_z", RATE) } else { (hz[1], "accl_y", FORCE) };
+                assert_eq!(read.samples.channels.len(), 3, "{seed} {way}: {proposal:?}");
+                assert!((read.rate_hz() / hz - 1.0).abs() < 1e-3, "{seed} {way}: {} {hz}", read.rate_hz());
+                assert!(is_near(read, channel, deviation), "{seed} {way}: {} {proposal:?}", read.neighbours(channel));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_list_in_a_cell_is_as_many_columns() {
+    let mut normal = normal(5);
+    for (heading, open, close, separator) in
+        [("t_s,gyro_dps,note", "\"[", "]\",x", ","), ("t_s;gyro_dps;note", "[", "];\"a; b\"", ";")]
+    {
+        let row = |row: u32| {
+            let list = [(); 3].map(|()| format!("{:.4}", RATE * normal())).join(", ");
+            format!("{:.2}{separator}{open}{list}{close}\n", f64::from(row) / 100.0)
+        };
+        let content = format!("{heading}\n") + &(0..ROWS).map(row).collect::<String>();
+        let columns = ["--columns", "gyro_x=gyro.0,gyro_y=gyro.1,gyro_z=gyro.2", "--units", "deg/s"];
+        for options in [&columns[..], &["--units", "deg/s"]] {
+            let read = text("lists.csv", &content, options);
+            assert!(is_near(&read, "gyro_z", RATE) && (read.rate_hz() / 100.0 - 1.0).abs() < 1e-6, "{heading}");
+        }
+    }
+}
+
+/// The parts of a time in several columns, through a midnight.
+#[test]
+fn the_parts_of_a_time_are_one_time() {
+    type Row = fn(u64) -> String;
+    let cases: [(&str, Row); 5] = [
+        ("secs,nsecs", |ns| format!("{},{}", ns / 1_000_000_000, ns % 1_000_000_000)),
+        ("header.stamp.sec,header.stamp.nanosec", |ns| format!("{},{}", ns / 1_000_000_000, ns % 1_000_000_000)),
+        ("sec,usec", |ns| format!("{},{}", ns / 1_000_000_000, ns % 1_000_000_000 / 1000)),
+        ("hour,minute,second,ms", |ns| {
+            let s = ns / 1_000_000_000;
+            format!("{},{},{},{}", s / 3600 % 24, s / 60 % 60, s % 60, ns / 1_000_000 % 1000)
+        }),
+        ("second,ms", |ns| format!("{},{}", ns / 1_000_000_000 % 60, ns / 1_000_000 % 1000)),
+    ];
+    for (names, stamp) in cases {
+        for hz in [100.0, 40.0, 250.0] {
+            let mut normal = normal(6);
+            let row = |row: u32| {
+                let ns = 1_700_006_390_000_000_000 + (f64::from(row) / hz * 1e9) as u64;
+                let [x, y, z] = [(); 3].map(|()| RATE * normal());
+                format!("{},{x:.4},{y:.4},{z:.4}\n", stamp(ns))
+            };
+            let content = format!("{names},gx_dps,gy_dps,gz_dps\n") + &(0..2 * ROWS).map(row).collect::<String>();
+            let read = text("parts.csv", &content, &[]);
+            assert!((read.rate_hz() / hz - 1.0).abs() < 1e-6, "{names} at {hz}: {}", read.rate_hz());
+            assert_eq!((read.samples.len() as u32, read.missing()), (2 * ROWS, 0), "{names} at {hz}");
+        }
+    }
+}
+
+/// A sensor that is turned between rests, or whose axes differ, in columns without names beside others.
+#[test]
+fn the_accelerometer_is_found_by_gravity_and_the_likeness_of_its_axes() {
+    for seed in 0..30 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut normal = normal(seed);
+        let turns = random.random_range(0..6);
+        let (noise, rate_noise) = (random.random_range(0.005..0.03), random.random_range(0.0008..0.004));
+        let tilt: f64 = random.random_range(-0.02..0.02);
+        let before = random.random_range(0..2_usize);
+        let is_rate_first = random.random_bool(0.3);
+        let row = |row: u32| {
+            let turn = f64::from(row) / f64::from(ROWS) * f64::from(turns);
+            // A quarter of each interval it turns.
+            let (whole, part) = (turn.floor(), turn.fract());
+            let angle: f64 = 0.9 * (whole + ((part - 0.75).max(0.0) * 4.0)) + tilt;
+            let turning =
+                if part > 0.75 && turns > 0 { 0.9 * 4.0 * f64::from(turns) / f64::from(ROWS) * 100.0 } else { 0.0 };
+            let force = [angle.sin(), 0.002, angle.cos()].map(|of| 9.80665 * of + noise * normal());
+            let rate = [0.0, turning, 0.0].map(|of| of + 0.003 + rate_noise * normal());
+            let [one, other] = if is_rate_first { [rate, force] } else { [force, rate] };
+            let more = ["", "7 "][before];
+            let written = |of: [f64; 3]| of.map(|value| format!("{value:.6}")).join(" ");
+            format!("{:.2} {more}{} {}\n", f64::from(row) / 100.0, written(one), written(other))
+        };
+        let content: String = (0..ROWS).map(row).collect();
+        let (tables, found) = as_proposed(content.as_bytes(), &[]);
+        assert_eq!(found.len(), 1, "{seed}");
+        let (first, second) = (1 + before, 4 + before);
+        let [force, rate] = if is_rate_first { [second, first] } else { [first, second] };
+        let expected = |name: &str, at: usize| {
+            ["x", "y", "z"].into_iter().zip(at..).map(|(axis, at)| format!("{name}_{axis}={at}")).collect::<Vec<_>>()
+        };
+        let columns = &found[0].0.columns;
+        for wanted in expected("accl", force).iter().chain(&expected("gyro", rate)) {
+            assert!(columns.contains(wanted), "{seed}, {turns} turns: {columns:?} without {wanted}");
+        }
+        assert!(found[0].0.units.contains(&"m/s^2".to_owned()), "{seed}: {:?} {:?}", found[0].0.units, tables[0].notes);
+    }
+}
+
+/// Memory that was erased or never written, at either end, with times that go on or not.
+#[test]
+fn padding_is_no_rest_and_no_row_to_whoever_looks() {
+    for seed in 0..12 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut normal = normal(seed);
+        let (before, after) =
+            (random.random_range(0..2) * random.random_range(300..900_u32), random.random_range(600..4000_u32));
+        let held = [0.0, -0.00763, 65_535.0][random.random_range(0..3)];
+        let is_time_held = random.random_bool(0.5);
+        let row = |row: u32| {
+            let is_padding = row < before || row >= before + ROWS;
+            let time = if is_padding && is_time_held && row > before { 4_294_967.295 } else { f64::from(row) / 20.0 };
+            let force = [0.0, 0.0, 9.8].map(|of: f64| if is_padding { held } else { of + 0.02 * normal() });
+            let rate = [0.0; 3].map(|of: f64| if is_padding { held } else { of + 0.1 * normal() });
+            let values = force.iter().chain(&rate).map(|value| format!("{value:.6}")).collect::<Vec<_>>().join("\t");
+            format!("{time:.6}\t{values}\n")
+        };
+        let content: String = (0..before + ROWS + after).map(row).collect();
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("flash.txt");
+        std::fs::write(&file, &content).expect("written");
+        let tables = inspect(&file);
+        assert_eq!(tables[0].rows as u32, ROWS, "{seed}: {:?}", tables[0].notes);
+        assert!((tables[0].rate.expect("a rate").hz / 20.0 - 1.0).abs() < 1e-3, "{seed}");
+        let steady = tables[0].steady.as_ref().expect("a sensor");
+        let own = before as usize..(before + ROWS) as usize;
+        assert!(own.start <= steady.rows.start && steady.rows.end <= own.end, "{seed}: {steady:?}");
+        assert!(tables[0].notes.iter().any(|note| note.contains("are padding and left out")), "{seed}");
+    }
+}
+
+/// A number of the packet is an index, whatever its column is called, and needs a rate.
+#[test]
+fn a_packet_number_is_no_time() {
+    for (seed, name) in ["Packet number", "PacketCounter", "sample_number", ""].into_iter().enumerate() {
+        let mut random = ChaCha8Rng::seed_from_u64(seed as u64);
+        let mut normal = normal(seed as u64);
+        let (mut number, mut lost) = (1, 0);
+        let row = |_: u32| {
+            let skipped = u32::from(random.random_bool(0.01));
+            (number, lost) = (number + 1 + skipped, lost + skipped);
+            let [x, y, z] = [(); 3].map(|()| RATE * normal());
+            format!("{number},{x:.4},{y:.4},{z:.4},0.02,0.01,-0.32\n")
+        };
+        let rows: String = (0..ROWS).map(row).collect();
+        let heading = if name.is_empty() {
+            String::new()
+        } else {
+            format!(
+                "{name},Gyroscope X (deg/s),Gyroscope Y (deg/s),Gyroscope Z (deg/s),Magnetometer X (G),Magnetometer Y (G),Magnetometer Z (G)\n"
+            )
+        };
+        let (_, found) = as_proposed((heading + &rows).as_bytes(), &["--rate", "256"]);
+        let [(proposal, read)] = &found[..] else { panic!("{name}: {}", found.len()) };
+        assert!(proposal.lacks_rate, "{name}: {proposal:?}");
+        assert_eq!((read.samples.len() as u32, read.missing() as u32), (ROWS, lost), "{name}: {proposal:?}");
+        assert_eq!(name.is_empty(), !read.samples.channels.iter().any(|of| of.profile.name == "magn_z"), "{name}");
+    }
+}
+
+/// A message has fields that its sender never fills: three zeros in every row are no sensor, and one is.
+#[test]
+fn a_vector_that_is_never_filled_is_left_out_with_a_note() {
+    let mut normal = normal(8);
+    let mut table = |zeros: usize| {
+        let row = |row: u32| {
+            let [x, y, z] = [(); 3].map(|()| RATE * normal());
+            let force =
+                [0, 1, 2].map(|axis| if axis < zeros { 0.0 } else { FORCE * normal() }).map(|of| of.to_string());
+            format!("{:.2},{x:.4},{y:.4},{z:.4},{}\n", f64::from(row) / 100.0, force.join(","))
+        };
+        let content = "t_s,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g\n".to_owned() + &(0..ROWS).map(row).collect::<String>();
+        text("imu.csv", &content, &[])
+    };
+    let unfilled = table(3);
+    assert_eq!(unfilled.samples.channels.len(), 3);
+    assert!(unfilled.notes_contain("accl_z (az) is never filled"), "{:?}", unfilled.notes);
+    assert_eq!(table(1).samples.channels.len(), 6);
+}
