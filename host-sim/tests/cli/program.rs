@@ -3,7 +3,7 @@
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use serde_json::Value;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::process::{Child, Command, Output};
 use std::thread;
@@ -91,4 +91,13 @@ pub(crate) fn error_line(output: &Output) -> String {
 pub(crate) fn counts(dir: &TempDir) -> PathBuf {
     let rows: String = (0..2000).map(|at| format!("{},{}\n", f64::from(at) / 100.0, at * 7919 % 41)).collect();
     write(dir, "rows.csv", format!("time_s,gyro_x_counts\n{rows}").as_bytes())
+}
+
+/// Writes of `unsent` what the port takes before its timeout. A port that the program has closed takes everything.
+pub(crate) fn send(port: &mut impl Write, unsent: &mut Vec<u8>) {
+    match port.write(unsent) {
+        Ok(count) => drop(unsent.drain(..count)),
+        Err(error) if error.kind() == ErrorKind::TimedOut => {}
+        Err(_) => unsent.clear(),
+    }
 }

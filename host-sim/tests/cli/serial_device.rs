@@ -1,6 +1,6 @@
 //! The command on a serial port: a pseudo-terminal that the firmware's application serves.
 
-use crate::program::host_sim;
+use crate::program::{host_sim, send};
 use ::host_sim::monitor;
 use recordings::serial::SerialLink;
 use serialport::{SerialPort, TTYPort};
@@ -52,14 +52,17 @@ fn with_device(arguments: &[&str], expected: &[&str]) -> Output {
         .spawn()
         .expect("the program starts");
     let device = thread::spawn(move || {
-        let (mut device, mut keys) = (NoisyDevice::new(), [0; 64]);
+        let (mut device, mut keys, mut unsent) = (NoisyDevice::new(), [0; 64], Vec::new());
         while !done.load(Relaxed) {
             match near.read(&mut keys) {
                 Ok(count) => device.device.press(&keys[..count]),
                 Err(error) => assert_eq!(error.kind(), ErrorKind::TimedOut),
             }
-            // The program may have closed the port.
-            let _ = near.write_all(&device.next());
+            // The device's time stands still until the program has read what was sent.
+            if unsent.is_empty() {
+                unsent = device.next();
+            }
+            send(&mut near, &mut unsent);
         }
     });
     if !expected.is_empty() {

@@ -1,6 +1,6 @@
 //! Recordings over a serial port that end early, and a device that is silent.
 
-use crate::program::{host_sim, signal, with_default_signals};
+use crate::program::{host_sim, send, signal, with_default_signals};
 use ::host_sim::monitor;
 use recordings::serial::SerialLink;
 use serialport::{SerialPort, TTYPort};
@@ -36,7 +36,7 @@ fn record(log: &Path, fault: Fault) -> (Output, String) {
         .spawn()
         .expect("the program starts");
     let mut device = Device::new(VirtualAdis16405::new(NoiseModel::paper(), 5), Device::blank_memory());
-    let (mut now_us, mut interrupted, mut keys, mut received) = (0, false, [0; 64], Vec::new());
+    let (mut now_us, mut interrupted, mut keys, mut received, mut unsent) = (0, false, [0; 64], Vec::new(), Vec::new());
     while program.try_wait().expect("a status").is_none() {
         if let Ok(count) = near.read(&mut keys) {
             received.extend_from_slice(&keys[..count]);
@@ -45,10 +45,15 @@ fn record(log: &Path, fault: Fault) -> (Output, String) {
         if interrupted {
             continue;
         }
+        // The device's time stands still until the program has read what was sent.
+        if !unsent.is_empty() {
+            send(&mut near, &mut unsent);
+            continue;
+        }
         now_us += 10_000;
-        let sent = device.run_until(now_us);
-        if fault != Fault::Silence {
-            let _ = near.write_all(&sent);
+        unsent = device.run_until(now_us);
+        if fault == Fault::Silence {
+            unsent.clear();
         }
         if let Fault::Signal(name) = fault
             && now_us >= FAULT_AFTER_US
