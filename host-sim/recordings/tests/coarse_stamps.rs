@@ -255,3 +255,16 @@ fn losses_between_exact_time_stamps_are_certain() {
         assert_eq!(stamps.uncertain_losses(), 0, "{rate_hz} Hz, {decimals} decimals");
     }
 }
+
+/// So many losses lie within a tick of each other that they look like fewer. The interval of the rate holds the truth all the same.
+#[test]
+fn losses_that_lie_within_a_tick_of_each_other_widen_the_interval_of_the_rate() {
+    for periods in [1.22, 2.45] {
+        for loss in [0.05, 0.1] {
+            for seed in 0..4 {
+                let tick_s = periods / HOST.rate_hz;
+                check(Host { tick_s, jitter_s: 0.1 / HOST.rate_hz, loss, ..HOST }, seed);
+            }
+        }
+    }
+}

@@ -129,8 +129,9 @@ impl AlignedStamps {
     /// What an alignment shows.
     fn from_track(track: Track, times: &[f64], tick_s: Option<f64>) -> Self {
         let samples = times.len() as f64;
-        let resolved =
-            track.width < COARSE || samples >= MIN_TICKS_BETWEEN_LOSSES * track.width * track.losses.len() as f64;
+        // Losses that lie within a tick of each other look like one of several samples: an outage is longer than the tick.
+        let single: f64 = track.losses.iter().map(|loss| (loss.missing as f64).min(track.width.ceil())).sum();
+        let resolved = track.width < COARSE || samples >= MIN_TICKS_BETWEEN_LOSSES * track.width * single;
         // Of losses that lie within a tick of each other the stamps show the sum at best; so many do if they are random.
         let events = track.losses.len() as f64;
         let confused = if track.width < COARSE { 0.0 } else { events * events * track.width / samples };
