@@ -100,11 +100,14 @@ impl Run {
         match (code, lines.as_slice()) {
             (0, []) | (2, [_, ..]) => None,
             (0, _) => Some("messages of a run that succeeds".to_owned()),
-            // One line, or the table of columns and a command.
+            // One line, or the table of columns and a command; without a known column the options that say which is which.
             (_, [error, rest @ ..])
                 if error.starts_with("error: ")
                     && error.len() < 2000
-                    && (rest.is_empty() || rest.iter().any(|line| line.starts_with("  host-sim "))) =>
+                    && (rest.is_empty()
+                        || rest.iter().any(|line| {
+                            line.starts_with("  host-sim ") || line.contains("; say which with --columns ")
+                        })) =>
             {
                 None
             }
