@@ -2,7 +2,7 @@
 
 use crate::tip::similar_name;
 use adis16405_driver::GyroRange;
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use recordings::serial;
 use recordings::time_base::TimeRange;
@@ -343,10 +343,9 @@ pub(crate) struct ExportArguments {
     pub(crate) files: Vec<PathBuf>,
 }
 
-/// Options of `analyze` that a proposed command states itself, and those without a value.
-const PROPOSED: [&str; 9] =
-    ["--topic", "--columns", "--units", "--rate", "--sensor", "--range", "--from", "--to", "--against"];
-const FLAGS: [&str; 6] = ["--quick", "--full", "--explain", "--quiet", "--each-sensor", "--yes"];
+/// Options of `analyze` that a proposed command states itself, or does not need.
+const PROPOSED: [&str; 11] =
+    ["topic", "columns", "units", "rate", "sensor", "range", "from", "to", "against", "yes", "each-sensor"];
 
 /// The options that were typed for `analyze`, without those that a proposed command states itself.
 pub(crate) fn other_options() -> Vec<String> {
@@ -354,20 +353,17 @@ pub(crate) fn other_options() -> Vec<String> {
     if words.next().as_deref() != Some("analyze") {
         return Vec::new();
     }
+    let program = Cli::command();
+    let arguments = || program.find_subcommand("analyze").into_iter().flat_map(clap::Command::get_arguments);
+    let takes_value =
+        |name: &str| arguments().any(|own| own.get_long() == Some(name) && own.get_action().takes_values());
     let mut options = Vec::new();
     while let Some(word) = words.next() {
-        let name = word.split('=').next().unwrap_or_default().to_owned();
-        let value = if word.starts_with("--") && !word.contains('=') && !FLAGS.contains(&name.as_str()) {
-            words.next()
-        } else {
-            None
-        };
-        if word.starts_with("--")
-            && !PROPOSED.contains(&name.as_str())
-            && !["--yes", "--each-sensor"].contains(&name.as_str())
-        {
-            options.push(word);
-            options.extend(value);
+        let Some(option) = word.strip_prefix("--") else { continue };
+        let name = option.split('=').next().unwrap_or_default();
+        let value = if option.contains('=') || !takes_value(name) { None } else { words.next() };
+        if !PROPOSED.contains(&name) {
+            options.extend([Some(word), value].into_iter().flatten());
         }
     }
     options

@@ -10,7 +10,7 @@ use crate::columns::column_selection::{ColumnSelection, is_output_register};
 use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::sensor_guess::SensorGuess;
 use crate::rows::batch::Batch;
-use crate::rows::padding::{PaddingFinder, Unpadded};
+use crate::rows::padding::PaddingFinder;
 use crate::rows::row_source::BATCH;
 use crate::rows::whole_table::WholeTable;
 use crate::time_base::clock::{Clock, Place, RowStamp};
@@ -179,10 +179,9 @@ impl InspectedTable {
 
 /// The table without the rows at either end that are padding, and how many of them are before its first row.
 fn without_padding(mut table: WholeTable) -> (WholeTable, usize) {
-    let facts: Vec<ColumnFacts> = table.columns.iter().map(ColumnFacts::new).collect();
     // Times may go on where the values do not.
-    let is_value = |of: &&ColumnFacts| of.values.windows(2).any(|pair| pair[1] < pair[0]);
-    let values: Vec<&[f64]> = facts.iter().filter(is_value).map(|of| of.values).collect();
+    let is_value = |values: &&[f64]| values.windows(2).any(|pair| pair[1] < pair[0]);
+    let values: Vec<&[f64]> = table.columns.iter().map(|column| column.values.as_slice()).filter(is_value).collect();
     let mut finder = PaddingFinder::default();
     let rows = if values.is_empty() { 0 } else { table.rows() };
     for start in (0..rows).step_by(BATCH) {
@@ -190,17 +189,13 @@ fn without_padding(mut table: WholeTable) -> (WholeTable, usize) {
         let values = values.iter().map(|column| column[part.clone()].to_vec()).collect();
         finder.add(&Batch { rows: part.len(), values, ..Batch::default() });
     }
-    drop(facts);
-    let Some(Unpadded { first, end }) = finder.finish() else { return (table, 0) };
-    let (before, after) = (first as usize, rows - end as usize);
+    let Some(unpadded) = finder.finish() else { return (table, 0) };
+    let before = unpadded.first as usize;
     for column in &mut table.columns {
-        column.values.truncate(end as usize);
+        column.values.truncate(unpadded.end as usize);
         column.values.drain(..before);
     }
-    table.notes.push(format!(
-        "{} rows that are all equal, {before} at the start and {after} at the end, are padding and left out",
-        before + after
-    ));
+    table.notes.push(unpadded.note(finder.rows()));
     (table, before)
 }
 

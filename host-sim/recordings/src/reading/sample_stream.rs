@@ -466,13 +466,8 @@ impl Survey {
         let survey = Self::read_rows(origin, reading, most_rows, monitor, Unpadded::ALL, Some(&mut padding));
         let Some(unpadded) = padding.finish() else { return survey };
         let mut survey = Self::read_rows(origin, reading, most_rows, monitor, unpadded, None)?;
-        let before = unpadded.first;
-        let after = padding.rows() - unpadded.end;
-        survey.read.padding = before + after;
-        survey.read.notes.push(format!(
-            "{} rows that are all equal, {before} at the start and {after} at the end, are padding and left out",
-            before + after
-        ));
+        survey.read.padding = unpadded.first + padding.rows() - unpadded.end;
+        survey.read.notes.push(unpadded.note(padding.rows()));
         Ok(survey)
     }
 

@@ -17,6 +17,15 @@ impl Unpadded {
     /// All rows.
     pub(crate) const ALL: Self = Self { first: 0, end: u64::MAX };
 
+    /// What is said of `rows` rows, of which only these are used.
+    pub(crate) fn note(self, rows: u64) -> String {
+        let (before, after) = (self.first, rows - self.end);
+        format!(
+            "{} rows that are all equal, {before} at the start and {after} at the end, are padding and left out",
+            before + after
+        )
+    }
+
     /// Leaves out the padding of a batch that begins with this row.
     pub(crate) fn apply(self, first_row: u64, batch: &mut Batch) {
         if self != Self::ALL {

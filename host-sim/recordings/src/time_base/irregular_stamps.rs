@@ -84,33 +84,43 @@ pub(crate) fn is_of_many(times: &[f64], tick_s: f64) -> bool {
     tick_s * (times.len() as f64) > MANY * span_s && span_s > 0.0
 }
 
+/// The rows between two changes of the stamp.
+struct WholeTicks {
+    /// The row after them.
+    end: usize,
+    rows: f64,
+    ticks: f64,
+}
+
 /// Stamps whose ticks hold many samples: the first sample of each tick is known to a sample period, and no other. Samples are missing from a
 /// tick where most others hold equally many more.
 pub(crate) fn by_ticks(times: &[f64], tick_s: f64, stated_hz: Option<f64>) -> Option<AlignedStamps> {
     let starts: Vec<usize> = (1..times.len()).filter(|at| times[*at] > times[*at - 1]).collect();
-    let wholes: Vec<(usize, f64, f64)> = starts
-        .windows(2)
-        .map(|pair| (pair[1], (pair[1] - pair[0]) as f64, ((times[pair[1]] - times[pair[0]]) / tick_s).round()))
-        .collect();
+    let between = |pair: &[usize]| WholeTicks {
+        end: pair[1],
+        rows: (pair[1] - pair[0]) as f64,
+        ticks: ((times[pair[1]] - times[pair[0]]) / tick_s).round(),
+    };
+    let wholes: Vec<WholeTicks> = starts.windows(2).map(between).collect();
     if wholes.len() < LEAST_TICKS {
         return None;
     }
     // Samples of a tick: as most ticks have, else as all have together.
-    let mut counts: Vec<f64> = wholes.iter().map(|(_, rows, ticks)| rows / ticks).collect();
+    let mut counts: Vec<f64> = wholes.iter().map(|of| of.rows / of.ticks).collect();
     let usual = quantile(&mut counts, 1, 2);
-    let is_alike = |(_, rows, ticks): &&(usize, f64, f64)| (rows - usual * ticks).abs() <= ROUNDING;
-    let alike: Vec<&(usize, f64, f64)> = wholes.iter().filter(is_alike).collect();
+    let is_alike = |of: &&WholeTicks| (of.rows - usual * of.ticks).abs() <= ROUNDING;
+    let alike: Vec<&WholeTicks> = wholes.iter().filter(is_alike).collect();
     let are_most = 2 * alike.len() > wholes.len();
-    let counted: Vec<&(usize, f64, f64)> = if are_most { alike } else { wholes.iter().collect() };
-    let (rows, ticks) = counted.iter().fold((0.0, 0.0), |(rows, ticks), (_, row, tick)| (rows + row, ticks + tick));
-    let hz = rows / (ticks * tick_s);
-    let error = (ticks * tick_s).recip();
+    let counted: Vec<&WholeTicks> = if are_most { alike } else { wholes.iter().collect() };
+    let seconds = counted.iter().map(|of| of.ticks).sum::<f64>() * tick_s;
+    let hz = counted.iter().map(|of| of.rows).sum::<f64>() / seconds;
+    let error = seconds.recip();
     let of_tick = stated_hz.filter(|stated| (stated / hz - 1.0).abs() < 0.1).unwrap_or(hz) * tick_s;
     let mut losses = Vec::new();
-    for (before, rows, ticks) in wholes.iter().filter(|_| are_most) {
+    for WholeTicks { end, rows, ticks } in wholes.iter().filter(|_| are_most) {
         let missing = of_tick * ticks - rows;
         if missing > ROUNDING {
-            losses.push(LostStretch { before: *before, missing: missing.round() as u64, certain: true });
+            losses.push(LostStretch { before: *end, missing: missing.round() as u64, certain: true });
         }
     }
     let mut periods = Vec::with_capacity(times.len());

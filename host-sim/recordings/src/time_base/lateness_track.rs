@@ -18,6 +18,12 @@ pub(crate) const LOSS: f64 = 0.5;
 const COARSE_LOSS: f64 = 0.7;
 /// Interval, in periods, that a lost sample makes at least.
 pub(crate) const LONG: f64 = 1.5;
+
+/// Growth of the lateness in such an interval, in periods; rounding takes a tick, also in periods.
+pub(crate) fn least_growth(tick: Option<f64>) -> f64 {
+    LONG - 1.0 - tick.unwrap_or(0.0)
+}
+
 /// Distance of a rise from a whole number of periods below which nothing but a loss explains it.
 pub(crate) const CERTAIN: f64 = 0.3;
 /// Times that an estimate of the period is improved by the alignment that it gives.
@@ -110,9 +116,9 @@ impl Track {
     fn of_lateness(lateness: Vec<f64>, period_s: f64, tick_s: Option<f64>, (queue, least): (usize, u64)) -> Self {
         let samples = lateness.len();
         let near = minimum_ahead(&lateness, SEARCH_QUEUE);
-        // A lost sample makes an interval long, in whatever order and however late the others are read; rounding takes a tick of it.
-        let long = LONG - 1.0 - tick_s.map_or(0.0, |tick| tick / period_s);
-        let is_long: Vec<bool> = lateness.windows(2).map(|pair| pair[1] - pair[0] >= long).collect();
+        // A lost sample makes an interval long, in whatever order and however late the others are read.
+        let least_growth = least_growth(tick_s.map(|tick_s| tick_s / period_s));
+        let is_long: Vec<bool> = lateness.windows(2).map(|pair| pair[1] - pair[0] >= least_growth).collect();
         let mut above: Vec<f64> = lateness.iter().zip(&near).map(|(late, least)| late - least).collect();
         // Of a uniform lateness three quarters are below 3/4 of its width; late deliveries are fewer than the fourth.
         let quartile = quantile(&mut above, 3, 4) * 4.0 / 3.0;

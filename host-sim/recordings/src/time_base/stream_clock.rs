@@ -8,7 +8,7 @@
 use crate::time_base::aligned_stamps::RateEstimate;
 use crate::time_base::clock_rate::SteadyStream;
 use crate::time_base::indexed_clock::{ClockStep, STEP_PERIODS, STEP_S};
-use crate::time_base::lateness_track::{CERTAIN, COARSE, LONG, LOSS, MEMORY};
+use crate::time_base::lateness_track::{CERTAIN, COARSE, LOSS, MEMORY, least_growth};
 use crate::time_base::lower_envelope::{MinimumBehind, minimum_ahead};
 use crate::time_base::stamp_alignment::MAX_QUEUE;
 use crate::time_base::stamp_quality::StampQuality;
@@ -54,8 +54,8 @@ pub(crate) struct StreamClock {
     /// Lateness of the rows that are not placed yet, and their times, s.
     ahead: Vec<f64>,
     times_s: Vec<f64>,
-    /// Growth of the lateness in an interval that a lost sample makes at least; rounding takes a tick of it.
-    long: f64,
+    /// Growth of the lateness in an interval that a lost sample makes at least.
+    least_growth: f64,
     /// Lateness of the last rows that were placed.
     recent: VecDeque<f64>,
     /// The stamps as a steady clock would have written them; `None` where they do not tell the sample periods.
@@ -103,9 +103,9 @@ impl StreamClock {
             last: Stamp::default(),
             ahead: Vec::new(),
             times_s: Vec::new(),
-            long: LONG
-                - 1.0
-                - head.and_then(|head| head.tick_s).zip(period_s).map_or(0.0, |(tick, period)| tick / period),
+            least_growth: least_growth(
+                head.and_then(|head| head.tick_s).zip(period_s).map(|(tick, period)| tick / period),
+            ),
             recent: VecDeque::new(),
             steady: if let Source::Stamps(period_s) = source { Some(SteadyStream::new(period_s)) } else { None },
             end: (0, 0.0),
@@ -205,7 +205,7 @@ impl StreamClock {
 
     /// Whether one of the last intervals is as long as a lost sample makes it.
     fn has_long_interval(&self) -> bool {
-        self.recent.iter().zip(self.recent.iter().skip(1)).any(|(one, next)| next - one >= self.long)
+        self.recent.iter().zip(self.recent.iter().skip(1)).any(|(one, next)| next - one >= self.least_growth)
     }
 
     /// The sample rate by the stamps of the rows that were placed, Hz.
