@@ -419,8 +419,7 @@ pub(crate) fn read_measurement(arguments: &RecordingArguments) -> Result<Measure
 
 /// What the driver reads of a log or of counts.
 fn replayed(input: &InputFile, range: GyroRangeArgument) -> Result<Recording> {
-    let Replay { recording, other_transactions, timing } =
-        simulation::replay(input.path(), range.into()).map_err(|error| input.rename(error))?;
+    let Replay { recording, other_transactions, timing } = simulation::replay(input.bytes(), range.into())?;
     note_all(&timing.notes());
     if other_transactions > 0 {
         note(format_args!("{other_transactions} transactions that are no bursts"));

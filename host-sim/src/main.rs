@@ -121,7 +121,7 @@ fn monitor_source(arguments: &MonitorArguments) -> Result<()> {
             deadline.with_context(|| format!("a duration of {seconds} s: it must be positive and finite, and no age"))
         })
         .transpose()?;
-    if !source.is_file() {
+    if !source.is_file() && !source.is_dir() {
         return monitor_device(arguments, deadline).with_context(|| source.display().to_string());
     }
     let name = source.file_name().unwrap_or_default().to_string_lossy();
