@@ -51,7 +51,7 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
     let AnalyzeArguments { recording, more, each_sensor, against, quick, reports, output } = arguments;
     let files: Vec<&Path> = [&recording.input.file].into_iter().chain(more).map(PathBuf::as_path).collect();
     let sensor = recording.input.sensor.as_deref().map(Path::new);
-    let outputs = OutputFiles::beside(files.iter().copied().chain(against.as_deref()).chain(sensor));
+    let outputs = OutputFiles::new(files.iter().copied().chain(against.as_deref()).chain(sensor), output.force);
     let mut recordings: Vec<RecordingArguments> = Vec::new();
     for &file in &files {
         let of_file = of_file(recording, file);
