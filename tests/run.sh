@@ -15,6 +15,8 @@ cd "$(dirname "$0")/.."
 
 MCU=thumbv7em-none-eabihf # Cortex-M4F: the firmware
 SMALL=thumbv6m-none-eabi  # Cortex-M0+: the Pico's firmware, the two libraries
+WINDOWS=x86_64-pc-windows-gnu
+BROWSER=wasm32-unknown-unknown
 mkdir -p "${CARGO_TARGET_DIR:-target}"
 TARGET=$(realpath "${CARGO_TARGET_DIR:-target}")
 WITHOUT_RECORDINGS=$TARGET/tests-without-recordings # names of tests, one a line
@@ -24,6 +26,7 @@ STEPS=(
     "format:formatting"
     "build:lints and build of the tests"
     "examples:lints of the libraries' examples for microcontrollers"
+    "systems:checks for Windows and for browsers"
     "documentation:documentation of the libraries"
     "dependencies:licences and sources of the dependencies"
     "python:the Python module and its tests"
@@ -67,7 +70,7 @@ compilers() {
     python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { echo "Python 3.11 or later is missing" >&2; exit 1; }
     command -v cc >/dev/null || { echo "a C compiler is missing: apt-get install gcc libc6-dev" >&2; exit 1; }
     local target component
-    for target in "$MCU" "$SMALL"; do
+    for target in "$MCU" "$SMALL" "$WINDOWS" "$BROWSER"; do
         rustup target list --installed | grep -qx "$target" || run rustup target add "$target"
     done
     for component in rustfmt clippy; do
@@ -131,6 +134,15 @@ examples() { # two workspaces with the same frameworks, which are compiled once
             run cargo clippy --locked --target "$MCU" --target-dir "$TARGET/examples" -- -D warnings
         )
     done
+}
+systems() { # what needs neither a compiler of C nor, in a browser, a port
+    (
+        unset RUSTC_WORKSPACE_WRAPPER
+        export RUSTFLAGS="-D warnings" # clippy measures types, whose sizes are those of the system
+        run cargo check --quiet --locked --target "$WINDOWS" --no-default-features --features host-sim/hdf5 --package host-sim
+        run cargo check --quiet --locked --target "$BROWSER" --no-default-features --features recordings/hdf5 \
+            --package recordings --package noise-analysis --package reports
+    )
 }
 documentation() {
     RUSTDOCFLAGS="-D warnings" run cargo doc --quiet --locked --no-deps --package adis16405-driver --package allan-core --all-features

@@ -51,7 +51,7 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
     let AnalyzeArguments { recording, more, each_sensor, against, quick, reports, output } = arguments;
     let files: Vec<&Path> = [&recording.input.file].into_iter().chain(more).map(PathBuf::as_path).collect();
     let sensor = recording.input.sensor.as_deref().map(Path::new);
-    let outputs = OutputFiles::beside(files.iter().copied().chain(against.as_deref()).chain(sensor));
+    let outputs = OutputFiles::new(files.iter().copied().chain(against.as_deref()).chain(sensor), output.force);
     let mut recordings: Vec<RecordingArguments> = Vec::new();
     for &file in &files {
         let of_file = of_file(recording, file);
@@ -419,8 +419,7 @@ pub(crate) fn read_measurement(arguments: &RecordingArguments) -> Result<Measure
 
 /// What the driver reads of a log or of counts.
 fn replayed(input: &InputFile, range: GyroRangeArgument) -> Result<Recording> {
-    let Replay { recording, other_transactions, timing } =
-        simulation::replay(input.path(), range.into()).map_err(|error| input.rename(error))?;
+    let Replay { recording, other_transactions, timing } = simulation::replay(input.bytes(), range.into())?;
     note_all(&timing.notes());
     if other_transactions > 0 {
         note(format_args!("{other_transactions} transactions that are no bursts"));

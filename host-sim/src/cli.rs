@@ -252,6 +252,9 @@ pub(crate) struct ConvertArguments {
     /// Format: table, frames or npy [default: by OUT's name].
     #[arg(long, help_heading = OUTPUT, value_name = "FORMAT", value_enum, hide_possible_values = true)]
     pub(crate) format: Option<RecordingFormat>,
+    /// Overwrite files that exist.
+    #[arg(long, help_heading = OUTPUT)]
+    pub(crate) force: bool,
 }
 
 /// What to simulate.
@@ -262,6 +265,9 @@ pub(crate) struct SimulateArguments {
     /// Format: table, frames or npy [default: by OUT's name].
     #[arg(long, help_heading = OUTPUT, value_name = "FORMAT", value_enum, hide_possible_values = true)]
     pub(crate) format: Option<RecordingFormat>,
+    /// Overwrite files that exist.
+    #[arg(long, help_heading = OUTPUT)]
+    pub(crate) force: bool,
     /// Virtual time in s [default: 3600].
     #[arg(long, allow_negative_numbers = true)]
     pub(crate) seconds: Option<f64>,
@@ -338,6 +344,9 @@ pub(crate) struct ExportArguments {
     /// One number for three axes: rms or worst.
     #[arg(long, help_heading = OUTPUT, value_enum, default_value_t, hide_possible_values = true)]
     pub(crate) axis: AxisChoice,
+    /// Overwrite files that exist.
+    #[arg(long, help_heading = OUTPUT)]
+    pub(crate) force: bool,
     /// Reports of `analyze --json`, and the file to write.
     #[arg(required = true, num_args = 2.., value_names = ["REPORT", "OUT"])]
     pub(crate) files: Vec<PathBuf>,
@@ -579,6 +588,9 @@ pub(crate) struct OutputArguments {
     /// Write the report as JSON; - for standard output.
     #[arg(long, value_name = "OUT")]
     pub(crate) json: Option<PathBuf>,
+    /// Overwrite files that exist.
+    #[arg(long)]
+    pub(crate) force: bool,
     /// Write the report as a web page, DIR/index.html.
     #[arg(long, value_name = "DIR")]
     pub(crate) page: Option<PathBuf>,
@@ -626,6 +638,9 @@ pub(crate) struct JsonArgument {
     /// Write the result as JSON.
     #[arg(long, value_name = "OUT")]
     pub(crate) json: Option<PathBuf>,
+    /// Overwrite files that exist.
+    #[arg(long)]
+    pub(crate) force: bool,
 }
 
 #[cfg(test)]

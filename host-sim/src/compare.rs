@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// Compares the last report of the arguments with the first, or with the data sheet, and prints the table.
 pub(crate) fn run(arguments: &CompareArguments) -> Result<()> {
     let CompareArguments { first, second, data_sheet: _, output } = arguments;
-    let files = OutputFiles::beside([first].into_iter().chain(second).map(PathBuf::as_path));
+    let files = OutputFiles::new([first].into_iter().chain(second).map(PathBuf::as_path), output.force);
     check_result(output, &files)?;
     let (comparison, before, after) = match second {
         Some(second) => {

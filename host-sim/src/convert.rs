@@ -12,13 +12,13 @@ use std::path::Path;
 
 /// Reads a recording of any format and writes it anew.
 pub(crate) fn run(arguments: &ConvertArguments) -> Result<()> {
-    let ConvertArguments { recording, out, format } = arguments;
+    let ConvertArguments { recording, out, format, force } = arguments;
     let InputArguments { file, sensor, .. } = &recording.input;
     if recording.rate.is_some() && recording.time_range().is_none() {
         bail!("--rate says where --from and --to are in a recording without times; leave it out");
     }
     let sensor = sensor.as_deref().map(Path::new);
-    let files = OutputFiles::beside([file.as_path()].into_iter().chain(sensor));
+    let files = OutputFiles::new([file.as_path()].into_iter().chain(sensor), *force);
     files.check(out)?;
     let format = recording_file::format_of(out, *format)?;
     read_or_ask(recording, |recording| convert(recording, out, format, &files))

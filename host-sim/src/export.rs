@@ -10,14 +10,14 @@ use std::path::PathBuf;
 
 /// Reads the reports and writes the file.
 pub(crate) fn run(arguments: &ExportArguments) -> Result<()> {
-    let ExportArguments { files, format, axis } = arguments;
+    let ExportArguments { files, format, axis, force } = arguments;
     let [reports @ .., out] = files.as_slice() else { bail!("no report") };
-    let outputs = OutputFiles::beside(reports.iter().map(PathBuf::as_path));
-    outputs.check(out)?;
     // A pipe or a device is not read.
     if out.is_file() && read_report(out).is_ok() {
         bail!("{}: is a report, which would be overwritten; name a file to write after the reports", out.display());
     }
+    let outputs = OutputFiles::new(reports.iter().map(PathBuf::as_path), *force);
+    outputs.check(out)?;
     let names = || reports.iter().map(|file| file.display().to_string()).collect::<Vec<_>>().join(", ");
     let read: Vec<SavedReport> = reports.iter().map(|file| read_report(file)).collect::<Result<_>>()?;
     let joined = SavedReport::joined(read).with_context(names)?.context("no report")?;

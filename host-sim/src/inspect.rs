@@ -193,7 +193,9 @@ impl Display for Contents {
                 writeln!(f, "    in doubt: {doubt}")?;
             }
         }
-        if self.proposals().count() > 1 {
+        // As `--each-sensor` takes them.
+        let is_taken = |proposal: &Proposal| proposal.is_complete() || proposal.is_safe();
+        if self.proposals().count() > 1 && self.proposals().all(is_taken) {
             let rest = if self.proposals().all(Proposal::is_complete) { "" } else { " --yes" };
             let file = quoted(&self.given.input.file.display().to_string());
             writeln!(f, "all of them, as several recordings:\n  host-sim analyze {file} --each-sensor{rest}")?;

@@ -76,7 +76,7 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
     match command {
         None => {
             output.page.get_or_insert_with(|| PathBuf::from(DEFAULT_PAGE));
-            let files = OutputFiles::default();
+            let files = OutputFiles::new([], output.force);
             output::check(&output, &files)?;
             output::write_report(&record::simulate(&simulate.simulation(3600.0))?.into(), None, &output, &files)
         }
@@ -84,15 +84,15 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
         Some(Command::Inspect(arguments)) => inspect::run(&arguments, analyze::read_measurement),
         Some(Command::Replay(arguments)) => {
             let ReplayArguments { file, output, .. } = &arguments;
-            let files = OutputFiles::beside([file.as_path()]);
+            let files = OutputFiles::new([file.as_path()], output.force);
             output::check(output, &files)?;
             let report = analyze::analyze_replay(&arguments)?;
             output::write_report(&report.into(), Some(&output::source_name(file)), output, &files)
         }
         Some(Command::Record { out, port, baud, seconds, output }) => {
-            OutputFiles::default().check(&out)?;
+            OutputFiles::new([], output.force).check(&out)?;
             // The log is read again: nothing else is written to it.
-            let files = OutputFiles::beside([out.as_path()]);
+            let files = OutputFiles::new([out.as_path()], output.force);
             output::check(&output, &files)?;
             let report = record::record_device(&out, &port, baud, seconds)?;
             output::write_report(&report.into(), Some(&output::source_name(&out)), &output, &files)
@@ -121,7 +121,7 @@ fn monitor_source(arguments: &MonitorArguments) -> Result<()> {
             deadline.with_context(|| format!("a duration of {seconds} s: it must be positive and finite, and no age"))
         })
         .transpose()?;
-    if !source.is_file() {
+    if !source.is_file() && !source.is_dir() {
         return monitor_device(arguments, deadline).with_context(|| source.display().to_string());
     }
     let name = source.file_name().unwrap_or_default().to_string_lossy();

@@ -1,56 +1,27 @@
-//! The files that a command writes: none of them is a file that it reads, whatever its name, and each is complete or as it was.
+//! The files that a command writes: none of them is a file that it reads, whatever its name; each is complete or as it was; and one that
+//! exists is overwritten where the user says so.
 
 use crate::interrupt::IncompleteFile;
 use anyhow::{Context, Result, bail};
+use recordings::file_format::files_of_bag;
+use same_file::Handle;
 use std::fs::{self, File, OpenOptions};
-#[cfg(unix)]
-use std::io;
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, PersistError};
 
 /// Longest ending of the name of a file that the one beside it keeps, bytes: writers choose the compression by it.
 const LONGEST_ENDING: usize = 32;
 
-/// What a name stands for: a file that exists, or one that does not.
-#[derive(Debug, Clone, PartialEq, Eq)]
-enum FileIdentity {
-    /// Device and inode, which all names and links of a file have in common. No file is held open for it.
-    #[cfg(unix)]
-    Inode(u64, u64),
-    /// The path without links.
-    Name(PathBuf),
-}
-
-impl FileIdentity {
-    fn new(file: &Path) -> Self {
-        #[cfg(unix)]
-        if let Some(identity) = Self::of_existing(file) {
-            return identity;
-        }
-        let name = || {
-            let folder = fs::canonicalize(folder_of(file));
-            folder.map_or(file.to_owned(), |folder| folder.join(file.file_name().unwrap_or_default()))
-        };
-        Self::Name(fs::canonicalize(file).unwrap_or_else(|_| name()))
-    }
-
-    #[cfg(unix)]
-    fn of_existing(file: &Path) -> Option<Self> {
-        use std::os::fd::AsFd;
-        use std::os::unix::fs::MetadataExt;
-        let metadata = if is_standard_stream(file) {
-            io::stdin().as_fd().try_clone_to_owned().and_then(|stdin| File::from(stdin).metadata())
-        } else {
-            fs::metadata(file)
-        };
-        metadata.ok().map(|metadata| Self::Inode(metadata.dev(), metadata.ino()))
-    }
-}
-
 /// Whether `-` is given for a file: standard input or standard output.
 pub(crate) fn is_standard_stream(file: &Path) -> bool {
     file.as_os_str() == "-"
+}
+
+/// Where a file is or will be, without links.
+fn place(file: &Path) -> PathBuf {
+    let in_folder = || Some(fs::canonicalize(folder_of(file)).ok()?.join(file.file_name()?));
+    fs::canonicalize(file).ok().or_else(in_folder).unwrap_or_else(|| file.to_owned())
 }
 
 fn folder_of(file: &Path) -> &Path {
@@ -60,19 +31,40 @@ fn folder_of(file: &Path) -> &Path {
 /// Writes the files of a command that reads some others.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct OutputFiles {
-    inputs: Vec<FileIdentity>,
+    /// Places of the files that are read; `-` is standard input.
+    inputs: Vec<PathBuf>,
+    overwrites: bool,
 }
 
 impl OutputFiles {
-    /// Of a command that reads `inputs`; `-` is standard input.
-    pub(crate) fn beside<'a>(inputs: impl IntoIterator<Item = &'a Path>) -> Self {
-        Self { inputs: inputs.into_iter().map(FileIdentity::new).collect() }
+    /// Of a command that reads `inputs`, where `-` is standard input; files that exist are refused unless it `overwrites` them.
+    pub(crate) fn new<'a>(inputs: impl IntoIterator<Item = &'a Path>, overwrites: bool) -> Self {
+        let place = |file: &Path| if is_standard_stream(file) { file.to_owned() } else { place(file) };
+        let files = |input: &Path| [vec![place(input)], files_of_bag(input).unwrap_or_default()].concat();
+        Self { inputs: inputs.into_iter().flat_map(files).collect(), overwrites }
     }
 
-    /// Refuses a file that the command reads.
+    /// Refuses a file that the command reads, under any of its names.
     fn check_identity(&self, file: &Path) -> Result<()> {
-        if self.inputs.contains(&FileIdentity::new(file)) {
+        // No more than two files are held open. A pipe is no output that is replaced, and must not be opened twice.
+        let is_file = |file: &Path| fs::metadata(file).is_ok_and(|metadata| metadata.is_file());
+        let handle = |file: &Path| if is_file(file) { Handle::from_path(file).ok() } else { None };
+        let (place, output) = (place(file), handle(file));
+        let is_output = |input: &PathBuf| {
+            let handle = || if is_standard_stream(input) { Handle::stdin().ok() } else { handle(input) };
+            *input == place || output.as_ref().is_some_and(|output| handle().as_ref() == Some(output))
+        };
+        if self.inputs.iter().any(is_output) {
             bail!("is an input; it would be overwritten");
+        }
+        Ok(())
+    }
+
+    /// Refuses an input, and a file that exists and must not be overwritten.
+    fn check_name(&self, file: &Path) -> Result<()> {
+        self.check_identity(file)?;
+        if !self.overwrites && fs::metadata(file).is_ok_and(|metadata| metadata.is_file()) {
+            bail!("exists already; --force overwrites it");
         }
         Ok(())
     }
@@ -82,31 +74,32 @@ impl OutputFiles {
     /// # Errors
     /// Names the file.
     pub(crate) fn check_all(&self, files: &[&Path]) -> Result<()> {
-        for (position, file) in files.iter().enumerate() {
+        let mut places: Vec<PathBuf> = Vec::new();
+        for file in files {
             self.check(file)?;
-            let identity = FileIdentity::new(file);
-            if files[..position].iter().any(|other| FileIdentity::new(other) == identity) {
+            let place = place(file);
+            if places.contains(&place) {
                 bail!("{}: named twice as an output", file.display());
             }
+            places.push(place);
         }
         Ok(())
     }
 
-    /// Checks before any work that `file` can be written and is no input. A file that exists keeps its content.
+    /// Checks before any work that `file` can be written, is no input, and does not exist unless it may be overwritten.
     ///
     /// # Errors
     /// Names the file.
     pub(crate) fn check(&self, file: &Path) -> Result<()> {
         let check = || -> Result<()> {
-            self.check_identity(file)?;
+            self.check_name(file)?;
             match fs::metadata(file) {
                 // A pipe or a device is not opened twice.
                 Ok(metadata) if !metadata.is_file() && !metadata.is_dir() => return Ok(()),
                 Ok(_) => drop(OpenOptions::new().write(true).open(file)?),
                 Err(_) => {}
             }
-            file_beside(&target(file)).map(drop)?;
-            Ok(())
+            file_beside(&target(file)).map(drop)
         };
         check().with_context(|| file.display().to_string())
     }
@@ -136,23 +129,36 @@ impl OutputFiles {
     /// Writes `file` with `write`, which is given a file of the same ending beside it; that takes the name when it is complete.
     ///
     /// # Errors
-    /// The file is an input, or cannot be written; it is then as it was. The error names it.
+    /// The file is an input, must not be overwritten, or cannot be written; it is then as it was. The error names it.
     pub(crate) fn write_with<R>(&self, file: &Path, write: impl FnOnce(&Path) -> Result<R>) -> Result<R> {
         let replace = || -> Result<R> {
-            self.check_identity(file)?;
-            let metadata = fs::metadata(file);
-            if metadata.is_ok_and(|metadata| !metadata.is_file()) {
+            self.check_name(file)?;
+            if fs::metadata(file).is_ok_and(|metadata| !metadata.is_file()) {
                 return write(file);
             }
             let target = target(file);
             let beside = file_beside(&target)?;
             let incomplete = IncompleteFile::new(beside.path());
             let written = write(beside.path())?;
-            beside.persist(&target)?;
+            self.persist(beside, &target)?;
             drop(incomplete);
             Ok(written)
         };
         replace().with_context(|| file.display().to_string())
+    }
+
+    /// Gives a complete file its name.
+    fn persist(&self, beside: NamedTempFile, target: &Path) -> io::Result<()> {
+        let beside = if self.overwrites {
+            beside
+        } else {
+            match beside.persist_noclobber(target) {
+                Err(PersistError { error, file }) if error.kind() != ErrorKind::AlreadyExists => file,
+                persisted => return persisted.map(drop).map_err(Into::into),
+            }
+        };
+        // Not every file system can refuse to replace a file.
+        beside.persist(target).map(drop).map_err(Into::into)
     }
 
     /// Writes `file` through a buffer.

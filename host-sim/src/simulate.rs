@@ -13,7 +13,7 @@ const DEFAULT_S: f64 = 3600.0;
 /// Runs the simulation and writes the recording.
 pub(crate) fn run(arguments: &SimulateArguments) -> Result<()> {
     let out = &arguments.out;
-    let files = OutputFiles::default();
+    let files = OutputFiles::new([], arguments.force);
     files.check(out)?;
     let simulation = simulation(arguments)?;
     let sampled_hz = simulation.sampled_hz()?;

@@ -20,6 +20,7 @@ mod ros_bag;
 mod ros_definition;
 mod ros_message;
 mod row_kinds;
+mod split_bag;
 #[cfg(feature = "sqlite")]
 mod sqlite_bag;
 mod table_head;

@@ -2,6 +2,7 @@
 
 pub(crate) mod budget;
 pub(crate) mod delimited_text;
+pub(crate) mod file_bytes;
 pub(crate) mod file_hash;
 pub(crate) mod gzip_members;
 pub(crate) mod input_error;

@@ -17,6 +17,7 @@ pub mod time_base;
 pub use columns::column_selection::{ColumnSelection, SelectionError};
 pub use counts::{count_table_writer, frame_log, numpy_matrix, recorded_file, serial, spi_export};
 pub use formats::file_format;
+pub use input::file_bytes::FileBytes;
 pub use input::file_hash::FileHash;
 pub use input::input_error::{InputError, Printable, Reason};
 pub use input::read_monitor::{ReadMonitor, ReadPass};

@@ -11,9 +11,8 @@ use recordings::count_table;
 use recordings::frame_log::{Frame, FrameLogReader};
 use recordings::recorded_file::{FrameReader, RecordedFile};
 use recordings::recording::{MAX_SAMPLES, Recorder, Recording, TimeStamp};
-use recordings::{InputError, Reason, SelectionError};
+use recordings::{FileBytes, InputError, Reason, SelectionError};
 use std::cell::RefCell;
-use std::path::Path;
 use std::rc::Rc;
 
 /// A replayed recording.
@@ -31,7 +30,8 @@ pub struct Replay {
 ///
 /// # Errors
 /// The file cannot be read, or a transaction differs from the one that the driver requests.
-pub fn replay(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
+pub fn replay(file: impl Into<FileBytes>, range: GyroRange) -> Result<Replay, InputError> {
+    let file = &file.into();
     match RecordedFile::open(file)? {
         RecordedFile::Frames(frames) => replay_frames(file, frames, range),
         RecordedFile::Table => replay_table(file, range),
@@ -42,7 +42,8 @@ pub fn replay(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
 ///
 /// # Errors
 /// As [`replay`].
-pub fn replay_table(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
+pub fn replay_table(file: impl Into<FileBytes>, range: GyroRange) -> Result<Replay, InputError> {
+    let file = &file.into();
     let mut recorder: Option<Recorder> = None;
     let mut player = Player::new();
     count_table::for_each_row(file, range, |channels, time_stamp, counts| {
@@ -58,7 +59,7 @@ pub fn replay_table(file: &Path, range: GyroRange) -> Result<Replay, InputError>
         }
         _ => error,
     })?;
-    let recording = recorder.map(Recorder::finish).ok_or_else(|| InputError::file(file, Reason::NoData))?;
+    let recording = recorder.map(Recorder::finish).ok_or_else(|| InputError::file(file.name(), Reason::NoData))?;
     Ok(Replay { recording, other_transactions: 0, timing: CapturedBusTiming::default() })
 }
 
@@ -66,11 +67,12 @@ pub fn replay_table(file: &Path, range: GyroRange) -> Result<Replay, InputError>
 ///
 /// # Errors
 /// As [`replay`], or the log has no burst, or bursts of two ranges.
-pub fn replay_log(file: &Path, range: GyroRange) -> Result<Replay, InputError> {
+pub fn replay_log(file: impl Into<FileBytes>, range: GyroRange) -> Result<Replay, InputError> {
+    let file = &file.into();
     replay_frames(file, FrameReader::Log(FrameLogReader::open(file)?), range)
 }
 
-fn replay_frames(file: &Path, mut frames: FrameReader, range: GyroRange) -> Result<Replay, InputError> {
+fn replay_frames(file: &FileBytes, mut frames: FrameReader, range: GyroRange) -> Result<Replay, InputError> {
     // As the log last selected it, and of the bursts so far.
     let (mut selected, mut taken_in) = (range, range);
     let mut recorder = Recorder::new(Channel::ALL.to_vec(), range);
@@ -87,14 +89,14 @@ fn replay_frames(file: &Path, mut frames: FrameReader, range: GyroRange) -> Resu
                 taken_in = selected;
             } else if selected != taken_in {
                 let reason = Reason::MixedRange { before: full_scale(taken_in), now: full_scale(selected) };
-                return Err(InputError::line(file, frames.line(), reason));
+                return Err(InputError::line(file.name(), frames.line(), reason));
             }
             if bursts == MAX_SAMPLES {
-                return Err(InputError::line(file, frames.line(), Reason::TooManySamples));
+                return Err(InputError::line(file.name(), frames.line(), Reason::TooManySamples));
             }
             let burst = player
                 .burst(&frame.mosi, &frame.miso)
-                .map_err(|reason| InputError::line(file, frames.line(), reason))?;
+                .map_err(|reason| InputError::line(file.name(), frames.line(), reason))?;
             recorder.push(TimeStamp::from_time(frame.time_s), &burst);
             bursts += 1;
         } else {
@@ -103,7 +105,7 @@ fn replay_frames(file: &Path, mut frames: FrameReader, range: GyroRange) -> Resu
         }
     }
     if bursts == 0 {
-        return Err(InputError::file(file, Reason::NoBurst));
+        return Err(InputError::file(file.name(), Reason::NoBurst));
     }
     Ok(Replay { recording: recorder.finish(), other_transactions, timing })
 }

@@ -159,6 +159,18 @@ fn every_printed_command_runs() {
             }
         }),
     ));
+    // Rows of two kinds, of which the first one alone has a heading: the unit of the others is in doubt.
+    files.push((
+        "one heading.txt",
+        rows("% 'ACCE;time (ms);Acc_X(m/s^2);Acc_Y(m/s^2);Acc_Z(m/s^2)'\n", &mut |at| {
+            let time = 10 * (at / 2);
+            if at % 2 == 0 {
+                format!("ACCE;{time};{}", three(0.01, gravity, ";"))
+            } else {
+                format!("GYRO;{time};{}", three(0.002, [0.0; 3], ";"))
+            }
+        }),
+    ));
     files.push((
         "devices.csv",
         rows("id,t_ms,gx_dps,gy_dps,gz_dps\n", &mut |at| {

@@ -1,4 +1,5 @@
-//! Files that the program writes: none is a file that it reads, under whatever name, and each is complete or as it was.
+//! Files that the program writes: none is a file that it reads, under whatever name; each is complete or as it was, and none that exists is
+//! overwritten unasked.
 
 use crate::program::{counts as table, error_line, host_sim, signal, wait_until, with_default_signals, write};
 use std::fs::{self, File};
@@ -75,17 +76,13 @@ fn a_file_that_cannot_be_written_whole_stays_as_it_was() {
     let dir = tempdir().expect("a folder");
     let rows = table(&dir);
     for (command, old) in [
-        (&["convert"][..], "old.csv"),
-        (&["analyze", "--quiet", "--json"], "old.json"),
-        (&["analyze", "--quiet", "--page"], "index.html"),
+        (&["convert", "--force"][..], "old.csv"),
+        (&["analyze", "--force", "--quiet", "--json"], "old.json"),
+        (&["analyze", "--force", "--quiet", "--page"], "index.html"),
     ] {
         let old = write(&dir, old, b"an old report\n");
         let out = if command.last() == Some(&"--page") { dir.path() } else { old.as_path() };
-        let arguments: Vec<&str> = match command {
-            [only] => vec![only, name(&rows), name(out)],
-            [first, rest @ ..] => [&[first, name(&rows)], rest, &[name(out)]].concat(),
-            [] => Vec::new(),
-        };
+        let arguments = [&command[..1], &[name(&rows)], &command[1..], &[name(out)]].concat();
         let output = on_a_full_disk(&arguments);
         let error = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(!output.status.success() && error.contains("too large"), "{command:?}: {error}");
@@ -109,7 +106,7 @@ fn a_signal_leaves_the_old_file_and_nothing_beside_it() {
         let dir = tempdir().expect("a folder");
         let log = write(&dir, "log.csv", b"an old log\n");
         let mut program = with_default_signals()
-            .args(["simulate", name(&log), "--format", "frames", "--seconds", "80000"])
+            .args(["simulate", name(&log), "--force", "--format", "frames", "--seconds", "80000"])
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
@@ -219,11 +216,66 @@ fn links_and_permissions_of_an_output_stay() {
     fs::set_permissions(&real, fs::Permissions::from_mode(0o640)).expect("permissions");
     let link = dir.path().join("link.csv");
     std::os::unix::fs::symlink(&real, &link).expect("a link");
-    let output = host_sim(&["convert", name(&rows), name(&link)]);
+    let output = host_sim(&["convert", name(&rows), name(&link), "--force"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(fs::symlink_metadata(&link).expect("the link").is_symlink());
     assert!(fs::read(&real).expect("a table").starts_with(b"time_s,gyro_x_counts\n"));
     assert_eq!(fs::metadata(&real).expect("a table").permissions().mode() & 0o777, 0o640);
+}
+
+/// Every command that writes files, and each of its options that names one.
+#[test]
+fn a_file_that_exists_is_overwritten_with_force_alone() {
+    let dir = tempdir().expect("a folder");
+    let rows = table(&dir);
+    let report = dir.path().join("report.json");
+    assert!(host_sim(&["analyze", name(&rows), "--quiet", "--json", name(&report)]).status.success());
+    let [rows, report] = [name(&rows), name(&report)];
+    let [old, page, picture] = ["old", "page/index.html", "pictures/overview.svg"].map(|file| dir.path().join(file));
+    let reports = dir.path().join("reports");
+    let one_report = reports.join("rows.json");
+    let [of_page, of_pictures] = [&page, &picture].map(|file| file.parent().expect("a folder"));
+    let export = format!("csv={}", name(&old));
+    for (command, file) in [
+        (&["analyze", rows, "--quiet", "--json", name(&old)][..], &old),
+        (&["analyze", rows, "--quiet", "--export", &export], &old),
+        (&["analyze", rows, "--quiet", "--page", name(of_page)], &page),
+        (&["analyze", rows, "--quiet", "--pictures", name(of_pictures)], &picture),
+        (&["analyze", rows, "--quiet", "--reports", name(&reports)], &one_report),
+        (&["replay", rows, "--quiet", "--json", name(&old)], &old),
+        (&["--seconds", "60", "--quiet", "--page", name(of_page)], &page),
+        (&["compare", report, report, "--json", name(&old)], &old),
+        (&["export", "--format", "csv", report, name(&old)], &old),
+        (&["convert", rows, name(&old)], &old),
+        (&["simulate", name(&old), "--seconds", "5"], &old),
+    ] {
+        fs::create_dir_all(file.parent().expect("a folder")).expect("a folder");
+        fs::write(file, "what was there").expect("written");
+        let line = error_line(&host_sim(command));
+        assert!(
+            line.contains(name(file)) && line.contains("exists already; --force overwrites it"),
+            "{command:?}: {line}"
+        );
+        assert_eq!(fs::read(file).expect("the file"), b"what was there", "{command:?}");
+        let output = host_sim(&[command, &["--force"]].concat());
+        assert!(output.status.success(), "{command:?}: {}", String::from_utf8_lossy(&output.stderr));
+        assert_ne!(fs::read(file).expect("the file"), b"what was there", "{command:?}");
+        // Nor is what the program wrote in the call before.
+        assert!(error_line(&host_sim(command)).contains("exists already"), "{command:?}");
+    }
+}
+
+/// A recording of hours would be gone.
+#[test]
+fn a_recording_of_a_device_is_not_overwritten() {
+    let dir = tempdir().expect("a folder");
+    let log = write(&dir, "night.csv", b"a night\n");
+    let line = error_line(&host_sim(&["record", name(&log), "--port", "/dev/null"]));
+    assert!(line.contains("night.csv") && line.contains("exists already"), "{line}");
+    let again = dir.path().join("again.csv");
+    let line = error_line(&host_sim(&["record", name(&again), "--port", "/dev/null", "--json", name(&again)]));
+    assert!(line.contains("is an input"), "{line}");
+    assert_eq!(names(dir.path()), ["night.csv"]);
 }
 
 /// Two reports and no file to write: the second one stays.
@@ -270,7 +322,8 @@ fn the_parts_of_a_sensor_are_exported_as_one() {
     let before = fs::read(&accl_json).expect("a report");
     let line = error_line(&host_sim(&["export", "--format", "kalibr", name(&gyro_json), name(&accl_json)]));
     assert!(line.contains("is a report") && fs::read(&accl_json).expect("a report") == before, "{line}");
-    let line = error_line(&host_sim(&["export", "--format", "vins", name(&gyro_json), name(&accl_json), name(&yaml)]));
+    let vins = ["export", "--force", "--format", "vins", name(&gyro_json), name(&accl_json), name(&yaml)];
+    let line = error_line(&host_sim(&vins));
     assert!(line.contains("parts at 100"), "{line}");
     // The same in one table with blanks.
     let mut rows: Vec<(u32, String)> = Vec::new();

@@ -28,9 +28,10 @@ fn standard_input_is_read_like_a_file() {
 fn a_named_pipe_is_read_once() {
     let dir = tempdir().expect("a folder");
     let file = counts(&dir);
-    let (pipe, out) = (dir.path().join("pipe"), dir.path().join("piped.json"));
+    let pipe = dir.path().join("pipe");
     assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo").success());
     for command in ["analyze", "replay"] {
+        let out = dir.path().join(format!("{command}.json"));
         let mut program = Command::new(env!("CARGO_BIN_EXE_host-sim"))
             .args([command, pipe.to_str().expect("UTF-8"), "--json", out.to_str().expect("UTF-8")])
             .stdout(Stdio::null())

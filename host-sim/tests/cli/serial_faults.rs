@@ -30,7 +30,7 @@ fn record(log: &Path, fault: Fault) -> (Output, String) {
     let port = far.name().expect("a name");
     near.set_timeout(Duration::from_millis(1)).expect("a timeout");
     let mut program = with_default_signals()
-        .args(["record", log.to_str().expect("UTF-8"), "--port", &port, "--seconds", "20"])
+        .args(["record", log.to_str().expect("UTF-8"), "--force", "--port", &port, "--seconds", "20"])
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()

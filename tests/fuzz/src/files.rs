@@ -23,11 +23,11 @@ pub(crate) fn recording(bytes: &[u8]) {
     let range = adis16405_driver::GyroRange::Dps300;
     match input.format() {
         FileFormat::FrameLog | FileFormat::SpiExport => {
-            let Ok(RecordedFile::Frames(mut frames)) = RecordedFile::open(input.path()) else { return };
+            let Ok(RecordedFile::Frames(mut frames)) = RecordedFile::open(input.bytes()) else { return };
             while let Ok(Some(_)) = frames.next() {}
         }
         FileFormat::CountTable => {
-            let _any = count_table::read(input.path(), range);
+            let _any = count_table::read(input.bytes(), range);
             if let Ok(stream) = SampleStream::counts(input, range, Reading::new(None, KEPT)) {
                 read_to_its_end(stream);
             }

@@ -465,7 +465,7 @@ const COMMANDS: [&str; 11] = [
     "uf2",
     "--seconds",
 ];
-const OPTIONS: [&str; 27] = [
+const OPTIONS: [&str; 28] = [
     "--rate",
     "--range",
     "--columns",
@@ -491,6 +491,7 @@ const OPTIONS: [&str; 27] = [
     "--effect",
     "--environment",
     "--fault",
+    "--force",
     "--format",
     "--help",
 ];
@@ -665,9 +666,9 @@ fn full_disk(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let out = campaign.write("out.csv", old);
     let folder = campaign.folder().to_owned();
     let words: Vec<&str> = match rng.random_range(0..3) {
-        0 => vec!["convert", &file, &out],
-        1 => vec!["simulate", &out, "--seconds", "5"],
-        _ => vec!["analyze", &file, "--rate", "100", "--quiet", "--json", &out],
+        0 => vec!["convert", &file, &out, "--force"],
+        1 => vec!["simulate", &out, "--force", "--seconds", "5"],
+        _ => vec!["analyze", &file, "--rate", "100", "--quiet", "--force", "--json", &out],
     };
     let mut program = Program::new(&folder, &words);
     let whole = {
@@ -691,6 +692,7 @@ fn interrupted(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let out = campaign.write("out.csv", old);
     let folder = campaign.folder().to_owned();
     let words = if rng.random() { vec!["convert", &file, &out] } else { vec!["simulate", &out, "--seconds", "30"] };
+    let words = [&words[..], &["--force"]].concat();
     let program = Program::new(&folder, &words);
     campaign.checked(&program, &[0], 0);
     let whole = std::fs::read(&out).expect("written");

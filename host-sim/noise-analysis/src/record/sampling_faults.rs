@@ -100,11 +100,12 @@ pub(crate) fn repeated_samples(measurement: &Measurement) -> Option<Detection> {
 }
 
 /// Compares the sample rate by the time stamps with the stated rate, or without one with the nearest rate that the sensor
-/// can be set to or that hosts usually read at; and its parts with each other.
+/// can be set to or that hosts usually read at; and its parts with each other. A sensor without a data sheet has no rate of its own.
 #[must_use]
 pub(crate) fn sample_clock(measurement: &Measurement) -> Option<Detection> {
     let MeasuredValue { value: measured, error } = rate_by_time_stamps(measurement)?;
-    let nominal = measurement.stated_rate_hz.unwrap_or_else(|| nearest_usual_rate(&measurement.profile, measured));
+    let nominal = measurement.stated_rate_hz.or_else(|| nearest_usual_rate(&measurement.profile, measured));
+    let nominal = nominal.unwrap_or(measured);
     let off = measured / nominal - 1.0;
     let z = off.abs() * measured / error;
     let p_value = 2.0 * upper_tail(z);
@@ -186,13 +187,13 @@ fn rate_change(measurement: &Measurement) -> Option<RateChange> {
     })
 }
 
-/// The nearest rate, in Hz, that the sensor can be set to or that is round.
-fn nearest_usual_rate(profile: &SensorProfile, measured: f64) -> f64 {
-    let native = profile.nearest_native_rate_hz(measured);
+/// The nearest rate, in Hz, that the sensor can be set to or that is round; `None` where its rates are not known.
+fn nearest_usual_rate(profile: &SensorProfile, measured: f64) -> Option<f64> {
+    let native = profile.nearest_native_rate_hz(measured)?;
     let decade = |power: i32| DOUBLINGS.map(move |doublings| 10f64.powi(power) * 2f64.powi(doublings));
     let round = (-1..=3).flat_map(decade).chain((0..=10).map(|power| 2f64.powi(power)));
     let distance = |rate: &f64| (rate / measured - 1.0).abs();
-    native.into_iter().chain(round).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(measured)
+    std::iter::once(native).chain(round).min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
 /// Sample rate in Hz: one over the slope of the least-squares line of the time stamps over the sample periods.
@@ -221,13 +222,18 @@ fn variance(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::nearest_usual_rate;
+    use measurement::SensorProfile;
 
     /// The ADIS16405 samples at 1638.4 Hz over whole numbers from 2 on, and at 52.85 Hz over whole numbers (data sheet).
     #[test]
     fn the_nearest_usual_rate_is_one_of_the_sensor_or_a_round_one() {
         for (measured, usual) in [(816.43, 819.2), (204.1, 204.8), (100.02, 100.0), (101.9, 102.4), (199.5, 200.0)] {
-            let nearest = nearest_usual_rate(&measurement::adis16405::profile(0.05), measured);
+            let nearest = nearest_usual_rate(&measurement::adis16405::profile(0.05), measured).expect("a part's rates");
             assert!((nearest / usual - 1.0).abs() < 1e-4, "{measured}: {nearest}");
+        }
+        // Loops, phones and parts without a profile run at any rate.
+        for rate_hz in (10..5000).map(|tenths| f64::from(tenths) / 10.0) {
+            assert_eq!(nearest_usual_rate(&SensorProfile::generic(), rate_hz), None, "{rate_hz}");
         }
     }
 }

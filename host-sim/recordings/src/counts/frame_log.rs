@@ -3,6 +3,7 @@
 //! Times are written with as many digits as they need to be read back exactly.
 
 use crate::input::delimited_text::{self, Lines};
+use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::{InputError, Reason};
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -49,8 +50,9 @@ impl FrameLogReader {
     ///
     /// # Errors
     /// The file cannot be read or does not start with [`HEADER`].
-    pub fn open(file: &Path) -> Result<Self, InputError> {
-        Self::new(file, Lines::open(file)?)
+    pub fn open(file: impl Into<FileBytes>) -> Result<Self, InputError> {
+        let file = file.into();
+        Self::new(file.name(), Lines::open(&file)?)
     }
 
     /// As [`open`](Self::open), of a file that was opened before.

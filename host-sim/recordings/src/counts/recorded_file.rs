@@ -3,8 +3,8 @@
 use crate::counts::frame_log::{FrameLogReader, HEADER};
 use crate::counts::spi_export::{self, CapturedFrame, SpiExportReader};
 use crate::input::delimited_text::Lines;
+use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::InputError;
-use std::path::Path;
 
 /// An open recording, told apart by its header.
 pub enum RecordedFile {
@@ -27,13 +27,13 @@ impl RecordedFile {
     ///
     /// # Errors
     /// The file cannot be read, or its header is that of none of the formats.
-    pub fn open(file: &Path) -> Result<Self, InputError> {
+    pub fn open(file: &FileBytes) -> Result<Self, InputError> {
         let mut lines = Lines::open(file)?;
         let header = lines.header()?;
         if header == Some(HEADER) {
-            FrameLogReader::new(file, lines).map(|log| Self::Frames(FrameReader::Log(log)))
+            FrameLogReader::new(file.name(), lines).map(|log| Self::Frames(FrameReader::Log(log)))
         } else if header.is_some_and(spi_export::is_header) {
-            SpiExportReader::new(file, lines).map(|export| Self::Frames(FrameReader::Export(Box::new(export))))
+            SpiExportReader::new(file.name(), lines).map(|export| Self::Frames(FrameReader::Export(Box::new(export))))
         } else {
             Ok(Self::Table)
         }

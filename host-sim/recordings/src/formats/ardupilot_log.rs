@@ -6,12 +6,11 @@ use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::AvailableColumn;
 use crate::formats::topics::{EachRow, Ending, Source, Topic, TopicSensor};
 use crate::input::budget::{Budget, Metered};
+use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::{InputError, Reason};
 use crate::rows::batch::Number;
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read};
-use std::path::Path;
 
 const FORMAT: &str = "ArduPilot log";
 
@@ -94,7 +93,7 @@ impl Rows {
 
 /// An open log.
 pub(crate) struct ArduPilotSource<'a> {
-    file: &'a Path,
+    file: &'a FileBytes,
     topics: Vec<Topic>,
     rows: Vec<Rows>,
     preferred: Option<String>,
@@ -102,7 +101,7 @@ pub(crate) struct ArduPilotSource<'a> {
 }
 
 impl<'a> ArduPilotSource<'a> {
-    pub(crate) fn open(file: &'a Path, budget: Budget) -> Result<Self, InputError> {
+    pub(crate) fn open(file: &'a FileBytes, budget: Budget) -> Result<Self, InputError> {
         let mut counted: BTreeMap<Rows, u64> = BTreeMap::new();
         let Log { formats, .. } = for_each_sample(file, budget, &mut |rows, _| {
             match counted.get_mut(rows) {
@@ -189,9 +188,9 @@ struct Log {
 type EachSample<'a> = dyn FnMut(&Rows, &dyn Fn(usize) -> Number) -> Result<(), InputError> + 'a;
 
 /// Gives every sample to `each`.
-fn for_each_sample(file: &Path, budget: Budget, each: &mut EachSample) -> Result<Log, InputError> {
-    let fail = |error| InputError::file(file, Reason::from_io(error));
-    let input = BufReader::new(File::open(file).map_err(fail)?);
+fn for_each_sample(file: &FileBytes, budget: Budget, each: &mut EachSample) -> Result<Log, InputError> {
+    let fail = |error| file.error(Reason::from_io(error));
+    let input = BufReader::new(file.open().map_err(fail)?);
     let mut messages = Messages::new(Metered::new(input, budget.meter()));
     let mut batch: Option<Batch> = None;
     // Of each type of message: its name with the instance that was seen last.

@@ -11,6 +11,8 @@ use crate::formats::matlab::MatReader;
 use crate::formats::mcap_bag::McapSource;
 use crate::formats::numpy::{NpyReader, NpzReader};
 use crate::formats::ros_bag::RosBagSource;
+use crate::formats::split_bag::SplitBag;
+pub use crate::formats::split_bag::files_of_bag;
 #[cfg(feature = "sqlite")]
 use crate::formats::sqlite_bag::SqliteSource;
 use crate::formats::text_table::TextRows;
@@ -20,6 +22,7 @@ use crate::formats::ulog::UlogSource;
 use crate::formats::{foreign_format, text_table};
 use crate::input::budget::{Budget, Metered};
 use crate::input::delimited_text::{Lines, is_utf16};
+use crate::input::file_bytes::FileBytes;
 use crate::input::file_hash::FileHash;
 use crate::input::gzip_members::{GZIP_MAGIC, GzipMembers};
 use crate::input::input_error::{InputError, Reason};
@@ -29,12 +32,12 @@ use crate::inspection::InspectedTable;
 use crate::rows::any_sensor::ReadOptions;
 use crate::rows::row_source::{BatchSource, FileRows, RowSource};
 use crate::rows::whole_table::WholeTable;
-use crate::time_base::time_base_error::StreamError;
 use adis16405_driver::GyroRange;
 use measurement::{SensorProfile, adis16405};
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread;
 use std::time::Duration;
@@ -112,20 +115,33 @@ const MAGICS: [(&[u8], FileFormat); 8] = [
     (&ardupilot_log::MAGIC, FileFormat::ArduPilot),
 ];
 
-/// An input that can be read more than once: a file, or a copy of what came through a pipe or was compressed.
+/// An input that can be read more than once: a file, a copy of what came through a pipe or was compressed, bytes in memory, or the files of
+/// a bag that was split.
 #[derive(Debug)]
 pub struct InputFile {
     /// As the user named it.
     name: PathBuf,
-    copy: Option<NamedTempFile>,
+    /// At least one; of a bag of ROS 2 in a folder all of its files, in their order.
+    parts: Vec<InputPart>,
     format: FileFormat,
     monitor: ReadMonitor,
     budget: Budget,
 }
 
+/// A file of an input.
+#[derive(Debug)]
+struct InputPart {
+    /// As it was given.
+    origin: FileBytes,
+    /// As it is read.
+    bytes: FileBytes,
+    budget: Budget,
+}
+
 impl InputFile {
     /// Opens `name`, `-` for standard input, and recognises its format. A pipe is copied to a temporary file, and so is a
-    /// compressed file of a binary format. Bytes that a device sent while its raw stream was on become a frame log.
+    /// compressed file of a binary format. Bytes that a device sent while its raw stream was on become a frame log. Of a folder the
+    /// bag of ROS 2 in it is opened.
     ///
     /// # Errors
     /// The file cannot be read or copied, or it has none of the formats.
@@ -140,69 +156,47 @@ impl InputFile {
     /// As [`open`](Self::open).
     pub fn open_monitored(name: &Path, monitor: &ReadMonitor) -> Result<Self, InputError> {
         let fail = |error| InputError::file(name, Reason::Io(error));
-        let mut copy = None;
-        if name == Path::new("-") {
-            copy = Some(copied_pipe(io::stdin(), monitor).map_err(fail)?);
+        let pipe =
+            |copied: io::Result<NamedTempFile>| Ok(vec![FileBytes::in_temporary_file(name, copied.map_err(fail)?)]);
+        let files = if name == Path::new("-") {
+            pipe(copied_pipe(io::stdin(), monitor))?
         } else {
             let metadata = name.metadata().map_err(fail)?;
             if metadata.is_dir() {
-                return Err(InputError::file(name, Reason::Directory));
-            }
-            if !metadata.is_file() {
-                copy = Some(copied_pipe(File::open(name).map_err(fail)?, monitor).map_err(fail)?);
-            }
-        }
-        let budget = Budget::of_file(copy.as_ref().map_or(name, NamedTempFile::path)).map_err(fail)?;
-        // Of compressed text, what is in it.
-        let mut text = None;
-        let mut head = head(copy.as_ref().map_or(name, NamedTempFile::path)).map_err(fail)?;
-        if head.starts_with(&GZIP_MAGIC) {
-            let compressed = File::open(copy.as_ref().map_or(name, NamedTempFile::path)).map_err(fail)?;
-            let mut inner = GzipMembers::new(BufReader::new(compressed));
-            let mut start = Vec::new();
-            // Damage is reported with its line where the whole is read.
-            let _ = inner.by_ref().take(HEAD_BYTES).read_to_end(&mut start);
-            if binary_format(&start).is_some() {
-                let whole = Metered::new(start.as_slice().chain(inner), budget.meter());
-                copy = Some(copied(whole).map_err(|error| InputError::file(name, Reason::from_io(error)))?);
-                head = start;
+                let files = files_of_bag(name).map_err(fail)?;
+                if files.is_empty() {
+                    return Err(InputError::file(name, Reason::Directory));
+                }
+                files.iter().map(FileBytes::from).collect()
+            } else if metadata.is_file() {
+                vec![FileBytes::from(name)]
             } else {
-                text = Some(start);
-            }
-        }
-        if head.starts_with(&ZSTD_MAGIC) {
-            let compressed = File::open(copy.as_ref().map_or(name, NamedTempFile::path)).map_err(fail)?;
-            let whole = ZstdFrames::new(BufReader::new(compressed));
-            let expanded = copied(Metered::new(whole, budget.meter()));
-            let expanded = expanded.map_err(|error| InputError::file(name, Reason::from_io(error)))?;
-            head = self::head(expanded.path()).map_err(fail)?;
-            copy = Some(expanded);
-        }
-        let format = match binary_format(&head) {
-            Some(format) => format,
-            None if serial::is_capture(&head) => {
-                let log = NamedTempFile::new().map_err(fail)?;
-                let capture = File::open(copy.as_ref().map_or(name, NamedTempFile::path)).map_err(fail)?;
-                serial::log_of_capture(BufReader::new(capture), log.path()).map_err(fail)?;
-                copy = Some(log);
-                FileFormat::FrameLog
-            }
-            None if foreign_format::is_report(&head) => {
-                return Err(InputError::file(name, foreign_format::REPORT));
-            }
-            None if foreign_format::is_json_document(&head) => {
-                return Err(InputError::file(name, foreign_format::JSON_DOCUMENT));
-            }
-            None if foreign_format::is_binary(text.as_ref().unwrap_or(&head))
-                && !(text.is_none() && is_utf16(&head)) =>
-            {
-                return Err(InputError::file(name, foreign_format::refusal(text.as_ref().unwrap_or(&head))));
-            }
-            None => {
-                text_format(copy.as_ref().map_or(name, NamedTempFile::path)).map_err(|error| renamed(error, name))?
+                pipe(copied_pipe(File::open(name).map_err(fail)?, monitor))?
             }
         };
-        Ok(Self { name: name.to_owned(), copy, format, monitor: monitor.clone(), budget })
+        Self::recognised(name, files, monitor)
+    }
+
+    /// Opens bytes in memory that are called `name`.
+    ///
+    /// # Errors
+    /// They have none of the formats, or are too many once they are decompressed.
+    pub fn in_memory(name: &Path, bytes: impl Into<Arc<[u8]>>) -> Result<Self, InputError> {
+        Self::recognised(name, vec![FileBytes::in_memory(name, bytes)], &ReadMonitor::default())
+    }
+
+    fn recognised(name: &Path, files: Vec<FileBytes>, monitor: &ReadMonitor) -> Result<Self, InputError> {
+        let (mut parts, mut format) = (Vec::new(), None);
+        for file in files {
+            let (part, of_part) = InputPart::recognised(file)?;
+            if *format.get_or_insert(of_part) != of_part {
+                return Err(InputError::file(name, Reason::Directory));
+            }
+            parts.push(part);
+        }
+        let format = format.ok_or_else(|| InputError::file(name, Reason::Directory))?;
+        let budget = Budget::joined(parts.iter().map(|part| part.budget));
+        Ok(Self { name: name.to_owned(), parts, format, monitor: monitor.clone(), budget })
     }
 
     /// What was recognised.
@@ -210,12 +204,12 @@ impl InputFile {
         self.format
     }
 
-    /// Begins to make the hash of the bytes.
+    /// Begins to make the hash of the bytes, as they were given.
     ///
     /// # Errors
     /// The file cannot be opened.
     pub fn begin_hash(&self) -> io::Result<FileHash> {
-        FileHash::begin(self.path())
+        FileHash::begin(&self.parts.iter().map(|part| part.origin.clone()).collect::<Vec<_>>())
     }
 
     /// As the user named it.
@@ -228,22 +222,9 @@ impl InputFile {
         &self.monitor
     }
 
-    /// Where the bytes are.
-    pub fn path(&self) -> &Path {
-        self.copy.as_ref().map_or(&self.name, NamedTempFile::path)
-    }
-
-    /// An error of [`path`](Self::path) under the name by which the user knows the file.
-    pub fn rename(&self, error: InputError) -> InputError {
-        renamed(error, &self.name)
-    }
-
-    /// The same of an error that may be of its time base.
-    pub(crate) fn rename_any(&self, error: StreamError) -> StreamError {
-        match error {
-            StreamError::Input(error) => self.rename(error).into(),
-            StreamError::TimeBase(_) => error,
-        }
+    /// The bytes as they are read; of a bag that was split, those of its first file.
+    pub fn bytes(&self) -> &FileBytes {
+        &self.parts[0].bytes
     }
 
     /// The rows of any sensor, or of register counts of an ADIS16405 whose rates were taken in `range`.
@@ -255,16 +236,13 @@ impl InputFile {
         options: &ReadOptions,
         range: Option<GyroRange>,
     ) -> Result<BatchSource<'_>, InputError> {
-        let path = self.path();
+        let (name, bytes) = (self.name(), self.bytes());
         let rows: Box<dyn RowSource + '_> = match self.format {
-            FileFormat::CountTable | FileFormat::TextTable => Box::new(TextRows::open(path, options, &self.monitor)?),
-            FileFormat::FrameLog | FileFormat::SpiExport => return Err(InputError::file(path, Reason::FrameLog)),
-            _ => {
-                let budget = self.budget.again();
-                Box::new(TopicRows::open(path, self.source(budget)?, options, budget)?)
-            }
+            FileFormat::CountTable | FileFormat::TextTable => Box::new(TextRows::open(bytes, options, &self.monitor)?),
+            FileFormat::FrameLog | FileFormat::SpiExport => return Err(InputError::file(name, Reason::FrameLog)),
+            _ => Box::new(TopicRows::open(name, self.source()?, options, self.budget)?),
         };
-        Ok(BatchSource::File(Box::new(FileRows::new(path, rows, &self.monitor, range))))
+        Ok(BatchSource::File(Box::new(FileRows::new(name, rows, &self.monitor, range))))
     }
 
     /// What is in the file without an analysis, of the topic that is named or of all that have an inertial sensor; `selection` is what the
@@ -273,10 +251,10 @@ impl InputFile {
     /// # Errors
     /// The file is damaged, has no rows of numbers, or is a log of the SPI bus, which has no columns.
     pub fn inspect(&self, topic: Option<&str>, selection: &ColumnSelection) -> Result<Vec<InspectedTable>, InputError> {
-        let path = self.path();
+        let name = self.name();
         let whole = match self.format {
             FileFormat::CountTable | FileFormat::TextTable => {
-                let read = |topic: Option<&str>| text_table::read_whole(path, topic, &self.monitor);
+                let read = |topic: Option<&str>| text_table::read_whole(self.bytes(), topic, &self.monitor);
                 match read(topic) {
                     // Rows of several kinds.
                     Err(InputError { reason: Reason::SeveralTopics(names), .. }) => {
@@ -285,13 +263,12 @@ impl InputFile {
                     table => table.map(|table| vec![table]),
                 }
             }
-            FileFormat::FrameLog | FileFormat::SpiExport => Err(InputError::file(path, Reason::FrameLog)),
+            FileFormat::FrameLog | FileFormat::SpiExport => Err(InputError::file(name, Reason::FrameLog)),
             _ => {
-                let budget = self.budget.again();
-                self.source(budget).and_then(|mut source| topics::read_whole(path, source.as_mut(), topic, budget))
+                let source = self.source();
+                source.and_then(|mut source| topics::read_whole(name, source.as_mut(), topic, self.budget))
             }
         };
-        let tables = whole.map_err(|error| self.rename(error))?;
         let inspect = |table: WholeTable| {
             let has_registers = table.columns.iter().any(|of| is_output_register(&of.column.name));
             let sensor = match self.format {
@@ -301,7 +278,7 @@ impl InputFile {
             };
             InspectedTable::new(table, &sensor, selection)
         };
-        Ok(tables.into_iter().map(inspect).collect())
+        Ok(whole?.into_iter().map(inspect).collect())
     }
 
     /// Names of the sensors of one kind that the file has, each to be read with [`ReadOptions::topic`]; none of a file with one sensor,
@@ -313,7 +290,7 @@ impl InputFile {
         if self.format.is_text() {
             return Ok(Vec::new());
         }
-        let source = self.source(self.budget.again()).map_err(|error| self.rename(error))?;
+        let source = self.source()?;
         Ok(topics::names_of_several(source.as_ref()))
     }
 
@@ -325,45 +302,91 @@ impl InputFile {
         if self.format.is_text() {
             return Ok(Vec::new());
         }
-        let source = self.source(self.budget.again()).map_err(|error| self.rename(error))?;
+        let source = self.source()?;
         Ok(source.topics().iter().map(TopicDescription::from).collect())
     }
 
     /// The topics of a binary format.
-    fn source(&self, budget: Budget) -> Result<Box<dyn Source + '_>, InputError> {
-        let path = self.path();
+    fn source(&self) -> Result<Box<dyn Source + '_>, InputError> {
+        let mut sources = self.parts.iter().map(|part| self.source_of(part)).collect::<Result<Vec<_>, _>>()?;
+        match sources.pop() {
+            Some(only) if sources.is_empty() => Ok(only),
+            last => Ok(Box::new(SplitBag::new(sources.into_iter().chain(last).collect()))),
+        }
+    }
+
+    fn source_of<'a>(&self, part: &'a InputPart) -> Result<Box<dyn Source + 'a>, InputError> {
+        let (bytes, budget) = (&part.bytes, part.budget.again());
         Ok(match self.format {
             FileFormat::CountTable | FileFormat::TextTable | FileFormat::FrameLog | FileFormat::SpiExport => {
-                return Err(InputError::file(path, Reason::NoTopic { format: "text" }));
+                return Err(bytes.error(Reason::NoTopic { format: "text" }));
             }
-            FileFormat::Npy => Box::new(NpyReader::open(path, budget, &self.monitor)?),
-            FileFormat::Npz => Box::new(NpzReader::open(path, budget)?),
-            FileFormat::Mat => Box::new(MatReader::open(path, budget)?),
-            FileFormat::RosBag => Box::new(RosBagSource::open(path, budget)?),
-            FileFormat::Mcap => Box::new(McapSource::open(path, budget)?),
+            FileFormat::Npy => Box::new(NpyReader::open(bytes, budget, &self.monitor)?),
+            FileFormat::Npz => Box::new(NpzReader::open(bytes, budget)?),
+            FileFormat::Mat => Box::new(MatReader::open(bytes, budget)?),
+            FileFormat::RosBag => Box::new(RosBagSource::open(bytes, budget)?),
+            FileFormat::Mcap => Box::new(McapSource::open(bytes, budget)?),
             #[cfg(feature = "sqlite")]
-            FileFormat::Sqlite => Box::new(SqliteSource::open(path, budget)?),
-            FileFormat::Ulog => Box::new(UlogSource::open(path, budget)?),
-            FileFormat::ArduPilot => Box::new(ArduPilotSource::open(path, budget)?),
+            FileFormat::Sqlite => Box::new(SqliteSource::open(bytes, budget)?),
+            FileFormat::Ulog => Box::new(UlogSource::open(bytes, budget)?),
+            FileFormat::ArduPilot => Box::new(ArduPilotSource::open(bytes, budget)?),
             #[cfg(feature = "hdf5")]
-            FileFormat::Hdf5 => Box::new(Hdf5Reader::open(path, budget)?),
+            FileFormat::Hdf5 => Box::new(Hdf5Reader::open(bytes, budget)?),
             #[cfg(not(all(feature = "hdf5", feature = "sqlite")))]
-            format => return Err(InputError::file(path, Reason::NotBuilt(format.name()))),
+            format => return Err(bytes.error(Reason::NotBuilt(format.name()))),
         })
     }
 }
 
-fn renamed(error: InputError, name: &Path) -> InputError {
-    InputError { file: name.to_owned(), ..error }
-}
-
-/// A temporary file with all that `input` has.
-fn copied(mut input: impl Read) -> io::Result<NamedTempFile> {
-    let mut copy = NamedTempFile::new()?;
-    io::copy(&mut input, &mut copy)?;
-    copy.flush()?;
-    copy.seek(SeekFrom::Start(0))?;
-    Ok(copy)
+impl InputPart {
+    /// A file of a recording, decompressed where its format needs that, and its format.
+    fn recognised(origin: FileBytes) -> Result<(Self, FileFormat), InputError> {
+        let fail = |error| origin.error(Reason::Io(error));
+        let refuse = |reason| Err(origin.error(reason));
+        let budget = Budget::of_file(&origin).map_err(fail)?;
+        let expanded = |whole: &mut dyn Read| {
+            FileBytes::copied(origin.name(), Metered::new(whole, budget.meter()))
+                .map_err(|error| origin.error(Reason::from_io(error)))
+        };
+        let mut bytes = origin.clone();
+        // Of compressed text, what is in it.
+        let mut text = None;
+        let mut head = head(&bytes).map_err(fail)?;
+        if head.starts_with(&GZIP_MAGIC) {
+            let mut inner = GzipMembers::new(BufReader::new(bytes.open().map_err(fail)?));
+            let mut start = Vec::new();
+            // Damage is reported with its line where the whole is read.
+            let _ = inner.by_ref().take(HEAD_BYTES).read_to_end(&mut start);
+            if binary_format(&start).is_some() {
+                bytes = expanded(&mut start.as_slice().chain(inner))?;
+                head = start;
+            } else {
+                text = Some(start);
+            }
+        }
+        if head.starts_with(&ZSTD_MAGIC) {
+            bytes = expanded(&mut ZstdFrames::new(BufReader::new(bytes.open().map_err(fail)?)))?;
+            head = self::head(&bytes).map_err(fail)?;
+        }
+        let format = match binary_format(&head) {
+            Some(format) => format,
+            None if serial::is_capture(&head) => {
+                let log = NamedTempFile::new().map_err(fail)?;
+                serial::log_of_capture(BufReader::new(bytes.open().map_err(fail)?), log.path()).map_err(fail)?;
+                bytes = FileBytes::in_temporary_file(origin.name(), log);
+                FileFormat::FrameLog
+            }
+            None if foreign_format::is_report(&head) => return refuse(foreign_format::REPORT),
+            None if foreign_format::is_json_document(&head) => return refuse(foreign_format::JSON_DOCUMENT),
+            None if foreign_format::is_binary(text.as_ref().unwrap_or(&head))
+                && !(text.is_none() && is_utf16(&head)) =>
+            {
+                return refuse(foreign_format::refusal(text.as_ref().unwrap_or(&head)));
+            }
+            None => text_format(&bytes)?,
+        };
+        Ok((Self { origin, bytes, budget }, format))
+    }
 }
 
 /// How often a pipe that sends nothing is left for a request to stop.
@@ -415,9 +438,9 @@ fn copied_pipe(input: impl Read + Send + 'static, monitor: &ReadMonitor) -> io::
     Ok(copy)
 }
 
-fn head(file: &Path) -> io::Result<Vec<u8>> {
+fn head(file: &FileBytes) -> io::Result<Vec<u8>> {
     let mut head = Vec::new();
-    File::open(file)?.take(HEAD_BYTES).read_to_end(&mut head)?;
+    file.open()?.take(HEAD_BYTES).read_to_end(&mut head)?;
     Ok(head)
 }
 
@@ -435,10 +458,10 @@ fn binary_format(head: &[u8]) -> Option<FileFormat> {
     MAGICS.iter().find(|(magic, _)| head.starts_with(magic)).map(|(_, format)| *format)
 }
 
-fn text_format(file: &Path) -> Result<FileFormat, InputError> {
+fn text_format(file: &FileBytes) -> Result<FileFormat, InputError> {
     let mut lines = Lines::open(file)?;
     Ok(match lines.header()? {
-        None => return Err(InputError::file(file, Reason::Empty)),
+        None => return Err(file.error(Reason::Empty)),
         Some(frame_log::HEADER) => FileFormat::FrameLog,
         Some(header) if spi_export::is_header(header) => FileFormat::SpiExport,
         Some(header) if count_table_writer::is_header(header) => FileFormat::CountTable,

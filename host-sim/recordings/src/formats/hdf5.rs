@@ -7,12 +7,13 @@ use crate::columns::unit::Unit;
 use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray, stated_rate};
 use crate::formats::message_layout::Scalar;
 use crate::input::budget::{Budget, Meter};
+use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::{InputError, Reason};
 use crate::rows::batch::Number;
 use crate::rows::recording::MAX_SAMPLES;
 use hdf5_pure::{AttrValue, Dataset, Datatype, DatatypeByteOrder, File, Group};
 use std::collections::HashMap;
-use std::path::Path;
+use std::io::Read;
 
 const FORMAT: &str = "HDF5";
 
@@ -69,13 +70,22 @@ struct Stated {
 }
 
 impl Hdf5Reader {
-    pub(crate) fn open(path: &Path, budget: Budget) -> Result<ArraySource<'_, Self>, InputError> {
-        let fail = |reason| InputError::file(path, reason);
-        let file = File::open_streaming(path).map_err(|error| fail(damaged(error)))?;
+    pub(crate) fn open(bytes: &FileBytes, budget: Budget) -> Result<ArraySource<'_, Self>, InputError> {
+        let fail = |reason| bytes.error(reason);
+        let file = match bytes.file() {
+            Some(file) => File::open_streaming(file),
+            None => {
+                let mut whole = Vec::new();
+                let read = bytes.open().and_then(|mut input| input.read_to_end(&mut whole));
+                read.map_err(|error| fail(Reason::Io(error)))?;
+                File::from_bytes(whole)
+            }
+        };
+        let file = file.map_err(|error| fail(damaged(error)))?;
         let mut found = Found { layouts: Vec::new(), arrays: Vec::new(), objects: 0 };
         found.add_group(&file.root(), "", &Stated::default(), 0).map_err(fail)?;
         let Found { layouts, arrays, .. } = found;
-        Ok(ArraySource::new(path, Self { file, layouts, meter: budget.meter() }, arrays, budget))
+        Ok(ArraySource::new(bytes.name(), Self { file, layouts, meter: budget.meter() }, arrays, budget))
     }
 }
 

@@ -4,13 +4,12 @@
 use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray};
 use crate::formats::message_layout::Scalar;
 use crate::input::budget::{Budget, Meter, Metered};
+use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::{InputError, Reason};
 use crate::rows::batch::Number;
 use crate::rows::recording::MAX_SAMPLES;
 use flate2::read::ZlibDecoder;
-use std::fs::File;
 use std::io::{self, BufReader, Read};
-use std::path::{Path, PathBuf};
 
 const FORMAT: &str = "MATLAB";
 
@@ -92,14 +91,14 @@ fn table_commands(name: &str, class: &str) -> String {
 
 /// An open `.mat` file, which is read from its beginning for each array.
 pub(crate) struct MatReader {
-    file: PathBuf,
+    file: FileBytes,
     arrays: Vec<ListedArray>,
     budget: Budget,
 }
 
 impl MatReader {
-    pub(crate) fn open(file: &Path, budget: Budget) -> Result<ArraySource<'_, Self>, InputError> {
-        let fail = |reason| InputError::file(file, reason);
+    pub(crate) fn open(file: &FileBytes, budget: Budget) -> Result<ArraySource<'_, Self>, InputError> {
+        let fail = |reason| file.error(reason);
         let mut listing = Walk::new(budget);
         listing.file(file).map_err(fail)?;
         if let ([], Some((name, class))) = (listing.arrays.as_slice(), listing.objects.first()) {
@@ -117,8 +116,8 @@ impl MatReader {
             NamedArray::matrix(&array.group, &array.name, rows, columns)
         };
         let arrays = listing.arrays.iter().map(array).collect();
-        let reader = Self { file: file.to_owned(), arrays: listing.arrays, budget };
-        Ok(ArraySource::new(file, reader, arrays, budget))
+        let reader = Self { file: file.clone(), arrays: listing.arrays, budget };
+        Ok(ArraySource::new(file.name(), reader, arrays, budget))
     }
 }
 
@@ -184,8 +183,8 @@ impl Walk<'_> {
         self.wanted.is_some_and(|(parts, _)| parts.contain(self.walked))
     }
 
-    fn file(&mut self, file: &Path) -> Result<(), Reason> {
-        let mut input = BufReader::new(File::open(file).map_err(Reason::Io)?);
+    fn file(&mut self, file: &FileBytes) -> Result<(), Reason> {
+        let mut input = BufReader::new(file.open().map_err(Reason::Io)?);
         let mut header = [0; HEADER_BYTES];
         input.read_exact(&mut header).map_err(ended)?;
         self.is_big_endian = header.ends_with(b"MI");

@@ -6,13 +6,13 @@ use crate::formats::ros_definition::{self, RosVersion};
 use crate::formats::ros_message::{self, RosRows};
 use crate::formats::topics::{EachRow, Ending, Source, Topic};
 use crate::input::budget::Budget;
+use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::InputError;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
 /// An MCAP file.
 pub(crate) struct McapSource<'a> {
-    file: &'a Path,
+    file: &'a FileBytes,
     topics: Vec<Topic>,
     /// Of each topic; `None` where its messages cannot be decoded.
     layouts: Vec<Option<(MessageLayout, Encoding)>>,
@@ -32,7 +32,7 @@ struct Channel {
 type Schema = (String, String, Vec<u8>);
 
 impl<'a> McapSource<'a> {
-    pub(crate) fn open(file: &'a Path, budget: Budget) -> Result<Self, InputError> {
+    pub(crate) fn open(file: &'a FileBytes, budget: Budget) -> Result<Self, InputError> {
         let mut schemas: BTreeMap<u16, Schema> = BTreeMap::new();
         let mut channels: BTreeMap<u16, Channel> = BTreeMap::new();
         // Channels may be declared anywhere: the topics are known after a first pass.
@@ -76,7 +76,7 @@ impl<'a> McapSource<'a> {
             source.channels.push(BTreeSet::from([id]));
         }
         match damage {
-            Some(damage) if source.topics.is_empty() => Err(InputError::file(file, damage)),
+            Some(damage) if source.topics.is_empty() => Err(file.error(damage)),
             _ => Ok(source),
         }
     }

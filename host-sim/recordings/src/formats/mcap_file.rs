@@ -3,13 +3,12 @@
 //! The crate `mcap` is not used: its decompression needs a compiler of C.
 
 use crate::input::budget::Budget;
+use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::{InputError, Reason};
 use crate::input::zstd_frames::ZstdFrames;
 use flate2::Crc;
 use lz4_flex::frame::FrameDecoder;
-use std::fs::File;
 use std::io::{self, BufReader, Read};
-use std::path::Path;
 
 pub(crate) const FORMAT: &str = "MCAP";
 
@@ -135,7 +134,7 @@ impl From<Reason> for Stop {
 
 /// Gives every record to `each`; and why there are no more where the file is damaged or ends early.
 pub(crate) fn for_each_record(
-    file: &Path,
+    file: &FileBytes,
     budget: Budget,
     mut each: impl FnMut(McapRecord) -> Result<(), InputError>,
 ) -> Result<Option<Reason>, InputError> {
@@ -157,9 +156,9 @@ pub(crate) fn for_each_record(
 /// Takes the operation code and the content of a record.
 type EachRecord<'a> = dyn FnMut(u8, &[u8]) -> Result<(), Stop> + 'a;
 
-fn read(file: &Path, each: &mut EachRecord) -> Result<(), Stop> {
-    let fail = |error| Stop::Refusal(InputError::file(file, Reason::Io(error)));
-    let mut input = BufReader::new(File::open(file).map_err(fail)?);
+fn read(file: &FileBytes, each: &mut EachRecord) -> Result<(), Stop> {
+    let fail = |error| Stop::Refusal(file.error(Reason::Io(error)));
+    let mut input = BufReader::new(file.open().map_err(fail)?);
     let mut data = Vec::new();
     let mut next = |bytes: u64, data: &mut Vec<u8>| {
         data.clear();
@@ -239,7 +238,8 @@ impl Read for Summed<'_> {
 mod tests {
     use super::{McapRecord, for_each_record};
     use crate::input::budget::Budget;
-    use std::io::Write;
+    use crate::input::file_bytes::FileBytes;
+    use std::path::Path;
 
     fn record(opcode: u8, parts: &[&[u8]]) -> Vec<u8> {
         let body = parts.concat();
@@ -252,11 +252,9 @@ mod tests {
 
     /// What is read of a file of these records, and whether it is called damaged.
     fn read(records: &[Vec<u8>]) -> (Vec<String>, Option<String>) {
-        let mut file = tempfile::NamedTempFile::new().expect("a file");
-        file.write_all(b"\x89MCAP0\r\n").expect("written");
-        file.write_all(&records.concat()).expect("written");
+        let file = FileBytes::in_memory(Path::new("x.mcap"), [b"\x89MCAP0\r\n".to_vec(), records.concat()].concat());
         let mut found = Vec::new();
-        let damage = for_each_record(file.path(), Budget::new(0), |record: McapRecord| {
+        let damage = for_each_record(&file, Budget::new(0), |record: McapRecord| {
             found.push(format!("{record:?}"));
             Ok(())
         });

@@ -5,13 +5,12 @@ use crate::formats::array_topics::{ArrayReader, ArraySource, EachArrayRow, Named
 use crate::formats::message_layout::Scalar;
 use crate::formats::numpy_header::{ElementType, Encoding, Header};
 use crate::input::budget::{Budget, Meter, Metered};
+use crate::input::file_bytes::{FileBytes, OpenBytes};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::{Counted, ReadMonitor};
 use crate::rows::batch::Number;
 use crate::rows::recording::MAX_SAMPLES;
-use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
-use std::path::Path;
 use zip::ZipArchive;
 
 /// Columns of a matrix beyond which it is no recording.
@@ -25,7 +24,7 @@ const ROWS_AT_ONCE: usize = 4096;
 
 /// An open `.npy` file.
 pub(crate) struct NpyReader {
-    input: BufReader<Counted<File>>,
+    input: BufReader<Counted<OpenBytes>>,
     layout: ArrayLayout,
     /// Where the numbers begin, bytes.
     start: u64,
@@ -34,17 +33,17 @@ pub(crate) struct NpyReader {
 impl NpyReader {
     /// Opens a file.
     pub(crate) fn open<'a>(
-        file: &'a Path,
+        file: &'a FileBytes,
         budget: Budget,
         monitor: &ReadMonitor,
     ) -> Result<ArraySource<'a, Self>, InputError> {
-        let fail = |reason| InputError::file(file, reason);
+        let fail = |reason| file.error(reason);
         let io = |error| fail(Reason::Io(error));
-        let mut input = BufReader::new(Counted::new(File::open(file).map_err(io)?, monitor));
+        let mut input = BufReader::new(Counted::new(file.open().map_err(io)?, monitor));
         let layout = ArrayLayout::read(&mut input, "").map_err(fail)?;
         let start = input.stream_position().map_err(io)?;
         let arrays = vec![layout.array()];
-        Ok(ArraySource::new(file, Self { input, layout, start }, arrays, budget))
+        Ok(ArraySource::new(file.name(), Self { input, layout, start }, arrays, budget))
     }
 
     /// The bytes of some rows from `first` on: of each of `columns`, or of whole rows.
@@ -115,16 +114,16 @@ impl ArrayReader for NpyReader {
 
 /// An open `.npz` file.
 pub(crate) struct NpzReader {
-    archive: ZipArchive<BufReader<File>>,
+    archive: ZipArchive<BufReader<OpenBytes>>,
     /// Number of the entry and layout of each array.
     layouts: Vec<(usize, ArrayLayout)>,
     meter: Meter,
 }
 
 impl NpzReader {
-    pub(crate) fn open(file: &Path, budget: Budget) -> Result<ArraySource<'_, Self>, InputError> {
-        let fail = |reason| InputError::file(file, reason);
-        let input = BufReader::new(File::open(file).map_err(|error| fail(Reason::Io(error)))?);
+    pub(crate) fn open(file: &FileBytes, budget: Budget) -> Result<ArraySource<'_, Self>, InputError> {
+        let fail = |reason| file.error(reason);
+        let input = BufReader::new(file.open().map_err(|error| fail(Reason::Io(error)))?);
         let mut archive = ZipArchive::new(input).map_err(|error| fail(damaged(error)))?;
         let mut layouts: Vec<(usize, ArrayLayout)> = Vec::new();
         for number in 0..archive.len() {
@@ -147,7 +146,7 @@ impl NpzReader {
         if let [array] = arrays.as_mut_slice() {
             array.name.clear();
         }
-        Ok(ArraySource::new(file, Self { archive, layouts, meter: budget.meter() }, arrays, budget))
+        Ok(ArraySource::new(file.name(), Self { archive, layouts, meter: budget.meter() }, arrays, budget))
     }
 }
 

@@ -9,13 +9,12 @@ use crate::formats::ros_definition::{self, RosVersion};
 use crate::formats::ros_message::{self, RosRows};
 use crate::formats::topics::{EachRow, Ending, Source, Topic};
 use crate::input::budget::{Budget, Meter, Metered};
+use crate::input::file_bytes::{FileBytes, OpenBytes};
 use crate::input::input_error::{InputError, Reason};
 use bzip2::read::BzDecoder;
 use lz4_flex::frame::FrameDecoder;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom};
-use std::path::Path;
 
 const FORMAT: &str = "ROS 1 bag";
 /// First line of every bag.
@@ -68,7 +67,7 @@ type EachRecord<'a> = dyn FnMut(Record) -> Result<(), InputError> + 'a;
 
 /// An open bag.
 pub(crate) struct RosBagSource<'a> {
-    file: &'a Path,
+    file: &'a FileBytes,
     topics: Vec<Topic>,
     /// Of each topic.
     layouts: Vec<MessageLayout>,
@@ -84,8 +83,8 @@ struct FoundTopic {
 }
 
 impl<'a> RosBagSource<'a> {
-    pub(crate) fn open(file: &'a Path, budget: Budget) -> Result<Self, InputError> {
-        let fail = |reason| InputError::file(file, reason);
+    pub(crate) fn open(file: &'a FileBytes, budget: Budget) -> Result<Self, InputError> {
+        let fail = |reason| file.error(reason);
         let mut found: BTreeMap<String, FoundTopic> = BTreeMap::new();
         let mut counts: BTreeMap<u32, u64> = BTreeMap::new();
         let mut input = BagBytes::open(file).map_err(fail)?;
@@ -139,7 +138,7 @@ impl Source for RosBagSource<'_> {
     fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError> {
         let mut rows = RosRows::new(&self.layouts[topic], Encoding::Packed, columns);
         let connections = &self.connections[topic];
-        let mut input = BagBytes::open(self.file).map_err(|reason| InputError::file(self.file, reason))?;
+        let mut input = BagBytes::open(self.file).map_err(|reason| self.file.error(reason))?;
         let damage = for_each_record(self.file, &mut input, self.budget, &mut |record| match record {
             Record::Message { connection, recorded_ns, data } if connections.contains(&connection) => {
                 each(rows.row(data, Some(recorded_ns)))
@@ -152,12 +151,12 @@ impl Source for RosBagSource<'_> {
 
 /// The bytes of a bag behind its first line.
 struct BagBytes {
-    input: BufReader<File>,
+    input: BufReader<OpenBytes>,
 }
 
 impl BagBytes {
-    fn open(file: &Path) -> Result<Self, Reason> {
-        let mut input = BufReader::new(File::open(file).map_err(Reason::Io)?);
+    fn open(file: &FileBytes) -> Result<Self, Reason> {
+        let mut input = BufReader::new(file.open().map_err(Reason::Io)?);
         input.seek(SeekFrom::Start(MAGIC.len() as u64)).map_err(Reason::Io)?;
         Ok(Self { input })
     }
@@ -165,7 +164,8 @@ impl BagBytes {
     /// Goes to the index, if there is one.
     fn seek_index(&mut self) -> Result<bool, Reason> {
         let start = MAGIC.len() as u64;
-        let length = self.input.get_ref().metadata().map_err(Reason::Io)?.len();
+        let length = self.input.seek(SeekFrom::End(0)).map_err(Reason::Io)?;
+        self.input.seek(SeekFrom::Start(start)).map_err(Reason::Io)?;
         let (mut header, mut data) = (Vec::new(), Vec::new());
         let is_read = next_record(&mut self.input, &mut header).is_ok_and(|is_one| is_one)
             && read_data(&mut self.input, &mut data).is_ok();
@@ -178,7 +178,7 @@ impl BagBytes {
 
 /// Calls `each` with the records from here on; why there are no more, where the bag is damaged or ends early.
 fn for_each_record(
-    file: &Path,
+    file: &FileBytes,
     input: &mut BagBytes,
     budget: Budget,
     each: &mut EachRecord,
@@ -187,7 +187,7 @@ fn for_each_record(
     match read_records(&mut input.input, &mut meter, true, each) {
         Ok(()) => Ok(None),
         Err(Stop::Refusal(error)) => Err(error),
-        Err(Stop::Reason(Reason::Io(error))) => Err(InputError::file(file, Reason::Io(error))),
+        Err(Stop::Reason(Reason::Io(error))) => Err(file.error(Reason::Io(error))),
         Err(Stop::Reason(reason)) => Ok(Some(reason)),
     }
 }
@@ -333,13 +333,13 @@ mod tests {
     use super::{CHUNK, CONNECTION, MAGIC, MESSAGE, RosBagSource};
     use crate::formats::topics::Source;
     use crate::input::budget::Budget;
+    use crate::input::file_bytes::FileBytes;
     use crate::input::input_error::Reason;
     use bzip2::Compression;
     use bzip2::write::BzEncoder;
     use lz4_flex::frame::FrameEncoder;
     use std::io::Write;
-    use std::path::PathBuf;
-    use tempfile::{TempDir, tempdir};
+    use std::path::Path;
 
     fn fields(fields: &[(&str, &[u8])]) -> Vec<u8> {
         let one = |(name, value): &(&str, &[u8])| {
@@ -373,11 +373,8 @@ mod tests {
         bytes
     }
 
-    fn bag(chunks: &[Vec<u8>]) -> (TempDir, PathBuf) {
-        let dir = tempdir().expect("a folder");
-        let file = dir.path().join("x.bag");
-        std::fs::write(&file, [MAGIC.to_vec(), chunks.concat()].concat()).expect("room");
-        (dir, file)
+    fn bag(chunks: &[Vec<u8>]) -> FileBytes {
+        FileBytes::in_memory(Path::new("x.bag"), [MAGIC.to_vec(), chunks.concat()].concat())
     }
 
     fn compressed(compression: &str, data: &[u8]) -> Vec<u8> {
@@ -413,12 +410,12 @@ mod tests {
         let expected: Vec<f64> = (0..50).map(f64::from).collect();
         for compression in ["none", "lz4", "bz2"] {
             let whole = chunk(compression, &compressed(compression, &records(50)));
-            let (_dir, file) = bag(std::slice::from_ref(&whole));
+            let file = bag(std::slice::from_ref(&whole));
             let mut source = RosBagSource::open(&file, Budget::new(10_000)).expect("a bag");
             assert_eq!(source.topics()[0].rows, Some(50), "{compression}");
             assert_eq!(read(&mut source), (expected.clone(), None), "{compression}");
             // The second chunk has no end.
-            let (_dir, file) = bag(&[whole.clone(), whole[..whole.len() / 2].to_vec()]);
+            let file = bag(&[whole.clone(), whole[..whole.len() / 2].to_vec()]);
             let mut source = RosBagSource::open(&file, Budget::new(10_000)).expect("a bag");
             let (rows, damage) = read(&mut source);
             assert_eq!(rows[..50], expected, "{compression}");
@@ -432,12 +429,12 @@ mod tests {
         let zeros = vec![0; 100 << 20];
         for compression in ["lz4", "bz2"] {
             let bytes = chunk(compression, &compressed(compression, &[records(1), zeros.clone()].concat()));
-            let (_dir, file) = bag(&[bytes]);
+            let file = bag(&[bytes]);
             let refused = RosBagSource::open(&file, Budget::new(0)).err().expect("refused").reason;
             assert!(matches!(refused, Reason::Expands { .. }), "{compression}: {refused}");
         }
         // A record that says it has four gigabytes.
-        let (_dir, file) = bag(&[[&8u32.to_le_bytes()[..], &fields(&[("op", &[2])]), &[0xFF; 4]].concat()]);
+        let file = bag(&[[&8u32.to_le_bytes()[..], &fields(&[("op", &[2])]), &[0xFF; 4]].concat()]);
         assert!(RosBagSource::open(&file, Budget::new(0)).is_err());
     }
 }

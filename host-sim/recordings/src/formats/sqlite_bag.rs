@@ -6,12 +6,12 @@ use crate::formats::ros_definition::{self, RosVersion};
 use crate::formats::ros_message::{self, RosRows};
 use crate::formats::topics::{EachRow, Ending, Source, Topic};
 use crate::input::budget::{Budget, Metered};
+use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::{InputError, Reason};
 use crate::input::zstd_frames::{ZSTD_MAGIC, ZstdFrames};
 use rusqlite::{Connection, OpenFlags};
 use std::collections::HashMap;
 use std::io::{self, Read};
-use std::path::Path;
 
 const FORMAT: &str = "ROS 2 SQLite bag";
 
@@ -20,7 +20,9 @@ const INSTRUCTIONS: i32 = 100_000;
 
 /// An open bag.
 pub(crate) struct SqliteSource<'a> {
-    file: &'a Path,
+    file: &'a FileBytes,
+    /// The file of the database, where the bytes are in memory.
+    _copy: Option<FileBytes>,
     database: Connection,
     topics: Vec<Topic>,
     /// Of each topic: its number in the database, and its layout where that is known.
@@ -29,15 +31,21 @@ pub(crate) struct SqliteSource<'a> {
 }
 
 impl<'a> SqliteSource<'a> {
-    pub(crate) fn open(file: &'a Path, budget: Budget) -> Result<Self, InputError> {
-        let fail = |error| InputError::file(file, damaged(error, budget));
+    pub(crate) fn open(file: &'a FileBytes, budget: Budget) -> Result<Self, InputError> {
+        let fail = |error| file.error(damaged(error, budget));
         let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-        let mut database = Connection::open_with_flags(file, flags).map_err(fail)?;
+        let copy = match file.file() {
+            Some(_) => None,
+            None => Some(file.open().and_then(|input| FileBytes::copied(file.name(), input))),
+        };
+        let copy = copy.transpose().map_err(|error| file.error(Reason::Io(error)))?;
+        let path = copy.as_ref().and_then(FileBytes::file).or(file.file()).unwrap_or(file.name());
+        let mut database = Connection::open_with_flags(path, flags).map_err(fail)?;
         // A query over tables that the file defines may never end.
         database.progress_handler(INSTRUCTIONS, Some(move || budget.check_time().is_err())).map_err(fail)?;
         if !has_table(&database, "topics").map_err(fail)? || !has_table(&database, "messages").map_err(fail)? {
             let topics = tables(&database).map_err(fail)?;
-            return Err(InputError::file(file, Reason::NoSensor { format: "SQLite database", topics }));
+            return Err(file.error(Reason::NoSensor { format: "SQLite database", topics }));
         }
         let mut query = database.prepare("SELECT id, name, type FROM topics ORDER BY id").map_err(fail)?;
         let rows = query.query_map((), |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?))).map_err(fail)?;
@@ -55,7 +63,7 @@ impl<'a> SqliteSource<'a> {
             });
             layouts.push((id, layout));
         }
-        Ok(Self { file, database, topics, layouts, budget })
+        Ok(Self { file, _copy: copy, database, topics, layouts, budget })
     }
 }
 
@@ -108,7 +116,7 @@ impl Source for SqliteSource<'_> {
 
     fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError> {
         let Self { file, database, layouts, budget, .. } = self;
-        let fail = |error| InputError::file(file, damaged(error, *budget));
+        let fail = |error| file.error(damaged(error, *budget));
         let (id, Some(layout)) = &layouts[topic] else { return Ok(Ending::default()) };
         let mut rows = RosRows::new(layout, Encoding::Cdr, columns);
         let mut meter = budget.meter();
@@ -145,19 +153,19 @@ mod tests {
     use super::SqliteSource;
     use crate::formats::topics::Source;
     use crate::input::budget::Budget;
+    use crate::input::file_bytes::FileBytes;
     use crate::input::input_error::{InputError, Reason};
     use rusqlite::Connection;
-    use std::path::PathBuf;
     use tempfile::{TempDir, tempdir};
 
     const TOPICS: &str = "CREATE TABLE topics(id INTEGER, name TEXT, type TEXT);";
     const MESSAGES: &str = "CREATE TABLE messages(id INTEGER, topic_id INTEGER, timestamp INTEGER, data BLOB);";
 
-    fn database(statements: &[&str]) -> (TempDir, PathBuf) {
+    fn database(statements: &[&str]) -> (TempDir, FileBytes) {
         let dir = tempdir().expect("a folder");
         let file = dir.path().join("bag.db3");
         Connection::open(&file).expect("a database").execute_batch(&statements.concat()).expect("written");
-        (dir, file)
+        (dir, FileBytes::from(&file))
     }
 
     fn reason(opened: Result<SqliteSource, InputError>) -> Option<Reason> {

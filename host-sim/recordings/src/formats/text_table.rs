@@ -10,6 +10,7 @@ use crate::formats::row_kinds::{RowKind, RowKinds};
 use crate::formats::table_head::{self, HEAD_LINES, Line, TableColumns, TableHead, is_row};
 use crate::input::budget::Budget;
 use crate::input::delimited_text::{self, Lines};
+use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::ReadMonitor;
 use crate::rows::any_sensor::ReadOptions;
@@ -17,7 +18,7 @@ use crate::rows::batch::{BatchBuilder, Number, RowFault};
 use crate::rows::row_source::{EachRow, Ending, Refusal, RowSource};
 use crate::rows::whole_table::{WholeTable, most_rows};
 use std::collections::VecDeque;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Part of the rows that may be damaged: a file with more is another one than it is taken for. So many are damaged before that is asked.
 const MOST_DAMAGED: f64 = 0.1;
@@ -25,7 +26,7 @@ const FIRST_DAMAGED: u64 = 64;
 
 /// The rows of a table, which can be read again; a monitor counts the bytes and may stop the reading.
 pub(crate) struct TextRows<'a> {
-    file: &'a Path,
+    file: &'a FileBytes,
     options: ReadOptions,
     monitor: ReadMonitor,
     chosen: Vec<ChosenColumn>,
@@ -36,7 +37,7 @@ pub(crate) struct TextRows<'a> {
 
 impl<'a> TextRows<'a> {
     /// Opens a table and chooses its columns.
-    pub(crate) fn open(file: &'a Path, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
+    pub(crate) fn open(file: &'a FileBytes, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
         let table = TextTable::open(file, options, monitor)?;
         let (chosen, rate_hz) = (table.chosen.clone(), table.rate_hz);
         let (options, monitor) = (options.clone(), monitor.clone());
@@ -78,7 +79,11 @@ impl RowSource for TextRows<'_> {
 }
 
 /// Reads all columns of a table; fields that are no numbers are missing.
-pub(crate) fn read_whole(file: &Path, topic: Option<&str>, monitor: &ReadMonitor) -> Result<WholeTable, InputError> {
+pub(crate) fn read_whole(
+    file: &FileBytes,
+    topic: Option<&str>,
+    monitor: &ReadMonitor,
+) -> Result<WholeTable, InputError> {
     let mut table = TextTable::open_with(file, topic, monitor, &|available| Ok(as_they_are(available)))?;
     table.is_lenient = true;
     let mut builder = BatchBuilder::new(&table.chosen, &[], None);
@@ -187,14 +192,19 @@ pub(crate) struct TextTable {
 
 impl TextTable {
     /// Opens a table and chooses its columns.
-    pub(crate) fn open(file: &Path, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
+    pub(crate) fn open(file: &FileBytes, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
         let choose = |available: &[AvailableColumn]| options.choose(available);
         let table = Self::open_with(file, options.topic.as_deref(), monitor, &choose)?;
         let columns_notes = options.selection.notes(&table.available, &table.chosen, &options.sensor);
         Ok(Self { columns_notes, ..table })
     }
 
-    fn open_with(file: &Path, topic: Option<&str>, monitor: &ReadMonitor, choose: &Choose) -> Result<Self, InputError> {
+    fn open_with(
+        file: &FileBytes,
+        topic: Option<&str>,
+        monitor: &ReadMonitor,
+        choose: &Choose,
+    ) -> Result<Self, InputError> {
         let mut lines = Lines::open_monitored(file, monitor)?;
         let mut first: Vec<Line> = Vec::new();
         while first.len() < HEAD_LINES {
@@ -219,9 +229,9 @@ impl TextTable {
                 }
                 let last = first.last().map(|(line, _)| *line);
                 Err(match last {
-                    None => InputError::file(file, Reason::Empty),
-                    Some(_) if is_whole => InputError::file(file, Reason::NoData),
-                    Some(line) => InputError::line(file, line, Reason::NoNumbers),
+                    None => file.error(Reason::Empty),
+                    Some(_) if is_whole => file.error(Reason::NoData),
+                    Some(line) => InputError::line(file.name(), line, Reason::NoNumbers),
                 })
             }
         }
@@ -230,7 +240,7 @@ impl TextTable {
 
 /// A file whose first lines were read.
 struct Opened<'a> {
-    file: &'a Path,
+    file: &'a FileBytes,
     choose: &'a Choose<'a>,
     lines: Lines,
 }
@@ -238,7 +248,7 @@ struct Opened<'a> {
 impl Opened<'_> {
     /// Of rows of columns.
     fn columns(self, topic: Option<&str>, mut head: TableHead) -> Result<TextTable, InputError> {
-        let fail = |reason| InputError::file(self.file, reason);
+        let fail = |reason| self.file.error(reason);
         let kinds = RowKinds::find(&head.fields());
         if kinds.is_none() {
             head.leave_preamble();
@@ -272,7 +282,7 @@ impl Opened<'_> {
         let available: Vec<AvailableColumn> = positions.iter().map(|at| available[*at].clone()).collect();
         let mut chosen = (self.choose)(&available).map_err(|error| {
             let reason = Reason::Selection(Box::new(error));
-            InputError { line: heading_line, ..InputError::file(self.file, reason) }
+            InputError { line: heading_line, ..self.file.error(reason) }
         })?;
         chosen.iter_mut().for_each(|column| column.position = positions[column.position]);
         drop(rows);
@@ -293,7 +303,7 @@ impl Opened<'_> {
         first: VecDeque<Line>,
     ) -> TextTable {
         TextTable {
-            file: self.file.to_owned(),
+            file: self.file.name().to_owned(),
             lines: self.lines,
             available,
             row: Vec::with_capacity(chosen.len()),
@@ -309,7 +319,7 @@ impl Opened<'_> {
     }
 
     fn chosen(&self, available: &[AvailableColumn]) -> Result<Vec<ChosenColumn>, InputError> {
-        (self.choose)(available).map_err(|error| InputError::file(self.file, Reason::Selection(Box::new(error))))
+        (self.choose)(available).map_err(|error| self.file.error(Reason::Selection(Box::new(error))))
     }
 
     /// Of sentences of one kind, that which the options name, else the most frequent one with numbers among the first.
@@ -336,11 +346,11 @@ impl Opened<'_> {
         let kind = match topic {
             Some(topic) => {
                 let named = kinds.iter().find(|(name, ..)| name == topic);
-                named.ok_or_else(|| InputError::file(file, unknown(topic)))?
+                named.ok_or_else(|| file.error(unknown(topic)))?
             }
             None => {
                 let most = kinds.iter().filter(|(name, ..)| is_numeric(name)).max_by_key(|(.., count)| *count);
-                most.ok_or_else(|| InputError::file(file, Reason::NoNumbers))?
+                most.ok_or_else(|| file.error(Reason::NoNumbers))?
             }
         };
         let (name, width) = (kind.0.clone(), kind.1);
@@ -423,14 +433,17 @@ impl TextTable {
                 }
                 Layout::Columns { separator, calendar, kind, others } => {
                     let read = of_row.numbers(split(text, *separator), calendar.as_mut(), row);
-                    let is_empty = |(column, number): (&ChosenColumn, &Number)| {
-                        !matches!(column.role, Role::Channel(_)) || number.value().is_nan()
+                    let of_kind = if let Some(RowKind::Filled { own, .. }) = &*kind { Some(own) } else { None };
+                    let is_own = |column: &ChosenColumn| match of_kind {
+                        Some(own) => own.contains(&column.position),
+                        None => matches!(column.role, Role::Channel(_)),
                     };
-                    let is_of_kind = matches!(kind, Some(RowKind::Filled { .. }));
+                    let is_empty =
+                        |(column, number): (&ChosenColumn, &Number)| !is_own(column) || number.value().is_nan();
                     let is_other = read.is_ok()
-                        && (!*is_lenient || is_of_kind)
+                        && (!*is_lenient || of_kind.is_some())
                         && chosen.iter().zip(row.iter()).all(is_empty)
-                        && is_of_other_sensor(split(text, *separator), chosen);
+                        && is_of_other_sensor(split(text, *separator), chosen, is_own);
                     *others += u64::from(is_other);
                     read.map(|()| !is_other)
                 }
@@ -589,12 +602,16 @@ impl RowFields {
     }
 }
 
-/// Whether a row has a number, but none of the `chosen` channels: it is of another sensor.
-fn is_of_other_sensor<'a>(fields: impl Iterator<Item = &'a str>, chosen: &[ChosenColumn]) -> bool {
+/// Whether a row has a number, but none of the `chosen` columns of its sensor: it is of another one.
+fn is_of_other_sensor<'a>(
+    fields: impl Iterator<Item = &'a str>,
+    chosen: &[ChosenColumn],
+    is_own: impl Fn(&ChosenColumn) -> bool,
+) -> bool {
     let (mut has_other, mut has_own) = (false, false);
     for (at, field) in fields.enumerate().filter(|(_, field)| !field.is_empty()) {
         match chosen.iter().find(|column| column.position == at) {
-            Some(column) if matches!(column.role, Role::Channel(_)) => has_own = true,
+            Some(column) if is_own(column) => has_own = true,
             Some(_) => {}
             None => has_other |= number(field).is_some_and(|number| !number.value().is_nan()),
         }

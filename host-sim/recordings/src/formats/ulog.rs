@@ -8,12 +8,11 @@ use crate::columns::column_selection::AvailableColumn;
 use crate::formats::message_layout::{Definitions, Encoding, Field, FieldType, MessageLayout, Repeat, Scalar};
 use crate::formats::topics::{EachRow, Ending, Source, Topic, TopicSensor};
 use crate::input::budget::Budget;
+use crate::input::file_bytes::{FileBytes, OpenBytes};
 use crate::input::input_error::{InputError, Reason};
 use crate::rows::batch::Number;
 use std::collections::{BTreeMap, HashMap};
-use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
-use std::path::Path;
 use std::rc::Rc;
 
 const FORMAT: &str = "PX4 ULog";
@@ -122,7 +121,7 @@ impl Pairing {
 
 /// An open log.
 pub(crate) struct UlogSource<'a> {
-    file: &'a Path,
+    file: &'a FileBytes,
     topics: Vec<Topic>,
     rows: Vec<Rows>,
     /// The gyroscope with the most samples, with its accelerometer; the accelerometer with the most where there is no gyroscope.
@@ -131,7 +130,7 @@ pub(crate) struct UlogSource<'a> {
 }
 
 impl<'a> UlogSource<'a> {
-    pub(crate) fn open(file: &'a Path, budget: Budget) -> Result<Self, InputError> {
+    pub(crate) fn open(file: &'a FileBytes, budget: Budget) -> Result<Self, InputError> {
         let mut layouts: BTreeMap<Key, Rc<MessageLayout>> = BTreeMap::new();
         let mut messages: BTreeMap<Key, u64> = BTreeMap::new();
         let mut samples: BTreeMap<Key, u64> = BTreeMap::new();
@@ -179,7 +178,7 @@ impl<'a> UlogSource<'a> {
         });
         source.preferred = best;
         match damage {
-            Some(damage) if source.topics.is_empty() => Err(InputError::file(file, damage)),
+            Some(damage) if source.topics.is_empty() => Err(file.error(damage)),
             _ => Ok(source),
         }
     }
@@ -352,12 +351,12 @@ fn earlier(time: Number, before_us: f64) -> Number {
 
 /// Gives each message of data to `each`; and why there are no more where the file is damaged.
 fn for_each_message(
-    file: &Path,
+    file: &FileBytes,
     budget: Budget,
     mut each: impl FnMut(Message) -> Result<(), InputError>,
 ) -> Result<Option<Reason>, InputError> {
-    let fail = |error| InputError::file(file, Reason::Io(error));
-    let mut input = MessageBytes { input: BufReader::new(File::open(file).map_err(fail)?), at: 0 };
+    let fail = |error| file.error(Reason::Io(error));
+    let mut input = MessageBytes { input: BufReader::new(file.open().map_err(fail)?), at: 0 };
     // Where data were appended, as after a crash: the message before it may have no end.
     let mut appended: Vec<u64> = Vec::new();
     let mut meter = budget.meter();
@@ -430,7 +429,7 @@ fn for_each_message(
 
 /// The bytes of a log.
 struct MessageBytes {
-    input: BufReader<File>,
+    input: BufReader<OpenBytes>,
     at: u64,
 }
 

@@ -4,10 +4,10 @@
 //! Every reader draws from one budget, whose amounts grow with the size of the file, so that no recording that a sensor made meets it: the
 //! noise of a converter does not compress to a fiftieth. They bound the time as well, but for a query of a database, which has a deadline.
 
+use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::Reason;
 use std::borrow::BorrowMut;
 use std::io::{self, Read};
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Bytes that a byte of the file may become when it is decompressed, and bytes that every file has beside.
@@ -46,9 +46,18 @@ impl Budget {
     }
 
     /// For this file, from now on; of a pipe without a limit.
-    pub(crate) fn of_file(file: &Path) -> io::Result<Self> {
-        let metadata = file.metadata()?;
-        Ok(Self::new(if metadata.is_file() { metadata.len() } else { u64::MAX }))
+    pub(crate) fn of_file(file: &FileBytes) -> io::Result<Self> {
+        Ok(Self::new(file.length()?.unwrap_or(u64::MAX)))
+    }
+
+    /// For files that are one recording, from now on.
+    pub(crate) fn joined(budgets: impl IntoIterator<Item = Self>) -> Self {
+        budgets.into_iter().fold(Self::new(0), |all, of| Self {
+            bytes: all.bytes.saturating_add(of.bytes),
+            values: all.values.saturating_add(of.values),
+            time: all.time.saturating_add(of.time),
+            ..all
+        })
     }
 
     /// Without any time left.

@@ -4,14 +4,14 @@
 //! line ends.
 
 use crate::input::budget::{Budget, Metered};
+use crate::input::file_bytes::FileBytes;
 use crate::input::gzip_members::{GZIP_MAGIC, GzipMembers};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_ahead::ReadAhead;
 use crate::input::read_monitor::{Counted, ReadMonitor};
 use encoding_rs_io::DecodeReaderBytes;
-use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Longest line that is read, bytes.
 const MAX_LINE_BYTES: u64 = 1 << 16;
@@ -40,17 +40,14 @@ impl Lines {
     ///
     /// # Errors
     /// The file is missing, unreadable, a directory or empty.
-    pub(crate) fn open(file: &Path) -> Result<Self, InputError> {
+    pub(crate) fn open(file: &FileBytes) -> Result<Self, InputError> {
         Self::open_monitored(file, &ReadMonitor::default())
     }
 
     /// As [`open`](Self::open); `monitor` counts the bytes.
-    pub(crate) fn open_monitored(file: &Path, monitor: &ReadMonitor) -> Result<Self, InputError> {
-        let fail = |reason| InputError::file(file, reason);
-        let mut raw = File::open(file).map_err(|e| fail(Reason::Io(e)))?;
-        if raw.metadata().map_err(|e| fail(Reason::Io(e)))?.is_dir() {
-            return Err(fail(Reason::Directory));
-        }
+    pub(crate) fn open_monitored(file: &FileBytes, monitor: &ReadMonitor) -> Result<Self, InputError> {
+        let fail = |reason| file.error(reason);
+        let mut raw = file.open().map_err(|e| fail(Reason::Io(e)))?;
         // The first bytes are chained in front again instead of seeking: the file may be a pipe.
         let mut start = Vec::with_capacity(2);
         raw.by_ref().take(2).read_to_end(&mut start).map_err(|e| fail(Reason::Io(e)))?;
@@ -74,7 +71,7 @@ impl Lines {
         };
         let input = BufReader::with_capacity(BUFFER_BYTES, bytes);
         Ok(Self {
-            file: file.to_owned(),
+            file: file.name().to_owned(),
             input,
             line: 0,
             bytes: Vec::new(),

@@ -1,10 +1,9 @@
 //! The SHA-256 of a file, which tells recordings of one name from each other.
 
+use crate::input::file_bytes::{FileBytes, OpenBytes};
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
-use std::fs::File;
 use std::io::{self, ErrorKind, Read};
-use std::path::Path;
 use std::thread::{self, JoinHandle};
 
 /// Bytes that are read at once.
@@ -15,13 +14,13 @@ const PART_BYTES: usize = 1 << 18;
 pub struct FileHash(JoinHandle<io::Result<String>>);
 
 impl FileHash {
-    /// Begins to read `file`.
+    /// Begins to read `files`, one after the other.
     ///
     /// # Errors
-    /// It cannot be opened.
-    pub(crate) fn begin(file: &Path) -> io::Result<Self> {
-        let input = File::open(file)?;
-        Ok(Self(thread::Builder::new().spawn(move || sha256(input))?))
+    /// One cannot be opened.
+    pub(crate) fn begin(files: &[FileBytes]) -> io::Result<Self> {
+        let inputs: Vec<OpenBytes> = files.iter().map(FileBytes::open).collect::<Result<_, _>>()?;
+        Ok(Self(thread::Builder::new().spawn(move || sha256(inputs))?))
     }
 
     /// The hash in hexadecimal digits, when the file was read.
@@ -33,15 +32,17 @@ impl FileHash {
     }
 }
 
-fn sha256(mut input: impl Read) -> io::Result<String> {
+fn sha256(inputs: impl IntoIterator<Item = impl Read>) -> io::Result<String> {
     let mut hash = Sha256::new();
     let mut part = vec![0; PART_BYTES];
-    loop {
-        match input.read(&mut part) {
-            Ok(0) => break,
-            Ok(count) => hash.update(&part[..count]),
-            Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
+    for mut input in inputs {
+        loop {
+            match input.read(&mut part) {
+                Ok(0) => break,
+                Ok(count) => hash.update(&part[..count]),
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
         }
     }
     let mut text = String::new();
@@ -63,7 +64,7 @@ mod tests {
             (b"abc".to_vec(), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"),
             (vec![b'a'; 1_000_000], "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0"),
         ] {
-            assert_eq!(sha256(message.as_slice()).expect("memory"), expected);
+            assert_eq!(sha256([message.as_slice()]).expect("memory"), expected);
         }
     }
 }

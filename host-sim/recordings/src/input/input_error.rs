@@ -28,7 +28,7 @@ pub enum Reason {
     #[error("{0}")]
     Io(io::Error),
     /// A folder where a file is expected.
-    #[error("is a directory, not a file; of a ROS 2 bag, give the .mcap or .db3 file in it")]
+    #[error("is a directory, not a file, and not that of one bag of ROS 2 in .mcap or .db3 files")]
     Directory,
     /// No byte, or only blank lines.
     #[error("the file is empty")]

@@ -36,12 +36,12 @@ impl SteadyPart {
         let block = BLOCK * alike;
         let blocks = rows.div_ceil(block);
         let mut is_steady = vec![true; blocks];
+        // The means of the blocks of each force, which change where the sensor was turned, and by how much they may.
+        let mut forces: Vec<(Vec<f64>, f64)> = Vec::new();
         for &(at, factor) in &inertial {
             let ColumnFacts { values, step, .. } = &columns[at];
-            let limit = factor.map(|factor| {
-                let limit = if sensors.iter().any(|sensor| sensor.is_force(at)) { REST_G } else { REST_DEG_S };
-                limit / factor
-            });
+            let is_force = sensors.iter().any(|sensor| sensor.is_force(at));
+            let limit = factor.map(|factor| if is_force { REST_G } else { REST_DEG_S } / factor);
             let moments: Vec<(f64, f64)> = values.chunks(block).map(moments).collect();
             let sorted = |part: fn(&(f64, f64)) -> f64| {
                 let mut all: Vec<f64> = moments.iter().map(part).filter(|value| value.is_finite()).collect();
@@ -53,13 +53,19 @@ impl SteadyPart {
             let quiet = deviations.get(deviations.len() / 8).copied().unwrap_or(0.0).max(step.unwrap_or(0.0));
             for (steady, (mean, deviation)) in is_steady.iter_mut().zip(&moments) {
                 let is_quiet = *deviation <= MOST_NOISE * quiet;
-                let is_rest = limit.is_none_or(|limit| (mean - usual).abs() < limit && *deviation < limit);
+                let is_usual = |limit: f64| is_force || (mean - usual).abs() < limit;
+                let is_rest = limit.is_none_or(|limit| is_usual(limit) && *deviation < limit);
                 // A block without a value says nothing.
                 *steady &= mean.is_nan() || is_quiet && is_rest;
             }
+            if let Some(limit) = limit.filter(|_| is_force) {
+                forces.push((moments.iter().map(|of| of.0).collect(), limit));
+            }
         }
+        let is_turned =
+            |first: usize, at: usize| forces.iter().any(|(means, limit)| (means[at] - means[first]).abs() >= *limit);
         // A movement may begin or end in the blocks beside those that it moves.
-        let mut longest = longest_run(&is_steady);
+        let mut longest = longest_run(&is_steady, is_turned);
         if longest.start > 0 && longest.len() > 2 {
             longest.start += 1;
         }
@@ -81,16 +87,17 @@ fn rows_alike(values: &[f64]) -> usize {
     lag
 }
 
-/// The longest run of true.
-fn longest_run(flags: &[bool]) -> Range<usize> {
+/// The longest run of true, which ends where `is_other` of its first place and the next one too.
+fn longest_run(flags: &[bool], is_other: impl Fn(usize, usize) -> bool) -> Range<usize> {
     let mut longest = 0..0;
     let mut first = 0;
     for at in 0..=flags.len() {
-        if at == flags.len() || !flags[at] {
+        let is_end = at == flags.len() || !flags[at];
+        if is_end || is_other(first, at) {
             if at - first > longest.len() {
                 longest = first..at;
             }
-            first = at + 1;
+            first = at + usize::from(is_end);
         }
     }
     longest

@@ -2,6 +2,7 @@
 
 use crate::formats::file_format::InputFile;
 use crate::formats::text_table::TextRows;
+use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::ReadMonitor;
 use crate::rows::any_sensor::ReadOptions;
@@ -11,7 +12,6 @@ use crate::rows::row_source::{BatchSource, FileRows, WantedRows};
 use crate::time_base::TimeRange;
 use crate::time_base::time_base_error::StreamError;
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
-use std::path::Path;
 
 /// Reads a table, plain or gzip, into a recording whose rates were taken in `range`.
 ///
@@ -20,7 +20,8 @@ use std::path::Path;
 ///
 /// # Errors
 /// The file cannot be read, or a row is at fault.
-pub fn read(file: &Path, range: GyroRange) -> Result<Recording, InputError> {
+pub fn read(file: impl Into<FileBytes>, range: GyroRange) -> Result<Recording, InputError> {
+    let file = &file.into();
     let mut rows = RecordedCounts::new(range);
     for_each_row(file, range, |channels, row, counts| rows.push(channels, row, counts))?;
     rows.finish(file)
@@ -43,8 +44,8 @@ impl RecordedCounts {
         Ok(())
     }
 
-    fn finish(self, file: &Path) -> Result<Recording, InputError> {
-        self.recorder.map(Recorder::finish).ok_or_else(|| InputError::file(file, Reason::NoData))
+    fn finish(self, file: &FileBytes) -> Result<Recording, InputError> {
+        self.recorder.map(Recorder::finish).ok_or_else(|| file.error(Reason::NoData))
     }
 }
 
@@ -54,18 +55,19 @@ impl RecordedCounts {
 /// # Errors
 /// As [`read`], and what `take` refuses.
 pub fn for_each_row(
-    file: &Path,
+    file: impl Into<FileBytes>,
     range: GyroRange,
     take: impl FnMut(&[Channel], TimeStamp, Counts) -> Result<(), Reason>,
 ) -> Result<(), InputError> {
+    let file = &file.into();
     let options = ReadOptions::of_counts(range);
     let monitor = ReadMonitor::default();
     let rows = Box::new(TextRows::open(file, &options, &monitor)?);
-    let source = BatchSource::File(Box::new(FileRows::new(file, rows, &monitor, Some(range))));
+    let source = BatchSource::File(Box::new(FileRows::new(file.name(), rows, &monitor, Some(range))));
     match for_each_row_of(source, WantedRows::all(None), file, take) {
         Ok(()) => Ok(()),
         Err(StreamError::Input(error)) => Err(error),
-        Err(StreamError::TimeBase(error)) => Err(InputError::file(file, Reason::Bus(error.to_string()))),
+        Err(StreamError::TimeBase(error)) => Err(file.error(Reason::Bus(error.to_string()))),
     }
 }
 
@@ -83,16 +85,16 @@ pub fn read_part(
         let source = input.batches(&ReadOptions::of_counts(range), Some(range))?;
         let mut rows = RecordedCounts::new(range);
         let wanted = WantedRows { part, ..WantedRows::all(stated_hz) };
-        for_each_row_of(source, wanted, input.path(), |channels, row, counts| rows.push(channels, row, counts))?;
-        Ok(rows.finish(input.path())?)
+        for_each_row_of(source, wanted, input.bytes(), |channels, row, counts| rows.push(channels, row, counts))?;
+        Ok(rows.finish(input.bytes())?)
     };
-    read().map_err(|error| input.rename_any(error))
+    read()
 }
 
 fn for_each_row_of(
     mut source: BatchSource,
     wanted: WantedRows,
-    file: &Path,
+    file: &FileBytes,
     mut take: impl FnMut(&[Channel], TimeStamp, Counts) -> Result<(), Reason>,
 ) -> Result<(), StreamError> {
     let channels: Vec<Channel> = source.columns().iter().filter_map(|column| column.register).collect();
@@ -101,18 +103,19 @@ fn for_each_row_of(
         for row in 0..batch.rows {
             rows += 1;
             if rows > MAX_SAMPLES {
-                return Err(InputError::row(file, rows, "", Reason::TooManySamples).into());
+                return Err(InputError::row(file.name(), rows, "", Reason::TooManySamples).into());
             }
             let mut counts = NOT_RECORDED;
             for (channel, column) in channels.iter().zip(&batch.values) {
                 if column[row].is_nan() {
                     let reason = Reason::NotInteger(String::new());
-                    return Err(InputError::row(file, rows, channel.name(), reason).into());
+                    return Err(InputError::row(file.name(), rows, channel.name(), reason).into());
                 }
                 counts[*channel as usize] = column[row] as i16;
             }
             let stamp = TimeStamp { index: batch.indices.get(row).copied(), time_s: batch.times.get(row).copied() };
-            take(&channels, stamp, Counts::new(counts)).map_err(|reason| InputError::row(file, rows, "", reason))?;
+            take(&channels, stamp, Counts::new(counts))
+                .map_err(|reason| InputError::row(file.name(), rows, "", reason))?;
         }
         Ok(())
     })?;

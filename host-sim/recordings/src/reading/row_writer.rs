@@ -124,8 +124,7 @@ impl SensorRows<'_> {
         &self,
         mut write: impl FnMut(&[ValueColumn], &Batch, &mut Vec<String>) -> io::Result<()>,
     ) -> Result<WrittenRows, WriteError> {
-        let mut source =
-            self.input.batches(&self.options, None).map_err(|error| self.input.rename_any(error.into()))?;
+        let mut source = self.input.batches(&self.options, None).map_err(StreamError::from)?;
         let columns = source.columns().to_vec();
         let (mut names, mut failure) = (Vec::new(), None);
         let wanted = WantedRows { part: self.part, ..WantedRows::all(self.stated_hz) };
@@ -143,7 +142,7 @@ impl SensorRows<'_> {
         if let Some(failure) = failure {
             return Err(failure.into());
         }
-        let read = read.map_err(|error| self.input.rename_any(error))?;
+        let read = read?;
         let is_complete = read.is_complete();
         let RowsRead { damage, notes, .. } = read;
         Ok(WrittenRows { columns: names, notes: notes.into_iter().chain(damage).collect(), is_complete })

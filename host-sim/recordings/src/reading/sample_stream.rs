@@ -127,13 +127,6 @@ impl Origin<'_> {
         }
     }
 
-    fn name(&self, error: StreamError) -> StreamError {
-        match self {
-            Self::File { input, .. } => input.rename_any(error),
-            Self::Recording(_) => error,
-        }
-    }
-
     fn sensor(&self) -> SensorProfile {
         match self {
             Self::File { options, .. } => options.sensor.clone(),
@@ -172,7 +165,7 @@ impl SampleStream {
     }
 
     fn open(origin: Origin<'static>, reading: Reading, monitor: &ReadMonitor) -> Result<Self, StreamError> {
-        let mut survey = Survey::read(&origin, reading, u64::MAX, monitor).map_err(|error| origin.name(error))?;
+        let mut survey = Survey::read(&origin, reading, u64::MAX, monitor)?;
         let samples = survey.samples(reading.kept)?;
         Ok(Self { origin, reading, survey, samples, monitor: monitor.clone() })
     }
@@ -227,11 +220,7 @@ impl SampleStream {
     ///
     /// # Errors
     /// The file is damaged.
-    pub fn read(&mut self, take: impl FnMut(SampleBlock)) -> Result<bool, StreamError> {
-        self.read_pass(take).map_err(|error| self.origin.name(error))
-    }
-
-    fn read_pass(&mut self, mut take: impl FnMut(SampleBlock)) -> Result<bool, StreamError> {
+    pub fn read(&mut self, mut take: impl FnMut(SampleBlock)) -> Result<bool, StreamError> {
         let Self { survey, origin, reading, monitor, samples } = self;
         if samples.is_in_memory {
             samples.beginning.blocks(BATCH).for_each(take);

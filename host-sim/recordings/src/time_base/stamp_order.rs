@@ -18,8 +18,6 @@ pub(crate) const ROWS_OF_SET_CLOCK: usize = 32;
 pub(crate) const ROWS_OF_FIRST: usize = 8;
 /// Rows before which a clock may be set forward.
 const ROWS_BEFORE_SET: u64 = 256;
-/// Usual intervals that stand for the unknown time until a clock began anew.
-const RESTART: f64 = 64.0;
 
 /// Numbers at which counters and clocks begin anew: of 15, 16, 24, 31 and 32 bits, and of a second, a minute, an hour, a day and a week, in s,
 /// ms, us and ns.
@@ -48,7 +46,6 @@ pub(crate) enum Order {
 pub(crate) struct StampOrder {
     /// What is added to a stamp.
     offset: f64,
-    first: Option<f64>,
     before_last: Option<f64>,
     last: Option<f64>,
     intervals: VecDeque<f64>,
@@ -132,7 +129,6 @@ impl StampOrder {
             }
             self.intervals.push_back(interval);
         }
-        self.first.get_or_insert(time);
         self.before_last = self.last;
         self.last = Some(time);
         self.accepted += 1;
@@ -166,17 +162,15 @@ impl StampOrder {
         *self = Self { wrong: self.wrong, ..Self::default() };
     }
 
-    /// Goes on with a clock that was set back to `time` before the row with this number. Where it began anew, the time until then is not known;
-    /// else it goes on at once.
+    /// Goes on at once with a clock that was set back to `time`, or began anew, before the row with this number: how long that took is not
+    /// known, and no sample is taken to be missing there.
     pub(crate) fn set_clock(&mut self, time: f64, row: u64) {
-        let (Some(first), Some(last), Some(usual)) = (self.first, self.last, self.usual()) else { return };
-        let is_begun_anew = time - first <= LONGEST_STEP * usual;
-        let step = if is_begun_anew { RESTART } else { 1.0 };
+        let (Some(last), Some(usual)) = (self.last, self.usual()) else { return };
         if self.sets == 0 {
             self.first_set = row;
         }
         self.sets += 1;
-        self.offset += last + step * usual - time;
+        self.offset += last + usual - time;
     }
 
     /// The time of a stamp, as of [`judge`](Self::judge), after the clock was set.
@@ -197,7 +191,7 @@ impl StampOrder {
             (
                 *sets,
                 format!(
-                    "the clock was set back {sets} times, first before row {first_set}; how long that took is not known"
+                    "the clock was set back {sets} times, first before row {first_set}; how long that took is not known, and no sample is taken to be missing there"
                 ),
             ),
             (

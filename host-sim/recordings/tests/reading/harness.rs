@@ -163,9 +163,9 @@ pub(crate) fn read_file<T: AsRef<str>>(file: &Path, options: &[T]) -> Result<Rea
 
 /// The bursts of a log of the SPI bus in its default range, without the driver.
 fn bursts(input: &InputFile) -> Result<Recording, InputError> {
-    let RecordedFile::Frames(mut frames) = RecordedFile::open(input.path())? else { panic!("a log of the bus") };
+    let RecordedFile::Frames(mut frames) = RecordedFile::open(input.bytes())? else { panic!("a log of the bus") };
     let mut recorder = Recorder::new(Channel::ALL.to_vec(), GyroRange::default());
-    while let Some(captured) = frames.next().map_err(|error| input.rename(error))? {
+    while let Some(captured) = frames.next()? {
         let frame = captured.frame;
         let answer: Option<[u8; BURST_BYTES]> = frame.miso.try_into().ok();
         if let Some(answer) = answer.filter(|_| frame.mosi.starts_with(&BURST_REQUEST[..2])) {
@@ -193,7 +193,7 @@ pub(crate) fn write_array(file: &Path, array: &Path) -> Result<Vec<String>, Stre
 fn sensor_rows<'a, T: AsRef<str>>(input: &'a InputFile, options: &[T]) -> Result<SensorRows<'a>, InputError> {
     let options = Options::new(options);
     let (part, stated_hz) = (options.part, options.rate_hz);
-    Ok(SensorRows { input, options: options.of_any_sensor(input.path())?, part, stated_hz })
+    Ok(SensorRows { input, options: options.of_any_sensor(input.name())?, part, stated_hz })
 }
 
 fn unwritten(error: WriteError) -> StreamError {

@@ -6,6 +6,7 @@ use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use recordings::inspection::{InspectedTable, Proposal};
+use ruzstd::encoding::{CompressionLevel, compress_to_vec};
 use std::path::Path;
 
 const ROWS: u32 = 3000;
@@ -169,13 +170,18 @@ fn rows_of_different_origin_are_several_sensors() {
                     (_, _) => format!("acc {time} {:.6} {:.6} {:.6}\n", x / 9.80665, y / 9.80665, z / 9.80665),
                 };
             }
-            let (_, found) = as_proposed(content.as_bytes(), &[]);
+            let (tables, found) = as_proposed(content.as_bytes(), &[]);
             assert_eq!(
                 found.len(),
                 2,
                 "{seed} {way}: {:?}",
                 found.iter().map(|(proposal, _)| proposal).collect::<Vec<_>>()
             );
+            for table in tables {
+                let found_hz = table.rate.map_or(f64::NAN, |rate| rate.hz);
+                let is_near = |hz: f64| (found_hz / hz - 1.0).abs() < 1e-3;
+                assert!(table.rows as u32 == ROWS && hz.into_iter().any(is_near), "{seed} {way}: {found_hz} Hz");
+            }
             for (proposal, read) in &found {
                 let is_rate = read.samples.channels.iter().any(|of| of.profile.name == "gyro_x");
                 let (hz, channel, deviation) = if is_rate { (hz[0], "gyro_z", RATE) } else { (hz[1], "accl_y", FORCE) };
@@ -356,4 +362,98 @@ fn a_vector_that_is_never_filled_is_left_out_with_a_note() {
     assert_eq!(unfilled.samples.channels.len(), 3);
     assert!(unfilled.notes_contain("accl_z (az) is never filled"), "{:?}", unfilled.notes);
     assert_eq!(table(1).samples.channels.len(), 6);
+}
+
+/// Messages of a sensor as a recorder of ROS 2 writes them to a file: `sensor_msgs/msg/Imu` in CDR.
+fn mcap(messages: &[(u64, [f64; 3])]) -> Vec<u8> {
+    let record = |opcode: u8, body: &[u8]| [&[opcode][..], &(body.len() as u64).to_le_bytes(), body].concat();
+    let text = |text: &str| [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat();
+    let schema = [&1u16.to_le_bytes()[..], &text("sensor_msgs/msg/Imu"), &text("ros2msg"), &text("")].concat();
+    let channel = [&7u16.to_le_bytes()[..], &1u16.to_le_bytes(), &text("/imu"), &text("cdr"), &[0; 4]].concat();
+    let mut file = [b"\x89MCAP0\r\n".to_vec(), record(3, &schema), record(4, &channel)].concat();
+    for (ns, rate) in messages {
+        let stamp = [ns / 1_000_000_000, ns % 1_000_000_000].map(|part| (part as u32).to_le_bytes());
+        // An empty name of the frame, and what aligns the numbers behind it.
+        let head = [&[0, 1, 0, 0][..], &stamp.concat(), &1u32.to_le_bytes(), &[0; 4]].concat();
+        let orientation = [0.0, 0.0, 0.0, 1.0].into_iter().chain([0.0; 9]);
+        let numbers = orientation.chain(*rate).chain([0.0; 9]).chain([0.0, 0.0, 9.8]).chain([0.0; 9]);
+        let data: Vec<u8> = head.into_iter().chain(numbers.flat_map(f64::to_le_bytes)).collect();
+        let header = [&7u16.to_le_bytes()[..], &[0; 4], &ns.to_le_bytes(), &ns.to_le_bytes()].concat();
+        file.extend(record(5, &[header, data].concat()));
+    }
+    file.extend(record(2, &[0; 20]));
+    file
+}
+
+/// A folder that `ros2 bag record` wrote, of one file or split into several; a file of it may be compressed.
+#[test]
+fn a_bag_in_a_folder_is_one_recording() {
+    for seed in 0..8 {
+        let (mut random, mut normal) = (ChaCha8Rng::seed_from_u64(seed), normal(seed));
+        let messages: Vec<(u64, [f64; 3])> = (0..u64::from(ROWS))
+            .map(|row| (1_700_000_000_000_000_000 + row * 5_000_000, [(); 3].map(|()| RATE.to_radians() * normal())))
+            .collect();
+        let folder = tempfile::tempdir().expect("a folder");
+        let bag = folder.path().join("run");
+        std::fs::create_dir(&bag).expect("a folder");
+        let files = random.random_range(1..5);
+        // In the order of numbers, not of letters.
+        let first = random.random_range(7..10);
+        for (number, part) in (first..).zip(messages.chunks(messages.len().div_ceil(files))) {
+            let (name, content) = (bag.join(format!("run_{number}.mcap")), mcap(part));
+            if random.random() {
+                std::fs::write(name, content).expect("written");
+            } else {
+                let compressed = compress_to_vec(content.as_slice(), CompressionLevel::Fastest);
+                std::fs::write(name.with_extension("mcap.zstd"), compressed).expect("written");
+            }
+        }
+        if random.random() {
+            std::fs::write(bag.join("metadata.yaml"), "rosbag2_bagfile_information:\n").expect("written");
+        }
+        let read_bag = || read_file(&bag, &[""; 0]);
+        let found = read_bag().unwrap_or_else(|error| panic!("{seed}: {error}"));
+        let whole = read("whole.mcap", &mcap(&messages), &[""; 0]).expect("one file");
+        assert_eq!((found.samples, found.notes), (whole.samples, whole.notes), "{seed}: {files} files");
+        std::fs::write(bag.join("other_0.mcap"), mcap(&messages)).expect("written");
+        let refused = read_bag().err().expect("two bags").to_string();
+        assert!(refused.contains("is a directory"), "{seed}: {refused}");
+    }
+}
+
+/// A device that is turned between rests: its rests are those of each attitude.
+#[test]
+fn a_device_that_is_turned_between_rests_is_at_rest_in_each() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("turned.csv");
+    for seed in 0..12 {
+        let (mut random, mut normal) = (ChaCha8Rng::seed_from_u64(seed), normal(seed));
+        // The length of each rest and of the turn behind it, and the angle of that turn about y.
+        let parts: Vec<[usize; 2]> =
+            (0..6).map(|_| [random.random_range(500..1500), random.random_range(100..400)]).collect();
+        let mut content = "t_s,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g\n".to_owned();
+        let (mut angle, mut row, mut rests) = (0.0_f64, 0, Vec::new());
+        for [rest, turn] in parts {
+            rests.push(row..row + rest);
+            let step = random.random_range(0.4..1.5) / turn as f64;
+            for at in 0..rest + turn {
+                let turning = if at < rest { 0.0 } else { step };
+                angle += turning;
+                let rate = [0.0, turning.to_degrees() * 100.0, 0.0].map(|of| of + RATE * normal());
+                let force = [angle.sin(), 0.0, angle.cos()].map(|of| of + FORCE * normal());
+                let values = rate.iter().chain(&force).map(|value| format!("{value:.5}")).collect::<Vec<_>>().join(",");
+                content += &format!("{:.2},{values}\n", row as f64 / 100.0);
+                row += 1;
+            }
+        }
+        std::fs::write(&file, content).expect("written");
+        let steady = inspect(&file).remove(0).steady.expect("a sensor");
+        // Whole blocks of 128 rows, or of 256 where the turns make neighbours alike; those that a turn touches and one at either end are left
+        // out.
+        let is_inside =
+            rests.iter().any(|rest| rest.start <= steady.rows.start + 128 && steady.rows.end <= rest.end + 128);
+        let longest = rests.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
+        assert!(steady.is_rest && is_inside, "{seed}: {steady:?} of {rests:?}");
+        assert!(steady.rows.len() + 4 * 256 > longest, "{seed}: {steady:?} of {rests:?}");
+    }
 }

@@ -1,0 +1,84 @@
+//! A bag of ROS 2 in a folder, which `ros2 bag record` may split into several files: their topics are one.
+
+use crate::formats::topics::{EachRow, Ending, Source, Topic};
+use crate::input::input_error::InputError;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Endings of the files of a bag, and that of a file which is compressed as a whole.
+const ENDINGS: [&str; 2] = [".mcap", ".db3"];
+const COMPRESSED: &str = ".zstd";
+
+/// The files of the bag in `folder` in their order, which is that of the numbers in their names (`run_0.mcap`, `run_1.mcap`); none where it
+/// has none, or those of several bags. Its `metadata.yaml` is not needed: a recorder that is killed writes none.
+///
+/// # Errors
+/// It is no folder that can be read.
+pub fn files_of_bag(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut found: Vec<(String, Option<u64>, PathBuf)> = Vec::new();
+    for entry in folder.read_dir()? {
+        let file = entry?.path();
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let plain = name.strip_suffix(COMPRESSED).unwrap_or(&name);
+        let Some(stem) = ENDINGS.iter().find_map(|ending| plain.strip_suffix(ending)) else { continue };
+        let numbered = stem.rsplit_once('_').and_then(|(stem, number)| Some((stem, number.parse().ok()?)));
+        let (stem, number) = numbered.map_or((stem, None), |(stem, number)| (stem, Some(number)));
+        found.push((stem.to_owned(), number, file.clone()));
+    }
+    found.sort();
+    let is_next = |pair: &[(String, Option<u64>, PathBuf)]| pair[0].0 == pair[1].0 && pair[0].1 < pair[1].1;
+    let is_one_bag = found.windows(2).all(is_next);
+    Ok(found.into_iter().filter(|_| is_one_bag).map(|(.., file)| file).collect())
+}
+
+/// The files of a bag, one after the other.
+pub(crate) struct SplitBag<'a> {
+    files: Vec<Box<dyn Source + 'a>>,
+    /// Of all files.
+    topics: Vec<Topic>,
+}
+
+impl<'a> SplitBag<'a> {
+    /// Of at least one file.
+    pub(crate) fn new(files: Vec<Box<dyn Source + 'a>>) -> Self {
+        let mut topics: Vec<Topic> = Vec::new();
+        for topic in files.iter().flat_map(|file| file.topics()) {
+            match topics.iter_mut().find(|known| is_same(known, topic)) {
+                Some(known) => known.rows = known.rows.zip(topic.rows).map(|(rows, more)| rows + more),
+                None => topics.push(topic.clone()),
+            }
+        }
+        Self { files, topics }
+    }
+}
+
+/// Whether the rows of one topic go on in the other.
+fn is_same(one: &Topic, other: &Topic) -> bool {
+    one.name == other.name && one.kind == other.kind && one.columns == other.columns
+}
+
+impl Source for SplitBag<'_> {
+    fn format(&self) -> &'static str {
+        self.files[0].format()
+    }
+
+    fn topics(&self) -> &[Topic] {
+        &self.topics
+    }
+
+    fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError> {
+        let mut all = Ending::default();
+        for file in &mut self.files {
+            let Some(at) = file.topics().iter().position(|of| is_same(of, &self.topics[topic])) else { continue };
+            let Ending { damage, notes } = file.read(at, columns, each)?;
+            all.notes.extend(notes);
+            if damage.is_some() {
+                all.damage = damage;
+                break;
+            }
+        }
+        all.notes.sort();
+        all.notes.dedup();
+        Ok(all)
+    }
+}
