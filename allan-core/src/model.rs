@@ -279,8 +279,8 @@ const MAX_LAGS: usize = 4 * MAX_OVERLAP as usize + 1;
 /// all correlations, then without those of narrow-band terms beyond two averaging times.
 ///
 /// Both are sums over the covariances of the second differences, as in Greenhall and Riley (see [`confidence`]). A
-/// deterministic term repeats in every record and adds scatter only through its product with the noise. A narrow-band term
-/// stays correlated over many averaging times. The result is 10¹⁸ if the mixture has no random term.
+/// deterministic term adds scatter through its product with the noise, and a sinusoid by its phase, which the differences of a record
+/// meet at few places. A narrow-band term stays correlated over many averaging times. The result is 10¹⁸ if the mixture has no random term.
 ///
 /// [`confidence`]: crate::confidence
 #[inline(never)] // its stack frame would otherwise be part of every caller's
@@ -296,7 +296,7 @@ pub(crate) fn degrees_of_freedom<T: TermSet>(
     let count = T::Real::from_word(point.count) * whole(overlap) / whole(point.overlap);
     let reach = |times: u32| (u64::from(times * overlap).min(point.count.saturating_sub(1))) as usize + 1;
     let (mut noise, mut deterministic) = ([0.0_f32; MAX_LAGS], [0.0_f32; MAX_LAGS]);
-    let mut far = T::Real::ZERO;
+    let (mut far, mut by_phase) = (T::Real::ZERO, T::Real::ZERO);
     for (kind, share) in parts {
         let sums = match kind {
             NoiseTerm::BiasInstability => &mut noise[..reach(4)],
@@ -310,12 +310,15 @@ pub(crate) fn degrees_of_freedom<T: TermSet>(
         }
         let stride = T::Real::from_word(point.n) / whole(overlap);
         far += two * *share * *share * T::squared_covariance_tail(kind, point.n, stride, sample_period);
+        let stride = point.n as f64 / f64::from(point.overlap);
+        by_phase += *share * *share * T::phase_variance(kind, point.count, stride, sample_period);
     }
     let pairs =
         noise.iter().zip(&deterministic).map(|(noise, fixed)| T::Real::from_single(noise * (noise + 2.0 * fixed)));
     let weight = |lag: usize| if lag == 0 { one } else { two * (one - T::Real::from_word(lag as u64) / count) };
     let weighted = |(lag, pair): (usize, T::Real)| if pair == T::Real::ZERO { pair } else { weight(lag) * pair };
-    let near: T::Real = pairs.enumerate().map(weighted).sum();
+    // The relative variance of a mean square is twice the sum of the pairs over their number.
+    let near = pairs.enumerate().map(weighted).sum::<T::Real>() + by_phase * count / two;
     let factor = subtraction_factor(T::Real::constant(point.avar), T::Real::constant(point.interpolation));
     let least = if count < one { count } else { one };
     let edf = |pairs: T::Real| clamp(factor * count / pairs, least, T::Real::constant(1e18));
@@ -393,8 +396,44 @@ fn add_correlations<T: TermSet>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::sin;
     use crate::simulation::{PERIOD, autocovariance, stationary};
+    use crate::term::Sinusoid;
+    use crate::{Cascade, Curve};
     use std::vec::Vec;
+
+    /// The Allan variance of a sinusoid depends on its phase where the differences of a short record meet few of them. The scatter over 64
+    /// phases of what the cascade makes of 15,000 samples is `2/edf` of its square.
+    #[test]
+    fn the_phase_of_a_sinusoid_scatters_its_variance() {
+        const PHASES: usize = 64;
+        let period = 0.01;
+        let mut shown = 0;
+        for frequency in [0.31, 0.7, 1.9] {
+            let curves: Vec<Curve<12>> = (0..PHASES)
+                .map(|phase| {
+                    let mut cascade = Cascade::<12, 4>::new();
+                    for at in 0..15_000 {
+                        let turns = frequency * period * f64::from(at) + phase as f64 / PHASES as f64;
+                        cascade.push((1e6 * sin(2.0 * core::f64::consts::PI * turns)) as i32);
+                    }
+                    cascade.curve(period)
+                })
+                .collect();
+            let kind = NoiseTerm::Sinusoid(Sinusoid { frequency });
+            let model = Model::new(period, [FittedTerm::exact(kind, 1e6)]);
+            for (at, point) in curves[0].points().iter().enumerate() {
+                let expected = model.avar(point.n);
+                let square = |curve: &Curve<12>| (curve.points()[at].avar / expected - 1.0).powi(2);
+                let scatter = curves.iter().map(square).sum::<f64>() / PHASES as f64;
+                let modelled = 2.0 / model.edf(point);
+                // The mean over the phases is exact; below 10⁻⁸ it is the rounding of the samples.
+                assert!((modelled / scatter - 1.0).abs() < 0.02 || scatter < 1e-8, "{}: {modelled} {scatter}", point.n);
+                shown += usize::from(scatter > 1e-4);
+            }
+        }
+        assert!(shown >= 2, "{shown}");
+    }
 
     #[test]
     fn second_differences_correlate_as_the_autocovariance_says() {

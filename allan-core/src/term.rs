@@ -241,6 +241,14 @@ impl NoiseTerm {
         }
     }
 
+    /// [`Process::phase_variance`] of the term.
+    pub(crate) fn phase_variance(&self, count: u64, stride: f64, sample_period: f64) -> f64 {
+        match self {
+            Self::Sinusoid(sinusoid) => sinusoid.phase_variance(count, stride, sample_period),
+            _ => 0.0,
+        }
+    }
+
     /// Whether it contributes the same to every record, so that it adds no scatter of its own to an estimate.
     pub(crate) const fn is_deterministic(&self) -> bool {
         matches!(self, Self::RateRamp | Self::Sinusoid(_))

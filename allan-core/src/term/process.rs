@@ -34,6 +34,12 @@ pub trait Process {
     fn squared_covariance_tail(&self, _n: u64, _stride: f64, _sample_period: f64) -> f64 {
         0.0
     }
+
+    /// Variance, over all phases that the process may begin with, of the mean square of `count` second differences at a distance of
+    /// `stride` samples, over the square of its expectation; 0 for processes without a phase.
+    fn phase_variance(&self, _count: u64, _stride: f64, _sample_period: f64) -> f64 {
+        0.0
+    }
 }
 
 /// Quantization of the angle: `σ² = 3Q²/τ²` (IEEE 952), exact at every `n`.
@@ -168,5 +174,15 @@ impl Process for Sinusoid {
         let ratio = sin(half * n as f64);
         let ratio = ratio * ratio / (n as f64 * sin(half));
         ratio * ratio
+    }
+
+    /// A difference is `sin(φ + jθ)` at the stride `j`, and its square `½ − ½·cos(2φ + 2jθ)`. The mean of the cosines over `count` strides has
+    /// the amplitude `sin(count·θ)/(count·sin θ)`, Dirichlet's kernel, and so half the square of it as its variance.
+    fn phase_variance(&self, count: u64, stride: f64, sample_period: f64) -> f64 {
+        let step = 2.0 * PI * self.frequency * sample_period * stride;
+        let (single, count) = (sin(step), count as f64);
+        // A stride of whole half periods meets every time the same phase.
+        let kernel = if abs(single) * count < 1e-6 { 1.0 } else { sin(count * step) / (count * single) };
+        kernel * kernel / 2.0
     }
 }

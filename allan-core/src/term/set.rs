@@ -24,6 +24,9 @@ pub(crate) trait TermSet {
     /// [`NoiseTerm::squared_covariance_tail`].
     fn squared_covariance_tail(kind: &NoiseTerm, n: u64, stride: Self::Real, sample_period: f64) -> Self::Real;
 
+    /// [`NoiseTerm::phase_variance`].
+    fn phase_variance(kind: &NoiseTerm, count: u64, stride: f64, sample_period: f64) -> Self::Real;
+
     /// [`NoiseTerm::share`].
     fn share(kind: &NoiseTerm, fraction: f64, n: u64, sample_period: f64) -> VarianceFractions;
 
@@ -63,6 +66,10 @@ impl TermSet for AllTerms {
 
     fn squared_covariance_tail(kind: &NoiseTerm, n: u64, stride: f64, sample_period: f64) -> f64 {
         kind.squared_covariance_tail(n, stride, sample_period)
+    }
+
+    fn phase_variance(kind: &NoiseTerm, count: u64, stride: f64, sample_period: f64) -> f64 {
+        kind.phase_variance(count, stride, sample_period)
     }
 
     fn share(kind: &NoiseTerm, fraction: f64, n: u64, sample_period: f64) -> VarianceFractions {
@@ -136,6 +143,10 @@ impl TermSet for PowerLawTerms {
     }
 
     fn squared_covariance_tail(_: &NoiseTerm, _: u64, _: f32, _: f64) -> f32 {
+        0.0
+    }
+
+    fn phase_variance(_: &NoiseTerm, _: u64, _: f64, _: f64) -> f32 {
         0.0
     }
 

@@ -37,6 +37,7 @@ pub mod quick;
 pub mod record;
 pub mod report;
 pub mod rivals;
+mod robust;
 pub mod samples;
 #[cfg(test)]
 #[path = "../tests/support/simulated_part.rs"]

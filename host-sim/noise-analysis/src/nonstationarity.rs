@@ -112,11 +112,7 @@ impl ChannelEpochs {
     /// Compares the two quarters of the first half of `curves`; `model` describes both together.
     pub(crate) fn compare(curves: EpochCurves, model: &Model) -> Self {
         let quarters = Stationarity::compare(&curves.quarters[0], &curves.quarters[1], model);
-        let part = match FittedPart::select(quarters) {
-            FittedPart::LaterQuarter if !curves.quarters_differ_beyond_epochs() => FittedPart::FirstHalf,
-            part => part,
-        };
-        Self { part, quarters, curves }
+        Self { part: FittedPart::select(quarters), quarters, curves }
     }
 
     /// The curves of the two quarters of the first half, the earlier first.

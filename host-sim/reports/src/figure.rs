@@ -85,7 +85,8 @@ fn standalone(plot: &Plot) -> Picture {
 pub fn pictures(report: &Report) -> Vec<Picture> {
     let overview = story(report).into_iter().chain(overview(report));
     let channels = report.channels.iter().flat_map(|channel| channel_plots(report, channel));
-    let findings = (0..report.findings.len()).filter_map(|index| evidence(report, index));
+    let findings =
+        (1..).zip(summary::finding_order(report)).filter_map(|(number, index)| evidence(report, index, number));
     overview.chain(channels).chain(findings).map(|plot| standalone(&plot)).collect()
 }
 

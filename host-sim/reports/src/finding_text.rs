@@ -1,16 +1,16 @@
 //! Each finding in words: one sentence of physics and one of advice, made of its parameters. `docs/findings.md` explains every
 //! sentence.
 
+mod amounts;
 #[cfg(test)]
 mod examples;
 
 use crate::formatting::{capital, moment, words};
-use crate::rounding::{
-    bounded_quantity, plain, quantity, quantity_digits, rounded_quantity, signed, significant, span,
-};
-use noise_analysis::bounds::{BoundedEstimate, ChannelEstimate};
+use crate::rounding::{plain, quantity, quantity_digits, signed, significant, span};
+use amounts::{Amounts, Label};
+use noise_analysis::bounds::{BoundedEstimate, Parameter};
 use noise_analysis::effects::{Effect, Observation, Unexplained, UnexplainedPlace};
-use noise_analysis::report::{ChannelReport, Finding, Parameter, Validation};
+use noise_analysis::report::{ChannelReport, Finding, Report, Validation};
 use std::f64::consts::SQRT_2;
 
 /// Frequency of a line below which nothing that turns or hums makes it, Hz.
@@ -26,7 +26,7 @@ pub struct FindingText {
     pub channels: String,
     /// How many these are.
     pub channel_count: usize,
-    /// What it is, with its size.
+    /// What it is, with the size in each channel.
     pub physics: String,
     /// The same without intervals and details, for one line of a narrow screen.
     pub brief: String,
@@ -38,37 +38,92 @@ pub struct FindingText {
     pub weight: String,
 }
 
+/// A finding as one of its channels shows it.
+#[derive(Debug, Clone, Copy)]
+pub struct ShownEffect<'a> {
+    /// Name of the channel, such as `gyro_z`.
+    pub channel: &'a str,
+    /// With the channel's own numbers.
+    pub effect: &'a Effect,
+}
+
+/// What every channel shows of the finding at `index`, in the order of the finding's channels.
+#[must_use]
+pub fn shown_effects(report: &Report, index: usize) -> Vec<ShownEffect<'_>> {
+    let of_channel = |name: &String| {
+        let channel = report.channels.iter().find(|channel| channel.name == *name)?;
+        let shown = channel.effects.iter().find(|shown| shown.finding == index)?;
+        Some(ShownEffect { channel: &channel.name, effect: &shown.effect })
+    };
+    report.findings.get(index).into_iter().flat_map(|finding| &finding.channels).filter_map(of_channel).collect()
+}
+
 /// What to do about a finding.
 struct Advice {
     /// Without a full stop.
     first: &'static str,
     /// With the sign that ends the first.
     rest: String,
-    /// Whether the analysis or the part has done it.
-    is_done: bool,
+    kind: AdviceKind,
+}
+
+#[derive(PartialEq)]
+enum AdviceKind {
+    /// The analysis or the part has done it.
+    Done,
+    /// Something to look for or to change.
+    Look,
+    /// Numbers of the finding are to be subtracted: only if the second half confirms them.
+    Compensate,
 }
 
 impl Advice {
     fn new(first: &'static str, rest: impl Into<String>) -> Self {
-        Self { first, rest: rest.into(), is_done: false }
+        Self { first, rest: rest.into(), kind: AdviceKind::Look }
     }
 
     fn done(first: &'static str, rest: &str) -> Self {
-        Self { first, rest: rest.to_owned(), is_done: true }
+        Self { kind: AdviceKind::Done, ..Self::new(first, rest) }
+    }
+
+    fn compensate(first: &'static str, rest: impl Into<String>) -> Self {
+        Self { kind: AdviceKind::Compensate, ..Self::new(first, rest) }
+    }
+
+    /// What does not make the second half worse, if that contradicts the numbers.
+    fn checked(self, validated: Validation) -> Self {
+        if self.kind == AdviceKind::Compensate && validated == Validation::No {
+            return Self::new(
+                "Record it again before anything is subtracted",
+                ": the second half does not confirm the numbers.",
+            );
+        }
+        self
     }
 }
 
-/// The words for `finding`.
+/// The words for the finding at `index` of `report`; `None` where there is none.
 #[must_use]
-pub fn describe(finding: &Finding) -> FindingText {
-    let (physics, advice) = sentences(finding, &bounded_quantity, &reaches(finding));
-    let (brief, _) = sentences(finding, &rounded_quantity, "");
+pub fn describe_in(report: &Report, index: usize) -> Option<FindingText> {
+    Some(describe(report.findings.get(index)?, &shown_effects(report, index)))
+}
+
+/// The words for `finding`, which its channels show as in `shown`; without these its own numbers are those of its clearest channel.
+#[must_use]
+pub fn describe(finding: &Finding, shown: &[ShownEffect]) -> FindingText {
+    let clearest = finding.channels.get(finding.clearest).map_or("", String::as_str);
+    let alone = [ShownEffect { channel: clearest, effect: &finding.effect }];
+    let shown = if shown.is_empty() { &alone } else { shown };
+    let label = Label::new(&finding.channels);
+    let [(physics, advice), (brief, _)] =
+        [false, true].map(|is_brief| sentences(finding, &Amounts { shown, label, is_brief }));
+    let advice = advice.checked(finding.validated);
     FindingText {
         channels: channel_list(&finding.channels),
         channel_count: finding.channels.len(),
         physics: physics.replace(DETAIL, ""),
         brief: brief.split(DETAIL).step_by(2).collect(),
-        step: (!advice.is_done).then(|| format!("{}.", advice.first)),
+        step: (advice.kind != AdviceKind::Done).then(|| format!("{}.", advice.first)),
         advice: format!("{}{}", advice.first, advice.rest),
         weight: weight(finding),
     }
@@ -92,28 +147,24 @@ fn gain(finding: &Finding) -> Option<String> {
     (share > 0.0 && share < 1.0).then(|| significant(100.0 * (1.0 - (1.0 - share).sqrt()), 2))
 }
 
-fn reaches(finding: &Finding) -> String {
-    let these = if finding.channels.len() > 1 { "these channels" } else { "this channel" };
-    format!(" reaches {these}")
-}
-
 /// Stands on either side of what the brief form of a sentence leaves out.
 const DETAIL: char = '|';
 
-/// The sentence of physics, with its details between two [`DETAIL`]s, and the advice; `amount` writes a parameter, and `reaches` comes after what reaches the channels from
-/// outside.
-fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: &str) -> (String, Advice) {
+/// The sentence of physics, with its details between two [`DETAIL`]s, and the advice. What the part or its environment has once, such as
+/// a frequency, is that of the clearest channel; sizes are those of each channel.
+fn sentences(finding: &Finding, amounts: &Amounts) -> (String, Advice) {
     let off = || {
         gain(finding)
             .map_or_else(String::new, |percent| format!(" It would take {percent} % off σ where it is largest."))
     };
-    let size = |of: ChannelEstimate| amount(&of.parameter());
-    let per = |of: ChannelEstimate, unit: &str| amount(&of.parameter_per(unit));
-    let hertz = |of: BoundedEstimate| amount(&of.parameter("Hz"));
-    let seconds = |of: BoundedEstimate| amount(&of.parameter("s"));
+    let each = |name: &'static str| amounts.each(name);
+    let percent = |name: &'static str| amounts.each_as(name, "%", 100.0);
+    let amount = |of: &Parameter| amounts.one(of);
+    let hertz = |of: BoundedEstimate| amounts.one(&of.parameter("Hz"));
+    let seconds = |of: BoundedEstimate| amounts.one(&of.parameter("s"));
     let period = |frequency_hz: BoundedEstimate| span(1.0 / frequency_hz.value);
-    // Between commas.
-    let reaching = || if reaches.is_empty() { String::new() } else { format!(",{reaches}") };
+    let is_several = finding.channels.len() > 1;
+    let one_or_each = |one: &'static str, each: &'static str| if is_several { each } else { one };
     match &finding.effect {
         Effect::OutputFilter(of) if (of.decimation.value - 1.0).abs() > 1e-9 => (
             format!(
@@ -133,8 +184,8 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
                 "; take N from averaging times longer than the filter, or use fewer taps for more bandwidth.",
             ),
         ),
-        Effect::LowPassFilter(of) => (
-            format!("A low-pass filter with a bandwidth of {}.", hertz(of.bandwidth_hz)),
+        Effect::LowPassFilter(_) => (
+            format!("A low-pass filter with a bandwidth of {}.", each("bandwidth")),
             Advice::done(
                 "Nothing to repair",
                 "; N holds below the bandwidth, and the samples are correlated above it.",
@@ -142,10 +193,10 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         ),
         Effect::SinusoidalLine(of) if of.frequency_hz.value < SLOW_HZ => (
             format!(
-                "A periodic change at {}|, every {}{reaches}|: an amplitude of {}.",
+                "A periodic change at {}|, every {}|: amplitude {}.",
                 hertz(of.frequency_hz),
                 period(of.frequency_hz),
-                size(of.amplitude)
+                each("amplitude")
             ),
             Advice::new(CYCLING, format!(".{}", off())),
         ),
@@ -153,7 +204,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
             format!(
                 "Every second sample is off by {}|: a line at half of the sample rate, {}|.",
                 // The deviation of the line is half of the offset.
-                size(of.amplitude.scaled(SQRT_2)),
+                amounts.each_scaled("amplitude", SQRT_2),
                 hertz(of.frequency_hz)
             ),
             Advice::new(
@@ -163,29 +214,27 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         ),
         Effect::SinusoidalLine(of) => (
             format!(
-                "A vibration or hum at {}{reaches}: a narrow line of {}.",
+                "A vibration or hum at {}|, a narrow line|: |amplitude |{}.",
                 hertz(of.frequency_hz),
-                size(of.amplitude)
+                each("amplitude")
             ),
             Advice::new("Look for a fan, a motor or the mains", format!("; a notch there would help.{}", off())),
         ),
         Effect::ResonantLine(of) if of.frequency_hz.value < SLOW_HZ => (
             format!(
-                "A fluctuation around {}|, every {} or so{}|: {} (1 σ).",
+                "A fluctuation around {}|, every {} or so|: {}| (1 σ)|.",
                 hertz(of.frequency_hz),
                 period(of.frequency_hz),
-                reaching(),
-                size(of.deviation)
+                each("deviation")
             ),
             Advice::new(CYCLING, format!(".{}", off())),
         ),
         Effect::ResonantLine(of) => (
             format!(
-                "A vibration around {}, {} wide{}: {} (1 σ).",
+                "A vibration around {}|, {} wide|: {}| (1 σ)|.",
                 hertz(of.frequency_hz),
                 quantity(of.bandwidth_hz.value, "Hz"),
-                reaching(),
-                size(of.deviation)
+                each("deviation")
             ),
             Advice::new(
                 "Look for a fan whose speed wanders or a loose mount",
@@ -193,17 +242,13 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
             ),
         ),
         Effect::ModulatedLine(of) => {
-            let (what, depth) = if of.of_phase {
-                ("phase", of.depth.parameter("rad"))
-            } else {
-                ("amplitude", of.depth.scaled(100.0).parameter("%"))
-            };
+            let (what, depth) =
+                if of.of_phase { ("phase", each("phase_deviation")) } else { ("amplitude", percent("depth")) };
             (
                 format!(
-                    "A vibration or hum at {}{reaches}, a line of changing {what}|: {}, changing by {} every {}|.",
+                    "A vibration or hum at {}|, a line of changing {what}|: {}|; its {what} changes by {depth} every {}|.",
                     hertz(of.frequency_hz),
-                    size(of.amplitude),
-                    amount(&depth),
+                    each("amplitude"),
                     seconds(of.period_s)
                 ),
                 Advice::new(
@@ -214,32 +259,32 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         }
         Effect::Chirp(of) => (
             format!(
-                "A line whose frequency runs from {} to {}|, by {}{reaches}: an amplitude of {}|.",
+                "A line whose frequency runs from {} to {}|, by {}: amplitude {}|.",
                 hertz(of.start_hz),
                 hertz(of.end_hz),
                 amount(&of.rate_hz_per_s.parameter("Hz/s")),
-                size(of.amplitude)
+                each("amplitude")
             ),
             Advice::new("Look for a motor whose speed changes over the record", format!(".{}", off())),
         ),
         Effect::Periodic(of) => (
             format!(
-                "A change that repeats every {} and is no sinusoid|{reaches}: a fundamental at {} with an amplitude of {}|.",
-                span(1.0 / of.frequency_hz.value),
+                "A change every {}| that is no sinusoid, with a fundamental at {}|: amplitude {}.",
+                period(of.frequency_hz),
                 hertz(of.frequency_hz),
-                size(of.amplitude)
+                each("amplitude")
             ),
             Advice::new(CYCLING, format!(".{}", off())),
         ),
         Effect::SquareWave(of) => (
-            format!("A square wave of {} with an amplitude of {}.", hertz(of.frequency_hz), size(of.amplitude)),
+            format!("A square wave of {}: amplitude {}.", hertz(of.frequency_hz), each("amplitude")),
             Advice::new("Look for a load on the supply or a heater that switches at this rate", format!(".{}", off())),
         ),
         Effect::TelegraphNoise(of) => (
             // Between two jumps of a symmetrical telegraph signal lie two correlation times on average.
             format!(
                 "The bias jumps between two levels {} apart|, on average every {}: a time constant of {}|.",
-                size(of.amplitude),
+                each("amplitude"),
                 span(2.0 * of.time_constant_s.value),
                 seconds(of.time_constant_s)
             ),
@@ -251,7 +296,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         Effect::ShotNoise(of) => (
             format!(
                 "Shocks of {}, {} an hour|, each of which begins at once and decays with a time constant of {}|.",
-                size(of.size),
+                each("size"),
                 amount(&of.rate_per_hour.parameter("")),
                 seconds(of.time_constant_s)
             ),
@@ -264,111 +309,136 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
             format!(
                 "A noise with a memory of {} and a size of {}| (1 σ)|.",
                 seconds(of.time_constant_s),
-                size(of.deviation)
+                each("deviation")
             ),
             Advice::new("Give the filter a first-order Gauss-Markov state of this time constant and size", "."),
         ),
-        Effect::CommonMode(of) => (
-            format!("A slow drift of {} in common|, which nothing recorded explains|.", size(of.deviation)),
+        Effect::CommonMode(_) => (
+            format!("A slow drift in common|, which nothing recorded explains|: {}| (1 σ)|.", each("deviation")),
             Advice::new(RECORD_CONDITIONS, "; look for a slow change in the room or the mount."),
         ),
         Effect::SharedDrift(of) => (
             format!(
-                "A slow drift in common with {}|, {} of it, which nothing recorded explains|.",
+                "A slow drift in common with {}|, which nothing recorded explains|: {}| of it|.",
                 channel_list(&[of.with.to_owned()]),
-                per(of.ratio, of.per)
+                each("ratio")
             ),
             Advice::new(RECORD_CONDITIONS, "; look for a slow change in the room or the mount."),
         ),
-        Effect::LinearDrift(of) => (
-            format!("The bias drifts in a straight line by {}.", amount(&of.slope_parameter())),
+        Effect::LinearDrift(_) => (
+            format!("The bias drifts in a straight line: {}.", each("slope")),
             Advice::new(
                 "Let the part warm up before recording, or discard the beginning",
                 "; correct the bias more often than this drift allows.",
             ),
         ),
         Effect::LevelStep(of) => (
-            format!("The bias stepped by {} at {}.", size(of.size), moment(of.time_s.value)),
+            format!("The bias stepped at {}: {}.", moment(of.time_s.value), each("size")),
             Advice::new(
                 "Look for a shock, a changed supply or a touched cable at that time",
                 "; cut the record there.",
             ),
         ),
         Effect::LevelChange(of) => (
-            format!(
-                "From {} on the noise is {} times as large| as before|.",
-                moment(of.time_s.value),
-                amount(&of.ratio.parameter(""))
-            ),
+            format!("From {} on the noise is {} times as large| as before|.", moment(of.time_s.value), each("ratio")),
             Advice::new(
                 "Look for what was switched on or off at that time",
                 "; N is that of both levels together: cut the record there.",
             ),
         ),
-        Effect::TemperatureSensitivity(of) => (
-            format!("The bias follows the temperature with {}.", per(of.sensitivity, "degC")),
-            Advice::new("Subtract this sensitivity times the change of temperature", format!(".{}", off())),
-        ),
-        Effect::TemperatureCurvature(of) => (
-            format!(
-                "The bias follows the temperature by a parabola|: {} and {}|.",
-                per(of.sensitivity, "degC"),
-                per(of.curvature, "degC^2")
+        Effect::TemperatureSensitivity(_) => (
+            format!("The bias follows the temperature: {}.", each("sensitivity")),
+            Advice::compensate(
+                one_or_each(
+                    "Subtract this sensitivity times the change of temperature",
+                    "Subtract each channel's sensitivity times the change of temperature",
+                ),
+                format!(".{}{}", bounds_alone(amounts, "sensitivity"), off()),
             ),
-            Advice::new(
+        ),
+        Effect::TemperatureCurvature(_) => (
+            format!(
+                "The bias follows the temperature| by a parabola|: {}| and {}|.",
+                each("sensitivity"),
+                each("curvature")
+            ),
+            Advice::compensate(
                 "Compensate with the second-order law, or calibrate over the whole range of temperature",
                 format!(".{}", off()),
             ),
         ),
         Effect::TurnOnTransient(of) => (
             format!(
-                "The bias begins {} off and settles| with a time constant of {}|.",
-                size(of.size),
-                seconds(of.time_constant_s)
+                "The bias starts off by {} and settles| with a time constant of {}|.",
+                each("size"),
+                each("time_constant")
             ),
             Advice::new(
                 "Let the part warm up before it is recorded or used",
-                format!(": after {} a hundredth of this is left.", span(4.6 * of.time_constant_s.value)),
+                format!(
+                    ": after {} a hundredth of this is left.",
+                    span(4.6 * amounts.largest("time_constant", of.time_constant_s.value))
+                ),
             ),
         ),
-        Effect::ThermalLag(of) => (
+        Effect::ThermalLag(_) => (
             format!(
-                "The bias follows the temperature with {}| through a lag of {}|.",
-                per(of.sensitivity, "degC"),
-                seconds(of.time_constant_s)
+                "The bias follows the temperature with a lag: {}|; time constant {}|.",
+                each("sensitivity"),
+                each("time_constant")
             ),
-            Advice::new(
-                "Compensate with the temperature behind a low-pass filter of this time constant",
-                format!(".{}", off()),
+            Advice::compensate(
+                one_or_each(
+                    "Compensate with the temperature behind a low-pass filter of this time constant",
+                    "Compensate each channel with the temperature behind a low-pass filter of its time constant",
+                ),
+                format!(".{}{}", bounds_alone(amounts, "sensitivity"), off()),
             ),
         ),
-        Effect::SupplySensitivity(of) => (
-            format!("The bias follows the supply voltage with {}.", per(of.sensitivity, "V")),
-            Advice::new("Regulate the supply, or subtract this sensitivity times its change", format!(".{}", off())),
+        Effect::SupplySensitivity(_) => (
+            format!("The bias follows the supply voltage: {}.", each("sensitivity")),
+            Advice::compensate(
+                one_or_each(
+                    "Regulate the supply, or subtract this sensitivity times its change",
+                    "Regulate the supply, or subtract each channel's sensitivity times its change",
+                ),
+                format!(".{}{}", bounds_alone(amounts, "sensitivity"), off()),
+            ),
         ),
-        Effect::AccelerationSensitivity(of) => {
-            let axes: Vec<String> = of.axes().map(|(axis, of)| format!("{} ({axis})", per(of, "g"))).collect();
+        Effect::AccelerationSensitivity(_) => {
+            let along = |(axis, name): (&str, &'static str)| {
+                let each = each(name);
+                (!each.is_empty()).then(|| format!("along {axis} {each}"))
+            };
+            let axes = [("x", "sensitivity_x"), ("y", "sensitivity_y"), ("z", "sensitivity_z")];
+            let axes: Vec<String> = axes.into_iter().filter_map(along).collect();
+            // A line of the screen has room for one axis.
+            let axes =
+                axes.iter().enumerate().map(|(at, axis)| if at == 0 { axis.clone() } else { format!("|; {axis}|") });
             (
-                format!("The rate follows the specific force|: {}|.", axes.join(", ")),
-                Advice::new(
-                    "Subtract these sensitivities times the accelerometers, or mount the part more stiffly",
+                format!("The rate follows the specific force: {}.", axes.collect::<String>()),
+                Advice::compensate(
+                    one_or_each(
+                        "Subtract these sensitivities times the accelerometers, or mount the part more stiffly",
+                        "Subtract each channel's sensitivities times the accelerometers, or mount the part more stiffly",
+                    ),
                     format!(".{}", off()),
                 ),
             )
         }
-        Effect::VibrationRectification(of) => (
-            format!(
-                "The bias follows the strength of the vibration| with {}|.",
-                per(of.sensitivity, &format!("{}^2", of.per))
+        Effect::VibrationRectification(_) => (
+            format!("The bias follows the |strength of the |vibration: {}.", each("sensitivity")),
+            Advice::compensate(
+                "Isolate the part from vibration, or compensate with the variance of the acceleration",
+                format!(".{}", bounds_alone(amounts, "sensitivity")),
             ),
-            Advice::new("Isolate the part from vibration, or compensate with the variance of the acceleration", "."),
         ),
-        Effect::AngleQuantization(of) => (
-            format!("Rounding shows: a quantization noise of {}.", amount(&of.coefficient_parameter())),
+        Effect::AngleQuantization(_) => (
+            format!("Rounding shows: a quantization noise of {}.", each("value")),
             Advice::new(FINER, "; short averaging times are dominated by rounding."),
         ),
-        Effect::EffectiveLsb(of) => (
-            format!("Rounding shows: only every value {} apart occurs.", size(of.step)),
+        Effect::EffectiveLsb(_) => (
+            format!("Rounding shows: only every value {} apart occurs.", each("step")),
             Advice::new(FINER, "; short averaging times are dominated by rounding."),
         ),
         Effect::NoiseBelowCount(_) => (
@@ -376,7 +446,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
             Advice::new("Take no coefficient from the short averaging times", "; use a smaller range, or add dither."),
         ),
         Effect::MissingCodes(of) => (
-            format!("The converter never gives {} of its codes|, which are {} apart|.", of.codes, size(of.spacing)),
+            format!("The converter never gives {} of its codes|, which are {} apart|.", of.codes, each("spacing")),
             Advice::new(
                 "Compare with another part",
                 "; the codes beside the missing ones hold their samples, an error of half a count.",
@@ -385,7 +455,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
         Effect::Spikes(of) => (
             format!(
                 "Single samples stand out by {}, {} an hour.",
-                size(of.size),
+                each("size"),
                 amount(&of.rate_per_hour.parameter(""))
             ),
             Advice::new("Check the wiring and the bus for interference", "; a filter should reject such samples."),
@@ -413,16 +483,16 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
                 ),
             },
             Advice::new(
-                "The models were fitted to these samples too, and noise needs a part at rest: record it again on a firm support",
-                ".",
+                "Noise needs a part at rest: analyse only that, or record it again on a firm support",
+                "; the models here were fitted to the motion too.",
             ),
         ),
-        Effect::Saturation(of) => (
-            format!("{} of the samples are at the end of the channel's range.", part_in_percent(of.fraction)),
+        Effect::Saturation(_) => (
+            format!("{} of the samples are at the end of the channel's range.", percent("share")),
             Advice::new("Use a larger range", "; what was cut off makes the noise look too small."),
         ),
-        Effect::StuckOutput(of) => (
-            format!("The output stayed at one value in {} of the samples.", part_in_percent(of.fraction)),
+        Effect::StuckOutput(_) => (
+            format!("The output stayed at one value in {} of the samples.", percent("share")),
             Advice::new("Look for a reader or a filter that repeats its last value", "; these samples are left out."),
         ),
         Effect::DroppedSamples(of) => (
@@ -460,7 +530,7 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
             ),
         },
         Effect::Unexplained(of) => {
-            let percent: Vec<f64> = of.excess_percent.iter().map(|of| of.value).collect();
+            let percent: Vec<f64> = amounts.values("excess_percent");
             (
                 format!("{}, which no known effect explains.", capital(&departure(of, &percent))),
                 Advice::new(
@@ -470,6 +540,15 @@ fn sentences(finding: &Finding, amount: &dyn Fn(&Parameter) -> String, reaches: 
             )
         }
     }
+}
+
+/// What is not to be subtracted, as nothing more than a bound on it is known; empty where there is nothing of the kind.
+fn bounds_alone(amounts: &Amounts, name: &'static str) -> String {
+    let bounded = amounts.with_bound_alone(name);
+    if bounded.is_empty() {
+        return String::new();
+    }
+    format!(" Subtract nothing in {}: the record gives a limit only.", channel_list(&bounded))
 }
 
 /// Advice for a drift that channels have in common.
@@ -493,18 +572,18 @@ pub(crate) fn departure(of: &Unexplained, percent: &[f64]) -> String {
         UnexplainedPlace::AveragingTime(tau_s) => format!("at averaging times around {}", span(tau_s.value)),
         UnexplainedPlace::Frequency(frequency_hz) => format!("around {}", quantity(frequency_hz.value, "Hz")),
     };
-    let size = |of: f64| significant(of.abs(), 2);
     let (low, high) =
-        percent.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), of| (low.min(of.abs()), high.max(of.abs())));
-    let amount = if size(low) == size(high) { size(high) } else { format!("{} to {}", size(low), size(high)) };
+        percent.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &of| (low.min(of), high.max(of)));
+    let range = |low: String, high: String| if low == high { high } else { format!("{low} to {high}") };
+    let size = |of: f64| significant(of.abs(), 2);
     match (percent, &of.observation) {
         ([], _) => format!("the data departs from the model {place}"),
-        ([first, ..], Observation::LevelByTemperature { .. }) => {
-            format!("the noise changes with the temperature, by {} %", signed(*first, 2))
+        (_, Observation::LevelByTemperature { .. }) => {
+            format!("the noise changes with the temperature, by {} %", range(signed(low, 2), signed(high, 2)))
         }
-        ([first, ..], _) => {
-            format!("σ is {amount} % {} the model {place}", if *first < 0.0 { "below" } else { "above" })
-        }
+        _ if low >= 0.0 => format!("σ is {} % above the model {place}", range(size(low), size(high))),
+        _ if high < 0.0 => format!("σ is {} % below the model {place}", range(size(high), size(low))),
+        _ => format!("σ is up to {} % below and {} % above the model {place}", size(low), size(high)),
     }
 }
 
@@ -573,8 +652,10 @@ mod tests {
 
     /// What a report says of the examples of a kind: the advice once after all sentences that it follows.
     fn sentences_of(kind: &str, examples: &[Effect]) -> String {
-        let texts =
-            examples.iter().filter(|effect| effect.name() == kind).map(|effect| describe(&finding(effect.clone())));
+        let texts = examples
+            .iter()
+            .filter(|effect| effect.name() == kind)
+            .map(|effect| describe(&finding(effect.clone()), &[]));
         let mut by_advice: Vec<(String, Vec<String>)> = Vec::new();
         for FindingText { physics, advice, .. } in texts {
             let known = by_advice.iter().position(|(known, _)| *known == advice);
@@ -601,7 +682,7 @@ mod tests {
     #[test]
     fn every_text_of_every_kind_is_a_sentence() {
         for effect in &examples() {
-            let text = describe(&finding(effect.clone()));
+            let text = describe(&finding(effect.clone()), &[]);
             assert!(text.physics.ends_with('.') && text.advice.ends_with('.'), "{}: {text:?}", effect.name());
         }
     }
@@ -610,7 +691,7 @@ mod tests {
     #[test]
     fn a_brief_sentence_fits_a_line_of_the_narrowest_screen() {
         for effect in &examples() {
-            let FindingText { brief, physics, .. } = describe(&finding(effect.clone()));
+            let FindingText { brief, physics, .. } = describe(&finding(effect.clone()), &[]);
             let is_short = brief.chars().count() <= 63 || matches!(effect, Effect::Unexplained(_));
             assert!(is_short && brief.ends_with('.'), "{} columns: {brief}", brief.chars().count());
             assert!(![&brief, &physics].iter().any(|text| text.contains(DETAIL)), "{physics}");
@@ -628,7 +709,7 @@ mod tests {
                 stretches,
                 moved_s: 12,
             };
-            describe(&finding(of)).physics
+            describe(&finding(of), &[]).physics
         };
         assert_eq!(motion(1000.0, 1020.0, 1), "The platform moved at 16 min 40 s for up to 20 s.");
         let several = "The platform moved 2 times between 7.0 s and 16 min 40 s, for up to 12 s together.";
@@ -643,7 +724,7 @@ mod tests {
             amplitude: BoundedEstimate::new(0.3, 0.29, 0.31).in_unit("deg/s"),
             evidence: TelegraphEvidence::Levels { jumps: 80.0, gain: 20.0 },
         };
-        let physics = describe(&finding(telegraph)).physics;
+        let physics = describe(&finding(telegraph), &[]).physics;
         assert!(physics.contains("0.300 ± 0.010 °/s apart, on average every 40 s: a time constant of 20"), "{physics}");
         // The amplitude of a square wave is half the distance of its levels.
         let square = SquareWave {
@@ -652,8 +733,8 @@ mod tests {
             multiples: Multiples { harmonics: vec![1, 3], sidebands: 0 },
             line: line(20.5).evidence,
         };
-        let physics = describe(&finding(square)).physics;
-        assert!(physics.ends_with("with an amplitude of 900 ± 100 µg."), "{physics}");
+        let physics = describe(&finding(square), &[]).physics;
+        assert!(physics.ends_with("Hz: amplitude 900 ± 100 µg."), "{physics}");
     }
 
     #[test]
@@ -665,16 +746,16 @@ mod tests {
             sigmas: 9.0,
             largest_multiple: 31.6,
         };
-        let physics = describe(&finding(drift)).physics;
-        let expected = "A slow drift in common with accel x, 2.9 ± 0.6 °/s/g of it, which nothing recorded explains.";
+        let physics = describe(&finding(drift), &[]).physics;
+        let expected = "A slow drift in common with accel x, which nothing recorded explains: 2.9 ± 0.6 °/s/g of it.";
         assert_eq!(physics, expected);
     }
 
     #[test]
     fn the_part_of_the_samples_that_is_cut_off_is_told() {
         let saturation = examples().into_iter().find(|effect| matches!(effect, Effect::Saturation(_))).expect("one");
-        let physics = describe(&finding(saturation)).physics;
-        assert_eq!(physics, "0.30 % of the samples are at the end of the channel's range.");
+        let physics = describe(&finding(saturation), &[]).physics;
+        assert_eq!(physics, "0.3 % of the samples are at the end of the channel's range.");
     }
 
     #[test]
@@ -704,7 +785,7 @@ mod tests {
         assert_eq!(of_step(NumberStyle::Plain), format!("the level changes by -3.100e-5 g {}", rest("3e-9")));
         assert_eq!(of_step(NumberStyle::Prefixed), format!("the level changes by −31.0 µg {}", rest("below 0.001")));
         // Nothing is said of a weight that is not known.
-        assert_eq!(describe(&finding(step)).weight, "");
+        assert_eq!(describe(&finding(step), &[]).weight, "");
         let mut in_two = finding(step);
         in_two.channels.insert(0, "accl_x".to_owned());
         in_two.clearest = 1;
@@ -744,8 +825,9 @@ mod tests {
             (Validation::Untestable, ""),
         ] {
             line.validated = validated;
-            let text = describe(&line);
-            assert!(text.physics.contains("20.50 ± 0.10 Hz reaches these channels: "), "{}", text.physics);
+            let text = describe(&line, &[]);
+            let expected = "A vibration or hum at 20.50 ± 0.10 Hz, a narrow line: amplitude gyro z 0.200 ± 0.010 °/s.";
+            assert_eq!(text.physics, expected);
             assert_eq!(text.weight, weight);
         }
     }
@@ -754,12 +836,7 @@ mod tests {
     fn a_share_becomes_a_gain_in_sigma() {
         let mut line = finding(line(20.5));
         line.share_percent.insert("gyro_z".to_owned(), 75.0);
-        let text = describe(&line);
-        assert!(
-            text.physics.starts_with("A vibration or hum at 20.50 ± 0.10 Hz reaches this channel"),
-            "{}",
-            text.physics
-        );
+        let text = describe(&line, &[]);
         // 1 − √(1 − 0.75) = 50 %.
         assert!(text.advice.ends_with("It would take 50 % off σ where it is largest."), "{}", text.advice);
         assert_eq!(text.weight, "up to 75 % of σ²");

@@ -2,6 +2,7 @@
 //! evidence; the rest is as in [`Report`].
 
 use crate::evidence::{EvidenceText, NumberStyle};
+use crate::finding_text::shown_effects;
 use crate::part_note;
 use crate::reading::ReadingRecord;
 use noise_analysis::report::assessment::Assessment;
@@ -45,7 +46,9 @@ struct PartJson<'a> {
 struct FindingJson<'a> {
     kind: &'static str,
     channels: &'a [String],
+    clearest: Option<&'a String>,
     parameters: BTreeMap<&'static str, Parameter>,
+    in_channels: BTreeMap<&'a str, BTreeMap<&'static str, Parameter>>,
     evidence: String,
     validated: Validation,
     share_percent: &'a BTreeMap<String, f64>,
@@ -117,7 +120,7 @@ impl<'a> From<&'a Report> for ReportJson<'a> {
             dropped,
             flagged,
             part: PartJson::from(part),
-            findings: findings.iter().map(FindingJson::from).collect(),
+            findings: (0..findings.len()).map(|index| FindingJson::new(report, index)).collect(),
             common_mode: common_mode.as_ref(),
             channels: channels.iter().map(ChannelJson::from).collect(),
         }
@@ -131,13 +134,17 @@ impl<'a> From<&'a PartReport> for PartJson<'a> {
     }
 }
 
-impl<'a> From<&'a Finding> for FindingJson<'a> {
-    fn from(finding: &'a Finding) -> Self {
-        let Finding { effect, channels, clearest: _, validated, share_percent } = finding;
+impl<'a> FindingJson<'a> {
+    fn new(report: &'a Report, index: usize) -> Self {
+        let finding = &report.findings[index];
+        let Finding { effect, channels, clearest, validated, share_percent } = finding;
+        let shown = shown_effects(report, index).into_iter();
         Self {
             kind: effect.name(),
             channels,
+            clearest: channels.get(*clearest),
             parameters: effect.parameters(),
+            in_channels: shown.map(|shown| (shown.channel, shown.effect.parameters())).collect(),
             evidence: EvidenceText::of_finding(finding, NumberStyle::Plain).sentence(),
             validated: *validated,
             share_percent,

@@ -7,7 +7,7 @@ use crate::coefficient_notes::coefficient_notes;
 use crate::evidence::{EvidenceText, NumberStyle};
 use crate::explanation;
 use crate::figure::{self, Plot};
-use crate::finding_text::{FindingText, channel_name, describe};
+use crate::finding_text::{self, FindingText, ShownEffect, channel_list, channel_name};
 use crate::formatting::{
     capital, count, filter_consistency, interval, missing_samples, number, parameter_name, recording_advice, words,
     worst_deviations,
@@ -193,6 +193,8 @@ fn drawing(plot: &Plot) -> Markup {
 
 /// Every finding with its words, its parameters, the analysis' evidence and a picture.
 fn findings(report: &Report) -> Markup {
+    let order = summary::finding_order(report);
+    let texts: Vec<FindingText> = order.iter().map(|&index| summary::finding_text(report, index)).collect();
     html! {
         section id="findings" {
             h2 { "What was found" }
@@ -200,39 +202,43 @@ fn findings(report: &Report) -> Markup {
                 p { (summary::nothing_found(report)) }
             } @else {
                 ol.list {
-                    @for (index, finding) in report.findings.iter().enumerate() {
-                        @let text = describe(finding);
-                        li { a href={ "#evidence-" (index + 1) } { (text.channels) } ": " (text.physics) }
+                    @for (number, text) in (1..).zip(&texts) {
+                        li { a href={ "#evidence-" (number) } { (text.channels) } ": " (text.physics) }
                     }
                 }
             }
         }
-        @for (index, finding) in report.findings.iter().enumerate() {
-            (finding_section(report, index, finding, &describe(finding)))
-        }
+        @for (number, (&index, text)) in (1..).zip(order.iter().zip(&texts)) { (finding_section(report, index, number, text)) }
     }
 }
 
-fn finding_section(report: &Report, index: usize, finding: &Finding, text: &FindingText) -> Markup {
+/// The finding at `index`, which is told as `number`.
+fn finding_section(report: &Report, index: usize, number: usize, text: &FindingText) -> Markup {
+    let finding = &report.findings[index];
     html! {
-        section.finding id={ "evidence-" (index + 1) } {
-            h3 { (index + 1) ". " (words(finding.effect.name())) " " small { (text.channels) } }
+        section.finding id={ "evidence-" (number) } {
+            h3 { (number) ". " (words(finding.effect.name())) " " small { (text.channels) } }
             p { (text.physics) " " (text.advice) }
             p.faint {
                 @if !text.weight.is_empty() { "In the record: " (text.weight) ". " }
                 (capital(&EvidenceText::of_finding(finding, NumberStyle::Prefixed).sentence())) "."
             }
-            (parameters(finding))
-            @if let Some(plot) = figure::evidence(report, index) { (drawing(&plot)) }
+            (parameters(report, index))
+            @if let Some(plot) = figure::evidence(report, index, number) { (drawing(&plot)) }
         }
     }
 }
 
-fn parameters(finding: &Finding) -> Markup {
+/// The parameters of the finding at `index` as each channel has them.
+fn parameters(report: &Report, index: usize) -> Markup {
+    let shown = finding_text::shown_effects(report, index);
     html! {
-        p.parameters {
-            @for (name, parameter) in &finding.effect.parameters() {
-                span { (parameter_name(name)) " " b { (bounded_quantity(parameter)) } }
+        @for ShownEffect { channel, effect } in &shown {
+            p.parameters {
+                @if shown.len() > 1 { span { b { (channel_list(&[(*channel).to_owned()])) } } }
+                @for (name, parameter) in &effect.parameters() {
+                    span { (parameter_name(name)) " " b { (bounded_quantity(parameter)) } }
+                }
             }
         }
     }
@@ -257,13 +263,14 @@ fn channel_section(report: &Report, channel: &ChannelReport) -> Markup {
                     (tables::errors(channel))
                     @let far = worst_deviations(channel);
                     @if !far.is_empty() { ul { @for text in &far { li.warning { (text) "." } } } }
-                    @let own: Vec<usize> = (0..report.findings.len())
-                        .filter(|index| report.findings[*index].channels.contains(&channel.name)).collect();
+                    @let own: Vec<(usize, &Finding)> = (1..).zip(summary::finding_order(report))
+                        .map(|(number, index)| (number, &report.findings[index]))
+                        .filter(|(_, finding)| finding.channels.contains(&channel.name)).collect();
                     @if own.is_empty() {
                         p.faint { "No finding concerns this channel." }
                     } @else {
-                        p { "Findings: " @for index in own {
-                            a href={ "#evidence-" (index + 1) } { (index + 1) " " (words(report.findings[index].effect.name())) } " " } }
+                        p { "Findings: " @for (number, finding) in own {
+                            a href={ "#evidence-" (number) } { (number) " " (words(finding.effect.name())) } " " } }
                     }
                 }
             }

@@ -2,7 +2,7 @@
 //! the coefficients in the units of their users, what the data contradicts, and what to do next.
 
 use crate::coefficients;
-use crate::finding_text::{ALL_CHANNELS, FindingText, channel_list, departure, describe};
+use crate::finding_text::{ALL_CHANNELS, FindingText, channel_list, departure, describe, shown_effects};
 use crate::formatting::{count, enumerated, words};
 use crate::part_note;
 use crate::rounding::{
@@ -222,9 +222,14 @@ fn error_change(deviance: [Option<f64>; 2]) -> String {
     format!("{before} → {after}")
 }
 
-/// A deviance a point with the digits that every place of the report gives it.
+/// A deviance a point with the digits that every place of the report gives it. Beyond a thousand the model is no model, and by how much
+/// says nothing.
 pub(crate) fn deviance_per_point(of: f64) -> String {
-    if of < 9.95 { format!("{of:.1}") } else { count(of.round() as u64) }
+    match of {
+        of if of < 9.95 => format!("{of:.1}"),
+        of if of <= 1000.0 => count(of.round() as u64),
+        _ => "> 1,000".to_owned(),
+    }
 }
 
 /// Whether the model with its effects fails on the unseen half.
@@ -682,29 +687,46 @@ fn magnetometers(report: &Report) -> Vec<String> {
     told
 }
 
-/// The findings that an effect explains, in the order of the report: a cause in a gyro or an accelerometer comes before one in a channel
-/// that is a condition.
-fn named_findings(report: &Report) -> Vec<&Finding> {
-    let named = report.findings.iter().filter(|finding| !matches!(finding.effect, Effect::Unexplained(_)));
-    let of_inertial =
-        |finding: &&Finding| finding.channels.iter().any(|name| name.starts_with("gyro_") || name.starts_with("accl_"));
-    let (inertial, others): (Vec<_>, Vec<_>) = named.partition(of_inertial);
-    inertial.into_iter().chain(others).collect()
+/// Positions of the findings in the order in which they are numbered: a cause in a gyro or an accelerometer, one in a channel that is a
+/// condition, then what nothing explains.
+pub(crate) fn finding_order(report: &Report) -> Vec<usize> {
+    let is_inertial = |name: &String| name.starts_with("gyro_") || name.starts_with("accl_");
+    let rank = |&index: &usize| {
+        let Finding { effect, channels, .. } = &report.findings[index];
+        match effect {
+            Effect::Unexplained(_) => 2,
+            _ => u8::from(!channels.iter().any(is_inertial)),
+        }
+    };
+    let mut order: Vec<usize> = (0..report.findings.len()).collect();
+    order.sort_by_key(rank);
+    order
+}
+
+/// Positions of the findings that an effect explains, in the order in which they are numbered.
+fn named_findings(report: &Report) -> Vec<usize> {
+    let is_named = |&index: &usize| !matches!(report.findings[index].effect, Effect::Unexplained(_));
+    finding_order(report).into_iter().filter(is_named).collect()
+}
+
+/// The finding at `index` in words.
+pub(crate) fn finding_text(report: &Report, index: usize) -> FindingText {
+    let finding = &report.findings[index];
+    let mut text = describe(finding, &shown_effects(report, index));
+    if let Some(related) = related_line(report, finding) {
+        text.weight = [text.weight, related].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ");
+    }
+    text
 }
 
 /// The findings in words, in the order in which they are numbered, those that nothing explains apart.
 #[must_use]
 pub fn findings(report: &Report) -> (Vec<FindingText>, Vec<FindingText>) {
-    let text = |finding: &Finding| {
-        let mut text = describe(finding);
-        if let Some(related) = related_line(report, finding) {
-            text.weight =
-                [text.weight, related].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ");
-        }
-        text
-    };
-    let unexplained = report.findings.iter().filter(|finding| matches!(finding.effect, Effect::Unexplained(_)));
-    (named_findings(report).into_iter().map(text).collect(), unexplained.map(text).collect())
+    let named = named_findings(report).len();
+    let mut texts: Vec<FindingText> =
+        finding_order(report).into_iter().map(|index| finding_text(report, index)).collect();
+    let unexplained = texts.split_off(named);
+    (texts, unexplained)
 }
 
 /// Largest difference of the frequency of a finding from that of a line that is followed, as a part of it: half of the distance to
@@ -792,19 +814,26 @@ pub fn contradictions(report: &Report) -> Vec<String> {
     told
 }
 
-/// The advice of the findings with the largest shares of the variance, the most useful first, each with the numbers of its findings.
+/// The advice of the findings with the largest shares of the variance, the most useful first, each with the numbers of its findings. A
+/// part that moved comes before all: noise needs one at rest.
 fn advice(report: &Report) -> Vec<(String, Vec<usize>)> {
-    let mut weighed: Vec<(f64, usize, &Finding)> = named_findings(report)
-        .into_iter()
-        .enumerate()
-        .map(|(index, finding)| (finding.share_percent.values().copied().fold(0.0, f64::max), index + 1, finding))
-        .collect();
-    weighed.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let is_motion = |index: usize| matches!(report.findings[index].effect, Effect::MotionInterval(_));
+    let share = |index: usize| report.findings[index].share_percent.values().copied().fold(0.0, f64::max);
+    let mut weighed: Vec<(usize, usize)> = named_findings(report).into_iter().enumerate().collect();
+    weighed.sort_by(|(_, a), (_, b)| is_motion(*b).cmp(&is_motion(*a)).then(share(*b).total_cmp(&share(*a))));
+    let at_rest = longest_at_rest(report);
     let mut steps: Vec<(String, Vec<usize>)> = Vec::new();
-    for (number, step) in weighed.into_iter().filter_map(|(_, number, of)| Some((number, describe(of).step?))) {
+    for (position, index) in weighed {
+        let step = match at_rest.filter(|_| is_motion(index)) {
+            Some(Stretch { from_s, to_s }) => {
+                Some(format!("Analyse the part at rest alone: add {}.", time_options(from_s, to_s)))
+            }
+            None => finding_text(report, index).step,
+        };
+        let Some(step) = step else { continue };
         match steps.iter_mut().find(|(known, _)| *known == step) {
-            Some((_, numbers)) => numbers.push(number),
-            None => steps.push((step, vec![number])),
+            Some((_, numbers)) => numbers.push(position + 1),
+            None => steps.push((step, vec![position + 1])),
         }
     }
     steps.truncate(MOST_STEPS);

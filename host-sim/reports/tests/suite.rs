@@ -4,6 +4,8 @@
 mod browser;
 #[path = "exports/main.rs"]
 mod exports;
+#[path = "findings/main.rs"]
+mod findings;
 #[path = "rendering/fixture.rs"]
 mod fixture;
 #[path = "live/main.rs"]

@@ -123,7 +123,7 @@ impl LatestMessages {
             hello.measured_rate_hz.map_or_else(String::new, |hz| format!(" Measured rate {} Hz.", plain(hz, 6)));
         let findings = self.findings(1.0 / hello.sample_rate_hz);
         let mut advice: Vec<String> = Vec::new();
-        for step in findings.iter().filter_map(|finding| finding_text::describe(finding).step) {
+        for step in findings.iter().filter_map(|finding| finding_text::describe(finding, &[]).step) {
             if !advice.contains(&step) {
                 advice.push(step);
             }
@@ -138,7 +138,7 @@ impl LatestMessages {
             sentences: format!("{lost} {epoch}{measured}"),
             tables: tables_of_channels(&self.coefficients(), rate_hz(hello)),
             curves: self.channels.values().filter_map(|report| curve(report, hello)).collect(),
-            findings: findings.iter().map(finding_text::describe).collect(),
+            findings: findings.iter().map(|finding| finding_text::describe(finding, &[])).collect(),
             unexplained: Vec::new(),
             advice,
             health: self

@@ -7,7 +7,7 @@
 
 use super::noise_levels::{
     DIFFERENCES, FEW_DIFFERENCES, HALF_EFFICIENCY, LevelScatter, NEIGHBOURS, Neighbourhood, SquaredDifferences,
-    TRIMMED_MEAN, Wandering, averaging_factors, doublings, exceedance, longer_levels, median, ratio_by_chance,
+    TRIMMED_MEAN, Wandering, averaging_factors, doublings, exceedance, longer_levels, ratio_by_chance,
 };
 use super::spikes::Disturbance;
 use crate::bounds::BoundedEstimate;
@@ -15,6 +15,7 @@ use crate::distributions::NORMAL_975;
 use crate::effects::NoisyInterval;
 use crate::effects::findings::{Correction, Detection, SIGNIFICANCE};
 use crate::parallel::in_parallel;
+use crate::robust::median;
 use crate::samples::rounding::dithered_avar;
 use crate::samples::series::Series;
 use std::ops::Range;
@@ -192,7 +193,7 @@ impl KnockRule {
             };
             let blocks = fit(false);
             let moving = blocks.iter().any(|of| of.moves).then(|| fit(true));
-            let typical = median(levels.into_iter().flatten().collect()) / TRIMMED_MEAN;
+            let typical = median(&mut levels.into_iter().flatten().collect::<Vec<f64>>()) / TRIMMED_MEAN;
             // The Allan variance is half the mean square of the differences.
             is_dithered |= 0.5 * typical > dithered_avar(dithered_avar_counts2, n as u64) * count;
             if blocks[0].freedoms.is_empty() {
@@ -372,12 +373,12 @@ impl KnockRule {
                 let start = usize::try_from(start).ok()?;
                 differences.trimmed_level(start..start + length)
             });
-            let beside: Vec<f64> = beside.collect();
+            let mut beside: Vec<f64> = beside.collect();
             let others = beside.len() as f64 * freedom / std::f64::consts::FRAC_PI_2;
             if beside.len() < SIDE as usize {
                 return None;
             }
-            let ratio = level / median(beside).max(self.floor);
+            let ratio = level / median(&mut beside).max(self.floor);
             let p_value = tests * exceedance(ratio, freedom, others);
             (p_value < SIGNIFICANCE_AT_A_KNOWN_TIME).then(|| {
                 let half = NORMAL_975 * (2.0 / freedom + 2.0 / others).sqrt();

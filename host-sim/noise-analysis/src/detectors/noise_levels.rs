@@ -8,6 +8,7 @@
 use crate::distributions::{quantile, student_tail};
 use crate::effects::findings::REFUTED;
 use crate::minimum::end_of;
+use crate::robust::median;
 use crate::samples::series::Series;
 use statrs::function::beta::checked_beta_reg;
 use std::ops::Range;
@@ -271,7 +272,7 @@ impl Neighbourhood {
         let medians = running_medians(&known, NEIGHBOURS);
         let side = |known_of: Range<usize>| match known_of.len() {
             NEIGHBOURS => medians.get(known_of.start).copied(),
-            FEWEST_NEIGHBOURS.. => Some(median(known[known_of].to_vec())),
+            FEWEST_NEIGHBOURS.. => Some(median(&mut known[known_of].to_vec())),
             _ => None,
         };
         // How many levels are known before each block.
@@ -432,12 +433,4 @@ pub(super) fn clipped_deviation(errors: &[f64]) -> f64 {
         limit = CLIP * deviation;
     }
     deviation
-}
-
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return f64::NAN;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -9,6 +9,7 @@ use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, quantile};
 use crate::effects::findings::REFUTED;
 use crate::effects::{Spikes, TelegraphEvidence, TelegraphNoise};
+use crate::robust::deviation_from_zero;
 use crate::samples::uniform_series::UniformSeries;
 
 /// Numbers of parts into which the record is divided: few parts for long correlation times, many for short ones.
@@ -132,17 +133,9 @@ impl PartMeans {
     }
 }
 
-/// Variance of the normal distribution whose absolute values have the median of those of `values`.
+/// Variance of normal numbers of the same median distance from 0 as those of `values` that are known.
 fn robust_variance(values: Vec<f64>) -> f64 {
-    /// Median of the absolute value of a standard normal number.
-    const MEDIAN: f64 = 0.674_489_75;
-    let mut sizes: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).map(f64::abs).collect();
-    let middle = sizes.len() / 2;
-    if sizes.is_empty() {
-        return 0.0;
-    }
-    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-    (*median / MEDIAN).powi(2)
+    deviation_from_zero(values.into_iter().filter(|value| value.is_finite())).powi(2)
 }
 
 /// The chain, and its gain in ln likelihood over any Gaussian process; `None` if the gain or a property of the chain is below

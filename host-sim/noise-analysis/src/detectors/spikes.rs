@@ -7,7 +7,7 @@
 //! each sample is compared with its [prediction](super::prediction) first. Where the noise is louder, as in a
 //! vibration whose level wanders, it is as many deviations of the errors around a sample.
 
-use super::noise_levels::{CLIP, clipped_deviation, median};
+use super::noise_levels::{CLIP, clipped_deviation};
 use super::prediction::Prediction;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{
@@ -15,6 +15,7 @@ use crate::distributions::{
 };
 use crate::effects::Spikes;
 use crate::effects::findings::{Correction, Detection, REFUTED, SIGNIFICANCE};
+use crate::robust::{median, median_and_deviation};
 use crate::samples::interpolation::{
     ALL_NEIGHBOURS, Autocovariance, LEAST_WHITE, Neighbours, PartialInterpolation, REACH,
 };
@@ -336,7 +337,7 @@ impl SpikeRule {
         let sizes = &found.sizes_of_events(samples);
         let largest = found.spikes.iter().map(|spike| spike.sigmas).fold(0.0, f64::max);
         // Of a size.
-        let deviation = median(found.spikes.iter().map(|spike| spike.size / spike.sigmas).collect());
+        let deviation = median(&mut found.spikes.iter().map(|spike| spike.size / spike.sigmas).collect::<Vec<f64>>());
         let size = SpikeSize::estimate(sizes, self.least * deviation, deviation);
         let count = sizes.len() as f64;
         let (fewest, most) = poisson_bounds(count);
@@ -662,7 +663,7 @@ fn against_louder_noise(errors: Vec<f64>, most: f64) -> Vec<f64> {
         (all - nearest) / (count - near).max(1.0)
     };
     let levels: Vec<f64> = (0..errors.len()).map(level).collect();
-    let typical = median(levels.clone());
+    let typical = median(&mut levels.clone());
     let louder = |level: f64| if level > typical { (level / typical).sqrt() } else { 1.0 };
     errors.iter().zip(levels).map(|(error, level)| error / louder(level)).collect()
 }
@@ -691,13 +692,9 @@ fn typical_difference(series: &Series) -> f64 {
 /// Limits the values to [`CLIP`] standard deviations from the median of their block: a disturbance that is longer than the interpolation reaches
 /// would be interpolated from its own samples. The deviation is that of the typical block, at least half a count.
 fn clip(values: &mut [f64], resolution: f64) {
-    let median_and_deviation = |block: &[f64]| {
-        let middle = median(block.to_vec());
-        // Half of normal values are within the third quartile.
-        (middle, median(block.iter().map(|value| (value - middle).abs()).collect()) / quantile(0.25))
-    };
-    let (middles, deviations): (Vec<f64>, Vec<f64>) = values.chunks(CLIPPED_BLOCK).map(median_and_deviation).unzip();
-    let most = CLIP * median(deviations).max(0.5 * resolution);
+    let (middles, mut deviations): (Vec<f64>, Vec<f64>) =
+        values.chunks(CLIPPED_BLOCK).map(median_and_deviation).unzip();
+    let most = CLIP * median(&mut deviations).max(0.5 * resolution);
     for (block, middle) in values.chunks_mut(CLIPPED_BLOCK).zip(middles) {
         block.iter_mut().for_each(|value| *value = value.clamp(middle - most, middle + most));
     }

@@ -1,9 +1,9 @@
 //! Curves of the halves, quarters and epochs of a channel's record, and whether the noise differs between the quarters.
 
 use crate::OCTAVES;
-use crate::distributions::{quantile, student_tail};
 use crate::fit::signal_share::SignalShare;
 use crate::record::sample_curves::SampleCurves;
+use crate::robust::median;
 use crate::samples::epoch_ranges::epochs;
 use crate::samples::exclusion::Exclusion;
 use crate::samples::gapped_cascade::GappedCascade;
@@ -16,9 +16,6 @@ use std::ops::Range;
 
 /// Highest probability, over all that is compared in a channel, at which stationary noise is taken to be non-stationary.
 pub(crate) const SIGNIFICANCE: f64 = 0.01;
-
-/// Median of the absolute value of a standard normal number.
-const NORMAL_MEDIAN: f64 = 0.674_489_75;
 
 /// An epoch's Allan variance is used up to averaging factors of a `MIN_AVERAGES`th of its samples.
 pub(crate) const MIN_AVERAGES: u64 = 64;
@@ -120,21 +117,6 @@ impl EpochCurves {
         &self.fitted_epochs[self.fitted_epochs.len() / 2..]
     }
 
-    /// Whether the quarters differ by more than their epochs do among themselves, at an octave that an epoch has. A level that goes up and
-    /// down in a shorter time than a quarter makes quarters differ, and the mean of both foretells what follows better than the later one.
-    ///
-    /// Student's t of the logarithms of the epochs' variances, over all octaves. Where single epochs stand out of the others, their mean
-    /// says nothing of the rest; where the epochs have no such octave they say nothing either: both are taken to differ.
-    #[must_use]
-    pub(crate) fn quarters_differ_beyond_epochs(&self) -> bool {
-        let (earlier, later) = (&self.fitted_epochs[..self.fitted_epochs.len() / 2], self.latest_epochs());
-        let octaves: Vec<u64> = self.quarters[1].points().iter().map(|point| point.n).collect();
-        let p_values: Vec<f64> =
-            octaves.into_iter().filter_map(|n| t_test(&levels(earlier, n)?, &levels(later, n)?)).collect();
-        let least = p_values.iter().copied().fold(f64::INFINITY, f64::min);
-        p_values.is_empty() || least * (p_values.len() as f64) < SIGNIFICANCE
-    }
-
     /// The curve of the later quarter with the median of its epochs at the octaves with at least 64 averages in an epoch.
     ///
     /// Some minutes of vibration raise the mean of the quarter and hardly the median of its epochs. The median of variances
@@ -168,54 +150,18 @@ pub(super) fn curve(series: &Series, slots: Range<u64>) -> Curve<OCTAVES> {
     Rounding::of_curve(&curve, series.resolution).subtracted_from(curve)
 }
 
-/// Logarithms of the variances of some epochs at an averaging factor; `None` where an epoch has too few averages.
-fn levels(epochs: &[Curve<OCTAVES>], n: u64) -> Option<Vec<f64>> {
-    let level = |epoch: &Curve<OCTAVES>| {
-        let point = epoch.points().iter().find(|point| point.n == n)?;
-        (n * MIN_AVERAGES <= epoch.samples() && point.avar > 0.0).then(|| point.avar.ln())
-    };
-    epochs.iter().map(level).collect()
-}
-
-/// Probability by chance that the means of two groups of levels of the same scatter differ as much; 0 where a level stands out of its
-/// group. `None` for groups of one.
-fn t_test(earlier: &[f64], later: &[f64]) -> Option<f64> {
-    let freedom = (earlier.len() + later.len()).checked_sub(2).filter(|freedom| *freedom > 0)? as f64;
-    let mean = |levels: &[f64]| levels.iter().sum::<f64>() / levels.len() as f64;
-    let squares = |levels: &[f64]| levels.iter().map(|level| (level - mean(levels)).powi(2)).sum::<f64>();
-    let deviation = ((squares(earlier) + squares(later)) / freedom).sqrt();
-    let stands_out = |levels: &[f64]| {
-        let mut sorted = levels.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        let median = sorted[sorted.len() / 2];
-        let mut distances: Vec<f64> = sorted.iter().map(|level| (level - median).abs()).collect();
-        distances.sort_by(f64::total_cmp);
-        let limit = quantile(0.5 * SIGNIFICANCE / levels.len() as f64) * distances[distances.len() / 2] / NORMAL_MEDIAN;
-        distances.last().is_some_and(|largest| *largest > limit)
-    };
-    if stands_out(earlier) || stands_out(later) {
-        return Some(0.0);
-    }
-    let error = deviation * (1.0 / earlier.len() as f64 + 1.0 / later.len() as f64).sqrt();
-    let difference = mean(later) - mean(earlier);
-    if error == 0.0 {
-        return Some(if difference == 0.0 { 1.0 } else { 0.0 });
-    }
-    let t = difference / error;
-    (freedom > 0.0).then(|| 2.0 * student_tail(t.abs(), freedom))
-}
-
 fn median_avar<const POINTS: usize>(epochs: &[Curve<POINTS>], n: u64) -> Option<f64> {
     let used = |epoch: &Curve<POINTS>| {
         let point = epoch.points().iter().find(|point| point.n == n)?;
         (n * MIN_AVERAGES <= epoch.samples()).then_some(*point)
     };
     let points: Vec<AllanPoint> = epochs.iter().filter_map(used).collect();
-    let mut avars: Vec<f64> = points.iter().map(|point| point.avar).collect();
-    avars.sort_by(f64::total_cmp);
-    let (lower, upper) = (avars.get(avars.len().checked_sub(1)? / 2)?, avars.get(avars.len() / 2)?);
+    if points.is_empty() {
+        return None;
+    }
+    let middle = median(&mut points.iter().map(|point| point.avar).collect::<Vec<f64>>());
     let edf = points.iter().map(|point| point.edf).sum::<f64>() / points.len() as f64;
-    Some((lower + upper) / 2.0 / (1.0 - 2.0 / (9.0 * edf)).powi(3))
+    Some(middle / (1.0 - 2.0 / (9.0 * edf)).powi(3))
 }
 
 /// A curve that models are compared with, at its octaves with `n ≤ M/8`, and the degrees of freedom of its points.

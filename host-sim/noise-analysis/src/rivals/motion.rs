@@ -16,6 +16,7 @@ use crate::distributions::{ROUNDING, quantile};
 use crate::effects::findings::SIGNIFICANCE;
 use crate::effects::{MotionInterval, MotionScale};
 use crate::report::Stretch;
+use crate::robust::{deviation_from_zero, median_and_deviation};
 use crate::samples::series::Series;
 use measurement::{ChannelId, ChannelProfile, PerChannel, Quantity};
 use std::ops::Range;
@@ -28,8 +29,6 @@ const BIAS_ERRORS: f64 = 3.0;
 const AROUND: usize = 2;
 /// Seconds within which a sudden motion begins.
 const BEGINS_WITHIN: usize = AROUND + 1;
-/// Median of the absolute value of a standard normal number.
-const NORMAL_MEDIAN: f64 = 0.674_489_75;
 
 /// The motion of one channel.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,17 +55,17 @@ pub(crate) fn find(series: &Series, channel: &ChannelProfile) -> Option<Platform
         sums[number].1 += 1;
     }
     let means: Vec<Option<f64>> = sums.iter().map(|(sum, count)| (*count > 0).then(|| sum / *count as f64)).collect();
-    let mut sorted: Vec<f64> = means.iter().copied().flatten().collect();
-    sorted.sort_by(f64::total_cmp);
-    let median = *sorted.get(sorted.len() / 2)?;
+    let known: Vec<f64> = means.iter().copied().flatten().collect();
+    if known.is_empty() {
+        return None;
+    }
+    let (median, deviation) = median_and_deviation(&known);
     let (scale, limit, error) = match channel.initial_bias_error {
         Some(bias_error) => (MotionScale::BiasError(bias_error), BIAS_ERRORS * bias_error, bias_error),
         None => {
-            let mut distances: Vec<f64> = sorted.iter().map(|mean| (mean - median).abs()).collect();
-            distances.sort_by(f64::total_cmp);
             // Means of values that seldom change scatter by less than their rounding.
-            let scatter = (distances[distances.len() / 2] / NORMAL_MEDIAN).max(ROUNDING.sqrt() * series.resolution);
-            (MotionScale::Scatter(scatter), quantile(0.5 * SIGNIFICANCE / sorted.len() as f64) * scatter, scatter)
+            let scatter = deviation.max(ROUNDING.sqrt() * series.resolution);
+            (MotionScale::Scatter(scatter), quantile(0.5 * SIGNIFICANCE / known.len() as f64) * scatter, scatter)
         }
     };
     let mut seconds: Vec<Range<usize>> = Vec::new();
@@ -102,11 +101,10 @@ pub(crate) fn find(series: &Series, channel: &ChannelProfile) -> Option<Platform
 /// Whether one of the changes within three seconds is larger than chance has one in a Gaussian process of their median size.
 fn is_sudden(means: &[Option<f64>]) -> bool {
     let pairs = means.iter().zip(means.iter().skip(BEGINS_WITHIN));
-    let mut changes: Vec<f64> =
+    let changes: Vec<f64> =
         pairs.filter_map(|(before, after)| Some((after.as_ref()? - before.as_ref()?).abs())).collect();
-    changes.sort_by(f64::total_cmp);
-    let (Some(median), Some(largest)) = (changes.get(changes.len() / 2), changes.last()) else { return false };
-    *largest > quantile(0.5 * SIGNIFICANCE / changes.len() as f64) * median / NORMAL_MEDIAN
+    let Some(largest) = changes.iter().copied().max_by(f64::total_cmp) else { return false };
+    largest > quantile(0.5 * SIGNIFICANCE / changes.len() as f64) * deviation_from_zero(changes.iter().copied())
 }
 
 /// The `motions` of all channels, without those by the scatter of the means that are not sudden in two channels in the same seconds.

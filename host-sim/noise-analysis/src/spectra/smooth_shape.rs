@@ -4,6 +4,7 @@
 //! lines hardly move.
 
 use super::whittle::{Sign, SpectralBand, fit_mixture, information, mixture_density};
+use crate::robust::median;
 use allan_core::term::{MovingAverageFilter, Process};
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
@@ -228,15 +229,6 @@ fn background_bands(ordinates: usize) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
-/// The middle value, or the mean of the two in the middle; 0 of an empty slice.
-pub(super) fn median(values: &mut [f64]) -> f64 {
-    let Some(last) = values.len().checked_sub(1) else {
-        return 0.0;
-    };
-    let (lower, &mut upper, _) = values.select_nth_unstable_by(values.len() / 2, f64::total_cmp);
-    if last % 2 == 0 { upper } else { (upper + lower.iter().copied().fold(0.0, f64::max)) / 2.0 }
-}
-
 /// Expected median of `count` variables that are each the mean of `looks` exponential ones of mean 1. The expected order statistic
 /// of rank `j` of exponential variables is the sum of `1/i` over the last `j` of `1 … count`; the median of a gamma variable of
 /// shape g, 4 or more, is within 0.3 % `1 − 1/(3g)` of its mean.
@@ -261,7 +253,5 @@ mod tests {
         for (count, expected) in [(1, 1.0), (2, 1.0), (3, 1.0 / 3.0 + 0.5), (100_001, std::f64::consts::LN_2)] {
             assert!((expected_median(count, 1.0) - expected).abs() < 1e-5, "{count}");
         }
-        assert_eq!(median(&mut [3.0, 1.0, 2.0]), 2.0);
-        assert_eq!(median(&mut [3.0, 1.0, 2.0, 9.0]), 2.5);
     }
 }

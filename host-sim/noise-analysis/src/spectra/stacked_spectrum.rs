@@ -7,8 +7,8 @@
 
 use super::alternation::Alternation;
 use super::lines::MOST;
-use super::smooth_shape::median;
 use super::whitened_spectrum::{NARROWEST, Resonance, SpectralLine, Spectrum, WhitenedSpectrum, refit};
+use crate::robust::median;
 use crate::samples::rounding::Rounding;
 use crate::samples::uniform_series::UniformSeries;
 

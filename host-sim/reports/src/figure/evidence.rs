@@ -3,10 +3,10 @@
 
 use super::axis::Axis;
 use super::channel::{allan_deviation_plot, spectrum_plot, time_unit};
-use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, frames, heights, places};
-use crate::finding_text::{channel_list, channel_name};
+use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, below_legend, frames, heights, places};
+use crate::finding_text::{channel_list, channel_name, shown_effects};
 use crate::formatting::words;
-use crate::rounding::{quantity_digits, span, unit};
+use crate::rounding::{bounded_quantity, quantity_digits, span, unit};
 use noise_analysis::effects::{
     Effect, LevelChange, LevelStep, ModulatedLine, MotionInterval, NoisyInterval, Periodic, ResonantLine,
     SinusoidalLine, SquareWave, StuckOutput, UnexplainedPlace,
@@ -15,14 +15,16 @@ use noise_analysis::report::{ChannelReport, Finding, Report};
 
 /// A line is shown with the frequencies from this part of its own to its inverse.
 const AROUND: f64 = 0.5;
+/// Of the channels of one unit.
+const LOOKS: [Look; 3] = [Look::Measured, Look::SecondAxis, Look::ThirdAxis];
 /// Bars of a histogram.
 const BARS: usize = 40;
 
-/// The picture for the finding at `index`; `None` where the report has nothing to show it with.
-pub(crate) fn evidence(report: &Report, index: usize) -> Option<Plot> {
+/// The picture for the finding at `index`, which is told as `number`; `None` where the report has nothing to show it with.
+pub(crate) fn evidence(report: &Report, index: usize, number: usize) -> Option<Plot> {
     let finding = report.findings.get(index)?;
-    let shown = clearest(finding);
-    let channel = report.channels.iter().find(|channel| Some(&channel.name) == shown)?;
+    let clearest = finding.channels.get(finding.clearest)?;
+    let channel = report.channels.iter().find(|channel| channel.name == *clearest)?;
     let plot = match &finding.effect {
         Effect::SinusoidalLine(SinusoidalLine { frequency_hz, .. })
         | Effect::ResonantLine(ResonantLine { frequency_hz, .. })
@@ -50,12 +52,15 @@ pub(crate) fn evidence(report: &Report, index: usize) -> Option<Plot> {
         | Effect::SharedDrift(_)
         | Effect::VibrationRectification(_) => in_time(report, channel, finding, None),
         Effect::TemperatureSensitivity(_) | Effect::TemperatureCurvature(_) | Effect::ThermalLag(_) => {
-            beside(report, channel, "temp")
+            beside(report, channel, index, &Covariate { name: "temp", sensitivity: "sensitivity" })
         }
-        Effect::SupplySensitivity(_) => beside(report, channel, "supply"),
-        Effect::AccelerationSensitivity(of) => {
-            of.axes().next().and_then(|(axis, _)| beside(report, channel, &format!("accl_{axis}")))
+        Effect::SupplySensitivity(_) => {
+            beside(report, channel, index, &Covariate { name: "supply", sensitivity: "sensitivity" })
         }
+        Effect::AccelerationSensitivity(of) => of.axes().next().and_then(|(axis, _)| {
+            let (name, sensitivity) = (format!("accl_{axis}"), format!("sensitivity_{axis}"));
+            beside(report, channel, index, &Covariate { name: &name, sensitivity: &sensitivity })
+        }),
         Effect::TelegraphNoise(_) => histogram(channel),
         Effect::Unexplained(of) => match of.place {
             UnexplainedPlace::Frequency(frequency_hz) => line_in_spectrum(report, channel, frequency_hz.value),
@@ -74,15 +79,8 @@ pub(crate) fn evidence(report: &Report, index: usize) -> Option<Plot> {
         | Effect::DroppedSamples(_)
         | Effect::RepeatedSamples(_) => Some(residual(report, channel)),
     }?;
-    let title =
-        format!("Evidence {}: {} in {}", index + 1, words(finding.effect.name()), channel_list(&finding.channels));
-    Some(Plot { id: format!("finding-{}", index + 1), title, ..plot })
-}
-
-/// The channel with the largest share of the cause, else the first.
-fn clearest(finding: &Finding) -> Option<&String> {
-    let most = finding.share_percent.iter().max_by(|a, b| a.1.total_cmp(b.1)).map(|(name, _)| name);
-    most.filter(|name| finding.channels.contains(name)).or(finding.channels.first())
+    let title = format!("Evidence {number}: {} in {}", words(finding.effect.name()), channel_list(&finding.channels));
+    Some(Plot { id: format!("finding-{number}"), title, ..plot })
 }
 
 /// The spectrum around a line.
@@ -128,7 +126,6 @@ struct TimePlace {
 
 /// The bias over time of the channels of a finding, with the place in time.
 fn in_time(report: &Report, channel: &ChannelReport, finding: &Finding, at: Option<TimePlace>) -> Option<Plot> {
-    let looks = [Look::Measured, Look::SecondAxis, Look::ThirdAxis];
     let same_unit =
         report.channels.iter().filter(|other| other.unit == channel.unit && finding.channels.contains(&other.name));
     let mut length = 0.0_f64;
@@ -139,7 +136,7 @@ fn in_time(report: &Report, channel: &ChannelReport, finding: &Finding, at: Opti
     let (scale, per) = time_unit(length);
     let lines: Vec<Line> = series
         .iter()
-        .zip(looks.into_iter().cycle())
+        .zip(LOOKS.into_iter().cycle())
         .map(|((other, bias), look)| {
             let points = bias.time_s.iter().map(|time| time / scale).zip(bias.mean.iter().copied()).collect();
             Line::new(channel_name(other), look, points)
@@ -161,37 +158,59 @@ fn in_time(report: &Report, channel: &ChannelReport, finding: &Finding, at: Opti
     })
 }
 
-/// The means of the channel over those of a covariate, block by block.
-fn beside(report: &Report, channel: &ChannelReport, covariate: &str) -> Option<Plot> {
-    let bias = channel.figure_data.bias_over_time.as_ref()?;
-    let other = report.channels.iter().find(|other| other.name == covariate)?;
+/// What a bias follows.
+struct Covariate<'a> {
+    /// Name of its channel.
+    name: &'a str,
+    /// Name of the parameter that says how much a channel follows it.
+    sensitivity: &'a str,
+}
+
+/// The means of the channels in the unit of `clearest` that show the finding at `index` over those of a covariate, block by block. The
+/// legend has each channel's own sensitivity.
+fn beside(report: &Report, clearest: &ChannelReport, index: usize, covariate: &Covariate) -> Option<Plot> {
+    let other = report.channels.iter().find(|other| other.name == covariate.name)?;
     let along = other.figure_data.bias_over_time.as_ref()?;
     let at = |time: &f64| along.time_s.iter().position(|of| of == time).map(|index| along.mean[index]);
-    let pairs: Vec<(usize, f64)> =
-        bias.time_s.iter().enumerate().filter_map(|(index, time)| Some((index, at(time)?))).collect();
-    let mut lines = vec![
-        Line::new(
-            format!("means of {}", span(bias.block_s)),
-            Look::Measured,
-            pairs.iter().map(|&(index, x)| (x, bias.mean[index])).collect(),
-        )
-        .with_dots()
-        .unjoined(),
-    ];
-    if bias.followed.len() == bias.mean.len() {
-        let mut followed: Vec<(f64, f64)> = pairs.iter().map(|&(index, x)| (x, bias.followed[index])).collect();
+    let shown = shown_effects(report, index);
+    let is_shown = |channel: &&ChannelReport| {
+        let is_one = shown.iter().any(|shown| shown.channel == channel.name);
+        channel.unit == clearest.unit && (is_one || channel.name == clearest.name)
+    };
+    let (mut lines, mut followed) = (Vec::new(), Vec::new());
+    for (channel, look) in report.channels.iter().filter(is_shown).zip(LOOKS.into_iter().cycle()) {
+        let Some(bias) = &channel.figure_data.bias_over_time else { continue };
+        let pairs: Vec<(usize, f64)> =
+            bias.time_s.iter().enumerate().filter_map(|(index, time)| Some((index, at(time)?))).collect();
+        let own = shown.iter().find(|shown| shown.channel == channel.name);
+        let own = own.and_then(|shown| shown.effect.parameters().remove(covariate.sensitivity));
+        let name = own.map_or_else(
+            || channel_name(channel),
+            |own| format!("{} {}", channel_name(channel), bounded_quantity(&own)),
+        );
+        let measured = pairs.iter().map(|&(index, x)| (x, bias.mean[index])).collect();
+        lines.push(Line::new(name, look, measured).with_dots().unjoined());
+        if bias.followed.len() == bias.mean.len() {
+            followed.extend(pairs.iter().map(|&(index, x)| (x, bias.followed[index])));
+        }
+    }
+    if lines.is_empty() {
+        return None;
+    }
+    if !followed.is_empty() {
         followed.sort_by(|a, b| a.0.total_cmp(&b.0));
         lines.push(Line::new("what the findings explain", Look::Followed, followed).with_dots().unjoined());
     }
-    let name = if covariate == "temp" { "temperature".to_owned() } else { channel_name(other) };
+    let name = if covariate.name == "temp" { "temperature".to_owned() } else { channel_name(other) };
     let [frame] = frames([240.0]);
     let label = format!("{name} less its mean, {}", unit(&other.unit));
     let across = Axis::linear(&label, lines.iter().flat_map(places), [LEFT, RIGHT]);
-    let up = Axis::linear(&format!("bias, {}", unit(&channel.unit)), lines.iter().flat_map(heights), frame);
+    let frame = below_legend(frame, &lines);
+    let up = Axis::linear(&format!("bias, {}", unit(&clearest.unit)), lines.iter().flat_map(heights), frame);
     Some(Plot {
         id: String::new(),
         title: String::new(),
-        description: format!("The bias of {} over the {name}, block by block.", channel_name(channel)),
+        description: format!("The bias over the {name}, in means of {}.", span(along.block_s)),
         panels: vec![Panel::new(across, up, lines)],
     })
 }

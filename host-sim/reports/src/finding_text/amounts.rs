@@ -1,0 +1,145 @@
+//! The numbers of a finding as a sentence has them: one, or each channel's own.
+
+use super::{ShownEffect, channel_list};
+use crate::rounding::{Scale, bounded_quantity, is_upper_bound, parameter_magnitude, rounded_quantity};
+use noise_analysis::report::Parameter;
+use std::f64::consts::FRAC_1_SQRT_2;
+
+/// Significant digits of the numbers of a brief sentence.
+const BRIEF_DIGITS: i32 = 2;
+
+/// The effects of a finding, and how their numbers are written.
+pub(super) struct Amounts<'a> {
+    /// One of every channel.
+    pub shown: &'a [ShownEffect<'a>],
+    /// What stands before the number of a channel.
+    pub label: Label,
+    /// Without intervals.
+    pub is_brief: bool,
+}
+
+/// What stands before the number of a channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Label {
+    /// Nothing: there is no other channel.
+    Nothing,
+    /// The axis: all channels are gyros, or all accelerometers.
+    Axis,
+    /// The sensor and its axis.
+    Channel,
+}
+
+impl Label {
+    /// For the channels of a finding.
+    pub(super) fn new(channels: &[String]) -> Self {
+        match channels {
+            [] | [_] => Self::Nothing,
+            [first, others @ ..] if others.iter().all(|other| sensor(other) == sensor(first)) => Self::Axis,
+            _ => Self::Channel,
+        }
+    }
+}
+
+/// `gyro_` of `gyro_z`; the name itself of what has no axis.
+fn sensor(channel: &str) -> &str {
+    channel.rfind('_').map_or(channel, |at| &channel[..=at])
+}
+
+/// A parameter of one channel.
+struct OfChannel<'a> {
+    channel: &'a str,
+    parameter: Parameter,
+}
+
+impl Amounts<'_> {
+    /// One number for all channels.
+    pub(super) fn one(&self, parameter: &Parameter) -> String {
+        if self.is_brief { rounded_quantity(parameter) } else { bounded_quantity(parameter) }
+    }
+
+    /// The parameter `name` of each channel: `0.27 °/s` of one, `x 21.2, y 11.9, z −27.8 m°/s/°C` of several.
+    pub(super) fn each(&self, name: &'static str) -> String {
+        self.written(self.parameters(name))
+    }
+
+    /// The same times `factor`, which is positive.
+    pub(super) fn each_scaled(&self, name: &'static str, factor: f64) -> String {
+        self.written(self.parameters(name).map(|of| OfChannel { parameter: scaled(of.parameter, factor), ..of }))
+    }
+
+    /// The same in another unit.
+    pub(super) fn each_as(&self, name: &'static str, unit: &str, factor: f64) -> String {
+        let converted = |of: Parameter| Parameter { unit: unit.to_owned(), ..scaled(of, factor) };
+        self.written(self.parameters(name).map(|of| OfChannel { parameter: converted(of.parameter), ..of }))
+    }
+
+    /// The values of the parameter `name`.
+    pub(super) fn values(&self, name: &'static str) -> Vec<f64> {
+        self.parameters(name).map(|of| of.parameter.value).collect()
+    }
+
+    /// The largest value of the parameter `name`, at least `least`.
+    pub(super) fn largest(&self, name: &'static str, least: f64) -> f64 {
+        self.values(name).into_iter().fold(least, f64::max)
+    }
+
+    /// The channels in which the parameter `name` may be 0 or of either sign.
+    pub(super) fn with_bound_alone(&self, name: &'static str) -> Vec<String> {
+        let is_bound = |of: &OfChannel| of.parameter.low <= 0.0 && of.parameter.high >= 0.0;
+        self.parameters(name).filter(is_bound).map(|of| of.channel.to_owned()).collect()
+    }
+
+    /// A line that has a width in some channels has an amplitude in the others: its deviation is 1/√2 of that.
+    fn parameters(&self, name: &'static str) -> impl Iterator<Item = OfChannel<'_>> {
+        self.shown.iter().filter_map(move |&ShownEffect { channel, effect }| {
+            let mut parameters = effect.parameters();
+            let parameter = match (parameters.remove(name), name) {
+                (None, "deviation") => scaled(parameters.remove("amplitude")?, FRAC_1_SQRT_2),
+                (own, _) => own?,
+            };
+            Some(OfChannel { channel, parameter })
+        })
+    }
+
+    fn written<'a>(&self, each: impl Iterator<Item = OfChannel<'a>>) -> String {
+        let each: Vec<OfChannel> = each.collect();
+        match &each[..] {
+            [one] if self.label == Label::Nothing => self.one(&one.parameter),
+            each => self.list(each),
+        }
+    }
+
+    /// Numbers of one unit share a prefix; the unit stands behind the last of them, and the kind of sensor before the first unless all
+    /// are of one kind.
+    fn list(&self, each: &[OfChannel]) -> String {
+        let is_alike = |one: &OfChannel, other: &OfChannel| {
+            sensor(one.channel) == sensor(other.channel) && one.parameter.unit == other.parameter.unit
+        };
+        let group = |group: &[OfChannel]| {
+            let magnitudes = group.iter().map(|of| parameter_magnitude(&of.parameter));
+            let scale = Scale::new(magnitudes, &group[0].parameter.unit);
+            let number = |(position, of): (usize, &OfChannel)| {
+                let axis = of.channel.trim_start_matches(sensor(of.channel));
+                let name = if (position > 0 || self.label == Label::Axis) && !axis.is_empty() {
+                    axis.to_owned()
+                } else {
+                    channel_list(&[of.channel.to_owned()])
+                };
+                let is_rounded = self.is_brief && !is_upper_bound(of.parameter.value, of.parameter.low);
+                let number = if is_rounded {
+                    scale.number(of.parameter.value, BRIEF_DIGITS)
+                } else {
+                    scale.estimate(&of.parameter)
+                };
+                format!("{name} {number}")
+            };
+            let numbers: Vec<String> = group.iter().enumerate().map(number).collect();
+            format!("{} {}", numbers.join(", "), scale.unit).trim_end().to_owned()
+        };
+        each.chunk_by(is_alike).map(group).collect::<Vec<_>>().join(", ")
+    }
+}
+
+fn scaled(Parameter { value, low, high, unit }: Parameter, factor: f64) -> Parameter {
+    Parameter { value: factor * value, low: factor * low, high: factor * high, unit }
+}
