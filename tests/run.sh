@@ -140,8 +140,8 @@ systems() { # what needs neither a compiler of C nor, in a browser, a port
         unset RUSTC_WORKSPACE_WRAPPER
         export RUSTFLAGS="-D warnings" # clippy measures types, whose sizes are those of the system
         run cargo check --quiet --locked --target "$WINDOWS" --no-default-features --features host-sim/hdf5 --package host-sim
-        run cargo check --quiet --locked --target "$BROWSER" --no-default-features --features recordings/hdf5 \
-            --package recordings --package noise-analysis --package reports
+        run cargo check --quiet --locked --target "$BROWSER" --no-default-features --features readers/hdf5 \
+            --package readers --package recordings --package noise-analysis --package reports
     )
 }
 documentation() {

@@ -18,8 +18,8 @@ use noise_analysis::effects::Effect;
 use noise_analysis::record::long_record::{MOST_LOST, MOST_SAMPLES, MOST_SAMPLES_WITH_LOSSES};
 use noise_analysis::report::several::{self, NoiseAgreement, NoiseInflation};
 use noise_analysis::report::{Report, Stretch};
-use recordings::any_sensor::ReadOptions;
-use recordings::file_format::{FileFormat, InputFile};
+use recordings::ReadOptions;
+use recordings::file_format::{FileFormat, RecordedFormat, RecordedInput};
 use recordings::recording::Recording;
 use recordings::sample_stream::{KeptInMemory, Reading, SampleStream, StreamError, part_of};
 use recordings::time_base::TimeRange;
@@ -335,7 +335,7 @@ struct SeveralRecordings<'a> {
 /// Analyses what the driver reads of a table of register counts or a frame log over the emulated bus.
 pub(crate) fn analyze_replay(arguments: &ReplayArguments) -> Result<Report> {
     let ReplayArguments { file, rate, range, output: _ } = arguments;
-    let input = InputFile::open(file)?;
+    let input = RecordedInput::open(file)?;
     if !input.format().is_text() {
         bail!(
             "{}: neither register counts nor an SPI log, which are all that can be replayed",
@@ -355,9 +355,9 @@ pub(crate) fn analyze_recording(recording: Recording, rate_hz: Option<f64>) -> R
 /// An open file, by the way in which it is read.
 enum Opened {
     /// Register counts of an ADIS16405.
-    Counts(InputFile),
+    Counts(RecordedInput),
     /// Numbers of any sensor.
-    AnySensor(InputFile, Box<ReadOptions>),
+    AnySensor(RecordedInput, Box<ReadOptions>),
     /// A log of the bus of an ADIS16405, which was read.
     Replayed(Recording),
 }
@@ -367,16 +367,18 @@ fn open(arguments: &InputArguments, monitor: &ReadMonitor) -> Result<Opened> {
     let InputArguments { file, range, sensor, columns, units, topic, .. } = arguments;
     let sensor = sensor.as_deref().map(|name| sensor_profile(name, (*range).into())).transpose()?;
     let selection = ColumnSelection::parse(columns, units)?;
-    let input = InputFile::open_monitored(file, monitor)?;
-    if let Some(topic) = topic.as_ref().filter(|_| input.format().is_text() && input.format() != FileFormat::TextTable)
+    let input = RecordedInput::open_monitored(file, monitor)?;
+    if let Some(topic) = topic
+        .as_ref()
+        .filter(|_| input.format().is_text() && input.format() != RecordedFormat::File(FileFormat::TextTable))
     {
         let name = file.display().to_string();
         bail!("{}: --topic {}: a file of text has no topics; leave it out", Printable(&name), Printable(topic));
     }
     let is_adis16405 = sensor.as_ref().is_none_or(|sensor| sensor.name == adis16405::NAME);
     match input.format() {
-        FileFormat::FrameLog | FileFormat::SpiExport => replayed(&input, *range).map(Opened::Replayed),
-        FileFormat::CountTable if is_adis16405 && selection.is_empty() => Ok(Opened::Counts(input)),
+        RecordedFormat::FrameLog | RecordedFormat::SpiExport => replayed(&input, *range).map(Opened::Replayed),
+        RecordedFormat::CountTable if is_adis16405 && selection.is_empty() => Ok(Opened::Counts(input)),
         _ => {
             let sensor = sensor.unwrap_or_else(SensorProfile::generic);
             let options = ReadOptions { sensor, selection, topic: topic.clone() };
@@ -390,7 +392,7 @@ pub(crate) enum Recorded {
     /// Register counts of an ADIS16405.
     Counts(Recording),
     /// Numbers of any sensor, which are read when they are written.
-    AnySensor(InputFile, Box<ReadOptions>),
+    AnySensor(RecordedInput, Box<ReadOptions>),
 }
 
 /// Opens a file of any format to write it anew; register counts are read, or the part of them that the arguments say.
@@ -418,7 +420,7 @@ pub(crate) fn read_measurement(arguments: &RecordingArguments) -> Result<Measure
 }
 
 /// What the driver reads of a log or of counts.
-fn replayed(input: &InputFile, range: GyroRangeArgument) -> Result<Recording> {
+fn replayed(input: &RecordedInput, range: GyroRangeArgument) -> Result<Recording> {
     let Replay { recording, other_transactions, timing } = simulation::replay(input.bytes(), range.into())?;
     note_all(&timing.notes());
     if other_transactions > 0 {

@@ -5,7 +5,7 @@ use crate::output::{self, note};
 use crate::output_files::is_standard_stream;
 use anyhow::{Result, anyhow};
 use measurement::Measurement;
-use recordings::file_format::{FileFormat, InputFile, TopicDescription};
+use recordings::file_format::{RecordedFormat, RecordedInput, TopicDescription};
 use recordings::inspection::{ColumnGuess, InspectedColumn, InspectedTable, Proposal};
 use recordings::sample_stream::StreamError;
 use recordings::time_base::{TimeBaseError, TimeRange};
@@ -29,9 +29,9 @@ type ReadMeasurement = fn(&RecordingArguments) -> Result<Measurement>;
 pub(crate) fn run(arguments: &InspectArguments, read: ReadMeasurement) -> Result<()> {
     let InspectArguments { files, topic } = arguments;
     for (number, file) in files.iter().enumerate() {
-        let input = InputFile::open(file)?;
+        let input = RecordedInput::open(file)?;
         let text = match input.format() {
-            FileFormat::FrameLog | FileFormat::SpiExport => describe_bus_log(file, read)?,
+            RecordedFormat::FrameLog | RecordedFormat::SpiExport => describe_bus_log(file, read)?,
             _ => {
                 let input_arguments = InputArguments { topic: topic.clone(), ..InputArguments::new(file) };
                 Contents::read(&input, RecordingArguments::new(input_arguments))?.to_string()
@@ -69,7 +69,7 @@ fn describe_bus_log(file: &Path, read: ReadMeasurement) -> Result<String> {
 /// # Errors
 /// The file is damaged, or has one sensor, or something is missing that is not guessed.
 pub(crate) fn each_sensor(recording: &RecordingArguments) -> Result<Vec<RecordingArguments>> {
-    let opened = InputFile::open(&recording.input.file)?;
+    let opened = RecordedInput::open(&recording.input.file)?;
     let contents = Contents::read(&opened, recording.clone())?;
     let is_offered = |proposal: &&Proposal| {
         contents.several.is_empty() || proposal.topic.as_ref().is_some_and(|topic| contents.several.contains(topic))
@@ -89,7 +89,7 @@ pub(crate) fn each_sensor(recording: &RecordingArguments) -> Result<Vec<Recordin
 /// The longest part at rest of the file of `recording`, as `inspect` shows it; `None` where that shows none, or more than one table.
 pub(crate) fn part_at_rest(recording: &RecordingArguments) -> Option<TimeRange> {
     let file = &recording.input.file;
-    let input = InputFile::open(file).ok().filter(|_| !is_standard_stream(file))?;
+    let input = RecordedInput::open(file).ok().filter(|_| !is_standard_stream(file))?;
     match Contents::read(&input, recording.clone()).ok()?.tables.as_slice() {
         [table] => table.part_at_rest(),
         _ => None,
@@ -108,7 +108,7 @@ struct Contents {
 }
 
 impl Contents {
-    fn read(input: &InputFile, given: RecordingArguments) -> Result<Self> {
+    fn read(input: &RecordedInput, given: RecordingArguments) -> Result<Self> {
         let InputArguments { columns, units, topic, .. } = &given.input;
         let mut tables = input.inspect(topic.as_deref(), &ColumnSelection::parse(columns, units)?)?;
         for proposal in tables.iter_mut().flat_map(|table| &mut table.proposals) {
@@ -354,7 +354,7 @@ pub(crate) fn read_or_ask<R>(
     if !is_answered_by_columns(&error) || is_standard_stream(file) {
         return Err(error);
     }
-    let opened = InputFile::open(file).map_err(anyhow::Error::from);
+    let opened = RecordedInput::open(file).map_err(anyhow::Error::from);
     let Ok(contents) = opened.and_then(|opened| Contents::read(&opened, recording.clone())) else { return Err(error) };
     let proposals: Vec<&Proposal> = contents.proposals().collect();
     let hint = match proposals.as_slice() {

@@ -6,8 +6,8 @@ use measurement::SensorProfile;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use recordings::ColumnSelection;
-use recordings::any_sensor::ReadOptions;
-use recordings::file_format::InputFile;
+use recordings::ReadOptions;
+use recordings::file_format::RecordedInput;
 use recordings::recording::{Recorder, TimeStamp};
 use recordings::sample_stream::{KeptInMemory, Reading, SampleStream};
 use recordings::time_base::{EstimatedTimeBase, TimeBaseError, time_base};
@@ -134,7 +134,7 @@ fn streamed(times: &[f64]) -> (f64, u64, Vec<String>) {
     let rows = times.iter().enumerate().map(|(at, time)| format!("{time:.6},{}\n", at % 100));
     std::fs::write(&file, format!("time_s,gyro_x_counts\n{}", rows.collect::<String>())).expect("a table");
     let kept = KeptInMemory { rows: 1 << 14, rows_with_losses: 1 << 14, most_lost: 1.0 };
-    let input = InputFile::open(&file).expect("a table");
+    let input = RecordedInput::open(&file).expect("a table");
     let reading = Reading::new(None, kept);
     let stream = SampleStream::counts(input, GyroRange::Dps300, reading).expect("a time base");
     assert!(!stream.is_in_memory(), "{:?}", stream.notes());
@@ -222,7 +222,7 @@ fn measured_bursts_show_the_rate() {
     let Some(file) = system_tests::recording(test, "others/stampfly_fft_20260114T115628.csv") else { return };
     let selection = ColumnSelection::parse(&[], &["rad/s", "m/s^2"].map(str::to_owned)).expect("units");
     let options = ReadOptions { sensor: SensorProfile::generic(), selection, topic: None };
-    let input = InputFile::open(&file).expect("a table");
+    let input = RecordedInput::open(&file).expect("a table");
     let reading = Reading::new(None, KeptInMemory::ALL);
     let samples = SampleStream::any_sensor(input, options, reading).expect("a time base").into_beginning();
     let rate_hz = samples.sample_rate_hz;
@@ -240,7 +240,7 @@ fn read_stamps(heading: &str, stamps: &[String]) -> (usize, f64, u64, Vec<String
     let selection = ColumnSelection::parse(&[], &[]).expect("nothing");
     let options = ReadOptions { sensor: SensorProfile::generic(), selection, topic: None };
     let reading = Reading::new(None, KeptInMemory::ALL);
-    let stream = SampleStream::any_sensor(InputFile::open(&file).expect("a table"), options, reading);
+    let stream = SampleStream::any_sensor(RecordedInput::open(&file).expect("a table"), options, reading);
     let stream = stream.unwrap_or_else(|error| panic!("{heading}: {error}"));
     let notes = stream.notes().to_vec();
     let samples = stream.into_beginning();

@@ -5,8 +5,8 @@ use measurement::{Measurement, RecordingDescription, SampleBlock, SensorProfile}
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use recordings::ColumnSelection;
-use recordings::any_sensor::ReadOptions;
-use recordings::file_format::{FileFormat, InputFile};
+use recordings::ReadOptions;
+use recordings::file_format::{RecordedFormat, RecordedInput};
 use recordings::sample_stream::{KeptInMemory, Reading, SampleStream};
 use recordings::time_base::TimeRange;
 use std::path::{Path, PathBuf};
@@ -32,8 +32,8 @@ struct Channel {
 }
 
 fn open(file: &Path, units: &[&str], reading: Reading) -> SampleStream {
-    let input = InputFile::open(file).expect("a file");
-    if input.format() == FileFormat::CountTable {
+    let input = RecordedInput::open(file).expect("a file");
+    if input.format() == RecordedFormat::CountTable {
         return SampleStream::counts(input, GyroRange::Dps300, reading).expect("a time base");
     }
     let units: Vec<String> = units.iter().map(|unit| (*unit).to_owned()).collect();

@@ -87,7 +87,7 @@ fn every_format_has_the_same_samples() {
     let report = analyzed(&dir, &["replay", &frames]);
     assert_eq!(report["dropped"]["no_new_data"], 7, "{}", report["dropped"]);
     // A table as bursts, and these as a table.
-    run(&["convert", &table, &frames, "--format", "frames", "--range", "75", "--force"]);
+    run(&["convert", &table, &frames, "--force", "--format", "frames", "--range", "75"]);
     let notes = run(&["convert", &frames, &back]);
     assert!(notes.contains("--range 75") && notes.contains("1 transactions that are no bursts"), "{notes}");
     assert_eq!(std::fs::read(&table).expect("a table"), std::fs::read(&back).expect("a table"));

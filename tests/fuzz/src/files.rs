@@ -2,8 +2,8 @@
 
 use clap::ValueEnum;
 use measurement::SensorProfile;
-use recordings::any_sensor::ReadOptions;
-use recordings::file_format::{FileFormat, InputFile};
+use recordings::ReadOptions;
+use recordings::file_format::{RecordedFormat, RecordedInput};
 use recordings::recorded_file::RecordedFile;
 use recordings::sample_stream::{KeptInMemory, Reading, SampleStream};
 use recordings::{ColumnSelection, count_table};
@@ -17,16 +17,16 @@ const KEPT: KeptInMemory = KeptInMemory { rows: 1 << 12, rows_with_losses: 1 << 
 pub(crate) fn recording(bytes: &[u8]) {
     let mut file = tempfile::NamedTempFile::new().expect("a file");
     file.write_all(bytes).expect("room");
-    let Ok(input) = InputFile::open(file.path()) else { return };
+    let Ok(input) = RecordedInput::open(file.path()) else { return };
     let _any = input.inspect(None, &ColumnSelection::default());
     let _any = (input.sensors(), input.contents());
     let range = adis16405_driver::GyroRange::Dps300;
     match input.format() {
-        FileFormat::FrameLog | FileFormat::SpiExport => {
+        RecordedFormat::FrameLog | RecordedFormat::SpiExport => {
             let Ok(RecordedFile::Frames(mut frames)) = RecordedFile::open(input.bytes()) else { return };
             while let Ok(Some(_)) = frames.next() {}
         }
-        FileFormat::CountTable => {
+        RecordedFormat::CountTable => {
             let _any = count_table::read(input.bytes(), range);
             if let Ok(stream) = SampleStream::counts(input, range, Reading::new(None, KEPT)) {
                 read_to_its_end(stream);

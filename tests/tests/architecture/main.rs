@@ -15,7 +15,8 @@ use std::process::Command;
 
 /// Each crate with the crates of the workspace that it may depend on. Dependencies for tests alone are free.
 ///
-/// The driver and `allan-core` know neither each other nor the rest. `measurement` is what `recordings` hands to
+/// The driver and `allan-core` know neither each other nor the rest. `readers` know files and neither the driver nor statistics, `time-base`
+/// knows stamps and no files; `recordings` adds what is the ADIS16405's own. `measurement` is what `recordings` hands to
 /// `noise-analysis`: so recordings contain no statistics, and the analysis no file, driver, firmware or virtual sensor.
 /// `measurement` needs `allan-core` only for the description of a sensor's filters. The virtual sensor is written from
 /// the data sheet alone, so that it can check the driver. Reports are made of findings: those of `noise-analysis` and
@@ -32,7 +33,9 @@ const MAY_DEPEND_ON: &[(&str, &str)] = &[
     ("example-board", "firmware link"),
     ("fourier", ""),
     ("measurement", "allan-core"),
-    ("recordings", "adis16405-driver link measurement"),
+    ("time-base", ""),
+    ("readers", "measurement time-base"),
+    ("recordings", "adis16405-driver link measurement readers time-base"),
     ("noise-analysis", "allan-core fourier measurement"),
     ("virtual-sensor", ""),
     ("simulation", "adis16405-driver firmware link recordings virtual-sensor"),

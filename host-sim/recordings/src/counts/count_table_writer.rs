@@ -1,10 +1,10 @@
 //! Recordings written as a table of register counts, which [`count_table`](crate::reading::count_table) reads back.
 
-use crate::input::delimited_text;
-use crate::rows::recording::Recording;
+use crate::recording::Recording;
 use adis16405_driver::Channel;
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use readers::delimited_text;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
@@ -74,7 +74,7 @@ fn write_rows(recording: &Recording, out: &mut dyn Write) -> io::Result<()> {
 mod tests {
     use super::write;
     use crate::reading::count_table;
-    use crate::rows::recording::{Recorder, TimeStamp};
+    use crate::recording::{Recorder, TimeStamp};
     use adis16405_driver::{Burst, Channel, Counts, GyroRange};
 
     #[test]
@@ -88,7 +88,7 @@ mod tests {
         ] {
             let mut recorder = Recorder::new(vec![Channel::GyroZ, Channel::Supply], GyroRange::Dps300);
             for row in 0..50_u64 {
-                let mut counts = crate::rows::recording::NOT_RECORDED;
+                let mut counts = crate::recording::NOT_RECORDED;
                 counts[Channel::GyroZ as usize] = 37 * row as i16 - 900;
                 recorder.push(stamp(row), &Burst::from_counts(&Counts::new(counts)));
             }

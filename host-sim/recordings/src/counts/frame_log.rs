@@ -2,11 +2,10 @@
 //!
 //! Times are written with as many digits as they need to be read back exactly.
 
-use crate::input::delimited_text::{self, Lines};
-use crate::input::file_bytes::FileBytes;
-use crate::input::input_error::{InputError, Reason};
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use readers::delimited_text::{self, Lines};
+use readers::{FileBytes, InputError, Reason};
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, Write};
@@ -57,7 +56,7 @@ impl FrameLogReader {
 
     /// As [`open`](Self::open), of a file that was opened before.
     pub(crate) fn new(file: &Path, mut lines: Lines) -> Result<Self, InputError> {
-        match lines.next()? {
+        match lines.next_line()? {
             None => Err(InputError::file(file, Reason::Empty)),
             Some((_, HEADER)) => Ok(Self { file: file.to_owned(), lines, line: 1, last_s: f64::NEG_INFINITY }),
             Some((line, _)) => Err(InputError::line(file, line, Reason::NotFrameLog)),
@@ -75,7 +74,7 @@ impl FrameLogReader {
     /// A line does not have a finite time, not before that of the last line, and two equally long rows of 16-bit words.
     #[expect(clippy::should_implement_trait, reason = "fallible: an iterator would yield errors for ever")]
     pub fn next(&mut self) -> Result<Option<Frame>, InputError> {
-        let Some((line, text)) = self.lines.next()? else {
+        let Some((line, text)) = self.lines.next_line()? else {
             return Ok(None);
         };
         let frame = parse(text, self.last_s).map_err(|(column, reason)| match column {

@@ -1,6 +1,6 @@
 //! Recordings written as a NumPy array of doubles in SI units, for programs that know no register counts.
 
-use crate::rows::recording::Recording;
+use crate::recording::Recording;
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -91,7 +91,7 @@ impl SiUnit {
 #[cfg(test)]
 mod tests {
     use super::write;
-    use crate::rows::recording::{NOT_RECORDED, Recorder, TimeStamp};
+    use crate::recording::{NOT_RECORDED, Recorder, TimeStamp};
     use adis16405_driver::{Burst, Channel, Counts, GyroRange};
 
     #[test]

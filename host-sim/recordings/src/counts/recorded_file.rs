@@ -2,9 +2,8 @@
 
 use crate::counts::frame_log::{FrameLogReader, HEADER};
 use crate::counts::spi_export::{self, CapturedFrame, SpiExportReader};
-use crate::input::delimited_text::Lines;
-use crate::input::file_bytes::FileBytes;
-use crate::input::input_error::InputError;
+use readers::delimited_text::Lines;
+use readers::{FileBytes, InputError};
 
 /// An open recording, told apart by its header.
 pub enum RecordedFile {

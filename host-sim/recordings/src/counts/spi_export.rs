@@ -4,8 +4,8 @@
 //! - sigrok-cli: `-A spi=mosi-transfer:miso-transfer --protocol-decoder-jsontrace`, one line an event.
 
 use crate::counts::frame_log::Frame;
-use crate::input::delimited_text::{self, Lines};
-use crate::input::input_error::{InputError, Reason};
+use readers::delimited_text::{self, Lines};
+use readers::{InputError, Reason};
 use serde_json::Value;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -75,7 +75,7 @@ pub struct SpiExportReader {
 impl SpiExportReader {
     /// Over a file that was opened before.
     pub(crate) fn new(file: &Path, mut lines: Lines) -> Result<Self, InputError> {
-        let header = lines.next()?.and_then(|(line, header)| Some((line, Layout::of_header(header)?)));
+        let header = lines.next_line()?.and_then(|(line, header)| Some((line, Layout::of_header(header)?)));
         let (line, layout) = header.ok_or_else(|| InputError::file(file, Reason::NotFrameLog))?;
         Ok(Self {
             file: file.to_owned(),
@@ -100,7 +100,7 @@ impl SpiExportReader {
     #[expect(clippy::should_implement_trait, reason = "fallible: an iterator would yield errors for ever")]
     pub fn next(&mut self) -> Result<Option<CapturedFrame>, InputError> {
         loop {
-            let Some((line, text)) = self.lines.next()? else {
+            let Some((line, text)) = self.lines.next_line()? else {
                 return match self.open.take() {
                     Some(last) => self.checked(last).map(Some),
                     None => Ok(None),

@@ -1,9 +1,10 @@
 //! What the numbers of a column show before they become counts.
 
-use crate::rows::batch::{ValueColumn, Verdict};
-use crate::rows::quantizer::Quantizer;
+use crate::batch_source::channel;
+use crate::recording::Verdict;
 use adis16405_driver::{Channel, Faults};
 use measurement::ChannelProfile;
+use readers::{Quantizer, ValueColumn};
 use std::collections::BTreeMap;
 
 /// How often a range of the data sheet a value may be before it is no measurement.
@@ -24,7 +25,7 @@ const MOST_KEPT: usize = 1 << 17;
 
 /// Why a number of a row is no measurement, if so.
 pub(crate) fn refusal(column: &ValueColumn, value: f64, verdict: Option<&Verdict>) -> Option<&'static str> {
-    match (column.register, verdict) {
+    match (channel(column), verdict) {
         _ if value.is_nan() => Some("missing"),
         (Some(channel), Some(verdict)) => refusal_of_register(channel, value, *verdict),
         _ if value.is_infinite() => Some("not_finite"),

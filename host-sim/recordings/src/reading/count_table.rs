@@ -1,17 +1,11 @@
 //! Tables of register counts of an ADIS16405: text tables whose numbers fit their registers.
 
-use crate::formats::file_format::InputFile;
-use crate::formats::text_table::TextRows;
-use crate::input::file_bytes::FileBytes;
-use crate::input::input_error::{InputError, Reason};
-use crate::input::read_monitor::ReadMonitor;
-use crate::rows::any_sensor::ReadOptions;
-use crate::rows::batch::Batch;
-use crate::rows::recording::{MAX_SAMPLES, NOT_RECORDED, Recorder, Recording, TimeStamp};
-use crate::rows::row_source::{BatchSource, FileRows, WantedRows};
-use crate::time_base::TimeRange;
-use crate::time_base::time_base_error::StreamError;
+use crate::batch_source::{channel, for_each_batch};
+use crate::file_format::{self, RecordedInput, options_of_counts};
+use crate::recording::{MAX_SAMPLES, NOT_RECORDED, Recorder, Recording, TimeStamp};
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
+use readers::{Batch, FileBytes, FileRows, InputError, InputFile, ReadMonitor, Reason, StreamError, WantedRows};
+use time_base::TimeRange;
 
 /// Reads a table, plain or gzip, into a recording whose rates were taken in `range`.
 ///
@@ -60,11 +54,9 @@ pub fn for_each_row(
     take: impl FnMut(&[Channel], TimeStamp, Counts) -> Result<(), Reason>,
 ) -> Result<(), InputError> {
     let file = &file.into();
-    let options = ReadOptions::of_counts(range);
-    let monitor = ReadMonitor::default();
-    let rows = Box::new(TextRows::open(file, &options, &monitor)?);
-    let source = BatchSource::File(Box::new(FileRows::new(file.name(), rows, &monitor, Some(range))));
-    match for_each_row_of(source, WantedRows::all(None), file, take) {
+    let options = options_of_counts(range);
+    let input = InputFile::recognised(file.name(), vec![file.clone()], &ReadMonitor::default())?;
+    match for_each_row_of(file_format::rows(&input, &options, true)?, WantedRows::all(None), file, take) {
         Ok(()) => Ok(()),
         Err(StreamError::Input(error)) => Err(error),
         Err(StreamError::TimeBase(error)) => Err(file.error(Reason::Bus(error.to_string()))),
@@ -76,13 +68,13 @@ pub fn for_each_row(
 /// # Errors
 /// As [`read`], or there is neither a time nor a rate, or no row in the part.
 pub fn read_part(
-    input: &InputFile,
+    input: &RecordedInput,
     range: GyroRange,
     part: Option<TimeRange>,
     stated_hz: Option<f64>,
 ) -> Result<Recording, StreamError> {
     let read = || -> Result<Recording, StreamError> {
-        let source = input.batches(&ReadOptions::of_counts(range), Some(range))?;
+        let source = input.rows(&options_of_counts(range), true)?;
         let mut rows = RecordedCounts::new(range);
         let wanted = WantedRows { part, ..WantedRows::all(stated_hz) };
         for_each_row_of(source, wanted, input.bytes(), |channels, row, counts| rows.push(channels, row, counts))?;
@@ -92,32 +84,35 @@ pub fn read_part(
 }
 
 fn for_each_row_of(
-    mut source: BatchSource,
+    mut source: FileRows,
     wanted: WantedRows,
     file: &FileBytes,
     mut take: impl FnMut(&[Channel], TimeStamp, Counts) -> Result<(), Reason>,
 ) -> Result<(), StreamError> {
-    let channels: Vec<Channel> = source.columns().iter().filter_map(|column| column.register).collect();
+    let channels: Vec<Channel> = source.columns().iter().filter_map(channel).collect();
     let mut rows = 0u64;
-    source.for_each_batch(wanted, |batch: Batch| {
-        for row in 0..batch.rows {
-            rows += 1;
-            if rows > MAX_SAMPLES {
-                return Err(InputError::row(file.name(), rows, "", Reason::TooManySamples).into());
-            }
-            let mut counts = NOT_RECORDED;
-            for (channel, column) in channels.iter().zip(&batch.values) {
-                if column[row].is_nan() {
-                    let reason = Reason::NotInteger(String::new());
-                    return Err(InputError::row(file.name(), rows, channel.name(), reason).into());
+    for_each_batch(
+        |give| source.read(wanted, give),
+        |batch: Batch| {
+            for row in 0..batch.rows {
+                rows += 1;
+                if rows > MAX_SAMPLES {
+                    return Err(InputError::row(file.name(), rows, "", Reason::TooManySamples).into());
                 }
-                counts[*channel as usize] = column[row] as i16;
+                let mut counts = NOT_RECORDED;
+                for (channel, column) in channels.iter().zip(&batch.values) {
+                    if column[row].is_nan() {
+                        let reason = Reason::NotInteger(String::new());
+                        return Err(InputError::row(file.name(), rows, channel.name(), reason).into());
+                    }
+                    counts[*channel as usize] = column[row] as i16;
+                }
+                let stamp = TimeStamp { index: batch.indices.get(row).copied(), time_s: batch.times.get(row).copied() };
+                take(&channels, stamp, Counts::new(counts))
+                    .map_err(|reason| InputError::row(file.name(), rows, "", reason))?;
             }
-            let stamp = TimeStamp { index: batch.indices.get(row).copied(), time_s: batch.times.get(row).copied() };
-            take(&channels, stamp, Counts::new(counts))
-                .map_err(|reason| InputError::row(file.name(), rows, "", reason))?;
-        }
-        Ok(())
-    })?;
+            Ok(())
+        },
+    )?;
     Ok(())
 }

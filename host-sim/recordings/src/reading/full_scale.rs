@@ -3,8 +3,7 @@
 //! The full scale is that of the data sheet, else that of 16 bits if the counts reach it and do not exceed it. How large a count is, is known
 //! at the end: until then a row is a candidate while it has the largest or the smallest number of its column.
 
-use crate::rows::batch::ValueColumn;
-use crate::rows::quantizer::Quantizer;
+use readers::{Quantizer, ValueColumn};
 use std::collections::BTreeMap;
 
 /// Largest and smallest count of 16 bits.
@@ -138,9 +137,8 @@ fn forget(rows: &mut BTreeMap<u128, u64>, bit: u128) {
 #[cfg(test)]
 mod tests {
     use super::FullScale;
-    use crate::rows::batch::ValueColumn;
-    use crate::rows::quantizer::Quantizer;
     use measurement::{ChannelProfile, Quantity};
+    use readers::{Quantizer, ValueColumn};
 
     /// Rows at full scale, and those of the first channel by its note, of counts in two channels.
     fn found(range: Option<f64>, rows: &[[f64; 2]]) -> (u64, Vec<String>) {

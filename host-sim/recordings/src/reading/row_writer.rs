@@ -1,22 +1,20 @@
 //! The rows of any sensor written as a table with units in its header, and as a NumPy array: a batch at a time, as they are read.
 
+use crate::batch_source::for_each_batch;
 use crate::counts::count_table_writer::write_text;
 use crate::counts::numpy_matrix::{MatrixWriter, SiUnit};
-use crate::formats::file_format::InputFile;
-use crate::rows::any_sensor::ReadOptions;
-use crate::rows::batch::{Batch, ValueColumn};
-use crate::rows::row_source::{RowsRead, WantedRows};
-use crate::time_base::TimeRange;
-use crate::time_base::time_base_error::StreamError;
+use crate::file_format::RecordedInput;
+use readers::{Batch, ReadOptions, RowsRead, StreamError, ValueColumn, WantedRows};
 use std::fmt::Write as _;
 use std::io;
 use std::path::Path;
+use time_base::TimeRange;
 
 /// The rows of a file that are written.
 #[derive(Debug)]
 pub struct SensorRows<'a> {
     /// The file.
-    pub input: &'a InputFile,
+    pub input: &'a RecordedInput,
     /// How it is read.
     pub options: ReadOptions,
     /// A part by time.
@@ -124,21 +122,24 @@ impl SensorRows<'_> {
         &self,
         mut write: impl FnMut(&[ValueColumn], &Batch, &mut Vec<String>) -> io::Result<()>,
     ) -> Result<WrittenRows, WriteError> {
-        let mut source = self.input.batches(&self.options, None).map_err(StreamError::from)?;
+        let mut source = self.input.rows(&self.options, false).map_err(StreamError::from)?;
         let columns = source.columns().to_vec();
         let (mut names, mut failure) = (Vec::new(), None);
         let wanted = WantedRows { part: self.part, ..WantedRows::all(self.stated_hz) };
         let mut first_s = None;
-        let read = source.for_each_batch(wanted, |mut batch| {
-            if let Some(&first) = batch.times.first() {
-                let first_s = *first_s.get_or_insert(first);
-                batch.times.iter_mut().for_each(|time| *time -= first_s);
-            }
-            if failure.is_none() {
-                failure = write(&columns, &batch, &mut names).err();
-            }
-            Ok(())
-        });
+        let read = for_each_batch(
+            |give| source.read(wanted, give),
+            |mut batch: Batch| {
+                if let Some(&first) = batch.times.first() {
+                    let first_s = *first_s.get_or_insert(first);
+                    batch.times.iter_mut().for_each(|time| *time -= first_s);
+                }
+                if failure.is_none() {
+                    failure = write(&columns, &batch, &mut names).err();
+                }
+                Ok(())
+            },
+        );
         if let Some(failure) = failure {
             return Err(failure.into());
         }

@@ -4,33 +4,27 @@
 //! longer one is read once more for its samples. Both go the same way, so that memory does not depend on the length of a recording, and
 //! nothing else does either.
 
-use crate::columns::axes::{ACCELEROMETER, GYROSCOPE, MAGNETOMETER};
-use crate::formats::file_format::InputFile;
-use crate::input::input_error::InputError;
-use crate::input::read_monitor::{ReadMonitor, ReadPass};
+use crate::batch_source::{BatchSource, RecordedRows};
+use crate::file_format::{RecordedInput, options_of_counts};
 use crate::reading::column_survey::{ColumnSurvey, refusal, rounding_note};
 use crate::reading::full_scale::FullScale;
-use crate::rows::any_sensor::ReadOptions;
-use crate::rows::batch::{Batch, RowBefore, ValueColumn, Verdict};
-use crate::rows::padding::{PaddingFinder, Unpadded};
-use crate::rows::quantizer::Quantizer;
-use crate::rows::recording::Recording;
-use crate::rows::row_source::{BATCH, BatchSource, RecordedRows, WantedRows};
-use crate::time_base::clock::{Clock, Place, RowStamp};
-use crate::time_base::stamp_quality::StampQuality;
-use crate::time_base::stream_clock::Placed;
-use crate::time_base::time_base_error::TimeBaseError;
-use crate::time_base::time_range::TimeRange;
+use crate::recording::{Recording, Verdict};
 use adis16405_driver::{Faults, GyroRange};
 use measurement::{
     ChannelProfile, MeasuredChannel, Measurement, RecordingDescription, SampleBlock, SensorProfile, adis16405,
     lost_part,
 };
+use readers::{
+    ACCELEROMETER, BATCH, GYROSCOPE, InputError, MAGNETOMETER, PaddingFinder, Quantizer, ReadMonitor, ReadOptions,
+    ReadPass, RowBefore, Unpadded, ValueColumn, WantedRows,
+};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
+use time_base::{Clock, Place, Placed, RowStamp, StampQuality, TimeBaseError, TimeRange};
 
-pub use crate::rows::row_source::RowsRead;
-pub use crate::time_base::time_base_error::StreamError;
+type Batch = readers::Batch<Verdict>;
+
+pub use readers::{RowsRead, StreamError};
 
 /// Sample periods at the start of a recording whose samples are kept.
 const BEGINNING: u64 = 1 << 16;
@@ -115,7 +109,7 @@ struct SurveyedSamples {
 
 /// Where the rows are.
 enum Origin<'a> {
-    File { input: InputFile, options: Box<ReadOptions>, range: Option<GyroRange> },
+    File { input: RecordedInput, options: Box<ReadOptions>, range: Option<GyroRange> },
     Recording(Cow<'a, Recording>),
 }
 
@@ -149,8 +143,8 @@ impl SampleStream {
     ///
     /// # Errors
     /// The file is damaged, or has no time base: see [`TimeBaseError`].
-    pub fn counts(input: InputFile, range: GyroRange, reading: Reading) -> Result<Self, StreamError> {
-        let options = Box::new(ReadOptions::of_counts(range));
+    pub fn counts(input: RecordedInput, range: GyroRange, reading: Reading) -> Result<Self, StreamError> {
+        let options = Box::new(options_of_counts(range));
         let monitor = input.monitor().clone();
         Self::open(Origin::File { input, options, range: Some(range) }, reading, &monitor)
     }
@@ -159,7 +153,7 @@ impl SampleStream {
     ///
     /// # Errors
     /// As [`counts`](Self::counts), and where the columns cannot be chosen.
-    pub fn any_sensor(input: InputFile, options: ReadOptions, reading: Reading) -> Result<Self, StreamError> {
+    pub fn any_sensor(input: RecordedInput, options: ReadOptions, reading: Reading) -> Result<Self, StreamError> {
         let monitor = input.monitor().clone();
         Self::open(Origin::File { input, options: Box::new(options), range: None }, reading, &monitor)
     }

@@ -5,7 +5,7 @@ use super::other_programs::{Sample, samples};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use recordings::ColumnSelection;
-use recordings::file_format::InputFile;
+use recordings::file_format::RecordedInput;
 use std::path::Path;
 
 /// Every format with its bytes cut off or flipped: samples, or one line of error that names the file.
@@ -35,9 +35,10 @@ fn damaged_files_of_every_format_end_in_a_result_or_one_line() {
             // Most are read whole, as they are converted; some on their time base, and some as their columns are shown.
             let error = match case {
                 5 | 10 => read_file(&file, options).err().map(|error| error.to_string()),
-                3 | 8 => {
-                    InputFile::open(&file).and_then(|file| file.inspect(None, &no_columns)).err().map(|e| e.to_string())
-                }
+                3 | 8 => RecordedInput::open(&file)
+                    .and_then(|file| file.inspect(None, &no_columns))
+                    .err()
+                    .map(|e| e.to_string()),
                 _ => rows(&file, options).err().map(|error| error.to_string()),
             };
             match error {

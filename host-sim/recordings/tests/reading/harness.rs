@@ -6,8 +6,8 @@ use flate2::write::GzEncoder;
 use measurement::{MeasuredChannel, Measurement, SensorProfile, adis16405, profile_file};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use recordings::any_sensor::ReadOptions;
-use recordings::file_format::{FileFormat, InputFile};
+use recordings::ReadOptions;
+use recordings::file_format::{RecordedFormat, RecordedInput};
 use recordings::inspection::InspectedTable;
 use recordings::recorded_file::RecordedFile;
 use recordings::recording::{Recorder, Recording, TimeStamp};
@@ -150,10 +150,10 @@ pub(crate) fn read_file<T: AsRef<str>>(file: &Path, options: &[T]) -> Result<Rea
     let options = Options::new(options);
     let kept = KeptInMemory { rows: ROWS_IN_MEMORY, rows_with_losses: ROWS_IN_MEMORY, most_lost: 1.0 };
     let reading = WayOfReading::new(options.rate_hz, kept).of_part(options.part);
-    let input = InputFile::open(file)?;
+    let input = RecordedInput::open(file)?;
     let stream = match input.format() {
-        FileFormat::FrameLog | FileFormat::SpiExport => SampleStream::recorded(bursts(&input)?, reading)?,
-        FileFormat::CountTable if options.are_of_counts() => SampleStream::counts(input, options.range, reading)?,
+        RecordedFormat::FrameLog | RecordedFormat::SpiExport => SampleStream::recorded(bursts(&input)?, reading)?,
+        RecordedFormat::CountTable if options.are_of_counts() => SampleStream::counts(input, options.range, reading)?,
         _ => SampleStream::any_sensor(input, options.of_any_sensor(file)?, reading)?,
     };
     assert!(stream.is_in_memory(), "{}: more rows than these tests read", file.display());
@@ -162,7 +162,7 @@ pub(crate) fn read_file<T: AsRef<str>>(file: &Path, options: &[T]) -> Result<Rea
 }
 
 /// The bursts of a log of the SPI bus in its default range, without the driver.
-fn bursts(input: &InputFile) -> Result<Recording, InputError> {
+fn bursts(input: &RecordedInput) -> Result<Recording, InputError> {
     let RecordedFile::Frames(mut frames) = RecordedFile::open(input.bytes())? else { panic!("a log of the bus") };
     let mut recorder = Recorder::new(Channel::ALL.to_vec(), GyroRange::default());
     while let Some(captured) = frames.next()? {
@@ -179,18 +179,18 @@ fn bursts(input: &InputFile) -> Result<Recording, InputError> {
 pub(crate) fn rows<T: AsRef<str>>(file: &Path, options: &[T]) -> Result<String, StreamError> {
     let folder = tempfile::tempdir().expect("a folder");
     let table = folder.path().join("table.csv");
-    let input = InputFile::open(file)?;
+    let input = RecordedInput::open(file)?;
     sensor_rows(&input, options)?.write_table(&table).map_err(unwritten)?;
     Ok(std::fs::read_to_string(&table).expect("a table"))
 }
 
 /// The rows of any sensor as an array in `array`; the names of its columns.
 pub(crate) fn write_array(file: &Path, array: &Path) -> Result<Vec<String>, StreamError> {
-    let input = InputFile::open(file)?;
+    let input = RecordedInput::open(file)?;
     Ok(sensor_rows(&input, &[""; 0])?.write_array(array).map_err(unwritten)?.columns)
 }
 
-fn sensor_rows<'a, T: AsRef<str>>(input: &'a InputFile, options: &[T]) -> Result<SensorRows<'a>, InputError> {
+fn sensor_rows<'a, T: AsRef<str>>(input: &'a RecordedInput, options: &[T]) -> Result<SensorRows<'a>, InputError> {
     let options = Options::new(options);
     let (part, stated_hz) = (options.part, options.rate_hz);
     Ok(SensorRows { input, options: options.of_any_sensor(input.name())?, part, stated_hz })
@@ -205,7 +205,7 @@ fn unwritten(error: WriteError) -> StreamError {
 
 /// What is in a file.
 pub(crate) fn inspect(file: &Path) -> Vec<InspectedTable> {
-    let input = InputFile::open(file).unwrap_or_else(|error| panic!("{error}"));
+    let input = RecordedInput::open(file).unwrap_or_else(|error| panic!("{error}"));
     input.inspect(None, &ColumnSelection::parse(&[], &[]).expect("nothing")).unwrap_or_else(|error| panic!("{error}"))
 }
 

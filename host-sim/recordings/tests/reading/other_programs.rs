@@ -1,7 +1,7 @@
 //! Files of every format that other programs wrote, with known noise, rate and losses (`make_samples.py`).
 
 use super::harness::{python, read, read_file, rows, write_array};
-use recordings::file_format::{FileFormat, InputFile};
+use recordings::file_format::{RecordedFormat, RecordedInput};
 use recordings::sample_stream::StreamError;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -83,7 +83,7 @@ fn every_format_is_converted() {
     let [array, back] = ["back.npy", "back.csv"].map(|name| folder.path().join(name));
     for Sample { name, file, options, truth } in samples {
         // A log of the bus has no columns.
-        if InputFile::open(file).expect(name).format() == FileFormat::SpiExport {
+        if RecordedInput::open(file).expect(name).format() == RecordedFormat::SpiExport {
             continue;
         }
         let lines = rows(file, options).expect(name).lines().count();
@@ -120,7 +120,7 @@ fn several_sensors_of_a_file_have_a_name_each() {
         ("attributes.h5", &[]),
         ("units.csv", &[]),
     ] {
-        let input = InputFile::open(&folder.join(file)).expect(file);
+        let input = RecordedInput::open(&folder.join(file)).expect(file);
         assert_eq!(input.sensors().expect(file), expected, "{file}");
         let topics = input.contents().expect(file);
         for name in expected {
@@ -136,7 +136,7 @@ fn several_sensors_of_a_file_have_a_name_each() {
             assert!(error.contains(first) && error.contains(second), "{file}: {error}");
         }
     }
-    let topics = InputFile::open(&folder.join("attributes.h5")).expect("HDF5").contents().expect("HDF5");
+    let topics = RecordedInput::open(&folder.join("attributes.h5")).expect("HDF5").contents().expect("HDF5");
     let acc = topics.iter().find(|topic| topic.name == "run 1/imu/acc").expect("a dataset");
     assert_eq!(acc.columns[2], ("run 1/imu/acc.2".to_owned(), Some("m/s^2")));
 }

@@ -3,7 +3,7 @@
 use super::harness::{gzip, read};
 use super::tables::counts;
 use adis16405_driver::GyroRange;
-use recordings::file_format::{FileFormat, InputFile};
+use recordings::file_format::{RecordedFormat, RecordedInput};
 use recordings::sample_stream::StreamError;
 use recordings::{InputError, count_table};
 use std::fmt::Display;
@@ -30,7 +30,7 @@ fn refuses((name, content, options, words): Case) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join(name);
     std::fs::write(&path, content).expect("written");
-    if InputFile::open(&path).is_ok_and(|input| input.format() == FileFormat::CountTable) {
+    if RecordedInput::open(&path).is_ok_and(|input| input.format() == RecordedFormat::CountTable) {
         let converted = count_table::read(&path, GyroRange::default()).expect_err(name);
         assert_eq!((converted.line, converted.reason.to_string()), (*line, reason(&error)), "{name}");
     }
@@ -84,11 +84,11 @@ fn files_that_are_no_recordings_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     for (file, words) in [(folder.path().join("missing.csv"), "No such file"), (folder.path().into(), "is a directory")]
     {
-        let error = InputFile::open(&file).expect_err(words);
+        let error = RecordedInput::open(&file).expect_err(words);
         check(words, &error, &[words]);
         assert_eq!(error.file, file);
     }
-    let error = InputFile::open(Path::new("/nowhere/\u{1b}[31m.csv")).expect_err("no such file");
+    let error = RecordedInput::open(Path::new("/nowhere/\u{1b}[31m.csv")).expect_err("no such file");
     check("control characters", &error, &["/nowhere/"]);
 }
 

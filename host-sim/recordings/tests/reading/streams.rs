@@ -4,7 +4,7 @@ use super::harness::gzip;
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
 use measurement::SampleBlock;
 use recordings::count_table;
-use recordings::file_format::InputFile;
+use recordings::file_format::RecordedInput;
 use recordings::frame_log::{Frame, FrameLogReader, FrameLogWriter};
 use recordings::recording::{Recorder, TimeStamp};
 use recordings::sample_stream::{KeptInMemory, Reading, SampleStream};
@@ -27,7 +27,7 @@ fn a_recording_has_the_blocks_of_its_table() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("table.csv");
     count_table_writer::write(&recording, &file).expect("a table");
-    let table = InputFile::open(&file).expect("a table");
+    let table = RecordedInput::open(&file).expect("a table");
     let [(recorded, recorded_samples), (read, read_samples)] = [
         SampleStream::recorded(recording, Reading::new(None, KEPT)).expect("a time base"),
         SampleStream::counts(table, GyroRange::Dps150, Reading::new(None, KEPT)).expect("a time base"),

@@ -2,8 +2,8 @@
 
 use adis16405_driver::GyroRange;
 use measurement::{MeasuredChannel, Measurement, SensorProfile};
-use recordings::any_sensor::ReadOptions;
-use recordings::file_format::{FileFormat, InputFile};
+use recordings::ReadOptions;
+use recordings::file_format::{RecordedFormat, RecordedInput};
 use recordings::inspection::{InspectedTable, SteadyPart};
 use recordings::sample_stream::{KeptInMemory, Reading, SampleStream, StreamError};
 use recordings::time_base::{TimeBaseError, TimeRange};
@@ -50,11 +50,11 @@ impl NoiseRecording {
     /// The file cannot be read, neither its time stamps nor `rate_hz` tell the sample rate, or the sensor is never at rest.
     pub fn read(file: &Path, rate_hz: Option<f64>) -> Result<Self, MeasuredNoiseError> {
         let file_name = || file.display().to_string();
-        let input = InputFile::open(file)?;
-        let samples = if input.format() == FileFormat::CountTable {
+        let input = RecordedInput::open(file)?;
+        let samples = if input.format() == RecordedFormat::CountTable {
             with_rate(rate_hz, |rate_hz| {
                 let reading = Reading::new(rate_hz, KeptInMemory::ALL);
-                SampleStream::counts(InputFile::open(file)?, GyroRange::Dps300, reading)
+                SampleStream::counts(RecordedInput::open(file)?, GyroRange::Dps300, reading)
             })
         } else {
             let tables = input.inspect(None, &ColumnSelection::default())?;
@@ -64,7 +64,7 @@ impl NoiseRecording {
             }
             with_rate(rate_hz, |rate_hz| {
                 let reading = Reading::new(rate_hz, KeptInMemory::ALL).of_part(rest);
-                SampleStream::any_sensor(InputFile::open(file)?, options.clone(), reading)
+                SampleStream::any_sensor(RecordedInput::open(file)?, options.clone(), reading)
             })
         };
         let samples = samples.map_err(|error| match error {

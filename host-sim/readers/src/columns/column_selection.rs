@@ -1,0 +1,817 @@
+//! Which columns of a file hold the channels, the time and the index, and in which units: as the user says it, else by the
+//! names of the columns.
+
+use crate::columns::unit::{COUNT, SECOND, Unit};
+use measurement::{ChannelProfile, Quantity, SensorProfile};
+
+/// What a column is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "a file has few columns, and a profile is copied as the rest of a column is"
+)]
+pub(crate) enum Role {
+    /// Time stamps.
+    Time,
+    /// Running number of the sample.
+    Index,
+    /// A channel of the sensor.
+    Channel(ChannelProfile),
+}
+
+impl Role {
+    /// As `--columns` takes it.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Time => "time",
+            Self::Index => "sample",
+            Self::Channel(profile) => profile.name,
+        }
+    }
+}
+
+/// A column that a file has.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct AvailableColumn {
+    /// Its name in the file; its number, from 0, where the file names none.
+    pub(crate) name: String,
+    /// Its unit, where the file says it.
+    pub(crate) unit: Option<Unit>,
+}
+
+/// All `available` columns as they are, to be looked at: as channels without a name, in the unit of the file.
+pub(crate) fn as_they_are(available: &[AvailableColumn]) -> Vec<ChosenColumn> {
+    let role = Role::Channel(ChannelProfile::generic("", Quantity::AuxiliaryVoltage));
+    let column = |(position, column): (usize, &AvailableColumn)| {
+        let (label, unit) = (column.name.clone(), column.unit);
+        ChosenColumn { position, role, label, unit, factor: 1.0 }
+    };
+    available.iter().enumerate().map(column).collect()
+}
+
+/// A column that is read.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ChosenColumn {
+    /// Position among the available columns.
+    pub(crate) position: usize,
+    pub(crate) role: Role,
+    /// As the file names it.
+    pub(crate) label: String,
+    /// Its unit; `None` for times that are stated without one.
+    pub(crate) unit: Option<Unit>,
+    /// Size of 1 in the unit of the channel.
+    pub(crate) factor: f64,
+}
+
+/// Why columns cannot be chosen.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SelectionError {
+    /// An argument that is no assignment.
+    #[error("--columns {0}: expected CHANNEL=COLUMN, such as gyro_x=wx")]
+    NoAssignment(String),
+    /// A channel that the sensor does not have.
+    #[error("--columns {name}=…: no such channel; {sensor} has {known}, and there are time and sample")]
+    UnknownChannel {
+        /// As given.
+        name: String,
+        /// Name of the sensor.
+        sensor: String,
+        /// Its channels.
+        known: String,
+    },
+    /// A channel that is assigned twice, or two columns that look like it.
+    #[error("{channel} is both {one} and {other}: say which with --columns")]
+    Ambiguous {
+        /// The channel.
+        channel: String,
+        /// A column.
+        one: String,
+        /// Another column.
+        other: String,
+    },
+    /// A column that the file does not have.
+    #[error("no column {wanted}; the file has {available}")]
+    NoColumn {
+        /// As given.
+        wanted: String,
+        /// Names of the columns.
+        available: String,
+    },
+    /// No column looks like a channel.
+    #[error("no column is named like a channel; say which is which, as in --columns gyro_x=NAME; the file has {0}")]
+    NoChannel(String),
+    /// A unit that is not known.
+    #[error("--units {unit}: not a known unit; known are {known}")]
+    UnknownUnit {
+        /// As given.
+        unit: String,
+        /// The known ones.
+        known: String,
+    },
+    /// Two units for one quantity.
+    #[error("--units {0} and {1} are of one quantity")]
+    TwoUnits(&'static str, &'static str),
+    /// A column without a stated unit.
+    #[error("column {column}: no unit of {channel}; give one, as in --units {example}")]
+    NoUnit {
+        /// The column.
+        column: String,
+        /// Its channel.
+        channel: String,
+        /// A unit of the channel.
+        example: &'static str,
+    },
+    /// Counts of a sensor whose scale is not known.
+    #[error("column {0}: counts of which sensor? give its profile with --sensor")]
+    CountsOfAny(String),
+}
+
+/// What the user says of the columns.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ColumnSelection {
+    /// Channel and column.
+    assignments: Vec<(String, String)>,
+    units: Vec<Unit>,
+}
+
+impl ColumnSelection {
+    /// From assignments such as `gyro_x=wx` and names of units, each of which is that of all columns of its quantity.
+    ///
+    /// # Errors
+    /// A text that is no assignment, or an unknown or a second unit of a quantity.
+    pub fn parse(columns: &[String], units: &[String]) -> Result<Self, SelectionError> {
+        let assignment = |text: &String| match text.split_once('=') {
+            Some((channel, column)) if !channel.trim().is_empty() && !column.trim().is_empty() => {
+                Ok((channel.trim().to_owned(), column.trim().to_owned()))
+            }
+            _ => Err(SelectionError::NoAssignment(text.clone())),
+        };
+        let assignments: Vec<(String, String)> = columns.iter().map(assignment).collect::<Result<_, _>>()?;
+        let mut known: Vec<Unit> = Vec::new();
+        for text in units {
+            let unit = Unit::parse(text).ok_or_else(|| SelectionError::UnknownUnit {
+                unit: text.clone(),
+                known: Unit::names().collect::<Vec<_>>().join(", "),
+            })?;
+            if let Some(other) = known.iter().find(|other| other.base == unit.base) {
+                return Err(SelectionError::TwoUnits(other.name, unit.name));
+            }
+            known.push(unit);
+        }
+        Ok(Self { assignments, units: known })
+    }
+
+    /// Whether the user says nothing.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.assignments.is_empty() && self.units.is_empty()
+    }
+
+    /// The channels, `time` and `sample` that the user assigns, each with the position of its column in `available`.
+    pub(crate) fn assignments(&self, available: &[AvailableColumn]) -> Vec<(&'static str, usize)> {
+        let sensor = SensorProfile::generic();
+        let assigned = self.assigned(available, &sensor).unwrap_or_default();
+        assigned.into_iter().map(|(role, position)| (role.name(), position)).collect()
+    }
+
+    /// The unit that the user states for the quantity with this base.
+    pub(crate) fn stated_unit(&self, base: &str) -> Option<Unit> {
+        self.units.iter().copied().find(|unit| unit.base == base)
+    }
+
+    /// Whether the user assigns columns.
+    pub(crate) fn has_columns(&self) -> bool {
+        !self.assignments.is_empty()
+    }
+
+    /// Whether the user states units.
+    pub(crate) fn has_units(&self) -> bool {
+        !self.units.is_empty()
+    }
+
+    /// Whether every column that the user names is one of `available`.
+    pub(crate) fn is_covered(&self, available: &[AvailableColumn]) -> bool {
+        self.assignments.iter().all(|(_, wanted)| available.iter().any(|column| column.name == *wanted))
+    }
+
+    /// The columns to read of `available`: time, index, and the channels in the order of `sensor`.
+    pub(crate) fn choose(
+        &self,
+        available: &[AvailableColumn],
+        sensor: &SensorProfile,
+    ) -> Result<Vec<ChosenColumn>, SelectionError> {
+        let mut chosen = if self.assignments.is_empty() {
+            by_name(available, sensor)?
+        } else {
+            let mut assigned = self.assigned(available, sensor)?;
+            if !assigned.iter().any(|(role, _)| *role == Role::Time) {
+                // The time is seldom named, and a file has rarely two.
+                assigned.extend(by_name(available, sensor).ok().and_then(|named| {
+                    named.into_iter().find(|(role, column)| {
+                        *role == Role::Time && !assigned.iter().any(|(_, other)| other == column)
+                    })
+                }));
+            }
+            assigned
+        };
+        if !chosen.iter().any(|(role, _)| matches!(role, Role::Channel(_))) {
+            return Err(SelectionError::NoChannel(names(available)));
+        }
+        if self.assignments.is_empty() {
+            let left_out = self.unitless_companions(&chosen, available);
+            chosen.retain(|(_, position)| !left_out.contains(position));
+        }
+        chosen.sort_by_key(|(role, _)| match role {
+            Role::Time => 0,
+            Role::Index => 1,
+            Role::Channel(profile) => {
+                2 + sensor.channels.iter().position(|channel| channel.name == profile.name).unwrap_or(0)
+            }
+        });
+        chosen.into_iter().map(|(role, position)| self.with_unit(role, position, &available[position])).collect()
+    }
+
+    /// The columns of other quantities than rate and force, by their positions, that have no unit, beside those of an inertial sensor: a
+    /// magnetometer or a thermometer is no reason to ask for one.
+    fn unitless_companions(&self, chosen: &[(Role, usize)], available: &[AvailableColumn]) -> Vec<usize> {
+        let quantity = |role: &Role| match role {
+            Role::Channel(profile) => Some(profile.quantity),
+            _ => None,
+        };
+        if !chosen.iter().any(|(role, _)| quantity(role).is_some_and(Quantity::is_inertial)) {
+            return Vec::new();
+        }
+        let is_unitless = |(role, position): &(Role, usize)| {
+            quantity(role).is_some_and(|quantity| {
+                let column = &available[*position];
+                let own = column.unit.filter(|unit| unit.measures(quantity) || unit.base == COUNT);
+                let own = own.or_else(|| unit_by_interface(&column.name, quantity));
+                let stated = self.stated_unit(quantity.unit()).or_else(|| self.stated_unit(COUNT));
+                !quantity.is_inertial() && own.or(stated).is_none()
+            })
+        };
+        chosen.iter().copied().filter(is_unitless).map(|(_, position)| position).collect()
+    }
+
+    /// Which of the columns are not among the `chosen` ones, and why, and which units their names tell: a sentence each; none where the user
+    /// chooses the columns.
+    pub(crate) fn notes(
+        &self,
+        available: &[AvailableColumn],
+        chosen: &[ChosenColumn],
+        sensor: &SensorProfile,
+    ) -> Vec<String> {
+        if !self.assignments.is_empty() {
+            return Vec::new();
+        }
+        let named = by_name(available, sensor).unwrap_or_default();
+        let unitless = self.unitless_companions(&named, available);
+        let is_used = |at: &usize| chosen.iter().any(|column| column.position == *at);
+        let (mut no_channel, mut other_unit) = (Vec::new(), Vec::new());
+        for (_, column) in available.iter().enumerate().filter(|(at, _)| !is_used(at) && !unitless.contains(at)) {
+            match (sensor.channel(&column.name).or_else(|| column.channel(sensor)), column.unit) {
+                (Some(_), Some(unit)) => other_unit.push(format!("{} in {}", column.name, unit.name)),
+                _ => no_channel.push(column.name.as_str()),
+            }
+        }
+        let mut notes = Vec::new();
+        if !unitless.is_empty() {
+            let names: Vec<&str> = unitless.iter().map(|&at| available[at].name.as_str()).collect();
+            notes.push(format!("{} left out: no unit; --units gives one", some_of(&names)));
+        }
+        if !other_unit.is_empty() {
+            let names: Vec<&str> = other_unit.iter().map(String::as_str).collect();
+            notes.push(format!(
+                "{} left out: a unit of another quantity than the name; --columns reads it",
+                some_of(&names)
+            ));
+        }
+        if !no_channel.is_empty() {
+            notes.push(format!("{} left out: no known name of a channel; --columns reads it", some_of(&no_channel)));
+        }
+        let by_interface = chosen.iter().filter(|column| self.unit_of_interface(column).is_some());
+        let by_interface: Vec<&str> = by_interface.map(|column| column.label.as_str()).collect();
+        if !by_interface.is_empty() {
+            let of =
+                "in the units of the industrial I/O interface of Linux, rad/s, m/s^2 and gauss; --units says otherwise";
+            notes.push(format!("{} taken to be {of}", some_of(&by_interface)));
+        }
+        notes
+    }
+
+    /// The unit that the name of a column alone tells.
+    fn unit_of_interface(&self, column: &ChosenColumn) -> Option<Unit> {
+        let Role::Channel(profile) = column.role else { return None };
+        let is_stated = self.stated_unit(profile.quantity.unit()).is_some();
+        unit_by_interface(&column.label, profile.quantity).filter(|unit| !is_stated && column.unit == Some(*unit))
+    }
+
+    fn assigned(
+        &self,
+        available: &[AvailableColumn],
+        sensor: &SensorProfile,
+    ) -> Result<Vec<(Role, usize)>, SelectionError> {
+        let mut assigned: Vec<(Role, usize)> = Vec::new();
+        for (name, wanted) in &self.assignments {
+            let role = match name.as_str() {
+                "time" => Role::Time,
+                "sample" => Role::Index,
+                _ => sensor.channel(name).map(Role::Channel).ok_or_else(|| SelectionError::UnknownChannel {
+                    name: name.clone(),
+                    sensor: sensor.name.to_owned(),
+                    known: sensor.channels.iter().map(|channel| channel.name).collect::<Vec<_>>().join(", "),
+                })?,
+            };
+            // By its name, or by its heading with the unit.
+            let by_name = available.iter().position(|column| column.name == *wanted);
+            let heading = AvailableColumn::from_heading(wanted);
+            let position = by_name
+                .or_else(|| available.iter().position(|column| *column == heading))
+                .ok_or_else(|| SelectionError::NoColumn { wanted: wanted.clone(), available: names(available) })?;
+            if let Some((_, other)) = assigned.iter().find(|(known, _)| *known == role) {
+                let (one, other) = (available[*other].name.clone(), wanted.clone());
+                return Err(SelectionError::Ambiguous { channel: name.clone(), one, other });
+            }
+            assigned.push((role, position));
+        }
+        Ok(assigned)
+    }
+
+    fn with_unit(&self, role: Role, position: usize, column: &AvailableColumn) -> Result<ChosenColumn, SelectionError> {
+        let stated = |base: &str| self.stated_unit(base);
+        let (unit, factor) = match role {
+            Role::Index => (None, 1.0),
+            Role::Time => (stated(SECOND).or(column.unit.filter(|unit| unit.base == SECOND)), 1.0),
+            Role::Channel(profile) => {
+                let own = column.unit.filter(|unit| unit.measures(profile.quantity) || unit.base == COUNT);
+                let own = own.or_else(|| stated(COUNT)).or_else(|| unit_by_interface(&column.name, profile.quantity));
+                let unit = stated(profile.quantity.unit()).or(own).ok_or_else(|| SelectionError::NoUnit {
+                    column: column.name.clone(),
+                    channel: profile.name.to_owned(),
+                    example: profile.quantity.unit(),
+                })?;
+                let is_known = profile != ChannelProfile::generic(profile.name, profile.quantity);
+                match unit.base {
+                    COUNT if is_known => (Some(unit), profile.lsb),
+                    COUNT => return Err(SelectionError::CountsOfAny(column.name.clone())),
+                    _ => (Some(unit), unit.factor),
+                }
+            }
+        };
+        Ok(ChosenColumn { position, role, label: column.name.clone(), unit, factor })
+    }
+}
+
+impl AvailableColumn {
+    /// From a heading that may end in a unit: `ax [m/s^2]`, `wx (rad/s)`, `gyro x, deg/s`, `gyro_x_deg_s`, `time_us`, `gyro_x_counts`. The
+    /// output registers of the ADIS164xx, `XGYRO_OUT`, have counts.
+    pub(crate) fn from_heading(heading: &str) -> Self {
+        let heading = heading.trim().trim_start_matches(['#', '%']).trim();
+        if let Some((name, unit)) = heading.rsplit_once(',')
+            && let Some(unit) = Unit::parse(unit)
+        {
+            return Self { name: name.trim().to_owned(), unit: Some(unit) };
+        }
+        if is_output_register(heading) {
+            return Self { name: heading.to_owned(), unit: Unit::parse(COUNT) };
+        }
+        for (open, close) in [('[', ']'), ('(', ')')] {
+            let bracketed = heading.strip_suffix(close).and_then(|text| text.rsplit_once(open));
+            if let Some((name, unit)) = bracketed
+                && let Some(unit) = Unit::parse(unit).map(|known| gauss_of_field(name, unit).unwrap_or(known))
+            {
+                return Self { name: name.trim().to_owned(), unit: Some(unit) };
+            }
+        }
+        if let Some(unit) = Unit::parse(heading).filter(|unit| unit.base == SECOND && heading.len() > 1) {
+            return Self { name: heading.to_owned(), unit: Some(unit) };
+        }
+        // The longest ending that is a unit: `deg_s`, not `s`.
+        let ends = heading.char_indices().filter(|(_, letter)| *letter == '_').map(|(at, _)| at);
+        let named = ends.filter(|at| *at > 0).find_map(|at| {
+            Unit::parse(&heading[at + 1..]).map(|unit| Self { name: heading[..at].to_owned(), unit: Some(unit) })
+        });
+        named
+            .filter(|column| role_of(&column.name).is_some())
+            .unwrap_or_else(|| Self { name: heading.to_owned(), unit: None })
+    }
+
+    /// What stands before the usual name of a channel, and the channel, `time` or `sample` that it names.
+    pub(crate) fn prefix_and_channel(&self) -> Option<(&str, &'static str)> {
+        let channel = match role_of(&self.name)? {
+            NamedRole::Time => return Some(("", "time")),
+            NamedRole::Index => return Some(("", "sample")),
+            NamedRole::Channel(name) => name,
+        };
+        // The shortest ending that is a name by itself has the longest beginning before it.
+        let starts = self.name.char_indices().map(|(at, _)| at).rev();
+        let short = starts.filter(|at| *at > 0 && !self.name[..*at].ends_with(|letter: char| letter.is_alphanumeric()));
+        let is_name =
+            |at: &usize| matches!(role_of(&self.name[*at..]), Some(NamedRole::Channel(own)) if own == channel);
+        Some((&self.name[..short.clone().find(is_name).unwrap_or(0)], channel))
+    }
+
+    /// The channel of `sensor` that its name tells.
+    fn channel(&self, sensor: &SensorProfile) -> Option<ChannelProfile> {
+        match role_of(&self.name)? {
+            NamedRole::Channel(name) => sensor.channel(name),
+            NamedRole::Time | NamedRole::Index => None,
+        }
+    }
+
+    /// Whether its unit may be that of a channel.
+    fn may_measure(&self, profile: &ChannelProfile) -> bool {
+        self.unit.is_none_or(|unit| unit.measures(profile.quantity) || unit.base == COUNT)
+    }
+
+    /// Whether its name is that of a time.
+    pub(crate) fn is_time(&self) -> bool {
+        matches!(role_of(&self.name), Some(NamedRole::Time))
+    }
+
+    /// A column of a format that says what it is.
+    pub(crate) fn known(name: &str, unit: &str) -> Self {
+        Self { name: name.to_owned(), unit: Unit::parse(unit) }
+    }
+}
+
+/// The names of columns in a message; of many the first.
+fn names(available: &[AvailableColumn]) -> String {
+    const SHOWN: usize = 24;
+    let shown: Vec<&str> = available.iter().take(SHOWN).map(|column| column.name.as_str()).collect();
+    let more = if available.len() > SHOWN { ", …" } else { "" };
+    format!("{}{more}", shown.join(", "))
+}
+
+/// Names of columns in a note; of many the first, and how many there are.
+fn some_of(names: &[&str]) -> String {
+    const SHOWN: usize = 8;
+    let shown = names.iter().take(SHOWN).copied().collect::<Vec<_>>().join(", ");
+    if names.len() > SHOWN { format!("{shown}, … ({} columns)", names.len()) } else { shown }
+}
+
+/// The unit of a magnetic field in `G`, which is gauss and not gravity.
+fn gauss_of_field(name: &str, unit: &str) -> Option<Unit> {
+    let is_field = matches!(role_of(name), Some(NamedRole::Channel(channel)) if channel.starts_with("magn"));
+    Unit::parse("gauss").filter(|_| is_field && unit.trim() == "G")
+}
+
+/// Whether a heading is the name of an output register in the data sheets of the ADIS164xx.
+pub fn is_output_register(heading: &str) -> bool {
+    const OF_PART: [&str; 3] = ["SUPPLY_OUT", "TEMP_OUT", "AUX_ADC"];
+    let of_axis = heading.strip_suffix("_OUT").and_then(|name| name.strip_prefix(['X', 'Y', 'Z']));
+    OF_PART.contains(&heading) || of_axis.is_some_and(|name| ["GYRO", "ACCL", "MAGN"].contains(&name))
+}
+
+/// The unit of a quantity in the industrial I/O interface of Linux, by a name of it that is not that of raw counts: `in_anglvel_x`.
+fn unit_by_interface(name: &str, quantity: Quantity) -> Option<Unit> {
+    let plain = name.to_lowercase();
+    let unit = match quantity.unit() {
+        "deg/s" if plain.starts_with("in_anglvel_") => "rad/s",
+        "g" if plain.starts_with("in_accel_") => "m/s^2",
+        "gauss" if plain.starts_with("in_magn_") => "gauss",
+        _ => return None,
+    };
+    if plain.ends_with("_raw") { None } else { Unit::parse(unit) }
+}
+
+/// The columns whose names say what they are: the name of a channel of any sensor, `time` or `sample`, and the position. `None` where
+/// two columns look like one channel.
+pub(crate) fn known_by_name(available: &[AvailableColumn]) -> Option<Vec<(&'static str, usize)>> {
+    let named = by_name(available, &SensorProfile::generic()).ok()?;
+    Some(named.into_iter().map(|(role, position)| (role.name(), position)).collect())
+}
+
+/// The columns whose names say what they are.
+fn by_name(available: &[AvailableColumn], sensor: &SensorProfile) -> Result<Vec<(Role, usize)>, SelectionError> {
+    let mut named: Vec<(Role, usize)> = Vec::new();
+    for (position, column) in available.iter().enumerate() {
+        let own = sensor.channel(&column.name).map(Role::Channel);
+        let of_body = || rate_of_body(available, position).and_then(|name| sensor.channel(name)).map(Role::Channel);
+        let by_name = || match role_of(&column.name)? {
+            NamedRole::Time => Some(Role::Time),
+            NamedRole::Index => Some(Role::Index),
+            NamedRole::Channel(name) => sensor.channel(name).map(Role::Channel),
+        };
+        let role = own.or_else(by_name).or_else(of_body).filter(|role| match role {
+            // A magnetic field is no rate, whatever it is called.
+            Role::Channel(profile) => column.may_measure(profile),
+            Role::Time | Role::Index => true,
+        });
+        let Some(role) = role else { continue };
+        if let Some((_, other)) = named.iter().find(|(known, _)| *known == role) {
+            if role == Role::Time {
+                // When the sample was taken, rather than when it was published or written.
+                if is_time_of_sample(&column.name) {
+                    named.retain(|(known, _)| *known != Role::Time);
+                    named.push((role, position));
+                }
+                continue;
+            }
+            if role == Role::Index {
+                continue;
+            }
+            let (one, other) = (available[*other].name.clone(), column.name.clone());
+            return Err(SelectionError::Ambiguous { channel: role.name().to_owned(), one, other });
+        }
+        named.push((role, position));
+    }
+    Ok(named)
+}
+
+/// The rate that a column is by the names of aviation: p, q and r, where there are all three.
+fn rate_of_body(available: &[AvailableColumn], position: usize) -> Option<&'static str> {
+    let is_named = |column: &AvailableColumn, letter: &str| column.name.trim().eq_ignore_ascii_case(letter);
+    let letters = ["p", "q", "r"];
+    let has_all = letters.iter().all(|letter| available.iter().any(|column| is_named(column, letter)));
+    let axis = letters.iter().position(|letter| has_all && is_named(&available[position], letter))?;
+    Some(AXES[0].1[axis])
+}
+
+/// What the name of a column says.
+enum NamedRole {
+    Time,
+    Index,
+    Channel(&'static str),
+}
+
+/// The usual names, in small letters with `_` for other signs and without the axis.
+const GYROSCOPE: [&str; 32] = [
+    "gyro",
+    "gy",
+    "gyr",
+    "gyros",
+    "gyroscope",
+    "gyro_rate",
+    "gyrorate",
+    "rot_rate",
+    "rotation_rate",
+    "rotationrate",
+    "angularvelocity",
+    "ang_vel",
+    "angvel",
+    "w",
+    "wb",
+    "g",
+    "omega",
+    "rate",
+    "angular_velocity",
+    "angular_rate",
+    "w_rs_s",
+    "gyro_rad",
+    "anglvel",
+    "angular_vel",
+    "angularvel",
+    "angularrate",
+    "ang_rate",
+    "angrate",
+    "rotrate",
+    "rotation",
+    "gyroadc",
+    "gyroscope_rate",
+];
+const ACCELEROMETER: [&str; 23] = [
+    "accl",
+    "ac",
+    "fb",
+    "acc",
+    "accel",
+    "accels",
+    "accelerometer",
+    "linearacceleration",
+    "lin_acc",
+    "linacc",
+    "a",
+    "acceleration",
+    "linear_acceleration",
+    "specific_force",
+    "a_rs_s",
+    "accelerometer_m_s2",
+    "force",
+    "accels",
+    "linear_accel",
+    "linearaccel",
+    "specificforce",
+    "accsmooth",
+    "accelerometer_acceleration",
+];
+const MAGNETOMETER: [&str; 11] = [
+    "magn",
+    "mag",
+    "magnetometer",
+    "m",
+    "mb",
+    "b",
+    "magnetic_field",
+    "magneticfield",
+    "mag_field",
+    "magfield",
+    "compass",
+];
+const AXES: [(&str, [&str; 3]); 3] = [
+    ("gyro", ["gyro_x", "gyro_y", "gyro_z"]),
+    ("accl", ["accl_x", "accl_y", "accl_z"]),
+    ("magn", ["magn_x", "magn_y", "magn_z"]),
+];
+
+/// Whether a time column has the times of the samples by its name, where a file has several.
+fn is_time_of_sample(name: &str) -> bool {
+    let name = name.to_lowercase();
+    name.ends_with("stamp_sample") || name.ends_with("header.stamp") || name.starts_with("sensor")
+}
+
+fn role_of(name: &str) -> Option<NamedRole> {
+    let plain: String =
+        name.to_lowercase().chars().map(|letter| if letter.is_ascii_alphanumeric() { letter } else { '_' }).collect();
+    let plain = plain.trim_matches('_');
+    // As the industrial I/O interface of Linux and data sheets call them: `in_anglvel_x_raw`, `XGYRO_OUT`.
+    let plain = plain.strip_prefix("in_").unwrap_or(plain);
+    let plain =
+        ["_raw", "_out", "_input", "_lsb"].iter().find_map(|ending| plain.strip_suffix(ending)).unwrap_or(plain);
+    match plain {
+        "time" | "times" | "t" | "timestamp" | "timestamps" | "time_stamp" | "stamp" | "timestamp_sample"
+        | "timeus" | "elapsed" | "elapsed_time" | "x_value" => {
+            return Some(NamedRole::Time);
+        }
+        // A column that is called by its unit.
+        _ if plain.len() > 1 && Unit::parse(plain).is_some_and(|unit| unit.base == SECOND) => {
+            return Some(NamedRole::Time);
+        }
+        _ if plain.ends_with("header_stamp") || plain.ends_with("timestamp") => return Some(NamedRole::Time),
+        "sample" | "packet" | "packet_counter" | "packetcounter" | "packet_number" | "packetnumber"
+        | "sample_number" | "samplenumber" | "sample_index" | "sample_counter" | "samplecounter" => {
+            return Some(NamedRole::Index);
+        }
+        "temp" | "tmp" | "temperature" => return Some(NamedRole::Channel("temp")),
+        "supply" | "vdd" => return Some(NamedRole::Channel("supply")),
+        "aux_adc" => return Some(NamedRole::Channel("aux_adc")),
+        _ => {}
+    }
+    let groups = [&GYROSCOPE[..], &ACCELEROMETER[..], &MAGNETOMETER[..]];
+    // The axis before the name: `xgyro`, `x_accel`. Single letters behind it are no name.
+    let before = plain.chars().next().and_then(|axis| "xyz".find(axis)).and_then(|axis| {
+        let base = plain[1..].trim_start_matches('_');
+        let group = groups.iter().position(|group| base.len() > 2 && group.contains(&base))?;
+        Some(NamedRole::Channel(AXES[group].1[axis]))
+    });
+    if before.is_some() {
+        return before;
+    }
+    let axis = plain.chars().last().and_then(|axis| "xyz".find(axis).or_else(|| "012".find(axis)))?;
+    let base = plain[..plain.len() - 1].trim_end_matches('_');
+    // A longer name may stand before the usual one: `imu0_gyro`, `field_angular_velocity`. Single letters stand alone.
+    let matches = |known: &str| base == known || known.len() > 2 && base.ends_with(&format!("_{known}"));
+    let group = groups.iter().position(|group| group.iter().any(|known| matches(known)))?;
+    Some(NamedRole::Channel(AXES[group].1[axis]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{AvailableColumn, ColumnSelection, Role, SelectionError};
+    use measurement::SensorProfile;
+
+    /// The roles, factors and units of a header.
+    fn chosen(headings: &[&str], columns: &[&str], units: &[&str]) -> Result<Vec<(String, f64)>, SelectionError> {
+        let owned = |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>();
+        let available: Vec<AvailableColumn> = headings.iter().map(|text| AvailableColumn::from_heading(text)).collect();
+        let selection = ColumnSelection::parse(&owned(columns), &owned(units))?;
+        let describe = |column: super::ChosenColumn| {
+            let role = match column.role {
+                Role::Time => format!("time {}", column.unit.map_or("?", |unit| unit.name)),
+                Role::Index => "sample".to_owned(),
+                Role::Channel(profile) => profile.name.to_owned(),
+            };
+            (format!("{role}={}", column.position), column.factor)
+        };
+        Ok(selection.choose(&available, &SensorProfile::generic())?.into_iter().map(describe).collect())
+    }
+
+    #[test]
+    fn headings_of_well_known_files_need_no_arguments() {
+        const RAD: f64 = 180.0 / std::f64::consts::PI;
+        const M_S2: f64 = 1.0 / 9.80665;
+        for (headings, expected) in [
+            // EuRoC: imu0/data.csv.
+            (
+                &[
+                    "#timestamp [ns]",
+                    "w_RS_S_x [rad s^-1]",
+                    "w_RS_S_y [rad s^-1]",
+                    "w_RS_S_z [rad s^-1]",
+                    "a_RS_S_x [m s^-2]",
+                ][..],
+                &[("time ns=0", 1.0), ("gyro_x=1", RAD), ("gyro_y=2", RAD), ("gyro_z=3", RAD), ("accl_x=4", M_S2)][..],
+            ),
+            (&["time_us", "ax [g]", "gyro_z_deg_s"], &[("time us=0", 1.0), ("gyro_z=2", 1.0), ("accl_x=1", 1.0)]),
+            // ulog2csv writes vectors so.
+            (&["timestamp", "gyro_rad[0]", "gyro_rad[1]"], &[("time ?=0", 1.0)]),
+        ] {
+            let found = chosen(headings, &[], &["rad/s"]).expect("columns");
+            for (at, (name, factor)) in expected.iter().enumerate() {
+                if *name == "gyro_z=2" {
+                    continue; // --units overrides the heading; covered below.
+                }
+                assert_eq!(found[at].0, *name);
+                assert!((found[at].1 - factor).abs() < 1e-12, "{name}: {}", found[at].1);
+            }
+        }
+        let plain = chosen(&["time_us", "ax [g]", "gyro_z_deg_s"], &[], &[]).expect("columns");
+        assert_eq!(plain[1], ("gyro_z=2".to_owned(), 1.0));
+    }
+
+    /// Spellings of programs, drivers and data sheets, each beside a time.
+    #[test]
+    fn the_names_of_all_trades_are_known() {
+        for (name, channel) in [
+            ("in_anglvel_x", "gyro_x"),
+            ("in_anglvel_z_raw", "gyro_z"),
+            ("in_accel_y", "accl_y"),
+            ("in_magn_z", "magn_z"),
+            ("XGYRO_OUT", "gyro_x"),
+            ("ZACCL_OUT", "accl_z"),
+            ("YMAGN_OUT", "magn_y"),
+            ("TEMP_OUT", "temp"),
+            ("gyro_x_radps", "gyro_x"),
+            ("accel_z_mps2", "accl_z"),
+            ("x_gyro", "gyro_x"),
+            ("zAccel", "accl_z"),
+            ("angular_velocity.y", "gyro_y"),
+            ("AngularRateX", "gyro_x"),
+            ("RotRateZ", "gyro_z"),
+            ("gyro_z, deg/s", "gyro_z"),
+            ("linear_accel_x", "accl_x"),
+            ("Magnetic Field y (uT)", "magn_y"),
+            ("compass_x", "magn_x"),
+        ] {
+            let column = AvailableColumn::from_heading(name);
+            let found = super::known_by_name(&[column]).expect("one");
+            assert_eq!(found, [(channel, 0)], "{name}");
+        }
+        let body = ["t (s)", "p (deg/s)", "q (deg/s)", "r (deg/s)"];
+        let expected = ["time s=0", "gyro_x=1", "gyro_y=2", "gyro_z=3"];
+        let found = chosen(&body, &[], &[]).expect("columns");
+        assert_eq!(found.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), expected);
+        // Pressure and rain, and a field that is called as a rate.
+        for headings in [&["t_s", "p", "r"][..], &["t_s", "w_x [uT]"], &["latitude", "quality"]] {
+            assert!(matches!(chosen(headings, &[], &["deg/s"]), Err(SelectionError::NoChannel(_))), "{headings:?}");
+        }
+    }
+
+    /// No column disappears without a word.
+    #[test]
+    fn every_column_is_used_or_named_as_left_out() {
+        let headings = ["time_s", "gx [deg/s]", "gy [deg/s]", "gz [deg/s]", "temp", "my_rate_q", "m_x [V]", "note"];
+        let available: Vec<AvailableColumn> = headings.iter().map(|text| AvailableColumn::from_heading(text)).collect();
+        let sensor = SensorProfile::generic();
+        let selection = ColumnSelection::default();
+        let chosen = selection.choose(&available, &sensor).expect("columns");
+        let notes = selection.notes(&available, &chosen, &sensor);
+        assert_eq!(
+            notes,
+            [
+                "temp left out: no unit; --units gives one",
+                "m_x in V left out: a unit of another quantity than the name; --columns reads it",
+                "my_rate_q, note left out: no known name of a channel; --columns reads it"
+            ]
+        );
+    }
+
+    #[test]
+    fn of_several_times_that_of_the_sample_is_taken() {
+        // As `rostopic echo -p` and ulog2csv write them.
+        let ros =
+            ["%time", "field.header.seq", "field.header.stamp", "field.header.frame_id", "field.angular_velocity.x"];
+        let expected = vec![("time ?=2".to_owned(), 1.0), ("gyro_x=4".to_owned(), 1.0)];
+        assert_eq!(chosen(&ros, &[], &["deg/s"]).expect("columns"), expected);
+        let px4 = ["timestamp", "timestamp_sample", "x"];
+        let expected = vec![("time us=1".to_owned(), 1.0), ("gyro_x=2".to_owned(), 1.0)];
+        assert_eq!(chosen(&px4, &["gyro_x=x"], &["deg/s", "us"]).expect("columns"), expected);
+    }
+
+    #[test]
+    fn a_column_is_known_by_its_heading_too() {
+        let headings = ["time_s", "wx_dps", "wx [rad/s]"];
+        let expected = vec![("time s=0".to_owned(), 1.0), ("gyro_x=1".to_owned(), 1.0)];
+        assert_eq!(chosen(&headings, &["time=time_s", "gyro_x=wx_dps"], &[]).expect("columns"), expected);
+        let found = chosen(&headings, &["gyro_x=wx [rad/s]"], &[]).expect("columns");
+        assert_eq!(found[0].0, "gyro_x=2");
+    }
+
+    #[test]
+    fn faults_of_the_selection_are_named() {
+        for (headings, columns, units, expected) in [
+            (&["wx"][..], &[][..], &[][..], "no unit of gyro_x"),
+            (&["wx", "gyro_x"], &[], &["deg/s"], "gyro_x is both wx and gyro_x"),
+            (&["p", "q"], &[], &[], "no column is named like a channel"),
+            (&["p", "q"], &["gyro_x=r"], &["deg/s"], "no column r; the file has p, q"),
+            (&["p"], &["gyro_w=p"], &["deg/s"], "gyro_w"),
+            (&["p"], &["gyro_x"], &["deg/s"], "expected CHANNEL=COLUMN"),
+            (&["p"], &["gyro_x=p"], &["furlong"], "not a known unit"),
+            (&["p"], &["gyro_x=p"], &["deg/s", "rad/s"], "are of one quantity"),
+            (&["gyro_x_counts"], &[], &[], "counts of which sensor"),
+        ] {
+            let error = chosen(headings, columns, units).expect_err(expected).to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+}

@@ -1,0 +1,436 @@
+//! Which format a file has, by its content; and the reading of any of them.
+
+use crate::columns::column_selection::ColumnSelection;
+use crate::formats::ardupilot_log::{self, ArduPilotSource};
+#[cfg(feature = "hdf5")]
+use crate::formats::hdf5::Hdf5Reader;
+use crate::formats::matlab::MatReader;
+use crate::formats::mcap_bag::McapSource;
+use crate::formats::numpy::{NpyReader, NpzReader};
+use crate::formats::ros_bag::RosBagSource;
+use crate::formats::split_bag::SplitBag;
+pub use crate::formats::split_bag::files_of_bag;
+#[cfg(feature = "sqlite")]
+use crate::formats::sqlite_bag::SqliteSource;
+use crate::formats::text_table::TextRows;
+pub use crate::formats::topics::TopicDescription;
+use crate::formats::topics::{self, Source, TopicRows};
+use crate::formats::ulog::UlogSource;
+use crate::formats::{foreign_format, text_table};
+use crate::input::budget::{Budget, Metered};
+use crate::input::delimited_text::{Lines, is_utf16};
+use crate::input::file_bytes::FileBytes;
+use crate::input::file_hash::FileHash;
+use crate::input::gzip_members::{GZIP_MAGIC, GzipMembers};
+use crate::input::input_error::{InputError, Reason};
+use crate::input::read_monitor::{Counted, ReadMonitor};
+use crate::input::zstd_frames::{ZSTD_MAGIC, ZstdFrames};
+use crate::inspection::InspectedTable;
+use crate::rows::any_sensor::ReadOptions;
+use crate::rows::batch::RegisterField;
+use crate::rows::row_source::{FileRows, RowSource};
+use crate::rows::whole_table::WholeTable;
+use measurement::SensorProfile;
+use std::fs::File;
+use std::io::{self, BufReader, Read, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::thread;
+use std::time::Duration;
+use tempfile::NamedTempFile;
+
+/// Bytes that tell a format: several messages of the raw stream.
+pub const HEAD_BYTES: u64 = 1 << 14;
+
+/// The format of a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FileFormat {
+    /// Lines of text: a table of numbers.
+    TextTable,
+    /// One array of NumPy.
+    Npy,
+    /// An archive of arrays of NumPy.
+    Npz,
+    /// MATLAB, level 5.
+    Mat,
+    /// A bag of ROS 1.
+    RosBag,
+    /// MCAP, of ROS 2 or Foxglove.
+    Mcap,
+    /// A bag of ROS 2 in SQLite.
+    Sqlite,
+    /// A log of PX4.
+    Ulog,
+    /// A DataFlash log of ArduPilot.
+    ArduPilot,
+    /// HDF5, which is also MATLAB 7.3.
+    Hdf5,
+}
+
+impl FileFormat {
+    /// What it is called in a sentence.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::TextTable => "text",
+            Self::Npy => "an array of NumPy",
+            Self::Npz => "arrays of NumPy",
+            Self::Mat => "MATLAB",
+            Self::RosBag => "a bag of ROS 1",
+            Self::Mcap => "MCAP",
+            Self::Sqlite => "a bag of ROS 2 in SQLite",
+            Self::Ulog => "a log of PX4",
+            Self::ArduPilot => "a DataFlash log of ArduPilot",
+            Self::Hdf5 => "HDF5",
+        }
+    }
+}
+
+/// First bytes of the binary formats.
+const MAGICS: [(&[u8], FileFormat); 8] = [
+    (b"\x93NUMPY", FileFormat::Npy),
+    (b"PK\x03\x04", FileFormat::Npz),
+    (b"MATLAB 5.0 MAT-file", FileFormat::Mat),
+    (b"#ROSBAG V2.0", FileFormat::RosBag),
+    (b"\x89MCAP0\r\n", FileFormat::Mcap),
+    (b"SQLite format 3\0", FileFormat::Sqlite),
+    (b"ULog\x01\x12\x35", FileFormat::Ulog),
+    (&ardupilot_log::MAGIC, FileFormat::ArduPilot),
+];
+
+/// An input that can be read more than once: a file, a copy of what came through a pipe or was compressed, bytes in memory, or the files of
+/// a bag that was split.
+#[derive(Debug)]
+pub struct InputFile {
+    /// As the user named it.
+    name: PathBuf,
+    /// At least one; of a bag of ROS 2 in a folder all of its files, in their order.
+    parts: Vec<InputPart>,
+    format: FileFormat,
+    monitor: ReadMonitor,
+    budget: Budget,
+}
+
+/// A file of an input.
+#[derive(Debug)]
+struct InputPart {
+    /// As it was given.
+    origin: FileBytes,
+    /// As it is read.
+    bytes: FileBytes,
+    budget: Budget,
+}
+
+impl InputFile {
+    /// Opens `name`, `-` for standard input, and recognises its format. A pipe is copied to a temporary file, and so is a
+    /// compressed file of a binary format. Of a folder the bag of ROS 2 in it is opened. `monitor` counts the bytes that are read of the
+    /// recording, and may stop the reading of a pipe, of text and of an array.
+    ///
+    /// # Errors
+    /// The file cannot be read or copied, or it has none of the formats.
+    pub fn open(name: &Path, monitor: &ReadMonitor) -> Result<Self, InputError> {
+        Self::recognised(name, Self::files(name, monitor)?, monitor)
+    }
+
+    /// The files of `name`, as [`open`](Self::open) reads them: one, or those of a bag in a folder.
+    ///
+    /// # Errors
+    /// There is none, or a pipe cannot be copied.
+    pub fn files(name: &Path, monitor: &ReadMonitor) -> Result<Vec<FileBytes>, InputError> {
+        let fail = |error| InputError::file(name, Reason::Io(error));
+        let pipe =
+            |copied: io::Result<NamedTempFile>| Ok(vec![FileBytes::in_temporary_file(name, copied.map_err(fail)?)]);
+        if name == Path::new("-") {
+            return pipe(copied_pipe(io::stdin(), monitor));
+        }
+        let metadata = name.metadata().map_err(fail)?;
+        if metadata.is_dir() {
+            let files = files_of_bag(name).map_err(fail)?;
+            let bytes: Vec<FileBytes> = files.iter().map(FileBytes::from).collect();
+            if bytes.is_empty() { Err(InputError::file(name, Reason::Directory)) } else { Ok(bytes) }
+        } else if metadata.is_file() {
+            Ok(vec![FileBytes::from(name)])
+        } else {
+            pipe(copied_pipe(File::open(name).map_err(fail)?, monitor))
+        }
+    }
+
+    /// Opens bytes in memory that are called `name`.
+    ///
+    /// # Errors
+    /// They have none of the formats, or are too many once they are decompressed.
+    pub fn in_memory(name: &Path, bytes: impl Into<Arc<[u8]>>) -> Result<Self, InputError> {
+        Self::recognised(name, vec![FileBytes::in_memory(name, bytes)], &ReadMonitor::default())
+    }
+
+    /// Recognises the format of files that are one recording called `name`.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn recognised(name: &Path, files: Vec<FileBytes>, monitor: &ReadMonitor) -> Result<Self, InputError> {
+        let (mut parts, mut format) = (Vec::new(), None);
+        for file in files {
+            let (part, of_part) = InputPart::recognised(file)?;
+            if *format.get_or_insert(of_part) != of_part {
+                return Err(InputError::file(name, Reason::Directory));
+            }
+            parts.push(part);
+        }
+        let format = format.ok_or_else(|| InputError::file(name, Reason::Directory))?;
+        let budget = Budget::joined(parts.iter().map(|part| part.budget));
+        Ok(Self { name: name.to_owned(), parts, format, monitor: monitor.clone(), budget })
+    }
+
+    /// What was recognised.
+    pub fn format(&self) -> FileFormat {
+        self.format
+    }
+
+    /// Begins to make the hash of the bytes, as they were given.
+    ///
+    /// # Errors
+    /// The file cannot be opened.
+    pub fn begin_hash(&self) -> io::Result<FileHash> {
+        FileHash::begin(&self.parts.iter().map(|part| part.origin.clone()).collect::<Vec<_>>())
+    }
+
+    /// As the user named it.
+    pub fn name(&self) -> &Path {
+        &self.name
+    }
+
+    /// Who watches the reading.
+    pub fn monitor(&self) -> &ReadMonitor {
+        &self.monitor
+    }
+
+    /// The bytes as they are read; of a bag that was split, those of its first file.
+    pub fn bytes(&self) -> &FileBytes {
+        &self.parts[0].bytes
+    }
+
+    /// The first line of text that is not blank.
+    ///
+    /// # Errors
+    /// It is no text, or there is none.
+    pub fn first_line(&self) -> Result<String, InputError> {
+        let mut lines = Lines::open(self.bytes())?;
+        lines.header()?.map(str::to_owned).ok_or_else(|| self.bytes().error(Reason::Empty))
+    }
+
+    /// The rows of a table, or of a topic; `register` tells the channels, by their names, whose numbers are words of a register.
+    ///
+    /// # Errors
+    /// The file is damaged, or its topic or columns cannot be chosen.
+    pub fn rows(
+        &self,
+        options: &ReadOptions,
+        register: &dyn Fn(&str) -> Option<RegisterField>,
+    ) -> Result<FileRows<'_>, InputError> {
+        let (name, bytes) = (self.name(), self.bytes());
+        let rows: Box<dyn RowSource + '_> = match self.format {
+            FileFormat::TextTable => Box::new(TextRows::open(bytes, options, &self.monitor)?),
+            _ => Box::new(TopicRows::open(name, self.source()?, options, self.budget)?),
+        };
+        Ok(FileRows::new(name, rows, &self.monitor, register))
+    }
+
+    /// What is in the file without an analysis, of the topic that is named or of all that have an inertial sensor; `selection` is what the
+    /// user says of the columns, and `sensor` tells, by the names of the columns of a table, how large its counts are.
+    ///
+    /// # Errors
+    /// The file is damaged, or has no rows of numbers.
+    pub fn inspect(
+        &self,
+        topic: Option<&str>,
+        selection: &ColumnSelection,
+        sensor: &dyn Fn(&[&str]) -> SensorProfile,
+    ) -> Result<Vec<InspectedTable>, InputError> {
+        let name = self.name();
+        let whole = match self.format {
+            FileFormat::TextTable => {
+                let read = |topic: Option<&str>| text_table::read_whole(self.bytes(), topic, &self.monitor);
+                match read(topic) {
+                    // Rows of several kinds.
+                    Err(InputError { reason: Reason::SeveralTopics(names), .. }) => {
+                        names.split(", ").map(|name| read(Some(name))).collect()
+                    }
+                    table => table.map(|table| vec![table]),
+                }
+            }
+            _ => {
+                let source = self.source();
+                source.and_then(|mut source| topics::read_whole(name, source.as_mut(), topic, self.budget))
+            }
+        };
+        let inspect = |table: WholeTable| {
+            let names: Vec<&str> = table.columns.iter().map(|of| of.column.name.as_str()).collect();
+            let sensor = sensor(&names);
+            InspectedTable::new(table, &sensor, selection)
+        };
+        Ok(whole?.into_iter().map(inspect).collect())
+    }
+
+    /// Names of the sensors of one kind that the file has, each to be read with [`ReadOptions::topic`]; none of a file with one sensor,
+    /// without a known one, or of text.
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn sensors(&self) -> Result<Vec<String>, InputError> {
+        if self.format == FileFormat::TextTable {
+            return Ok(Vec::new());
+        }
+        let source = self.source()?;
+        Ok(topics::names_of_several(source.as_ref()))
+    }
+
+    /// What is in the file: topics of messages, groups of arrays or the only array, with their columns; nothing of text.
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn contents(&self) -> Result<Vec<TopicDescription>, InputError> {
+        if self.format == FileFormat::TextTable {
+            return Ok(Vec::new());
+        }
+        let source = self.source()?;
+        Ok(source.topics().iter().map(TopicDescription::from).collect())
+    }
+
+    /// The topics of a binary format.
+    fn source(&self) -> Result<Box<dyn Source + '_>, InputError> {
+        let mut sources = self.parts.iter().map(|part| self.source_of(part)).collect::<Result<Vec<_>, _>>()?;
+        match sources.pop() {
+            Some(only) if sources.is_empty() => Ok(only),
+            last => Ok(Box::new(SplitBag::new(sources.into_iter().chain(last).collect()))),
+        }
+    }
+
+    fn source_of<'a>(&self, part: &'a InputPart) -> Result<Box<dyn Source + 'a>, InputError> {
+        let (bytes, budget) = (&part.bytes, part.budget.again());
+        Ok(match self.format {
+            FileFormat::TextTable => return Err(bytes.error(Reason::NoTopic { format: "text" })),
+            FileFormat::Npy => Box::new(NpyReader::open(bytes, budget, &self.monitor)?),
+            FileFormat::Npz => Box::new(NpzReader::open(bytes, budget)?),
+            FileFormat::Mat => Box::new(MatReader::open(bytes, budget)?),
+            FileFormat::RosBag => Box::new(RosBagSource::open(bytes, budget)?),
+            FileFormat::Mcap => Box::new(McapSource::open(bytes, budget)?),
+            #[cfg(feature = "sqlite")]
+            FileFormat::Sqlite => Box::new(SqliteSource::open(bytes, budget)?),
+            FileFormat::Ulog => Box::new(UlogSource::open(bytes, budget)?),
+            FileFormat::ArduPilot => Box::new(ArduPilotSource::open(bytes, budget)?),
+            #[cfg(feature = "hdf5")]
+            FileFormat::Hdf5 => Box::new(Hdf5Reader::open(bytes, budget)?),
+            #[cfg(not(all(feature = "hdf5", feature = "sqlite")))]
+            format => return Err(bytes.error(Reason::NotBuilt(format.name()))),
+        })
+    }
+}
+
+impl InputPart {
+    /// A file of a recording, decompressed where its format needs that, and its format.
+    fn recognised(origin: FileBytes) -> Result<(Self, FileFormat), InputError> {
+        let fail = |error| origin.error(Reason::Io(error));
+        let refuse = |reason| Err(origin.error(reason));
+        let budget = Budget::of_file(&origin).map_err(fail)?;
+        let expanded = |whole: &mut dyn Read| {
+            FileBytes::copied(origin.name(), Metered::new(whole, budget.meter()))
+                .map_err(|error| origin.error(Reason::from_io(error)))
+        };
+        let mut bytes = origin.clone();
+        // Of compressed text, what is in it.
+        let mut text = None;
+        let mut head = bytes.head(HEAD_BYTES).map_err(fail)?;
+        if head.starts_with(&GZIP_MAGIC) {
+            let mut inner = GzipMembers::new(BufReader::new(bytes.open().map_err(fail)?));
+            let mut start = Vec::new();
+            // Damage is reported with its line where the whole is read.
+            let _ = inner.by_ref().take(HEAD_BYTES).read_to_end(&mut start);
+            if binary_format(&start).is_some() {
+                bytes = expanded(&mut start.as_slice().chain(inner))?;
+                head = start;
+            } else {
+                text = Some(start);
+            }
+        }
+        if head.starts_with(&ZSTD_MAGIC) {
+            bytes = expanded(&mut ZstdFrames::new(BufReader::new(bytes.open().map_err(fail)?)))?;
+            head = bytes.head(HEAD_BYTES).map_err(fail)?;
+        }
+        let format = match binary_format(&head) {
+            Some(format) => format,
+            None if foreign_format::is_report(&head) => return refuse(foreign_format::REPORT),
+            None if foreign_format::is_json_document(&head) => return refuse(foreign_format::JSON_DOCUMENT),
+            None if foreign_format::is_binary(text.as_ref().unwrap_or(&head))
+                && !(text.is_none() && is_utf16(&head)) =>
+            {
+                return refuse(foreign_format::refusal(text.as_ref().unwrap_or(&head)));
+            }
+            None => FileFormat::TextTable,
+        };
+        Ok((Self { origin, bytes, budget }, format))
+    }
+}
+
+/// How often a pipe that sends nothing is left for a request to stop.
+const STOP_INTERVAL: Duration = Duration::from_millis(50);
+/// Parts of a pipe that wait to be written.
+const PARTS: usize = 4;
+/// Bytes of a part.
+const PART_BYTES: usize = 1 << 16;
+
+/// A temporary file with all that comes through a pipe, until it ends or `monitor` stops the reading.
+///
+/// A thread reads the pipe, because a read waits until something comes. After a stop it waits for the end of the process.
+fn copied_pipe(input: impl Read + Send + 'static, monitor: &ReadMonitor) -> io::Result<NamedTempFile> {
+    monitor.begin();
+    let (sender, parts) = mpsc::sync_channel::<io::Result<Vec<u8>>>(PARTS);
+    let mut input = Counted::new(input, monitor);
+    thread::spawn(move || {
+        loop {
+            let mut part = vec![0; PART_BYTES];
+            let read = match input.read(&mut part) {
+                Ok(0) => break,
+                Ok(count) => {
+                    part.truncate(count);
+                    Ok(part)
+                }
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                Err(error) => Err(error),
+            };
+            let is_failed = read.is_err();
+            if sender.send(read).is_err() || is_failed {
+                break;
+            }
+        }
+    });
+    let mut copy = NamedTempFile::new()?;
+    loop {
+        if monitor.take_stop() {
+            monitor.cut();
+            break;
+        }
+        match parts.recv_timeout(STOP_INTERVAL) {
+            Ok(part) => copy.write_all(&part?)?,
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+    }
+    copy.flush()?;
+    monitor.end();
+    Ok(copy)
+}
+
+/// Whether the first bytes are those of HDF5, whose signature may come behind 512 bytes, or 1024, and so on.
+fn is_hdf5(head: &[u8]) -> bool {
+    let mut starts =
+        std::iter::once(0).chain((9..).map(|power| 1usize << power).take_while(|start| *start < head.len()));
+    starts.any(|start| head[start..].starts_with(b"\x89HDF\r\n\x1A\n"))
+}
+
+fn binary_format(head: &[u8]) -> Option<FileFormat> {
+    if is_hdf5(head) {
+        return Some(FileFormat::Hdf5);
+    }
+    MAGICS.iter().find(|(magic, _)| head.starts_with(magic)).map(|(_, format)| *format)
+}

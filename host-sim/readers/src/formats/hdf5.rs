@@ -1,0 +1,357 @@
+//! Datasets of HDF5, which is also what MATLAB 7.3 and `h5py` write: matrices of numbers and tables of records, by their paths.
+//!
+//! Of the crates without a C library `hdf5-pure` reads windows of rows, all of the files that the tests write with `h5py`, and says how
+//! large a dataset is before it is read.
+
+use crate::columns::unit::Unit;
+use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray, stated_rate};
+use crate::formats::message_layout::Scalar;
+use crate::input::budget::{Budget, Meter};
+use crate::input::file_bytes::FileBytes;
+use crate::input::input_error::{InputError, Reason};
+use crate::rows::batch::Number;
+use crate::rows::whole_table::MAX_SAMPLES;
+use hdf5_pure::{AttrValue, Dataset, Datatype, DatatypeByteOrder, File, Group};
+use std::collections::HashMap;
+use std::io::Read;
+
+const FORMAT: &str = "HDF5";
+
+/// Columns of a matrix beyond which it is no recording.
+const MAX_COLUMNS: usize = 1024;
+/// Groups and datasets of a file.
+const MAX_OBJECTS: usize = 1 << 14;
+/// Rows that are read at once, where the chunks of the file are smaller.
+const ROWS_AT_ONCE: u64 = 4096;
+
+/// Names of attributes that state a unit, in small letters.
+const UNITS: [&str; 2] = ["unit", "units"];
+/// Those of a factor of the numbers, and of what is added to the products (NetCDF Climate and Forecast Conventions, 8.1).
+const SCALES: [&str; 2] = ["scale_factor", "scale"];
+const OFFSET: &str = "add_offset";
+/// The attribute by which MATLAB says what an array was, and what of it are no numbers.
+const MATLAB_CLASS: &str = "MATLAB_class";
+const NO_NUMBERS: [&str; 4] = ["char", "cell", "string", "function_handle"];
+
+/// A number in a record or an element.
+#[derive(Debug, Clone, Copy)]
+struct Encoded {
+    offset: usize,
+    scalar: Scalar,
+    is_big_endian: bool,
+}
+
+/// How a dataset lies in the file.
+struct Layout {
+    path: String,
+    rows: usize,
+    /// Of each column; all at the start of an element where each column is a row of the file.
+    columns: Vec<Encoded>,
+    /// Bytes of a row of the file.
+    stride: usize,
+    /// Whether each column is a row of the file.
+    is_by_column: bool,
+    /// What the numbers are multiplied by, and what is added.
+    scale: Option<[f64; 2]>,
+}
+
+/// An open file.
+pub(crate) struct Hdf5Reader {
+    file: File,
+    layouts: Vec<Layout>,
+    meter: Meter,
+}
+
+/// What the groups around a dataset state.
+#[derive(Clone, Default)]
+struct Stated {
+    rate: Option<(f64, String)>,
+    unit: Option<Unit>,
+}
+
+impl Hdf5Reader {
+    pub(crate) fn open(bytes: &FileBytes, budget: Budget) -> Result<ArraySource<'_, Self>, InputError> {
+        let fail = |reason| bytes.error(reason);
+        let file = match bytes.file() {
+            Some(file) => File::open_streaming(file),
+            None => {
+                let mut whole = Vec::new();
+                let read = bytes.open().and_then(|mut input| input.read_to_end(&mut whole));
+                read.map_err(|error| fail(Reason::Io(error)))?;
+                File::from_bytes(whole)
+            }
+        };
+        let file = file.map_err(|error| fail(damaged(error)))?;
+        let mut found = Found { layouts: Vec::new(), arrays: Vec::new(), objects: 0 };
+        found.add_group(&file.root(), "", &Stated::default(), 0).map_err(fail)?;
+        let Found { layouts, arrays, .. } = found;
+        Ok(ArraySource::new(bytes.name(), Self { file, layouts, meter: budget.meter() }, arrays, budget))
+    }
+}
+
+fn damaged(error: impl ToString) -> Reason {
+    Reason::Format { format: FORMAT, error: error.to_string().into() }
+}
+
+/// The datasets of numbers of a file.
+struct Found {
+    layouts: Vec<Layout>,
+    arrays: Vec<NamedArray>,
+    objects: usize,
+}
+
+impl Found {
+    fn add_group(&mut self, group: &Group, path: &str, around: &Stated, level: usize) -> Result<(), Reason> {
+        Budget::check_depth(level)?;
+        let stated = around.with(&group.attrs().unwrap_or_default(), path);
+        for name in group.datasets().map_err(damaged)? {
+            self.count()?;
+            // A dataset of a kind that is not read leaves the others to be read.
+            let Ok(dataset) = group.dataset(&name) else { continue };
+            self.add(&dataset, path, &name, &stated);
+        }
+        for name in group.groups().map_err(damaged)? {
+            self.count()?;
+            // MATLAB keeps what cells refer to in a group of its own.
+            if name.starts_with('#') {
+                continue;
+            }
+            let inner = group.group(&name).map_err(damaged)?;
+            self.add_group(&inner, &format!("{path}{name}/"), &stated, level + 1)?;
+        }
+        Ok(())
+    }
+
+    fn count(&mut self) -> Result<(), Reason> {
+        self.objects += 1;
+        let most = MAX_OBJECTS;
+        if self.objects > most { Err(Reason::Array(format!("more than {most} datasets"))) } else { Ok(()) }
+    }
+
+    fn add(&mut self, dataset: &Dataset, group: &str, name: &str, around: &Stated) {
+        let attributes = dataset.attrs().unwrap_or_default();
+        let class = attributes.get(MATLAB_CLASS).and_then(text);
+        if class.is_some_and(|class| NO_NUMBERS.contains(&class.as_str())) {
+            return;
+        }
+        let (Ok(kind), Ok(shape)) = (dataset.datatype(), dataset.shape()) else { return };
+        let path = format!("{group}{name}");
+        let Some((mut layout, names)) = layout(&path, &kind, &shape) else { return };
+        let of = |known: &[&str]| {
+            attributes
+                .iter()
+                .find(|(name, _)| known.contains(&name.to_lowercase().as_str()))
+                .and_then(|(_, of)| number(of))
+        };
+        let (factor, offset) = (of(&SCALES), of(&[OFFSET]));
+        layout.scale = factor.or(offset).map(|_| [factor.unwrap_or(1.0), offset.unwrap_or(0.0)]);
+        let Stated { rate, unit } = around.with(&attributes, &path);
+        let (group, name, rows) = (group.to_owned(), name.to_owned(), layout.rows);
+        self.arrays.push(NamedArray { group, name, rows, columns: names, unit, rate });
+        self.layouts.push(layout);
+    }
+}
+
+impl Stated {
+    /// With what these attributes of `path` say.
+    fn with(&self, attributes: &HashMap<String, AttrValue>, path: &str) -> Self {
+        let mut stated = self.clone();
+        for (name, value) in attributes {
+            let plain = name.to_lowercase();
+            if let Some(hz) = number(value).and_then(|number| stated_rate(name, number)) {
+                let of = if path.is_empty() { "the file" } else { path.trim_end_matches('/') };
+                stated.rate = Some((hz, format!("attribute {name} of {of}")));
+            }
+            if UNITS.contains(&plain.as_str()) {
+                stated.unit = text(value).and_then(|text| Unit::parse(&text)).or(stated.unit);
+            }
+        }
+        stated
+    }
+}
+
+/// The number of an attribute that has one.
+fn number(value: &AttrValue) -> Option<f64> {
+    match value {
+        AttrValue::F32(value) => Some(f64::from(*value)),
+        AttrValue::F64(value) => Some(*value),
+        AttrValue::I8(value) => Some(f64::from(*value)),
+        AttrValue::I16(value) => Some(f64::from(*value)),
+        AttrValue::I32(value) => Some(f64::from(*value)),
+        AttrValue::I64(value) => Some(*value as f64),
+        AttrValue::U8(value) => Some(f64::from(*value)),
+        AttrValue::U16(value) => Some(f64::from(*value)),
+        AttrValue::U32(value) => Some(f64::from(*value)),
+        AttrValue::U64(value) => Some(*value as f64),
+        AttrValue::F32Array(values) => values.first().map(|value| f64::from(*value)).filter(|_| values.len() == 1),
+        AttrValue::F64Array(values) => values.first().copied().filter(|_| values.len() == 1),
+        AttrValue::I32Array(values) => values.first().map(|value| f64::from(*value)).filter(|_| values.len() == 1),
+        AttrValue::I64Array(values) => values.first().map(|value| *value as f64).filter(|_| values.len() == 1),
+        _ => text(value)?.trim().parse().ok(),
+    }
+}
+
+/// The text of an attribute that has one.
+fn text(value: &AttrValue) -> Option<String> {
+    match value {
+        AttrValue::String(text)
+        | AttrValue::AsciiString(text)
+        | AttrValue::VarLenString(text)
+        | AttrValue::VarLenAsciiString(text)
+        | AttrValue::StringSized { value: text, .. }
+        | AttrValue::AsciiStringSized { value: text, .. } => Some(text.trim_end_matches('\0').to_owned()),
+        AttrValue::StringArray(texts)
+        | AttrValue::AsciiStringArray(texts)
+        | AttrValue::VarLenStringArray(texts)
+        | AttrValue::VarLenAsciiStringArray(texts) => {
+            let first = texts.first()?;
+            texts.iter().all(|text| text == first).then(|| first.clone())
+        }
+        _ => None,
+    }
+}
+
+/// How a dataset lies, and the names of its columns; `None` for what is no vector, matrix or table of numbers.
+fn layout(path: &str, kind: &Datatype, shape: &[u64]) -> Option<(Layout, Vec<String>)> {
+    let sides: Vec<usize> = shape.iter().map(|side| usize::try_from(*side).ok()).collect::<Option<_>>()?;
+    let (first, second) = match *sides.as_slice() {
+        [rows] => (rows, 1),
+        [rows, columns] => (rows, columns),
+        _ => return None,
+    };
+    let size = kind.type_size() as usize;
+    let path = path.to_owned();
+    if let Datatype::Compound { .. } = kind {
+        let mut found = Vec::new();
+        add_numbers("", kind, 0, 0, &mut found);
+        if second != 1 || found.len() > MAX_COLUMNS {
+            return None;
+        }
+        found.retain(|(encoded, _)| encoded.offset + encoded.scalar.bytes() <= size);
+        let (columns, names): (Vec<Encoded>, Vec<String>) = found.into_iter().unzip();
+        let layout = Layout { path, rows: first, columns, stride: size, is_by_column: false, scale: None };
+        return Some((layout, names)).filter(|(layout, _)| !layout.columns.is_empty() && layout.rows > 0);
+    }
+    let element = encoded(kind, 0)?;
+    let (rows, columns) = (first.max(second), first.min(second));
+    if columns == 0 || columns > MAX_COLUMNS || size != element.scalar.bytes() {
+        return None;
+    }
+    let is_by_column = second > first;
+    let place = |column: usize| if is_by_column { 0 } else { column * size };
+    let layout = Layout {
+        path,
+        rows,
+        columns: (0..columns).map(|column| Encoded { offset: place(column), ..element }).collect(),
+        stride: second * size,
+        is_by_column,
+        scale: None,
+    };
+    Some((layout, (0..columns).map(|column| column.to_string()).collect()))
+}
+
+/// Adds the numbers of a record at `offset`, also in records and arrays within it: `gyro.x`, `gyro.0`.
+fn add_numbers(path: &str, kind: &Datatype, offset: usize, level: usize, found: &mut Vec<(Encoded, String)>) {
+    if found.len() > MAX_COLUMNS || Budget::check_depth(level).is_err() {
+        return;
+    }
+    let inner = |name: &str| if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };
+    match kind {
+        Datatype::Compound { members, .. } => {
+            for member in members {
+                let Ok(own) = usize::try_from(member.byte_offset) else { continue };
+                add_numbers(&inner(&member.name), &member.datatype, offset.saturating_add(own), level + 1, found);
+            }
+        }
+        Datatype::Array { base_type, dimensions } => {
+            let count = dimensions.iter().fold(1usize, |count, side| count.saturating_mul(*side as usize));
+            let size = base_type.type_size() as usize;
+            for number in 0..count.min(MAX_COLUMNS) {
+                let own = offset.saturating_add(number.saturating_mul(size));
+                add_numbers(&inner(&number.to_string()), base_type, own, level + 1, found);
+            }
+        }
+        _ => found.extend(encoded(kind, offset).map(|encoded| (encoded, path.to_owned()))),
+    }
+}
+
+/// A number of this type at `offset`; `None` for other types.
+fn encoded(kind: &Datatype, offset: usize) -> Option<Encoded> {
+    let bytes = u8::try_from(kind.type_size()).ok()?;
+    let (scalar, order) = match kind {
+        Datatype::FixedPoint { byte_order, layout, .. } if matches!(bytes, 1 | 2 | 4 | 8) => {
+            (if layout.signed { Scalar::Signed(bytes) } else { Scalar::Unsigned(bytes) }, *byte_order)
+        }
+        Datatype::FloatingPoint { byte_order, .. } if matches!(bytes, 2 | 4 | 8) => (Scalar::Float(bytes), *byte_order),
+        Datatype::Enumeration { base_type, .. } => return encoded(base_type, offset),
+        _ => return None,
+    };
+    let is_big_endian = match order {
+        DatatypeByteOrder::LittleEndian => false,
+        DatatypeByteOrder::BigEndian => true,
+        _ => return None,
+    };
+    Some(Encoded { offset, scalar, is_big_endian })
+}
+
+impl Encoded {
+    /// The number in a row of the file; NaN beyond its end.
+    fn number(self, row: &[u8]) -> Number {
+        let size = self.scalar.bytes();
+        let Some(own) = row.get(self.offset..self.offset + size) else { return Number::Real(f64::NAN) };
+        let mut word = [0; 8];
+        word[..size].copy_from_slice(own);
+        if self.is_big_endian {
+            word[..size].reverse();
+        }
+        self.scalar.number(u64::from_le_bytes(word))
+    }
+}
+
+impl ArrayReader for Hdf5Reader {
+    const FORMAT: &'static str = FORMAT;
+
+    fn read(
+        &mut self,
+        array: usize,
+        columns: &[usize],
+        add: &mut dyn FnMut(u64) -> Result<(), Reason>,
+    ) -> Result<Vec<Vec<Number>>, Reason> {
+        let Layout { path, rows, columns: encoded, stride, is_by_column, scale } = &self.layouts[array];
+        let number = |column: usize, bytes: &[u8]| {
+            let number = encoded[column].number(bytes);
+            scale.map_or(number, |[factor, offset]| Number::Real(factor * number.value() + offset))
+        };
+        if *rows as u64 > MAX_SAMPLES {
+            return Err(Reason::TooManySamples);
+        }
+        let (rows, stride) = (*rows as u64, *stride as u64);
+        add(rows * columns.len() as u64)?;
+        let dataset = self.file.dataset(path).map_err(damaged)?;
+        let mut values: Vec<Vec<Number>> = vec![Vec::new(); columns.len()];
+        if *is_by_column {
+            for (values, &column) in values.iter_mut().zip(columns) {
+                self.meter.add_bytes(stride)?;
+                let bytes = dataset.read_raw_rows(column as u64, 1).map_err(damaged)?;
+                let elements = bytes.chunks_exact(encoded[column].scalar.bytes());
+                values.extend(elements.map(|element| number(column, element)));
+            }
+            return Ok(values);
+        }
+        let chunk = dataset.chunk_shape().ok().flatten().and_then(|shape| shape.first().copied()).unwrap_or(1);
+        let window = ROWS_AT_ONCE.next_multiple_of(chunk.clamp(1, ROWS_AT_ONCE)).max(chunk.min(1 << 20));
+        let mut start = 0;
+        while start < rows {
+            let count = window.min(rows - start);
+            self.meter.add_bytes(count * stride)?;
+            let bytes = dataset.read_raw_rows(start, count).map_err(damaged)?;
+            for row in bytes.chunks_exact(stride as usize) {
+                for (values, &column) in values.iter_mut().zip(columns) {
+                    values.push(number(column, row));
+                }
+            }
+            start += count;
+        }
+        Ok(values)
+    }
+}

@@ -1,0 +1,348 @@
+//! Arrays of NumPy: `.npy` and `.npz`.
+
+use crate::columns::unit::Unit;
+use crate::formats::array_topics::{ArrayReader, ArraySource, EachArrayRow, NamedArray};
+use crate::formats::message_layout::Scalar;
+use crate::formats::numpy_header::{ElementType, Encoding, Header};
+use crate::input::budget::{Budget, Meter, Metered};
+use crate::input::file_bytes::{FileBytes, OpenBytes};
+use crate::input::input_error::{InputError, Reason};
+use crate::input::read_monitor::{Counted, ReadMonitor};
+use crate::rows::batch::Number;
+use crate::rows::whole_table::MAX_SAMPLES;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use zip::ZipArchive;
+
+/// Columns of a matrix beyond which it is no recording.
+const MAX_COLUMNS: u64 = 1024;
+/// What is said of an array of Python objects.
+const OBJECTS: &str = "holds Python objects, which are not read; of a dict of arrays, in Python: \
+                       numpy.savez(\"FILE.npz\", **numpy.load(\"FILE\", allow_pickle=True).item())";
+
+/// Rows of an array that are read at once.
+const ROWS_AT_ONCE: usize = 4096;
+
+/// An open `.npy` file.
+pub(crate) struct NpyReader {
+    input: BufReader<Counted<OpenBytes>>,
+    layout: ArrayLayout,
+    /// Where the numbers begin, bytes.
+    start: u64,
+}
+
+impl NpyReader {
+    /// Opens a file.
+    pub(crate) fn open<'a>(
+        file: &'a FileBytes,
+        budget: Budget,
+        monitor: &ReadMonitor,
+    ) -> Result<ArraySource<'a, Self>, InputError> {
+        let fail = |reason| file.error(reason);
+        let io = |error| fail(Reason::Io(error));
+        let mut input = BufReader::new(Counted::new(file.open().map_err(io)?, monitor));
+        let layout = ArrayLayout::read(&mut input, "").map_err(fail)?;
+        let start = input.stream_position().map_err(io)?;
+        let arrays = vec![layout.array()];
+        Ok(ArraySource::new(file.name(), Self { input, layout, start }, arrays, budget))
+    }
+
+    /// The bytes of some rows from `first` on: of each of `columns`, or of whole rows.
+    fn fill(&mut self, first: usize, columns: &[usize], buffers: &mut [Vec<u8>]) -> Result<usize, Reason> {
+        let Self { layout, input, start } = self;
+        let rows = ROWS_AT_ONCE.min(layout.rows - first);
+        for (buffer, column) in buffers.iter_mut().zip(columns) {
+            let before = if layout.by_column { column * layout.rows + first } else { first };
+            input.seek(SeekFrom::Start(*start + (before * layout.stride) as u64)).map_err(Reason::Io)?;
+            buffer.resize(rows * layout.stride, 0);
+            input.read_exact(buffer).map_err(|error| match error.kind() {
+                io::ErrorKind::UnexpectedEof => Reason::Truncated { format: "NumPy array" },
+                _ => Reason::Io(error),
+            })?;
+        }
+        Ok(rows)
+    }
+}
+
+impl ArrayReader for NpyReader {
+    const FORMAT: &'static str = "NumPy array";
+
+    fn read(
+        &mut self,
+        _array: usize,
+        columns: &[usize],
+        add: &mut dyn FnMut(u64) -> Result<(), Reason>,
+    ) -> Result<Vec<Vec<Number>>, Reason> {
+        self.input.seek(SeekFrom::Start(self.start)).map_err(Reason::Io)?;
+        self.layout.columns(&mut self.input, columns, add)
+    }
+
+    fn for_each_row(
+        &mut self,
+        _array: usize,
+        columns: &[usize],
+        each: &mut EachArrayRow,
+    ) -> Option<Result<(), InputError>> {
+        let mut buffers = vec![Vec::new(); if self.layout.by_column { columns.len() } else { 1 }];
+        // Of each column: the buffer with its numbers, where they begin in it, and how they are encoded.
+        let place = |(number, &column): (usize, &usize)| {
+            let FieldLayout { offset, encoding, .. } = &self.layout.fields[column];
+            if self.layout.by_column { (number, 0, encoding.clone()) } else { (0, *offset, encoding.clone()) }
+        };
+        let places: Vec<(usize, usize, Encoding)> = columns.iter().enumerate().map(place).collect();
+        let mut row = Vec::with_capacity(columns.len());
+        let mut first = 0;
+        while first < self.layout.rows {
+            let rows = match self.fill(first, columns, &mut buffers) {
+                Ok(rows) => rows,
+                Err(reason) => return Some(each(Err(reason))),
+            };
+            for at in 0..rows {
+                row.clear();
+                let start = at * self.layout.stride;
+                row.extend(
+                    places.iter().map(|(of, offset, encoding)| decode(encoding, &buffers[*of][start + offset..])),
+                );
+                if let Err(error) = each(Ok(&row)) {
+                    return Some(Err(error));
+                }
+            }
+            first += rows;
+        }
+        Some(Ok(()))
+    }
+}
+
+/// An open `.npz` file.
+pub(crate) struct NpzReader {
+    archive: ZipArchive<BufReader<OpenBytes>>,
+    /// Number of the entry and layout of each array.
+    layouts: Vec<(usize, ArrayLayout)>,
+    meter: Meter,
+}
+
+impl NpzReader {
+    pub(crate) fn open(file: &FileBytes, budget: Budget) -> Result<ArraySource<'_, Self>, InputError> {
+        let fail = |reason| file.error(reason);
+        let input = BufReader::new(file.open().map_err(|error| fail(Reason::Io(error)))?);
+        let mut archive = ZipArchive::new(input).map_err(|error| fail(damaged(error)))?;
+        let mut layouts: Vec<(usize, ArrayLayout)> = Vec::new();
+        for number in 0..archive.len() {
+            if let Some(layout) = entry_layout(&mut archive, number).map_err(fail)? {
+                layouts.push((number, layout));
+            }
+        }
+        if layouts.is_empty() {
+            // Spreadsheets are archives too.
+            let what = if archive.index_for_name("[Content_Types].xml").is_some() {
+                "a spreadsheet"
+            } else {
+                "a ZIP archive without an array"
+            };
+            let how = "give the table in it, as CSV";
+            return Err(fail(Reason::Foreign { what, how }));
+        }
+        let mut arrays: Vec<NamedArray> = layouts.iter().map(|(_, layout)| layout.array()).collect();
+        // An only array needs no name.
+        if let [array] = arrays.as_mut_slice() {
+            array.name.clear();
+        }
+        Ok(ArraySource::new(file.name(), Self { archive, layouts, meter: budget.meter() }, arrays, budget))
+    }
+}
+
+impl ArrayReader for NpzReader {
+    const FORMAT: &'static str = "NumPy .npz";
+
+    fn read(
+        &mut self,
+        array: usize,
+        columns: &[usize],
+        add: &mut dyn FnMut(u64) -> Result<(), Reason>,
+    ) -> Result<Vec<Vec<Number>>, Reason> {
+        let (number, layout) = &self.layouts[array];
+        let mut entry = self.archive.by_index(*number).map_err(damaged)?;
+        ArrayLayout::read(&mut entry, &layout.name)?;
+        layout.columns(&mut BufReader::new(Metered::new(entry, &mut self.meter)), columns, add)
+    }
+}
+
+/// The layout of an entry of an archive; `None` for what is no array of numbers: text and objects are left out.
+fn entry_layout<R: Read + Seek>(archive: &mut ZipArchive<R>, number: usize) -> Result<Option<ArrayLayout>, Reason> {
+    let mut entry = archive.by_index(number).map_err(damaged)?;
+    let path = entry.name().map_err(damaged)?.into_owned();
+    let Some(name) = path.strip_suffix(".npy") else { return Ok(None) };
+    match ArrayLayout::read(&mut entry, name) {
+        Ok(layout) => Ok(Some(layout)),
+        Err(Reason::Array(_)) => Ok(None),
+        Err(other) => Err(other),
+    }
+}
+
+fn damaged(error: zip::result::ZipError) -> Reason {
+    Reason::Format { format: "NumPy .npz", error: error.to_string().into() }
+}
+
+/// A field of a row: where it lies and how it is encoded.
+#[derive(Debug, Clone, PartialEq)]
+struct FieldLayout {
+    name: String,
+    offset: usize,
+    encoding: Encoding,
+}
+
+/// How an array lies in its file.
+#[derive(Debug, Clone, PartialEq)]
+struct ArrayLayout {
+    name: String,
+    rows: usize,
+    fields: Vec<FieldLayout>,
+    /// Bytes of a row; of an element where columns are contiguous.
+    stride: usize,
+    /// Whether each column lies in one piece.
+    by_column: bool,
+    unit: Option<Unit>,
+}
+
+impl ArrayLayout {
+    /// Reads the header; the numbers follow in `input`.
+    fn read(input: &mut impl Read, name: &str) -> Result<Self, Reason> {
+        let unusable = |what: String| Reason::Array(format!("array {name:?} {what}"));
+        let Header { element, is_fortran_order, shape } = Header::read(input)?;
+        let (outer, inner, first_is_time) = match *shape.as_slice() {
+            [] => (1, 1, true),
+            [rows] => (rows, 1, true),
+            [rows, columns] => (rows.max(columns), rows.min(columns), rows >= columns),
+            _ => return Err(unusable(format!("has {} dimensions; a recording has 1 or 2", shape.len()))),
+        };
+        if inner > MAX_COLUMNS {
+            return Err(unusable(format!("has {inner} columns, more than {MAX_COLUMNS}")));
+        }
+        let mut unit = None;
+        let mut fields = Vec::new();
+        let mut stride = 0usize;
+        let mut add = |name: String, encoding: &Encoding| -> Result<(), Reason> {
+            if encoding.kind == 'O' {
+                return Err(unusable(OBJECTS.to_owned()));
+            }
+            if !encoding.is_number() {
+                return Err(unusable(format!("holds no numbers but {}", encoding.text)));
+            }
+            unit = unit.or_else(|| encoding.time_unit().and_then(Unit::parse));
+            fields.push(FieldLayout { name, offset: stride, encoding: encoding.clone() });
+            stride += encoding.bytes;
+            Ok(())
+        };
+        let is_plain = match element {
+            ElementType::Record(named) => {
+                if inner > 1 {
+                    return Err(unusable("is a matrix of records".to_owned()));
+                }
+                let mut plain = Vec::new();
+                for (name, field) in &named {
+                    flatten(name, field, &mut plain).map_err(unusable)?;
+                }
+                plain.into_iter().try_for_each(|(name, encoding)| add(name, encoding))?;
+                false
+            }
+            ElementType::Plain(encoding) => {
+                (0..inner).try_for_each(|number| add(number.to_string(), &encoding))?;
+                true
+            }
+            ElementType::Array(..) => return Err(unusable("has rows within rows".to_owned())),
+        };
+        let by_column = is_plain && inner > 1 && is_fortran_order == first_is_time;
+        let stride = if by_column { stride / fields.len().max(1) } else { stride };
+        Ok(Self { name: name.to_owned(), rows: outer as usize, fields, stride, by_column, unit })
+    }
+
+    fn array(&self) -> NamedArray {
+        let columns = self.fields.iter().map(|field| field.name.clone()).collect();
+        NamedArray { name: self.name.clone(), rows: self.rows, columns, unit: self.unit, ..NamedArray::default() }
+    }
+
+    /// The numbers of `columns`, from the end of the header on.
+    fn columns(
+        &self,
+        input: &mut impl Read,
+        columns: &[usize],
+        add: &mut dyn FnMut(u64) -> Result<(), Reason>,
+    ) -> Result<Vec<Vec<Number>>, Reason> {
+        if self.rows as u64 > MAX_SAMPLES {
+            return Err(Reason::TooManySamples);
+        }
+        add(self.rows as u64 * columns.len() as u64)?;
+        let mut values: Vec<Vec<Number>> = columns.iter().map(|_| Vec::new()).collect();
+        let mut bytes = vec![0; self.stride];
+        let mut read = |bytes: &mut [u8]| {
+            input.read_exact(bytes).map_err(|error| match error.kind() {
+                io::ErrorKind::UnexpectedEof => Reason::Truncated { format: "NumPy array" },
+                _ => Reason::from_io(error),
+            })
+        };
+        if self.by_column {
+            for number in 0..self.fields.len() {
+                let at = columns.iter().position(|column| *column == number);
+                for _ in 0..self.rows {
+                    read(&mut bytes)?;
+                    if let Some(at) = at {
+                        values[at].push(decode(&self.fields[number].encoding, &bytes));
+                    }
+                }
+            }
+        } else {
+            for _ in 0..self.rows {
+                read(&mut bytes)?;
+                for (values, &column) in values.iter_mut().zip(columns) {
+                    let field = &self.fields[column];
+                    values.push(decode(&field.encoding, &bytes[field.offset..]));
+                }
+            }
+        }
+        Ok(values)
+    }
+}
+
+/// Adds the numbers in a field of a record: `gyro.0` of an array in it, `imu.gx` of a record in it.
+fn flatten<'a>(name: &str, element: &'a ElementType, plain: &mut Vec<(String, &'a Encoding)>) -> Result<(), String> {
+    match element {
+        ElementType::Plain(encoding) => plain.push((name.to_owned(), encoding)),
+        ElementType::Array(count, inner) => {
+            for number in 0..*count {
+                let before = plain.len();
+                flatten(&format!("{name}.{number}"), inner, plain)?;
+                if plain.len() == before {
+                    // Arrays without a number, however many there are.
+                    break;
+                }
+            }
+        }
+        ElementType::Record(fields) => {
+            for (of_field, field) in fields {
+                flatten(&format!("{name}.{of_field}"), field, plain)?;
+            }
+        }
+    }
+    let most = MAX_COLUMNS;
+    if plain.len() as u64 > most { Err(format!("has more than {most} columns")) } else { Ok(()) }
+}
+
+/// The number at the start of `bytes`; NaN where they are too few.
+fn decode(encoding: &Encoding, bytes: &[u8]) -> Number {
+    let size = encoding.bytes;
+    let Some(own) = bytes.get(..size).filter(|own| own.len() <= 8) else { return Number::Real(f64::NAN) };
+    let mut word = [0; 8];
+    match <[u8; 8]>::try_from(own) {
+        Ok(whole) => word = whole,
+        Err(_) => word[..size].copy_from_slice(own),
+    }
+    if encoding.is_big_endian {
+        word[..size].reverse();
+    }
+    let bits = u64::from_le_bytes(word);
+    let unused = 64 - 8 * size as u32;
+    match encoding.kind {
+        'f' => Scalar::Float(size as u8).number(bits),
+        'u' | 'b' => i64::try_from(bits).map_or(Number::Real(bits as f64), Number::Integer),
+        _ => Number::Integer((bits << unused).cast_signed() >> unused),
+    }
+}

@@ -1,0 +1,620 @@
+//! Tables of numbers in any units: CSV with commas, semicolons, tabs or blanks, with or without a heading, sentences as of NMEA 0183, and
+//! lines that name each number.
+
+use crate::columns::column_selection::{AvailableColumn, ChosenColumn, Role, SelectionError, as_they_are};
+use crate::formats::calendar::{CalendarClock, CalendarColumns};
+use crate::formats::fields::{number, split};
+use crate::formats::labelled_row;
+use crate::formats::nmea::{self, Sentence};
+use crate::formats::row_kinds::{RowKind, RowKinds};
+use crate::formats::table_head::{self, HEAD_LINES, Line, TableColumns, TableHead, is_row};
+use crate::input::budget::Budget;
+use crate::input::delimited_text::{self, Lines};
+use crate::input::file_bytes::FileBytes;
+use crate::input::input_error::{InputError, Reason};
+use crate::input::read_monitor::ReadMonitor;
+use crate::rows::any_sensor::ReadOptions;
+use crate::rows::batch::{BatchBuilder, Number, RowFault};
+use crate::rows::row_source::{EachRow, Ending, Refusal, RowSource};
+use crate::rows::whole_table::{WholeTable, most_rows};
+use std::collections::VecDeque;
+use std::path::PathBuf;
+
+/// Part of the rows that may be damaged: a file with more is another one than it is taken for. So many are damaged before that is asked.
+const MOST_DAMAGED: f64 = 0.1;
+const FIRST_DAMAGED: u64 = 64;
+
+/// The rows of a table, which can be read again; a monitor counts the bytes and may stop the reading.
+pub(crate) struct TextRows<'a> {
+    file: &'a FileBytes,
+    options: ReadOptions,
+    monitor: ReadMonitor,
+    chosen: Vec<ChosenColumn>,
+    rate_hz: Option<f64>,
+    /// The table before its first reading.
+    opened: Option<TextTable>,
+}
+
+impl<'a> TextRows<'a> {
+    /// Opens a table and chooses its columns.
+    pub(crate) fn open(file: &'a FileBytes, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
+        let table = TextTable::open(file, options, monitor)?;
+        let (chosen, rate_hz) = (table.chosen.clone(), table.rate_hz);
+        let (options, monitor) = (options.clone(), monitor.clone());
+        Ok(Self { file, options, monitor, chosen, rate_hz, opened: Some(table) })
+    }
+}
+
+impl RowSource for TextRows<'_> {
+    fn chosen(&self) -> &[ChosenColumn] {
+        &self.chosen
+    }
+
+    fn rate_hz(&self) -> Option<f64> {
+        self.rate_hz
+    }
+
+    fn budget(&self) -> Option<Budget> {
+        None
+    }
+
+    fn read(&mut self, each: &mut EachRow) -> Result<Ending, InputError> {
+        let mut table = match self.opened.take() {
+            Some(table) => table,
+            None => TextTable::open(self.file, &self.options, &self.monitor)?,
+        };
+        while let Some(line) = table.next_row()? {
+            match each(&table.row) {
+                Ok(()) => table.damaged.rows += 1,
+                Err(Refusal::Fault(fault)) => {
+                    let error = table.fault(line, fault);
+                    table.damaged.add(error)?;
+                }
+                Err(Refusal::Enough) => break,
+            }
+        }
+        table.damaged.check()?;
+        Ok(Ending { damage: None, notes: table.notes() })
+    }
+}
+
+/// Reads all columns of a table; fields that are no numbers are missing.
+pub(crate) fn read_whole(
+    file: &FileBytes,
+    topic: Option<&str>,
+    monitor: &ReadMonitor,
+) -> Result<WholeTable, InputError> {
+    let mut table = TextTable::open_with(file, topic, monitor, &|available| Ok(as_they_are(available)))?;
+    table.is_lenient = true;
+    let mut builder = BatchBuilder::new(&table.chosen, &[], None);
+    let most = most_rows(table.chosen.len());
+    let mut whole = WholeTable { name: topic.unwrap_or_default().to_owned(), ..WholeTable::default() };
+    loop {
+        whole.is_cut = builder.rows() >= most;
+        let row = table.next_row().and_then(|line| {
+            let Some(line) = line.filter(|_| !whole.is_cut) else { return Ok(false) };
+            table.damaged.rows += 1;
+            builder.push(&table.row).map(|()| true).map_err(|fault| table.fault(line, fault))
+        });
+        let row = match row {
+            Ok(false) => table.damaged.check().map(|()| false),
+            row => row,
+        };
+        match row {
+            Ok(true) => {}
+            Ok(false) => break,
+            Err(error) if builder.rows() == 0 => return Err(error),
+            Err(error) => {
+                whole.notes.push(format!("{error}; the {} rows before that are shown", builder.rows()));
+                break;
+            }
+        }
+    }
+    whole.notes.extend(table.notes());
+    whole.rate_hz = table.rate_hz;
+    Ok(whole.with_rows(table.chosen, builder))
+}
+
+/// Chooses the columns to read of those that there are.
+type Choose<'a> = dyn Fn(&[AvailableColumn]) -> Result<Vec<ChosenColumn>, SelectionError> + 'a;
+
+/// How the fields of a row are told from each other.
+enum Layout {
+    /// By a separator; blanks where there is none.
+    Columns {
+        separator: Option<char>,
+        calendar: Option<CalendarClock>,
+        /// That which is read, of rows of several kinds.
+        kind: Option<RowKind>,
+        /// Rows of the other kinds.
+        others: u64,
+    },
+    /// Those of one kind of sentence.
+    Sentences { name: String, damaged: u64, others: u64 },
+    /// Each with its name; `others` are lines without these names.
+    Labelled { names: Vec<String>, calendar: Option<CalendarClock>, others: u64 },
+}
+
+/// Rows that are left out because they cannot be read.
+#[derive(Debug, Default)]
+struct DamagedRows {
+    rows: u64,
+    damaged: u64,
+    first: Option<InputError>,
+    note: String,
+}
+
+impl DamagedRows {
+    /// Leaves out a row.
+    ///
+    /// # Errors
+    /// Too many rows are damaged.
+    fn add(&mut self, error: InputError) -> Result<(), InputError> {
+        self.damaged += 1;
+        if self.first.is_none() {
+            let line = error.line.map_or_else(String::new, |line| format!("line {line}: "));
+            self.note = format!("{line}{}", error.reason);
+            self.first = Some(error);
+        }
+        if self.damaged >= FIRST_DAMAGED { self.check() } else { Ok(()) }
+    }
+
+    fn check(&mut self) -> Result<(), InputError> {
+        let are_many = self.damaged as f64 > MOST_DAMAGED * self.rows as f64;
+        self.first.take_if(|_| are_many).map_or(Ok(()), Err)
+    }
+
+    fn note(&self) -> Option<String> {
+        let Self { damaged, note, .. } = self;
+        (*damaged > 0).then(|| format!("{damaged} damaged rows are left out, the first of them {note}"))
+    }
+}
+
+/// An open table, read row by row.
+pub(crate) struct TextTable {
+    file: PathBuf,
+    lines: Lines,
+    available: Vec<AvailableColumn>,
+    chosen: Vec<ChosenColumn>,
+    layout: Layout,
+    /// The rate that a line before the rows states, Hz.
+    rate_hz: Option<f64>,
+    /// What the user should know of the columns.
+    columns_notes: Vec<String>,
+    damaged: DamagedRows,
+    /// Whether a field that is no number is a missing one.
+    is_lenient: bool,
+    fields: RowFields,
+    /// The first rows, which were read to tell the columns.
+    first: VecDeque<(u64, String)>,
+    row: Vec<Number>,
+}
+
+impl TextTable {
+    /// Opens a table and chooses its columns.
+    pub(crate) fn open(file: &FileBytes, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
+        let choose = |available: &[AvailableColumn]| options.choose(available);
+        let table = Self::open_with(file, options.topic.as_deref(), monitor, &choose)?;
+        let columns_notes = options.selection.notes(&table.available, &table.chosen, &options.sensor);
+        Ok(Self { columns_notes, ..table })
+    }
+
+    fn open_with(
+        file: &FileBytes,
+        topic: Option<&str>,
+        monitor: &ReadMonitor,
+        choose: &Choose,
+    ) -> Result<Self, InputError> {
+        let mut lines = Lines::open_monitored(file, monitor)?;
+        let mut first: Vec<Line> = Vec::new();
+        while first.len() < HEAD_LINES {
+            let Some((line, text)) = lines.next_line()? else { break };
+            first.push((line, text.to_owned()));
+        }
+        let opened = Opened { file, choose, lines };
+        let is_whole = first.len() < HEAD_LINES;
+        let sentence = first.iter().position(|(_, text)| Sentence::parse(text).is_some());
+        let row = first.iter().position(|(_, text)| is_row(text));
+        match (sentence, row) {
+            (Some(sentence), row) if row.is_none_or(|row| sentence <= row) => {
+                opened.sentences(topic, first.split_off(sentence).into())
+            }
+            (_, Some(_)) => {
+                let head = TableHead::at_first_row(first).unwrap_or_default();
+                opened.columns(topic, head)
+            }
+            _ => {
+                if let Some(names) = labelled_names(&first) {
+                    return opened.labelled(names, first);
+                }
+                let last = first.last().map(|(line, _)| *line);
+                Err(match last {
+                    None => file.error(Reason::Empty),
+                    Some(_) if is_whole => file.error(Reason::NoData),
+                    Some(line) => InputError::line(file.name(), line, Reason::NoNumbers),
+                })
+            }
+        }
+    }
+}
+
+/// A file whose first lines were read.
+struct Opened<'a> {
+    file: &'a FileBytes,
+    choose: &'a Choose<'a>,
+    lines: Lines,
+}
+
+impl Opened<'_> {
+    /// Of rows of columns.
+    fn columns(self, topic: Option<&str>, mut head: TableHead) -> Result<TextTable, InputError> {
+        let fail = |reason| self.file.error(reason);
+        let kinds = RowKinds::find(&head.fields());
+        if kinds.is_none() {
+            head.leave_preamble();
+        }
+        let rows = head.fields();
+        let by_blanks = || RowKinds::find_by_blanks(&rows, &head.columns(None).available);
+        let kinds = kinds.or_else(|| RowKinds::find_by_number(&rows, &head.last_names())).or_else(by_blanks);
+        let kind = match (&kinds, topic) {
+            (None, None) => None,
+            (None, Some(topic)) => {
+                let names = Box::new((topic.to_owned(), "no topics: it is a table".to_owned()));
+                return Err(fail(Reason::UnknownTopic(names)));
+            }
+            (Some(kinds), topic) => {
+                // The columns that are read may be those of one kind alone.
+                let by_columns = || {
+                    let chosen = (self.choose)(&head.columns(None).available).ok()?;
+                    let channels = chosen.iter().filter(|column| matches!(column.role, Role::Channel(_)));
+                    kinds.filled_at(&channels.map(|column| column.position).collect::<Vec<_>>()).cloned()
+                };
+                Some(match topic.map_or_else(by_columns, |_| None) {
+                    Some(kind) => kind,
+                    None => kinds.choose(topic).map_err(fail)?,
+                })
+            }
+        };
+        let TableColumns { available, width, calendar, heading_line } = head.columns(kind.as_ref());
+        // The columns of the other kinds are none of this one.
+        let others: &[usize] = if let Some(RowKind::Filled { others, .. }) = &kind { others } else { &[] };
+        let positions: Vec<usize> = (0..available.len()).filter(|at| !others.contains(at)).collect();
+        let available: Vec<AvailableColumn> = positions.iter().map(|at| available[*at].clone()).collect();
+        let mut chosen = (self.choose)(&available).map_err(|error| {
+            let reason = Reason::Selection(Box::new(error));
+            InputError { line: heading_line, ..self.file.error(reason) }
+        })?;
+        chosen.iter_mut().for_each(|column| column.position = positions[column.position]);
+        drop(rows);
+        // The tabs at the end of a line are blanks too.
+        let fields = RowFields::new(width, head.separator == Some('\t'), &chosen);
+        let rate_hz = head.rate_hz();
+        let calendar = calendar.map(CalendarClock::new);
+        let layout = Layout::Columns { separator: head.separator, calendar, kind, others: 0 };
+        Ok(TextTable { rate_hz, ..self.table(available, chosen, layout, fields, head.rows) })
+    }
+
+    fn table(
+        self,
+        available: Vec<AvailableColumn>,
+        chosen: Vec<ChosenColumn>,
+        layout: Layout,
+        fields: RowFields,
+        first: VecDeque<Line>,
+    ) -> TextTable {
+        TextTable {
+            file: self.file.name().to_owned(),
+            lines: self.lines,
+            available,
+            row: Vec::with_capacity(chosen.len()),
+            chosen,
+            layout,
+            rate_hz: None,
+            columns_notes: Vec::new(),
+            damaged: DamagedRows::default(),
+            is_lenient: false,
+            fields,
+            first,
+        }
+    }
+
+    fn chosen(&self, available: &[AvailableColumn]) -> Result<Vec<ChosenColumn>, InputError> {
+        (self.choose)(available).map_err(|error| self.file.error(Reason::Selection(Box::new(error))))
+    }
+
+    /// Of sentences of one kind, that which the options name, else the most frequent one with numbers among the first.
+    fn sentences(self, topic: Option<&str>, first: VecDeque<Line>) -> Result<TextTable, InputError> {
+        let file = self.file;
+        // Name and number of fields of each kind, and how many there are.
+        let mut kinds: Vec<(String, usize, usize)> = Vec::new();
+        for sentence in first.iter().filter_map(|(_, text)| Sentence::parse(text)).filter(|of| of.is_intact) {
+            match kinds.iter_mut().find(|(name, ..)| name == sentence.name) {
+                Some((.., count)) => *count += 1,
+                None => kinds.push((sentence.name.to_owned(), sentence.fields.len(), 1)),
+            }
+        }
+        let names = || kinds.iter().map(|(name, ..)| name.as_str()).collect::<Vec<_>>().join(", ");
+        let unknown = |topic: &str| Reason::UnknownTopic(Box::new((topic.to_owned(), names())));
+        let is_numeric = |name: &str| {
+            let of_kind = first.iter().filter_map(|(_, text)| Sentence::parse(text)).find(|of| of.name == name);
+            of_kind.is_some_and(|of| {
+                let numbers =
+                    of.fields.iter().filter(|field| number(field).is_some_and(|it| !it.value().is_nan())).count();
+                2 * numbers >= of.fields.len()
+            })
+        };
+        let kind = match topic {
+            Some(topic) => {
+                let named = kinds.iter().find(|(name, ..)| name == topic);
+                named.ok_or_else(|| file.error(unknown(topic)))?
+            }
+            None => {
+                let most = kinds.iter().filter(|(name, ..)| is_numeric(name)).max_by_key(|(.., count)| *count);
+                most.ok_or_else(|| file.error(Reason::NoNumbers))?
+            }
+        };
+        let (name, width) = (kind.0.clone(), kind.1);
+        let available = nmea::columns(&name, width);
+        let chosen = self.chosen(&available)?;
+        let fields = RowFields::new(width, false, &chosen);
+        Ok(self.table(available, chosen, Layout::Sentences { name, damaged: 0, others: 0 }, fields, first))
+    }
+
+    /// Of lines that name each of their numbers; `first` are the lines that were read.
+    fn labelled(self, names: Vec<String>, first: Vec<Line>) -> Result<TextTable, InputError> {
+        let rows = first.iter().filter_map(|(_, text)| labelled_row::parse(text));
+        let row = rows.map(|row| values_of(&names, row)).next().unwrap_or_default();
+        let calendar = CalendarColumns::find(&row.iter().map(String::as_str).collect::<Vec<_>>());
+        let mut available = table_head::named_columns(&names, None);
+        if let Some(calendar) = &calendar {
+            table_head::set_calendar(&mut available, calendar);
+        }
+        let chosen = self.chosen(&available)?;
+        let fields = RowFields::new(names.len(), false, &chosen);
+        let layout = Layout::Labelled { names, calendar: calendar.map(CalendarClock::new), others: 0 };
+        Ok(self.table(available, chosen, layout, fields, first.into()))
+    }
+}
+
+impl TextTable {
+    /// What the user should know of the rows that were read, one sentence each.
+    fn notes(&self) -> Vec<String> {
+        let of_rate = self.rate_hz.map(|hz| format!("the file states a rate of {hz} Hz before its rows"));
+        let zeros = self.lines.zero_bytes();
+        let of_zeros = (zeros > 0).then(|| format!("{zeros} bytes that are zero are left out"));
+        let mut notes: Vec<String> = self.columns_notes.iter().cloned().chain(of_rate).collect();
+        notes.extend(self.damaged.note().into_iter().chain(of_zeros));
+        let (name, damaged, others) = match &self.layout {
+            Layout::Columns { others: 0, .. } | Layout::Labelled { others: 0, .. } => return notes,
+            Layout::Labelled { others, .. } => {
+                notes.push(format!("{others} lines without the names of the others are left out"));
+                return notes;
+            }
+            Layout::Columns { others, .. } => {
+                notes.push(format!("{others} rows of other kinds are left out; --topic reads another"));
+                return notes;
+            }
+            Layout::Sentences { name, damaged, others } => (name, damaged, others),
+        };
+        let sentences = [
+            (*damaged, format!("{damaged} sentences whose checksum is wrong; their values are missing")),
+            (*others, format!("{others} lines that are no sentence {name} are left out; --topic reads another")),
+        ];
+        notes.extend(sentences.into_iter().filter(|(count, _)| *count > 0).map(|(_, text)| text));
+        notes
+    }
+
+    /// An error of a row of a line.
+    fn fault(&self, line: u64, RowFault { column, reason }: RowFault) -> InputError {
+        match column {
+            Some(at) => InputError::field(&self.file, line, &self.chosen[at].label, reason),
+            None => InputError::line(&self.file, line, reason),
+        }
+    }
+
+    /// Reads the next row into `row`; its line, or `None` at the end.
+    fn next_row(&mut self) -> Result<Option<u64>, InputError> {
+        let Self { file, lines, chosen, layout, is_lenient, fields: of_row, first, row, damaged, .. } = self;
+        loop {
+            let first = first.pop_front();
+            let (line, text) = match &first {
+                Some((line, text)) => (*line, text.as_str()),
+                None => match lines.next_line()? {
+                    Some(next) => next,
+                    None => return Ok(None),
+                },
+            };
+            let of_layout = match layout {
+                Layout::Columns { separator, kind: Some(RowKind::Labelled { at, name }), others, .. }
+                    if split(text, *separator).nth(*at) != Some(name) =>
+                {
+                    *others += 1;
+                    Ok(false)
+                }
+                Layout::Columns { separator, calendar, kind, others } => {
+                    let read = of_row.numbers(split(text, *separator), calendar.as_mut(), row);
+                    let of_kind = if let Some(RowKind::Filled { own, .. }) = &*kind { Some(own) } else { None };
+                    let is_own = |column: &ChosenColumn| match of_kind {
+                        Some(own) => own.contains(&column.position),
+                        None => matches!(column.role, Role::Channel(_)),
+                    };
+                    let is_empty =
+                        |(column, number): (&ChosenColumn, &Number)| !is_own(column) || number.value().is_nan();
+                    let is_other = read.is_ok()
+                        && (!*is_lenient || of_kind.is_some())
+                        && chosen.iter().zip(row.iter()).all(is_empty)
+                        && is_of_other_sensor(split(text, *separator), chosen, is_own);
+                    *others += u64::from(is_other);
+                    read.map(|()| !is_other)
+                }
+                Layout::Labelled { names, calendar, others } => {
+                    let row_of = labelled_row::parse(text);
+                    match row_of.filter(|row_of| row_of.iter().any(|(name, _)| names.contains(name))) {
+                        Some(row_of) => {
+                            let values = values_of(names, row_of);
+                            of_row.numbers(values.iter().map(String::as_str), calendar.as_mut(), row).map(|()| true)
+                        }
+                        None => {
+                            *others += 1;
+                            Ok(false)
+                        }
+                    }
+                }
+                Layout::Sentences { name, damaged, others } => match Sentence::parse(text) {
+                    Some(sentence) if !sentence.is_intact => {
+                        *damaged += 1;
+                        row.clear();
+                        row.resize(chosen.len(), Number::Real(f64::NAN));
+                        // A sample came, and its values are not known; nor is its time, if it has one.
+                        Ok(chosen.iter().all(|column| matches!(column.role, Role::Channel(_))))
+                    }
+                    Some(Sentence { name: own, fields, .. }) if own == *name => {
+                        of_row.numbers(fields.into_iter(), None, row).map(|()| true)
+                    }
+                    _ => {
+                        *others += 1;
+                        Ok(false)
+                    }
+                },
+            };
+            let of_layout = of_layout.or_else(|fault| match fault {
+                // The row has the missing ones as NaN.
+                (Some(_), Reason::NotNumber(_) | Reason::NotTime(_)) if *is_lenient => Ok(true),
+                fault => Err(fault),
+            });
+            match of_layout {
+                Ok(true) => return Ok(Some(line)),
+                Ok(false) => {}
+                Err((Some(at), reason)) => damaged.add(InputError::field(file, line, &chosen[at].label, reason))?,
+                Err((None, reason)) => damaged.add(InputError::line(file, line, reason))?,
+            }
+        }
+    }
+}
+
+/// The names in most of the first lines of a file, where each names its numbers.
+fn labelled_names(lines: &[(u64, String)]) -> Option<Vec<String>> {
+    let mut kinds: Vec<(Vec<String>, usize)> = Vec::new();
+    for row in lines.iter().filter_map(|(_, text)| labelled_row::parse(text)) {
+        let numbers = row.iter().filter(|(_, value)| number(value).is_some()).count();
+        let names: Vec<String> = row.into_iter().map(|(name, _)| name).collect();
+        match kinds.iter_mut().find(|(known, _)| *known == names) {
+            Some((_, count)) => *count += 1,
+            None if 2 * numbers >= names.len() => kinds.push((names, 1)),
+            None => {}
+        }
+    }
+    let (names, count) = kinds.into_iter().max_by_key(|(_, count)| *count)?;
+    (2 * count > lines.len()).then_some(names)
+}
+
+/// The values of a row in the order of `names`; empty where it has none.
+fn values_of(names: &[String], row: Vec<(String, String)>) -> Vec<String> {
+    let mut values = vec![String::new(); names.len()];
+    for (at, (name, value)) in row.into_iter().enumerate() {
+        // Most rows have the same order.
+        let is_same = names.get(at) == Some(&name);
+        if let Some(at) = Some(at).filter(|_| is_same).or_else(|| names.iter().position(|known| *known == name)) {
+            values[at] = value;
+        }
+    }
+    values
+}
+
+/// The fields of a row, and which of them are read.
+#[derive(Debug)]
+struct RowFields {
+    width: usize,
+    /// Whether empty fields at the end may be absent.
+    may_be_short: bool,
+    /// Position of each field that is read, in ascending order, and which of the chosen columns it is.
+    read: Vec<(usize, usize)>,
+}
+
+impl RowFields {
+    fn new(width: usize, may_be_short: bool, chosen: &[ChosenColumn]) -> Self {
+        let mut read: Vec<(usize, usize)> =
+            chosen.iter().enumerate().map(|(at, column)| (column.position, at)).collect();
+        read.sort_unstable();
+        Self { width, may_be_short, read }
+    }
+
+    /// The numbers of the chosen columns of a row.
+    fn numbers<'a>(
+        &self,
+        mut fields: impl Iterator<Item = &'a str>,
+        mut calendar: Option<&mut CalendarClock>,
+        row: &mut Vec<Number>,
+    ) -> Result<(), (Option<usize>, Reason)> {
+        row.clear();
+        row.resize(self.read.len(), Number::Real(f64::NAN));
+        let mut read = self.read.as_slice();
+        let mut found = 0;
+        // Fields up to the last one that is not empty.
+        let mut filled = 0;
+        let mut fault: Option<(usize, Reason)> = None;
+        let mut after_date = None;
+        // The sum of the parts of a time.
+        let mut parts_ns = Some(0_i64);
+        while let Some(field) = after_date.take().or_else(|| fields.next()) {
+            let position = found;
+            found += 1;
+            if !field.is_empty() {
+                filled = found;
+            }
+            let mut time_ns = None;
+            if let Some(part) = calendar.as_ref().and_then(|clock| clock.part_ns(position, field)) {
+                parts_ns = parts_ns.zip(part).and_then(|(sum, part)| sum.checked_add(part));
+            }
+            if let Some(clock) = calendar.as_deref_mut().filter(|clock| clock.is_at(position)) {
+                if matches!(clock.columns, CalendarColumns::Two(_)) {
+                    after_date = fields.next();
+                }
+                time_ns = Some(clock.time_ns(field, after_date.unwrap_or_default()));
+            }
+            while let [(next, at), rest @ ..] = read
+                && *next == position
+            {
+                read = rest;
+                let (known, reason): (_, fn(String) -> Reason) = match time_ns {
+                    Some(time_ns) => (time_ns.map(Number::Integer), Reason::NotTime),
+                    None => (number(field), Reason::NotNumber),
+                };
+                match known {
+                    Some(known) => row[*at] = known,
+                    None if fault.as_ref().is_some_and(|(first, _)| first < at) => {}
+                    None => fault = Some((*at, reason(delimited_text::quote(field)))),
+                }
+            }
+        }
+        if let Some(start) = calendar.as_ref().and_then(|clock| clock.start_of_parts())
+            && let Some((_, at)) = self.read.iter().find(|(position, _)| *position == start)
+        {
+            let time_ns = parts_ns.and_then(|sum| calendar.as_mut()?.sum_ns(sum));
+            row[*at] = time_ns.map_or(Number::Real(f64::NAN), Number::Integer);
+        }
+        let is_complete = found >= self.width || self.may_be_short && found + 1 >= self.width.min(2);
+        match fault {
+            _ if !is_complete || filled > self.width => Err((None, Reason::FieldCount { found, expected: self.width })),
+            Some((at, reason)) => Err((Some(at), reason)),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Whether a row has a number, but none of the `chosen` columns of its sensor: it is of another one.
+fn is_of_other_sensor<'a>(
+    fields: impl Iterator<Item = &'a str>,
+    chosen: &[ChosenColumn],
+    is_own: impl Fn(&ChosenColumn) -> bool,
+) -> bool {
+    let (mut has_other, mut has_own) = (false, false);
+    for (at, field) in fields.enumerate().filter(|(_, field)| !field.is_empty()) {
+        match chosen.iter().find(|column| column.position == at) {
+            Some(column) if is_own(column) => has_own = true,
+            Some(_) => {}
+            None => has_other |= number(field).is_some_and(|number| !number.value().is_nan()),
+        }
+    }
+    has_other && !has_own
+}

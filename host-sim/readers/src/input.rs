@@ -1,0 +1,12 @@
+//! Bytes and lines of a recording as they are read, and what is wrong with them.
+
+pub(crate) mod budget;
+pub mod delimited_text;
+pub(crate) mod file_bytes;
+pub(crate) mod file_hash;
+pub(crate) mod gzip_members;
+pub(crate) mod input_error;
+pub(crate) mod read_ahead;
+pub(crate) mod read_monitor;
+pub(crate) mod stream_error;
+pub(crate) mod zstd_frames;

@@ -1,0 +1,181 @@
+//! What the reading of one file may cost: bytes once they are decompressed, numbers, and levels of nesting.
+//!
+//! A file of a few kilobytes can ask for gigabytes (compressed constants) or for a stack of any depth (definitions within definitions).
+//! Every reader draws from one budget, whose amounts grow with the size of the file, so that no recording that a sensor made meets it: the
+//! noise of a converter does not compress to a fiftieth. They bound the time as well, but for a query of a database, which has a deadline.
+
+use crate::input::file_bytes::FileBytes;
+use crate::input::input_error::Reason;
+use std::borrow::BorrowMut;
+use std::io::{self, Read};
+use std::time::{Duration, Instant};
+
+/// Bytes that a byte of the file may become when it is decompressed, and bytes that every file has beside.
+const BYTES_PER_BYTE: u64 = 50;
+const BYTES_OF_ANY: u64 = 1 << 24;
+/// Numbers that a byte of the file may become, and numbers that every file has beside.
+const VALUES_PER_BYTE: u64 = 8;
+const VALUES_OF_ANY: u64 = 1 << 20;
+/// Time of a query for a byte of the file, and for every file.
+const NANOSECONDS_PER_BYTE: u64 = 1_000;
+const TIME_OF_ANY: Duration = Duration::from_secs(10);
+/// Definitions within definitions, structures within structures, groups within groups.
+const MOST_LEVELS: usize = 32;
+
+/// The end of a query that may take so long; a browser has neither queries nor a clock.
+fn deadline(time: Duration) -> Option<Instant> {
+    if cfg!(target_family = "wasm") { None } else { Instant::now().checked_add(time) }
+}
+
+/// The amounts for one file. A reader that goes through the file twice takes a [`Meter`] for each time.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Budget {
+    bytes: u64,
+    values: u64,
+    time: Duration,
+    /// `None` without a limit.
+    #[cfg_attr(not(feature = "sqlite"), expect(dead_code, reason = "a query alone may never end"))]
+    end: Option<Instant>,
+}
+
+impl Budget {
+    /// For a file of `bytes`, from now on.
+    pub(crate) fn new(bytes: u64) -> Self {
+        let time = TIME_OF_ANY + Duration::from_nanos(bytes.saturating_mul(NANOSECONDS_PER_BYTE));
+        Self {
+            bytes: BYTES_OF_ANY.saturating_add(bytes.saturating_mul(BYTES_PER_BYTE)),
+            values: VALUES_OF_ANY.saturating_add(bytes.saturating_mul(VALUES_PER_BYTE)),
+            time,
+            end: deadline(time),
+        }
+    }
+
+    /// For this file, from now on; of a pipe without a limit.
+    pub(crate) fn of_file(file: &FileBytes) -> io::Result<Self> {
+        Ok(Self::new(file.length()?.unwrap_or(u64::MAX)))
+    }
+
+    /// For files that are one recording, from now on.
+    pub(crate) fn joined(budgets: impl IntoIterator<Item = Self>) -> Self {
+        budgets.into_iter().fold(Self::new(0), |all, of| Self {
+            bytes: all.bytes.saturating_add(of.bytes),
+            values: all.values.saturating_add(of.values),
+            time: all.time.saturating_add(of.time),
+            ..all
+        })
+    }
+
+    /// Without any time left.
+    #[cfg(test)]
+    pub(crate) fn spent() -> Self {
+        let budget = Self::new(0);
+        Self { end: budget.end.and_then(|end| end.checked_sub(budget.time)), ..budget }
+    }
+
+    /// The same for another reading, from now on.
+    pub(crate) fn again(self) -> Self {
+        Self { end: deadline(self.time), ..self }
+    }
+
+    /// Counts from nothing.
+    pub(crate) fn meter(self) -> Meter {
+        Meter { budget: self, bytes: 0, values: 0 }
+    }
+
+    /// Refuses what lies deeper than any recording.
+    pub(crate) fn check_depth(levels: usize) -> Result<(), Reason> {
+        if levels > MOST_LEVELS { Err(Reason::TooDeep { most: MOST_LEVELS }) } else { Ok(()) }
+    }
+
+    /// Refuses to go on with a query after the time has passed.
+    #[cfg(any(feature = "sqlite", test))]
+    pub(crate) fn check_time(self) -> Result<(), Reason> {
+        let is_late = self.end.is_some_and(|end| Instant::now() > end);
+        if is_late { Err(Reason::TooSlow { seconds: self.time.as_secs() }) } else { Ok(()) }
+    }
+}
+
+/// What one reading has cost.
+#[derive(Debug)]
+pub(crate) struct Meter {
+    budget: Budget,
+    bytes: u64,
+    values: u64,
+}
+
+impl Meter {
+    pub(crate) fn budget(&self) -> Budget {
+        self.budget
+    }
+
+    /// Adds bytes that were decompressed.
+    pub(crate) fn add_bytes(&mut self, bytes: u64) -> Result<(), Reason> {
+        self.bytes = self.bytes.saturating_add(bytes);
+        if self.bytes > self.budget.bytes {
+            return Err(Reason::Expands { bytes: self.budget.bytes });
+        }
+        Ok(())
+    }
+
+    /// Adds numbers that are held.
+    pub(crate) fn add_values(&mut self, values: u64) -> Result<(), Reason> {
+        self.values = self.values.saturating_add(values);
+        if self.values > self.budget.values {
+            return Err(Reason::TooManyValues { values: self.budget.values });
+        }
+        Ok(())
+    }
+}
+
+/// Counts what comes out of a decompressor. What the budget refuses is an error that [`Reason::from_io`] gives back.
+pub(crate) struct Metered<R, M = Meter> {
+    input: R,
+    meter: M,
+}
+
+impl<R, M> Metered<R, M> {
+    pub(crate) fn new(input: R, meter: M) -> Self {
+        Self { input, meter }
+    }
+
+    /// What the reading has cost until now.
+    pub(crate) fn into_meter(self) -> M {
+        self.meter
+    }
+}
+
+impl<R: Read, M: BorrowMut<Meter>> Read for Metered<R, M> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.input.read(buffer)?;
+        self.meter.borrow_mut().add_bytes(count as u64).map_err(io::Error::other)?;
+        Ok(count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BYTES_OF_ANY, BYTES_PER_BYTE, Budget, MOST_LEVELS, Metered, VALUES_OF_ANY, VALUES_PER_BYTE};
+    use crate::input::input_error::Reason;
+    use std::io::Read;
+
+    #[test]
+    fn every_amount_ends_where_it_says_and_a_second_reading_begins_anew() {
+        let budget = Budget::new(1_000);
+        let (bytes, values) = (BYTES_OF_ANY + 1_000 * BYTES_PER_BYTE, VALUES_OF_ANY + 1_000 * VALUES_PER_BYTE);
+        let mut meter = budget.meter();
+        meter.add_bytes(bytes).expect("within the budget");
+        assert!(matches!(meter.add_bytes(1), Err(Reason::Expands { bytes: of }) if of == bytes));
+        meter.add_values(values).expect("within the budget");
+        assert!(matches!(meter.add_values(1), Err(Reason::TooManyValues { values: of }) if of == values));
+        budget.meter().add_bytes(bytes).expect("a second reading");
+        Budget::check_depth(MOST_LEVELS).expect("within the budget");
+        assert!(matches!(Budget::check_depth(MOST_LEVELS + 1), Err(Reason::TooDeep { .. })));
+    }
+
+    #[test]
+    fn what_a_decompressor_gives_is_counted_and_the_reason_comes_back() {
+        let mut endless = Metered::new(std::io::repeat(0), Budget::new(0).meter());
+        let error = std::io::copy(&mut endless.by_ref().take(u64::MAX), &mut std::io::sink()).unwrap_err();
+        assert!(matches!(Reason::from_io(error), Reason::Expands { bytes } if bytes == BYTES_OF_ANY));
+    }
+}

@@ -1,0 +1,211 @@
+//! Comma-separated text from a plain or gzip file, line by line, with the number of every line as an editor shows it.
+//!
+//! The crate `csv` is not used because the line number that it reports is wrong after a blank line and in files with CR LF
+//! line ends.
+
+use crate::input::budget::{Budget, Metered};
+use crate::input::file_bytes::FileBytes;
+use crate::input::gzip_members::{GZIP_MAGIC, GzipMembers};
+use crate::input::input_error::{InputError, Reason};
+use crate::input::read_ahead::ReadAhead;
+use crate::input::read_monitor::{Counted, ReadMonitor};
+use encoding_rs_io::DecodeReaderBytes;
+use std::io::{self, BufRead, BufReader, Cursor, Read};
+use std::path::PathBuf;
+
+/// Longest line that is read, bytes.
+const MAX_LINE_BYTES: u64 = 1 << 16;
+
+/// Size of each read buffer, bytes.
+const BUFFER_BYTES: usize = 1 << 16;
+
+/// An open file, read one line at a time.
+pub struct Lines {
+    file: PathBuf,
+    input: BufReader<Box<dyn Read + Send>>,
+    line: u64,
+    bytes: Vec<u8>,
+    /// The line, where it is no UTF-8.
+    latin: String,
+    is_latin: bool,
+    /// Whether the line in `bytes` is read once more.
+    again: bool,
+    /// Bytes that are zero, as where a disk was full or a device lost its power.
+    zero_bytes: u64,
+    monitor: ReadMonitor,
+}
+
+impl Lines {
+    /// Opens `file`. Whether it is compressed is told by its first bytes, not by its name.
+    ///
+    /// # Errors
+    /// The file is missing, unreadable, a directory or empty.
+    pub fn open(file: &FileBytes) -> Result<Self, InputError> {
+        Self::open_monitored(file, &ReadMonitor::default())
+    }
+
+    /// As [`open`](Self::open); `monitor` counts the bytes.
+    pub(crate) fn open_monitored(file: &FileBytes, monitor: &ReadMonitor) -> Result<Self, InputError> {
+        let fail = |reason| file.error(reason);
+        let mut raw = file.open().map_err(|e| fail(Reason::Io(e)))?;
+        // The first bytes are chained in front again instead of seeking: the file may be a pipe.
+        let mut start = Vec::with_capacity(2);
+        raw.by_ref().take(2).read_to_end(&mut start).map_err(|e| fail(Reason::Io(e)))?;
+        if start.is_empty() {
+            return Err(fail(Reason::Empty));
+        }
+        let compressed = start == GZIP_MAGIC;
+        let is_utf16 = is_utf16(&start);
+        monitor.begin();
+        let counted = Counted::new(Cursor::new(start).chain(raw), monitor);
+        let whole = BufReader::with_capacity(BUFFER_BYTES, counted);
+        let bytes: Box<dyn Read + Send> = if compressed {
+            let budget = Budget::of_file(file).map_err(|e| fail(Reason::Io(e)))?;
+            let members = Metered::new(GzipMembers::new(whole), budget.meter());
+            if cfg!(target_family = "wasm") {
+                Box::new(members)
+            } else {
+                Box::new(ReadAhead::new(members).map_err(|e| fail(Reason::Io(e)))?)
+            }
+        } else if is_utf16 {
+            // As programs for Windows write it.
+            Box::new(DecodeReaderBytes::new(whole))
+        } else {
+            Box::new(whole)
+        };
+        let input = BufReader::with_capacity(BUFFER_BYTES, bytes);
+        Ok(Self {
+            file: file.name().to_owned(),
+            input,
+            line: 0,
+            bytes: Vec::new(),
+            latin: String::new(),
+            is_latin: false,
+            again: false,
+            zero_bytes: 0,
+            monitor: monitor.clone(),
+        })
+    }
+
+    /// The next line that is not blank, without the blanks around it, and its number from 1; `None` at the end of the file. A line that
+    /// is no UTF-8 is Latin-1, as programs for Windows write a degree sign.
+    ///
+    /// # Errors
+    /// The file cannot be read or decompressed, or the line is longer than 65536 bytes or has control characters.
+    pub fn next_line(&mut self) -> Result<Option<(u64, &str)>, InputError> {
+        while !std::mem::take(&mut self.again) {
+            self.line += 1;
+            self.bytes.clear();
+            let read = (&mut self.input).take(MAX_LINE_BYTES).read_until(b'\n', &mut self.bytes);
+            let read = match read.map_err(read_failure) {
+                Ok(read) => read,
+                Err(Reason::TruncatedGzip) if self.monitor.is_cut() => 0,
+                Err(reason) => return Err(InputError::line(&self.file, self.line, reason)),
+            };
+            // The copy of a pipe that was stopped may end within a line.
+            if read == 0 || (self.monitor.is_cut() && self.bytes.last() != Some(&b'\n')) {
+                self.monitor.end();
+                return Ok(None);
+            }
+            if self.bytes.contains(&0) {
+                let length = self.bytes.len();
+                self.bytes.retain(|byte| *byte != 0);
+                self.zero_bytes += (length - self.bytes.len()) as u64;
+                // The rest of a line of zeros follows.
+                self.line -= u64::from(self.bytes.is_empty());
+            } else if read as u64 == MAX_LINE_BYTES && self.bytes.last() != Some(&b'\n') {
+                return Err(InputError::line(&self.file, self.line, Reason::LongLine));
+            }
+            if !self.bytes.trim_ascii().is_empty() {
+                break;
+            }
+        }
+        self.is_latin = false;
+        if let Ok(text) = text(&self.bytes) {
+            return Ok(Some((self.line, text)));
+        }
+        // Characters that no text has tell other bytes from letters.
+        let latin = self.bytes.trim_ascii().iter().map(|byte| char::from(*byte));
+        if latin.clone().any(|letter| letter.is_control() && letter != '\t') {
+            return Err(InputError::line(&self.file, self.line, Reason::NotText));
+        }
+        self.latin.clear();
+        self.latin.extend(latin);
+        self.is_latin = true;
+        Ok(Some((self.line, &self.latin)))
+    }
+
+    /// Bytes that are zero, which were left out.
+    pub(crate) fn zero_bytes(&self) -> u64 {
+        self.zero_bytes
+    }
+
+    /// The header without consuming it: what [`next_line`](Self::next_line) returns now, and will return once more. `None` for a file of
+    /// blank lines.
+    ///
+    /// # Errors
+    /// As [`next_line`](Self::next_line).
+    pub fn header(&mut self) -> Result<Option<&str>, InputError> {
+        let found = self.next_line()?.is_some();
+        self.again = found;
+        Ok(found.then_some(if self.is_latin { self.latin.as_str() } else { text(&self.bytes).unwrap_or_default() }))
+    }
+}
+
+/// Whether a file begins as text in UTF-16, in either order of the bytes.
+pub(crate) fn is_utf16(start: &[u8]) -> bool {
+    start.starts_with(b"\xFF\xFE") || start.starts_with(b"\xFE\xFF")
+}
+
+impl Drop for Lines {
+    fn drop(&mut self) {
+        self.monitor.end();
+    }
+}
+
+/// The text of a line without the blanks around it.
+fn text(bytes: &[u8]) -> Result<&str, std::str::Utf8Error> {
+    let plain = bytes.trim_ascii();
+    if let [first, .., last] = plain
+        && first.is_ascii_graphic()
+        && last.is_ascii_graphic()
+    {
+        return std::str::from_utf8(plain);
+    }
+    std::str::from_utf8(bytes).map(|text| text.trim_start_matches('\u{feff}').trim())
+}
+
+/// Tells damaged compression from a failing disk.
+fn read_failure(error: io::Error) -> Reason {
+    match error.kind() {
+        io::ErrorKind::UnexpectedEof => Reason::TruncatedGzip,
+        io::ErrorKind::InvalidInput => Reason::DamagedGzip(error),
+        io::ErrorKind::InvalidData => Reason::TrailingBytes,
+        _ => Reason::from_io(error),
+    }
+}
+
+/// A field without the blanks and the quotation marks around it.
+pub fn field(raw: &str) -> &str {
+    // Most have neither.
+    let is_bare = |byte: Option<&u8>| byte.is_none_or(|byte| byte.is_ascii_graphic() && *byte != b'"');
+    if is_bare(raw.as_bytes().first()) && is_bare(raw.as_bytes().last()) {
+        return raw;
+    }
+    let trimmed = raw.trim();
+    trimmed.strip_prefix('"').and_then(|t| t.strip_suffix('"')).unwrap_or(trimmed)
+}
+
+/// The first 32 characters of a field, for an error message.
+pub fn quote(text: &str) -> String {
+    text.chars().take(32).collect()
+}
+
+/// A finite time in seconds.
+pub fn time(text: &str) -> Result<f64, Reason> {
+    match text.parse::<f64>() {
+        Ok(time) if time.is_finite() => Ok(time),
+        Ok(_) => Err(Reason::NotFinite(quote(text))),
+        Err(_) => Err(Reason::NotNumber(quote(text))),
+    }
+}

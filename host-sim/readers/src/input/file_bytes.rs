@@ -1,0 +1,135 @@
+//! The bytes of a recording, which can be read more than once: of a file, of a copy of what came through a pipe or was compressed, or in
+//! memory.
+
+use crate::input::input_error::{InputError, Reason};
+use std::fs::{self, File};
+use std::io::{self, Cursor, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use tempfile::NamedTempFile;
+
+/// The bytes, under the name by which the user knows them. All clones are of the same bytes.
+#[derive(Debug, Clone)]
+pub struct FileBytes {
+    name: PathBuf,
+    /// `None` where they are in the file of this name.
+    copy: Option<BytesCopy>,
+}
+
+#[derive(Debug, Clone)]
+enum BytesCopy {
+    File(Arc<NamedTempFile>),
+    Memory(Arc<[u8]>),
+}
+
+impl<P: AsRef<Path> + ?Sized> From<&P> for FileBytes {
+    /// The bytes of a file.
+    fn from(file: &P) -> Self {
+        Self { name: file.as_ref().to_owned(), copy: None }
+    }
+}
+
+impl From<&Self> for FileBytes {
+    fn from(bytes: &Self) -> Self {
+        bytes.clone()
+    }
+}
+
+impl FileBytes {
+    /// Bytes in memory that are called `name`.
+    pub fn in_memory(name: &Path, bytes: impl Into<Arc<[u8]>>) -> Self {
+        Self { name: name.to_owned(), copy: Some(BytesCopy::Memory(bytes.into())) }
+    }
+
+    /// What is in a temporary file.
+    pub fn in_temporary_file(name: &Path, file: NamedTempFile) -> Self {
+        Self { name: name.to_owned(), copy: Some(BytesCopy::File(Arc::new(file))) }
+    }
+
+    /// A copy of all that `input` has, in a temporary file where the system has files.
+    pub(crate) fn copied(name: &Path, mut input: impl Read) -> io::Result<Self> {
+        if cfg!(target_family = "wasm") {
+            let mut bytes = Vec::new();
+            input.read_to_end(&mut bytes)?;
+            return Ok(Self::in_memory(name, bytes));
+        }
+        let mut copy = NamedTempFile::new()?;
+        io::copy(&mut input, &mut copy)?;
+        copy.flush()?;
+        Ok(Self::in_temporary_file(name, copy))
+    }
+
+    /// As the user named it.
+    #[must_use]
+    pub fn name(&self) -> &Path {
+        &self.name
+    }
+
+    /// The file that has them; `None` in memory.
+    pub(crate) fn file(&self) -> Option<&Path> {
+        match &self.copy {
+            None => Some(&self.name),
+            Some(BytesCopy::File(file)) => Some(file.path()),
+            Some(BytesCopy::Memory(_)) => None,
+        }
+    }
+
+    /// Opens them at their beginning.
+    pub fn open(&self) -> io::Result<OpenBytes> {
+        match (&self.copy, self.file()) {
+            (Some(BytesCopy::Memory(bytes)), _) => Ok(OpenBytes::Memory(Cursor::new(Arc::clone(bytes)))),
+            (_, file) => File::open(file.unwrap_or(&self.name)).map(OpenBytes::File),
+        }
+    }
+
+    /// The first ones.
+    ///
+    /// # Errors
+    /// They cannot be read.
+    pub fn head(&self, most: u64) -> io::Result<Vec<u8>> {
+        let mut head = Vec::new();
+        self.open()?.take(most).read_to_end(&mut head)?;
+        Ok(head)
+    }
+
+    /// How many there are; `None` of a pipe.
+    pub(crate) fn length(&self) -> io::Result<Option<u64>> {
+        match (&self.copy, self.file()) {
+            (Some(BytesCopy::Memory(bytes)), _) => Ok(Some(bytes.len() as u64)),
+            (_, file) => {
+                let metadata = fs::metadata(file.unwrap_or(&self.name))?;
+                Ok(Some(metadata.len()).filter(|_| metadata.is_file()))
+            }
+        }
+    }
+
+    /// A fault of the file as a whole.
+    #[must_use]
+    pub fn error(&self, reason: Reason) -> InputError {
+        InputError::file(&self.name, reason)
+    }
+}
+
+/// Open bytes.
+pub enum OpenBytes {
+    File(File),
+    Memory(Cursor<Arc<[u8]>>),
+}
+
+impl Read for OpenBytes {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self {
+            Self::File(file) => file.read(buffer),
+            Self::Memory(bytes) => bytes.read(buffer),
+        }
+    }
+}
+
+impl Seek for OpenBytes {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        match self {
+            Self::File(file) => file.seek(position),
+            Self::Memory(bytes) => bytes.seek(position),
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! How far the reading of a file is, and the request to end it before the end of the file.
+
+use std::io::{self, Read, Seek, SeekFrom};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering::Relaxed};
+
+/// What a recording is read for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReadPass {
+    /// The first rows, which tell the clock of the time stamps: all of a recording that is held in memory.
+    FirstRows,
+    /// The first reading of a recording that is read in blocks: its rate, its length, and the size of its counts.
+    Survey,
+    /// The second reading of such a recording: its samples.
+    Samples,
+}
+
+/// Shared by the reader of a file and by those who watch it. All clones are one monitor.
+#[derive(Debug, Clone, Default)]
+pub struct ReadMonitor(Arc<State>);
+
+#[derive(Debug, Default)]
+struct State {
+    bytes: AtomicU64,
+    pass: AtomicU8,
+    is_reading: AtomicBool,
+    stop: AtomicBool,
+    is_interrupted: AtomicBool,
+    is_cut: AtomicBool,
+}
+
+impl ReadMonitor {
+    /// Bytes that were read from the file since it was opened last; compressed ones, where the file is compressed.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.0.bytes.load(Relaxed)
+    }
+
+    /// What the file is read for.
+    #[must_use]
+    pub fn pass(&self) -> ReadPass {
+        let passes = [ReadPass::FirstRows, ReadPass::Survey, ReadPass::Samples];
+        let pass = self.0.pass.load(Relaxed);
+        passes.into_iter().find(|of| *of as u8 == pass).unwrap_or(ReadPass::FirstRows)
+    }
+
+    /// Begins a reading.
+    pub fn begin_pass(&self, pass: ReadPass) {
+        self.0.pass.store(pass as u8, Relaxed);
+    }
+
+    /// Whether a file is being read that can be stopped.
+    #[must_use]
+    pub fn is_reading(&self) -> bool {
+        self.0.is_reading.load(Relaxed)
+    }
+
+    /// Ends the reading after the row that is read now, as if the file ended there.
+    pub fn stop(&self) {
+        self.0.stop.store(true, Relaxed);
+    }
+
+    /// Whether the reading was ended by [`stop`](Self::stop).
+    #[must_use]
+    pub fn is_interrupted(&self) -> bool {
+        self.0.is_interrupted.load(Relaxed)
+    }
+
+    /// Begins a file.
+    pub(crate) fn begin(&self) {
+        self.0.bytes.store(0, Relaxed);
+        self.0.is_reading.store(true, Relaxed);
+    }
+
+    /// Ends a file.
+    pub(crate) fn end(&self) {
+        self.0.is_reading.store(false, Relaxed);
+    }
+
+    /// Whether the reading has to end here. The request is served by this: the next file is read to its end.
+    pub(crate) fn take_stop(&self) -> bool {
+        let is_stopped = self.0.stop.load(Relaxed) && self.0.stop.swap(false, Relaxed);
+        if is_stopped {
+            self.0.is_interrupted.store(true, Relaxed);
+        }
+        is_stopped
+    }
+
+    /// Notes that the file is a copy of a pipe whose reading was stopped: it may end within a line or within compressed data.
+    pub(crate) fn cut(&self) {
+        self.0.is_cut.store(true, Relaxed);
+    }
+
+    pub(crate) fn is_cut(&self) -> bool {
+        self.0.is_cut.load(Relaxed)
+    }
+
+    /// Counts bytes that were read.
+    pub(crate) fn count(&self, bytes: usize) {
+        self.0.bytes.fetch_add(bytes as u64, Relaxed);
+    }
+}
+
+/// Counts what is read through it.
+pub(crate) struct Counted<R> {
+    input: R,
+    monitor: ReadMonitor,
+}
+
+impl<R> Counted<R> {
+    pub(crate) fn new(input: R, monitor: &ReadMonitor) -> Self {
+        Self { input, monitor: monitor.clone() }
+    }
+}
+
+impl<R: Seek> Seek for Counted<R> {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        self.input.seek(position)
+    }
+}
+
+impl<R: Read> Read for Counted<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.input.read(buffer)?;
+        self.monitor.count(count);
+        Ok(count)
+    }
+}

@@ -1,0 +1,493 @@
+//! Which columns are an inertial sensor: as the format says it, by their names, or by their numbers.
+
+use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
+use crate::columns::column_selection::{AvailableColumn, ColumnSelection, known_by_name};
+use crate::columns::unit::{COUNT, SECOND, Unit};
+use crate::inspection::column_facts::ColumnFacts;
+use crate::inspection::time_unit::time_unit;
+use crate::inspection::unit_guess::{self, UnitGuess};
+use crate::rows::batch::usual_unit;
+use crate::rows::whole_table::{WholeSensor, WholeTable};
+use measurement::SensorProfile;
+use std::collections::BTreeMap;
+use time_base::TimeRange;
+
+/// What a column is taken for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ColumnGuess {
+    /// Name of the channel, or `time` or `sample`.
+    pub channel: &'static str,
+    /// Unit that the file does not say.
+    pub unit: Option<&'static str>,
+    /// Why, where neither the format nor the name of the column says it.
+    pub reason: String,
+}
+
+/// The options with which a sensor of a file is analysed.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Proposal {
+    /// `--topic`, where it is needed.
+    pub topic: Option<String>,
+    /// `--columns`: channel and column; empty where the file tells the columns.
+    pub columns: Vec<String>,
+    /// `--units`; empty where the file tells them.
+    pub units: Vec<String>,
+    /// `--from` and `--to`: the part at rest, where the sensor was moved before or after it.
+    pub part: Option<TimeRange>,
+    /// Whether `--rate` is needed.
+    pub lacks_rate: bool,
+    /// Whether the sensor is found without its topic, if it is the only one.
+    pub is_found: bool,
+    /// Whether a column or a unit is guessed.
+    pub is_guessed: bool,
+    /// `--sensor`, where the names of the columns are those of its registers.
+    pub sensor: Option<&'static str>,
+    /// Guesses that are not safe, one sentence each.
+    pub doubts: Vec<String>,
+}
+
+impl Proposal {
+    /// Whether nothing is guessed: the file or the user says it.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        !self.is_guessed && !self.lacks_rate
+    }
+
+    /// Whether nothing is missing in it, and no guess is in doubt.
+    #[must_use]
+    pub fn is_safe(&self) -> bool {
+        !self.lacks_rate && self.doubts.is_empty()
+    }
+}
+
+/// How the columns of a sensor are known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Evidence {
+    /// The user says it.
+    User,
+    /// The format knows them.
+    Format,
+    /// By their names.
+    Names,
+    /// By their names, but the names of several sensors.
+    Prefix,
+    /// By their numbers.
+    Numbers,
+}
+
+/// Channel, `time` or `sample`; position of the column; its unit, where the file says it; and why it is taken for that.
+type Columns = Vec<(&'static str, usize, Option<Unit>, &'static str)>;
+
+/// A sensor in a table.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct SensorGuess {
+    /// For `--topic`; empty where there is one.
+    name: String,
+    evidence: Evidence,
+    columns: Columns,
+    /// Units that the file does not say.
+    force: Option<UnitGuess>,
+    rate: Option<UnitGuess>,
+    time: Option<(Unit, String)>,
+    /// Whether a temperature without a unit is taken to be in °C.
+    is_celsius: bool,
+}
+
+/// The unit that a temperature without one is taken to have, and the temperatures of sensors.
+const CELSIUS: &str = "degC";
+const TEMPERATURES: std::ops::RangeInclusive<f64> = -40.0..=125.0;
+
+impl SensorGuess {
+    /// The sensors of a table; none where no column is one of a gyroscope or an accelerometer.
+    pub(crate) fn all(
+        table: &WholeTable,
+        facts: &[ColumnFacts],
+        profile: &SensorProfile,
+        selection: &ColumnSelection,
+    ) -> Vec<Self> {
+        let mut found: Vec<Self> = Self::by_user(facts, selection).into_iter().collect();
+        if found.is_empty() {
+            let by_format: Vec<Self> = table.sensors.iter().map(|sensor| Self::of_format(sensor, facts)).collect();
+            let by_names = Self::by_names(facts);
+            // What lies in several groups of arrays is not seen as a whole by the format.
+            let channels = |of: &[Self]| of.iter().map(|sensor| sensor.inertial().count()).max().unwrap_or(0);
+            let is_more = table.is_of_arrays && channels(&by_names) > channels(&by_format);
+            found = if by_format.is_empty() || is_more { by_names } else { by_format };
+        }
+        if found.is_empty() {
+            found = Self::by_numbers(facts, &table.name).into_iter().collect();
+        } else if table.rate_hz.is_none() {
+            found.iter_mut().for_each(|sensor| sensor.add_clock(facts));
+        }
+        found.into_iter().map(|sensor| sensor.with_units(facts, profile, selection)).collect()
+    }
+
+    fn new(name: &str, evidence: Evidence, columns: Columns) -> Self {
+        Self { name: name.to_owned(), evidence, columns, force: None, rate: None, time: None, is_celsius: false }
+    }
+
+    /// What the user says, and the time, which is seldom named.
+    fn by_user(facts: &[ColumnFacts], selection: &ColumnSelection) -> Option<Self> {
+        let available: Vec<AvailableColumn> = facts.iter().map(|of| of.column.clone()).collect();
+        let mut assigned = selection.assignments(&available);
+        let named = known_by_name(&available).unwrap_or_default();
+        let time = named.into_iter().find(|(channel, _)| *channel == "time");
+        assigned.extend(time.filter(|_| !assigned.iter().any(|(channel, _)| *channel == "time")));
+        let columns = assigned.into_iter().map(|(channel, at)| (channel, at, facts[at].column.unit, "")).collect();
+        Some(Self::new("", Evidence::User, columns)).filter(Self::is_inertial)
+    }
+
+    fn of_format(sensor: &WholeSensor, facts: &[ColumnFacts]) -> Self {
+        let column = |&(channel, at, unit): &(&'static str, usize, Option<Unit>)| {
+            (channel, at, unit.or(facts[at].column.unit), "")
+        };
+        Self::new(&sensor.name, Evidence::Format, sensor.columns.iter().map(column).collect())
+    }
+
+    /// By the names of the columns: one sensor, or one for each beginning of the names where they are those of several.
+    fn by_names(facts: &[ColumnFacts]) -> Vec<Self> {
+        let available: Vec<AvailableColumn> = facts.iter().map(|of| of.column.clone()).collect();
+        let unit = |at: usize| facts[at].column.unit;
+        if let Some(named) = known_by_name(&available) {
+            let columns: Columns = named.into_iter().map(|(channel, at)| (channel, at, unit(at), "")).collect();
+            return Some(Self::new("", Evidence::Names, columns)).filter(Self::is_inertial).into_iter().collect();
+        }
+        let mut groups: BTreeMap<&str, Vec<(&'static str, usize)>> = BTreeMap::new();
+        for (at, column) in available.iter().enumerate() {
+            if let Some((prefix, channel)) = column.prefix_and_channel() {
+                let group = groups.entry(prefix).or_default();
+                if !group.iter().any(|(known, _)| *known == channel) {
+                    group.push((channel, at));
+                }
+            }
+        }
+        // Times stand beside all of them.
+        let common = groups.remove("").unwrap_or_default();
+        let of_group = |(_, own): (&str, Vec<(&'static str, usize)>)| {
+            let is_new = |(channel, _): &&(&'static str, usize)| !own.iter().any(|(known, _)| known == channel);
+            let all =
+                common.iter().filter(|(channel, _)| matches!(*channel, "time" | "sample")).filter(is_new).chain(&own);
+            let columns = all.map(|&(channel, at)| (channel, at, unit(at), "")).collect();
+            Some(Self::new("", Evidence::Prefix, columns)).filter(Self::is_inertial)
+        };
+        let of_common = common.iter().map(|&(channel, at)| (channel, at, unit(at), "")).collect();
+        let of_common = Some(Self::new("", Evidence::Prefix, of_common)).filter(Self::is_inertial);
+        of_common.into_iter().chain(groups.clone().into_iter().filter_map(of_group)).collect()
+    }
+
+    /// The column with the times of the rows: by its name, or because it grows evenly.
+    fn clock(facts: &[ColumnFacts]) -> Option<(usize, &'static str)> {
+        let named = facts.iter().position(|of| of.column.is_time()).map(|at| (at, ""));
+        let is_clock = |at: &usize| facts[*at].is_clock() && !facts[*at].is_counter();
+        named.or_else(|| (0..facts.len()).find(is_clock).map(|at| (at, "it grows evenly")))
+    }
+
+    /// Adds the times, where the names do not say them.
+    fn add_clock(&mut self, facts: &[ColumnFacts]) {
+        let is_known = ["time", "sample"].iter().any(|channel| self.position(channel).is_some());
+        if matches!(self.evidence, Evidence::Names | Evidence::Prefix)
+            && !is_known
+            && let Some((at, why)) = Self::clock(facts)
+        {
+            self.columns.push(("time", at, facts[at].column.unit, why));
+            self.evidence = Evidence::Prefix;
+        }
+    }
+
+    /// By the numbers: a column that grows is the time, three neighbours that are as long as gravity are the accelerometer, and of the others
+    /// those three whose mean is smallest against their noise are the gyroscope. Rows that are called as one of these have no other.
+    fn by_numbers(facts: &[ColumnFacts], topic: &str) -> Option<Self> {
+        let mut columns: Columns = Vec::new();
+        let unit = |at: usize| facts[at].column.unit;
+        let clock = Self::clock(facts);
+        columns.extend(clock.map(|(at, why)| ("time", at, unit(at), why)));
+        let clock = clock.map(|(at, _)| at);
+        let counter = (0..facts.len()).find(|at| facts[*at].is_counter() && clock != Some(*at));
+        columns.extend(counter.filter(|_| clock.is_none()).map(|at| ("sample", at, None, "it grows by one")));
+        let is_free = |at: usize| {
+            let of = &facts[at];
+            let may_be = may_be_inertial(of.column) && of.noise > 0.0 && !of.is_clock();
+            may_be && clock != Some(at) && counter != Some(at)
+        };
+        let Triples { force, others } = Triples::find(facts, is_free);
+        let first = force.into_iter().chain(others.iter().copied()).min();
+        let (force, others) = match RowLabel::of(topic) {
+            Some(RowLabel::Force) => (force.or(first), Vec::new()),
+            Some(RowLabel::Rate) => (None, first.into_iter().collect()),
+            Some(RowLabel::Other) => (None, Vec::new()),
+            None => (force, others),
+        };
+        let against_noise = |at: usize| {
+            let axes = &facts[at..at + 3];
+            let norm = axes.iter().map(|axis| axis.mean * axis.mean).sum::<f64>().sqrt();
+            norm / axes.iter().map(|axis| axis.noise).fold(0.0, f64::max)
+        };
+        let rate = others.into_iter().min_by(|one, other| against_noise(*one).total_cmp(&against_noise(*other)));
+        let reason = "the three are not gravity";
+        for (channels, first, reason) in [(GYROSCOPE, rate, reason), (ACCELEROMETER, force, "")] {
+            let Some(first) = first else { continue };
+            // The names may say the order of the axes.
+            let axis =
+                |at: usize| facts[at].column.name.to_lowercase().chars().last().and_then(|axis| "xyz".find(axis));
+            let named: Vec<usize> = (first..first + 3).filter_map(axis).collect();
+            let is_named = (0..3).all(|axis| named.contains(&axis));
+            for (number, at) in (first..first + 3).enumerate() {
+                let channel = channels[if is_named { named[number] } else { number }];
+                columns.push((channel, at, unit(at), reason));
+            }
+        }
+        // The order of the axes, whatever that of the columns.
+        columns.sort_by_key(|(channel, ..)| {
+            ["time", "sample"].iter().chain(&GYROSCOPE).chain(&ACCELEROMETER).position(|known| known == channel)
+        });
+        Some(Self::new("", Evidence::Numbers, columns)).filter(Self::is_inertial)
+    }
+
+    /// The same with the units that the file does not say.
+    fn with_units(mut self, facts: &[ColumnFacts], profile: &SensorProfile, selection: &ColumnSelection) -> Self {
+        let any = SensorProfile::generic();
+        for (channel, _, unit, _) in &mut self.columns {
+            let base = any.channel(channel).map_or(SECOND, |of| of.quantity.unit());
+            *unit = selection.stated_unit(base).or(*unit);
+            // Counts have the size that the sensor's profile says.
+            if unit.is_some_and(|unit| unit.base == COUNT) {
+                *unit = profile
+                    .channel(channel)
+                    .filter(|of| of.lsb != 1.0)
+                    .and_then(|of| Some(Unit { factor: of.lsb, ..Unit::parse(of.quantity.unit())? }));
+            }
+        }
+        let lacks_unit = |channels: [&str; 3]| {
+            self.columns.iter().any(|(channel, _, unit, _)| channels.contains(channel) && unit.is_none())
+        };
+        let of = |channels: [&str; 3]| -> Vec<&ColumnFacts> {
+            channels.iter().filter_map(|channel| Some(&facts[self.position(channel)?])).collect()
+        };
+        let (force, rate) = (of(ACCELEROMETER), of(GYROSCOPE));
+        let force_guess = unit_guess::force_unit(&force).filter(|_| lacks_unit(ACCELEROMETER));
+        let force_guess = force_guess.or_else(|| {
+            let reason = "the accelerometer does not show gravity in any unit; m/s^2 is taken".to_owned();
+            lacks_unit(ACCELEROMETER).then_some(UnitGuess { unit: "m/s^2", reason, is_safe: false })
+        });
+        let own_force = self.columns.iter().find(|(channel, ..)| ACCELEROMETER.contains(channel));
+        let own_force = own_force.and_then(|(_, _, unit, _)| unit.map(|unit| unit.name));
+        let known_force = force_guess.as_ref().filter(|of| of.is_safe).map(|of| of.unit).or(own_force);
+        let rate_guess = lacks_unit(GYROSCOPE).then(|| unit_guess::rate_unit(&rate, known_force));
+        // What the analysis takes without being told is no guess.
+        let time_guess = self.columns.iter().find(|(channel, ..)| *channel == "time").and_then(|&(_, at, unit, _)| {
+            let values = facts[at].values;
+            let origin = values.first().copied().unwrap_or(0.0);
+            let since: Vec<f64> = values.iter().map(|value| value - origin).collect();
+            let is_missing = !unit.is_some_and(|unit| unit.is_time()) && usual_unit(&since, origin).is_none();
+            time_unit(values).filter(|_| is_missing)
+        });
+        let is_celsius = self.columns.iter().any(|(channel, at, unit, _)| {
+            *channel == "temp" && unit.is_none() && TEMPERATURES.contains(&facts[*at].mean)
+        });
+        Self { force: force_guess, rate: rate_guess, time: time_guess, is_celsius, ..self }
+    }
+
+    /// Whether it has a channel of an inertial sensor, or of a magnetometer.
+    fn is_inertial(&self) -> bool {
+        let is_axis = |channel: &str| GYROSCOPE.contains(&channel) || ACCELEROMETER.contains(&channel);
+        self.columns.iter().any(|(channel, ..)| is_axis(channel) || channel.starts_with("magn_"))
+    }
+
+    /// The position of the column of a channel.
+    pub(crate) fn position(&self, channel: &str) -> Option<usize> {
+        self.columns.iter().find(|(own, ..)| *own == channel).map(|(_, at, ..)| *at)
+    }
+
+    /// Whether the column at `at` is one of the accelerometer.
+    pub(crate) fn is_force(&self, at: usize) -> bool {
+        self.columns.iter().any(|(channel, own, ..)| *own == at && ACCELEROMETER.contains(channel))
+    }
+
+    /// Columns of gyroscope and accelerometer: positions, and the size of 1 in deg/s or g, where it is known.
+    pub(crate) fn inertial(&self) -> impl Iterator<Item = (usize, Option<f64>)> {
+        self.columns.iter().filter_map(|&(channel, at, unit, _)| {
+            let guess = self.unit_guess(channel)?;
+            let guessed = guess.filter(|of| of.is_safe).and_then(|of| Unit::parse(of.unit));
+            Some((at, unit.or(guessed).map(|unit| unit.factor)))
+        })
+    }
+
+    /// The guess of the unit of a channel of gyroscope or accelerometer, if there is one; `None` of other channels.
+    fn unit_guess(&self, channel: &str) -> Option<Option<&UnitGuess>> {
+        if GYROSCOPE.contains(&channel) {
+            return Some(self.rate.as_ref());
+        }
+        ACCELEROMETER.contains(&channel).then_some(self.force.as_ref())
+    }
+
+    /// What the column at `at` is taken for.
+    pub(crate) fn guess(&self, at: usize) -> Option<ColumnGuess> {
+        let &(channel, _, unit, why) = self.columns.iter().find(|(_, own, ..)| *own == at)?;
+        let (guessed, reason) = match (self.unit_guess(channel).flatten(), &self.time) {
+            (Some(UnitGuess { unit: guessed, reason, .. }), _) if unit.is_none() => (Some(*guessed), reason.clone()),
+            (_, Some((guessed, reason))) if channel == "time" => (Some(guessed.name), reason.clone()),
+            _ if channel == "temp" && self.is_celsius => (Some(CELSIUS), "a temperature of a sensor".to_owned()),
+            _ => (None, String::new()),
+        };
+        let reason = [why, reason.as_str()].into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join("; ");
+        Some(ColumnGuess { channel, unit: guessed, reason })
+    }
+
+    /// The options with which this sensor of `table` is analysed.
+    pub(crate) fn proposal(&self, table: &WholeTable, facts: &[ColumnFacts], has_rate: bool) -> Proposal {
+        let is_needed = |(channel, _, unit, _): &(&str, usize, Option<Unit>, &str)| {
+            let is_axis = GYROSCOPE.contains(channel) || ACCELEROMETER.contains(channel);
+            let is_known = unit.is_some() || *channel == "temp" && self.is_celsius;
+            is_axis || matches!(*channel, "time" | "sample") || is_known
+        };
+        let mut proposal = Proposal { lacks_rate: !has_rate, ..Proposal::default() };
+        let is_part = table.is_of_arrays && self.evidence == Evidence::Names;
+        if matches!(self.evidence, Evidence::Prefix | Evidence::Numbers) || is_part {
+            let assigned = self.columns.iter().filter(|column| is_needed(column));
+            let assignment =
+                |(channel, at, ..): &(&str, usize, Option<Unit>, &str)| format!("{channel}={}", facts[*at].column.name);
+            proposal.columns = assigned.map(assignment).collect();
+        }
+        let topic = if self.evidence == Evidence::Format { &self.name } else { &table.name };
+        proposal.topic = Some(topic.clone()).filter(|topic| !topic.is_empty());
+        proposal.is_found = matches!(self.evidence, Evidence::Format | Evidence::Names | Evidence::User);
+        let has_guess = self.rate.is_some() || self.force.is_some() || self.time.is_some();
+        proposal.is_guessed = has_guess || self.evidence == Evidence::Numbers;
+        proposal.units.extend(self.time.as_ref().map(|(unit, _)| unit.name.to_owned()));
+        let lacks_force = self.position(ACCELEROMETER[0]).is_none();
+        let is_told = matches!(RowLabel::of(&table.name), Some(RowLabel::Rate));
+        if self.evidence == Evidence::Numbers
+            && lacks_force
+            && !is_told
+            && self.rate.as_ref().is_none_or(|rate| rate.is_safe)
+        {
+            proposal.doubts.push("nothing but their place says that the three columns are rates".to_owned());
+        }
+        proposal.units.extend(self.is_celsius.then(|| CELSIUS.to_owned()));
+        for guess in self.rate.iter().chain(&self.force) {
+            proposal.units.push(guess.unit.to_owned());
+            proposal.doubts.extend(Some(guess.reason.clone()).filter(|_| !guess.is_safe));
+        }
+        proposal
+    }
+}
+
+/// What the name of a kind of rows says of their numbers.
+enum RowLabel {
+    Force,
+    Rate,
+    Other,
+}
+
+impl RowLabel {
+    fn of(topic: &str) -> Option<Self> {
+        let plain = topic.to_lowercase();
+        let begins = |names: &[&str]| names.iter().any(|name| plain.starts_with(name));
+        match () {
+            () if begins(&["acc", "lin_acc", "linacc"]) => Some(Self::Force),
+            () if begins(&["gyr", "ang", "rate", "rot"]) => Some(Self::Rate),
+            () if begins(&["mag", "gps", "gnss", "baro", "pres", "temp", "light", "ori", "ahrs"]) => Some(Self::Other),
+            () => None,
+        }
+    }
+}
+
+/// Parts of names that are none of a rate or a specific force.
+const OTHER_NAMES: [&str; 22] = [
+    "lat",
+    "lon",
+    "alt",
+    "easting",
+    "northing",
+    "quality",
+    "yaw",
+    "pitch",
+    "roll",
+    "heading",
+    "speed",
+    "press",
+    "humid",
+    "volt",
+    "current",
+    "batt",
+    "covariance",
+    "orientation",
+    "quat",
+    "magnetic",
+    "position",
+    "temp",
+];
+
+/// Whether the name and the unit of a column leave it to be a rate or a specific force.
+fn may_be_inertial(column: &AvailableColumn) -> bool {
+    let name = column.name.to_lowercase();
+    let unit = column.unit.is_none_or(|unit| ["deg/s", "g", COUNT].contains(&unit.base));
+    unit && !OTHER_NAMES.iter().any(|other| name.contains(other))
+}
+
+/// Least length of threes that may be the accelerometer, in that of the longest.
+const LONGEST: f64 = 0.9;
+/// Largest ratio of the noises of three axes of one sensor.
+const MOST_UNLIKE: f64 = 10.0;
+
+/// First positions of threes of neighbours that may be the axes of a sensor.
+struct Triples {
+    /// Those that are as long as gravity.
+    force: Option<usize>,
+    others: Vec<usize>,
+}
+
+impl Triples {
+    fn find(facts: &[ColumnFacts], is_free: impl Fn(usize) -> bool) -> Self {
+        let unlike = |at: usize| {
+            let noises = || facts[at..at + 3].iter().map(|of| of.noise);
+            noises().fold(0.0, f64::max) / noises().fold(f64::INFINITY, f64::min)
+        };
+        let mut runs: Vec<std::ops::Range<usize>> = Vec::new();
+        let mut start = 0;
+        while start < facts.len() {
+            let length = (start..facts.len()).take_while(|at| is_free(*at)).count();
+            runs.push(start..start + length);
+            start += length + 1;
+        }
+        let all = |run: &std::ops::Range<usize>| {
+            (run.start..(run.end + 1).saturating_sub(3).max(run.start))
+                .filter(|at| unlike(*at) < MOST_UNLIKE)
+                .collect::<Vec<_>>()
+        };
+        let axes = |at: usize| [&facts[at], &facts[at + 1], &facts[at + 2]];
+        let length = |at: usize| unit_guess::usual_length(&axes(at));
+        let is_gravity = |at: &usize| unit_guess::force_unit(&axes(*at)).is_some();
+        let gravity: Vec<usize> = runs.iter().flat_map(all).filter(is_gravity).collect();
+        // The longest of several: 9.8 is no bias, 1 may be.
+        let longest = gravity.iter().map(|at| length(*at)).fold(0.0, f64::max);
+        // Of those that share a column the one that leaves the most threes of axes beside it, and those the most alike.
+        let division = |at: usize| {
+            let run = runs.iter().find(|run| run.contains(&at)).cloned().unwrap_or_default();
+            let threes: Vec<usize> =
+                (run.start..(run.end + 1).saturating_sub(3)).filter(|other| other.abs_diff(at) % 3 == 0).collect();
+            let unlike: f64 = threes.iter().map(|at| unlike(*at).ln()).sum();
+            (threes.len(), unlike / threes.len().max(1) as f64)
+        };
+        let force = gravity.into_iter().filter(|at| length(*at) > LONGEST * longest).min_by(|one, other| {
+            let (one, other) = (division(*one), division(*other));
+            other.0.cmp(&one.0).then(one.1.total_cmp(&other.1))
+        });
+        let mut others = Vec::new();
+        for run in runs {
+            let parts = match force.filter(|at| run.contains(at)) {
+                Some(at) => vec![run.start..at, at + 3..run.end],
+                None => vec![run],
+            };
+            for part in parts.into_iter().filter(|part| part.len() >= 3) {
+                // From where the axes are most alike.
+                let of_offset = |offset: usize| (part.start + offset..part.end - 2).step_by(3).collect::<Vec<_>>();
+                let cost = |triples: &Vec<usize>| triples.iter().map(|at| unlike(*at).ln()).sum::<f64>();
+                let offsets = (0..=part.len() % 3).map(of_offset);
+                let best = offsets.min_by(|one, other| cost(one).total_cmp(&cost(other))).unwrap_or_default();
+                others.extend(best.into_iter().filter(|at| unlike(*at) < MOST_UNLIKE));
+            }
+        }
+        Self { force, others }
+    }
+}

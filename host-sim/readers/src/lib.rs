@@ -1,0 +1,28 @@
+//! Readers of recordings of inertial sensors: tables of text, NumPy, MATLAB, HDF5, bags of ROS, MCAP, flight logs.
+//!
+//! [`InputFile`] recognises a format by its content, of a file, of a pipe or of bytes in memory. Every format becomes batches of columns
+//! ([`FileRows`]), with the names and units that the file says, or what the user says ([`ReadOptions`]), and notes on what was left out.
+//! What a file may cost is bounded. A row that cannot be used is an [`InputError`] with the file, the line and the reason, or is left out and
+//! counted.
+
+mod columns;
+mod formats;
+mod input;
+pub mod inspection;
+mod rows;
+
+pub use columns::axes::{ACCELEROMETER, GYROSCOPE, MAGNETOMETER};
+pub use columns::column_selection::{ColumnSelection, SelectionError, is_output_register};
+pub use formats::file_format::{FileFormat, HEAD_BYTES, InputFile, TopicDescription, files_of_bag};
+pub use input::delimited_text;
+pub use input::file_bytes::{FileBytes, OpenBytes};
+pub use input::file_hash::FileHash;
+pub use input::input_error::{InputError, Printable, Reason};
+pub use input::read_monitor::{ReadMonitor, ReadPass};
+pub use input::stream_error::StreamError;
+pub use rows::any_sensor::ReadOptions;
+pub use rows::batch::{Batch, RegisterField, RowBefore, ValueColumn};
+pub use rows::padding::{PaddingFinder, Unpadded};
+pub use rows::quantizer::Quantizer;
+pub use rows::row_source::{BATCH, FileRows, PartFilter, RowsRead, WantedRows};
+pub use rows::whole_table::MAX_SAMPLES;

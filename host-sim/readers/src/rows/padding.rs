@@ -1,0 +1,110 @@
+//! Rows at either end of a recording that are all equal: memory that was erased or never written, or a value that was held.
+
+use crate::rows::batch::{Batch, RowBefore};
+
+/// Fewest equal rows that are padding, and how many times as many as the most equal rows within the recording.
+const LEAST_ROWS: u64 = 64;
+const TIMES_AS_MANY: u64 = 8;
+
+/// The rows between the padding, by their numbers from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Unpadded {
+    pub first: u64,
+    pub end: u64,
+}
+
+impl Unpadded {
+    /// All rows.
+    pub const ALL: Self = Self { first: 0, end: u64::MAX };
+
+    /// What is said of `rows` rows, of which only these are used.
+    pub fn note(self, rows: u64) -> String {
+        let (before, after) = (self.first, rows - self.end);
+        format!(
+            "{} rows that are all equal, {before} at the start and {after} at the end, are padding and left out",
+            before + after
+        )
+    }
+
+    /// Leaves out the padding of a batch that begins with this row.
+    pub fn apply<V>(self, first_row: u64, batch: &mut Batch<V>) {
+        if self != Self::ALL {
+            let rows = first_row..first_row + batch.rows as u64;
+            batch.retain(&rows.map(|row| (self.first..self.end).contains(&row)).collect::<Vec<_>>());
+        }
+    }
+}
+
+/// Looks for padding.
+#[derive(Debug, Default)]
+pub struct PaddingFinder {
+    rows: u64,
+    /// Equal rows at the start, as long as there is no other.
+    leading: Option<u64>,
+    /// Equal rows until now, and most of them within the recording.
+    run: u64,
+    longest: u64,
+    before: RowBefore,
+}
+
+impl PaddingFinder {
+    /// Looks at the next rows.
+    pub fn add<V>(&mut self, batch: &Batch<V>) {
+        for is_equal in self.before.equals(batch) {
+            if is_equal {
+                self.run += 1;
+            } else {
+                match self.leading {
+                    _ if self.rows == 0 => {}
+                    None => self.leading = Some(self.run),
+                    Some(_) => self.longest = self.longest.max(self.run),
+                }
+                self.run = 1;
+            }
+            self.rows += 1;
+        }
+    }
+
+    /// Rows that were looked at.
+    pub fn rows(&self) -> u64 {
+        self.rows
+    }
+
+    /// The rows without padding; `None` where there is none.
+    pub fn finish(&self) -> Option<Unpadded> {
+        let is_padding = |run: &u64| *run >= LEAST_ROWS.max(TIMES_AS_MANY * self.longest);
+        let leading = self.leading.filter(is_padding).unwrap_or(0);
+        // Rows that are all equal are a constant.
+        let trailing = Some(self.run).filter(|run| self.leading.is_some() && is_padding(run)).unwrap_or(0);
+        (leading + trailing > 0).then_some(Unpadded { first: leading, end: self.rows - trailing })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{PaddingFinder, Unpadded};
+    use crate::rows::batch::Batch;
+
+    fn found(values: &[f64], batch_rows: usize) -> Option<Unpadded> {
+        let mut finder = PaddingFinder::default();
+        for part in values.chunks(batch_rows) {
+            let values = vec![part.to_vec(), part.iter().map(|value| 2.0 * value).collect()];
+            finder.add::<()>(&Batch { rows: part.len(), values, ..Batch::default() });
+        }
+        finder.finish()
+    }
+
+    #[test]
+    fn equal_rows_at_either_end_are_padding_in_batches_of_any_size() {
+        let noise: Vec<f64> = (0..5000).map(|row| f64::from(row * 7919 % 101)).collect();
+        let held = |before: usize, after: usize| [vec![0.0; before], noise[1..].to_vec(), vec![-1.0; after]].concat();
+        for batch_rows in [1, 7, 100, 10_000] {
+            assert_eq!(found(&noise, batch_rows), None);
+            assert_eq!(found(&held(0, 240), batch_rows), Some(Unpadded { first: 0, end: 4999 }));
+            assert_eq!(found(&held(1500, 100), batch_rows), Some(Unpadded { first: 1500, end: 6499 }));
+            // Too few to be told from rows that are equal by chance.
+            assert_eq!(found(&held(30, 30), batch_rows), None);
+            assert_eq!(found(&vec![3.0; 5000], batch_rows), None);
+        }
+    }
+}

@@ -1,0 +1,327 @@
+//! Rows of a file of any format as batches of columns.
+
+use crate::columns::column_selection::{ChosenColumn, Role};
+use crate::input::budget::Budget;
+use crate::input::input_error::{InputError, Reason};
+use crate::input::read_monitor::ReadMonitor;
+use crate::input::stream_error::StreamError;
+use crate::rows::batch::{Batch, BatchBuilder, HELD_ROWS, Number, RegisterField, RowFault, ValueColumn, usual_unit};
+use std::path::Path;
+use time_base::TimeBaseError;
+use time_base::TimeRange;
+
+/// Rows of a batch.
+pub const BATCH: usize = 1 << 14;
+/// Rows that tell the unit of times that do not say it.
+const ROWS_OF_UNIT: usize = 1 << 16;
+
+/// Takes the numbers of a row, one for each of the chosen columns.
+pub(crate) type EachRow<'a> = dyn FnMut(&[Number]) -> Result<(), Refusal> + 'a;
+
+/// Why a row is not taken.
+#[derive(Debug)]
+pub(crate) enum Refusal {
+    /// It cannot be used.
+    Fault(RowFault),
+    /// No more rows are wanted.
+    Enough,
+}
+
+/// How the reading of a file ended.
+#[derive(Debug, Default)]
+pub(crate) struct Ending {
+    /// Why there are no more rows, where the file is damaged or ends early.
+    pub(crate) damage: Option<String>,
+    /// What the user should know, one sentence each.
+    pub(crate) notes: Vec<String>,
+}
+
+/// Rows of a file, one after the other.
+pub(crate) trait RowSource: Send {
+    /// The columns that are read.
+    fn chosen(&self) -> &[ChosenColumn];
+
+    /// The rate that the file states beside its rows, Hz.
+    fn rate_hz(&self) -> Option<f64>;
+
+    /// What the file may cost, where its rows can be many more than its bytes.
+    fn budget(&self) -> Option<Budget>;
+
+    /// Gives all rows, until one is not taken.
+    ///
+    /// # Errors
+    /// The file is damaged, or a row is at fault.
+    fn read(&mut self, each: &mut EachRow) -> Result<Ending, InputError>;
+}
+
+/// Which rows of a recording are wanted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WantedRows {
+    /// A part by time.
+    pub part: Option<TimeRange>,
+    /// The sample rate that the user states, Hz: it places the part where there are no times.
+    pub stated_hz: Option<f64>,
+    /// Rows of the file that are read at most.
+    pub most_rows: u64,
+    /// Rows of a batch.
+    pub batch_rows: usize,
+}
+
+impl WantedRows {
+    /// All of them.
+    pub fn all(stated_hz: Option<f64>) -> Self {
+        Self { part: None, stated_hz, most_rows: u64::MAX, batch_rows: BATCH }
+    }
+}
+
+/// What was read, beside the batches.
+#[derive(Debug, Default, Clone, PartialEq)]
+pub struct RowsRead {
+    /// Rows of the file.
+    pub rows: u64,
+    /// Rows outside of the part that is wanted, as far as it was read for it.
+    pub outside: u64,
+    /// Rows at either end that are all equal, which are padding.
+    pub padding: u64,
+    /// Whether the user stopped the reading before the end.
+    pub is_stopped: bool,
+    /// Why the file was not read to its end, where it is damaged.
+    pub damage: Option<String>,
+    /// What the user should know, one sentence each.
+    pub notes: Vec<String>,
+}
+
+impl RowsRead {
+    /// Whether the file was read to its end, or to that of the part that is wanted.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.damage.is_none() && !self.is_stopped
+    }
+}
+
+/// Keeps the rows of a part.
+pub struct PartFilter {
+    part: Option<TimeRange>,
+    period_s: Option<f64>,
+    first_index: Option<u64>,
+    first_s: Option<f64>,
+    rows: u64,
+    kept: u64,
+    last_s: f64,
+}
+
+impl PartFilter {
+    /// Of what is wanted of a file that states this rate, Hz.
+    #[must_use]
+    pub fn new(wanted: WantedRows, file_hz: Option<f64>) -> Self {
+        let period_s = wanted.stated_hz.or(file_hz).map(f64::recip);
+        Self { part: wanted.part, period_s, first_index: None, first_s: None, rows: 0, kept: 0, last_s: 0.0 }
+    }
+
+    /// Leaves out what is outside of the part; whether later rows may be inside.
+    ///
+    /// # Errors
+    /// Neither times nor a rate place the rows.
+    pub fn apply<V>(&mut self, batch: &mut Batch<V>) -> Result<bool, TimeBaseError> {
+        let Some(TimeRange { from_s, to_s }) = self.part else { return Ok(true) };
+        let period_s = || match self.period_s {
+            Some(period_s) if period_s.is_finite() && period_s > 0.0 => Ok(period_s),
+            Some(period_s) => Err(TimeBaseError::InvalidRate(period_s.recip())),
+            None => Err(TimeBaseError::NoRate),
+        };
+        let elapsed_s: Vec<f64> = if let Some(&first) = batch.times.first() {
+            let first_s = *self.first_s.get_or_insert(first);
+            batch.times.iter().map(|time| time - first_s).collect()
+        } else if let Some(&first) = batch.indices.first() {
+            let first = *self.first_index.get_or_insert(first);
+            let period_s = period_s()?;
+            batch.indices.iter().map(|index| (index - first) as f64 * period_s).collect()
+        } else if batch.rows == 0 {
+            Vec::new()
+        } else {
+            let period_s = period_s()?;
+            (0..batch.rows as u64).map(|row| (self.rows + row) as f64 * period_s).collect()
+        };
+        self.rows += batch.rows as u64;
+        self.last_s = elapsed_s.last().copied().unwrap_or(self.last_s);
+        let is_inside: Vec<bool> = elapsed_s.iter().map(|time| (from_s..to_s).contains(time)).collect();
+        batch.retain(&is_inside);
+        self.kept += batch.rows as u64;
+        Ok(self.last_s < to_s)
+    }
+
+    /// Checks that the part has rows.
+    ///
+    /// # Errors
+    /// It has none.
+    pub fn finish(&self) -> Result<(), TimeBaseError> {
+        match self.part {
+            Some(TimeRange { from_s, to_s }) if self.kept == 0 => {
+                Err(TimeBaseError::EmptyTimeRange { from_s, to_s, recording_s: self.last_s })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The rows of a file.
+pub struct FileRows<'a> {
+    file: &'a Path,
+    source: Box<dyn RowSource + 'a>,
+    columns: Vec<ValueColumn>,
+    monitor: ReadMonitor,
+}
+
+/// What a reading has to give to, and what it has given.
+struct Delivery<'a> {
+    builder: BatchBuilder,
+    /// Of times without a unit, batches that wait for it.
+    waiting: Vec<Batch>,
+    waiting_rows: usize,
+    time_unit_s: Option<f64>,
+    filter: PartFilter,
+    give: &'a mut dyn FnMut(Batch) -> bool,
+    error: Option<StreamError>,
+    notes: Vec<String>,
+    time_label: String,
+    is_over: bool,
+}
+
+impl<'a> FileRows<'a> {
+    /// Of rows whose channels may be words of registers.
+    pub(crate) fn new(
+        file: &'a Path,
+        source: Box<dyn RowSource + 'a>,
+        monitor: &ReadMonitor,
+        register: &dyn Fn(&str) -> Option<RegisterField>,
+    ) -> Self {
+        let column = |column: &ChosenColumn| match column.role {
+            Role::Channel(profile) => Some(ValueColumn {
+                profile,
+                factor: column.factor,
+                label: column.label.clone(),
+                register: register(profile.name),
+            }),
+            Role::Time | Role::Index => None,
+        };
+        let columns = source.chosen().iter().filter_map(column).collect();
+        Self { file, source, columns, monitor: monitor.clone() }
+    }
+
+    /// The channels that are read.
+    #[must_use]
+    pub fn columns(&self) -> &[ValueColumn] {
+        &self.columns
+    }
+
+    /// The rate that the file states beside its rows, Hz, where it has no time stamps: they say more.
+    #[must_use]
+    pub fn rate_hz(&self) -> Option<f64> {
+        let has_times = self.source.chosen().iter().any(|column| column.role == Role::Time);
+        self.source.rate_hz().filter(|_| !has_times)
+    }
+
+    /// Reads all rows and calls `give` with each batch, until it returns false.
+    ///
+    /// # Errors
+    /// The file is damaged, or the part has no row.
+    pub fn read(&mut self, wanted: WantedRows, give: &mut dyn FnMut(Batch) -> bool) -> Result<RowsRead, StreamError> {
+        let file = self.file;
+        let chosen = self.source.chosen();
+        let time = chosen.iter().find(|column| column.role == Role::Time);
+        let file_hz = self.source.rate_hz().filter(|_| time.is_none());
+        let mut delivery = Delivery {
+            builder: BatchBuilder::new(chosen, &self.columns, self.source.budget()),
+            waiting: Vec::new(),
+            waiting_rows: 0,
+            time_unit_s: time.map_or(Some(1.0), |time| time.unit.map(|unit| unit.factor)),
+            filter: PartFilter::new(wanted, file_hz),
+            give,
+            error: None,
+            notes: Vec::new(),
+            time_label: time.map(|time| time.label.clone()).unwrap_or_default(),
+            is_over: false,
+        };
+        let mut is_stopped = false;
+        let monitor = &self.monitor;
+        monitor.begin();
+        let ending = self.source.read(&mut |row| {
+            is_stopped |= monitor.take_stop();
+            if is_stopped || delivery.is_over || delivery.builder.rows() >= wanted.most_rows {
+                return Err(Refusal::Enough);
+            }
+            delivery.builder.push(row).map_err(Refusal::Fault)?;
+            if delivery.builder.waiting() >= wanted.batch_rows.saturating_add(HELD_ROWS) {
+                delivery.deliver(file);
+            }
+            Ok(())
+        });
+        monitor.end();
+        // What the consumer refuses comes first: it ended the reading.
+        if let Some(error) = delivery.error.take() {
+            return Err(error);
+        }
+        let Ending { damage, notes } = ending?;
+        is_stopped |= monitor.is_cut();
+        delivery.finish(file)?;
+        let backwards = delivery.builder.backwards().map_err(|reason| InputError::file(file, reason))?;
+        let rows = delivery.builder.rows();
+        let mut notes_of_rows: Vec<String> =
+            backwards.into_iter().chain(delivery.builder.notes()).chain(delivery.notes).collect();
+        notes_of_rows.extend(notes);
+        let damage = damage.map(|damage| format!("{damage}; the {rows} rows before that are used"));
+        let outside = delivery.filter.rows.saturating_sub(delivery.filter.kept);
+        Ok(RowsRead { rows, outside, padding: 0, is_stopped, damage, notes: notes_of_rows })
+    }
+}
+
+impl Delivery<'_> {
+    /// Gives the rows that were built, once the unit of their times is known.
+    fn deliver(&mut self, file: &Path) {
+        let batch = self.builder.take();
+        self.waiting_rows += batch.rows;
+        self.waiting.push(batch);
+        if self.time_unit_s.is_none() && self.waiting_rows < ROWS_OF_UNIT {
+            return;
+        }
+        if let Err(error) = self.give_waiting(file) {
+            self.error = Some(error);
+            self.is_over = true;
+        }
+    }
+
+    fn finish(&mut self, file: &Path) -> Result<(), StreamError> {
+        let batch = self.builder.take_last();
+        self.waiting.push(batch);
+        if self.builder.rows() > 0 {
+            self.give_waiting(file)?;
+            self.filter.finish()?;
+        }
+        Ok(())
+    }
+
+    fn give_waiting(&mut self, file: &Path) -> Result<(), StreamError> {
+        let time_unit_s = match self.time_unit_s {
+            Some(time_unit_s) => time_unit_s,
+            None => {
+                let times: Vec<f64> =
+                    self.waiting.iter().flat_map(|batch| &batch.times).copied().take(ROWS_OF_UNIT).collect();
+                let unit = usual_unit(&times, self.builder.first_time());
+                let unit = unit.ok_or_else(|| InputError::file(file, Reason::NoTimeUnit(self.time_label.clone())))?;
+                self.notes.push(format!("the column {} is taken to be in {}", self.time_label, unit.name));
+                self.time_unit_s = Some(unit.factor);
+                unit.factor
+            }
+        };
+        for mut batch in std::mem::take(&mut self.waiting) {
+            if self.is_over {
+                break;
+            }
+            batch.times.iter_mut().for_each(|time| *time *= time_unit_s);
+            let may_go_on = self.filter.apply(&mut batch)?;
+            let is_wanted = (self.give)(batch);
+            self.is_over = !is_wanted || !may_go_on;
+        }
+        Ok(())
+    }
+}

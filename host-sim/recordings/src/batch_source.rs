@@ -1,0 +1,186 @@
+//! Batches of a file of any format, or of a recording in memory, with what the burst validator says of register counts.
+
+use crate::recording::{NOT_RECORDED, RecordedSample, Recorder, Recording, TimeStamp, Verdict};
+use adis16405_driver::{Burst, Channel, Counts, GyroRange};
+use measurement::adis16405;
+use readers::{Batch, FileRows, PartFilter, RegisterField, RowsRead, StreamError, ValueColumn, WantedRows};
+use std::panic::resume_unwind;
+use std::sync::mpsc::sync_channel;
+use std::thread;
+use time_base::{TimeBaseError, TimeRange};
+
+/// The register of a channel, as readers know it.
+pub(crate) fn field(channel: Channel) -> RegisterField {
+    RegisterField { place: channel as usize, limits: channel.limits() }
+}
+
+/// The channel whose register counts a column has.
+pub(crate) fn channel(column: &ValueColumn) -> Option<Channel> {
+    column.register.and_then(|register| Channel::ALL.get(register.place).copied())
+}
+
+/// A recording as batches of columns, which can be read again.
+pub(crate) enum BatchSource<'a> {
+    /// A file of any format; of register counts with their validator.
+    File(FileRows<'a>, Option<Recorder>),
+    /// Samples in memory.
+    Recording(RecordedRows<'a>),
+}
+
+impl<'a> BatchSource<'a> {
+    /// Of numbers of any sensor, or of register counts of an ADIS16405 whose rates were taken in `range`.
+    pub(crate) fn file(rows: FileRows<'a>, range: Option<GyroRange>) -> Self {
+        let channels: Option<Vec<Channel>> = rows.columns().iter().map(channel).collect();
+        let validator = range.zip(channels).map(|(range, channels)| Recorder::new(channels, range));
+        Self::File(rows, validator)
+    }
+
+    /// The channels that are read.
+    pub(crate) fn columns(&self) -> &[ValueColumn] {
+        match self {
+            Self::File(rows, _) => rows.columns(),
+            Self::Recording(recording) => &recording.columns,
+        }
+    }
+
+    /// The rate that the file states beside its rows, Hz, where it has no time stamps: they say more.
+    pub(crate) fn rate_hz(&self) -> Option<f64> {
+        match self {
+            Self::File(rows, _) => rows.rate_hz(),
+            Self::Recording(_) => None,
+        }
+    }
+
+    /// Reads all rows as [`for_each_batch`] does.
+    ///
+    /// # Errors
+    /// As [`for_each_batch`].
+    pub(crate) fn for_each_batch(
+        &mut self,
+        wanted: WantedRows,
+        take: impl FnMut(Batch<Verdict>) -> Result<(), StreamError>,
+    ) -> Result<RowsRead, StreamError> {
+        let read = |give: &mut dyn FnMut(Batch<Verdict>) -> bool| match self {
+            Self::File(rows, validator) => rows.read(wanted, &mut |batch| {
+                let verdicts = validator.as_mut().map(|validator| verdicts(validator, &batch));
+                give(batch.with_verdicts(verdicts.unwrap_or_default()))
+            }),
+            Self::Recording(recording) => recording.read(wanted, give),
+        };
+        for_each_batch(read, take)
+    }
+}
+
+/// Calls `take` with each batch that `read` gives, which reads on another thread where there are threads.
+///
+/// # Errors
+/// The file is damaged, the part has no row, or `take` fails.
+pub(crate) fn for_each_batch<B: Send>(
+    read: impl FnOnce(&mut dyn FnMut(B) -> bool) -> Result<RowsRead, StreamError> + Send,
+    mut take: impl FnMut(B) -> Result<(), StreamError>,
+) -> Result<RowsRead, StreamError> {
+    if cfg!(target_family = "wasm") {
+        let mut taken = Ok(());
+        let read = read(&mut |batch| {
+            taken = take(batch);
+            taken.is_ok()
+        });
+        return taken.and(read);
+    }
+    let (send, batches) = sync_channel::<B>(1);
+    thread::scope(|scope| {
+        let reader = scope.spawn(move || read(&mut |batch| send.send(batch).is_ok()));
+        let taken = batches.into_iter().try_for_each(take);
+        let read = reader.join().unwrap_or_else(|panic| resume_unwind(panic));
+        taken.and(read)
+    })
+}
+
+/// What the burst validator says of register counts, which fit their fields; one that is missing is as if it had not been recorded.
+fn verdicts(validator: &mut Recorder, batch: &Batch) -> Vec<Verdict> {
+    for row in 0..batch.rows {
+        let mut counts = NOT_RECORDED;
+        for (channel, column) in validator.channels().iter().zip(&batch.values) {
+            if !column[row].is_nan() {
+                counts[*channel as usize] = column[row] as i16;
+            }
+        }
+        validator.push(TimeStamp::default(), &Burst::from_counts(&Counts::new(counts)));
+    }
+    validator.take_samples().iter().map(RecordedSample::verdict).collect()
+}
+
+/// Samples in memory.
+pub(crate) struct RecordedRows<'a> {
+    recording: &'a Recording,
+    columns: Vec<ValueColumn>,
+    has_times: bool,
+    has_indices: bool,
+}
+
+impl<'a> RecordedRows<'a> {
+    pub(crate) fn new(recording: &'a Recording) -> Self {
+        let profile = adis16405::profile(recording.range.lsb());
+        let column = |&channel: &Channel| {
+            let profile = profile.channels[channel as usize];
+            ValueColumn {
+                profile,
+                factor: profile.lsb,
+                label: channel.name().to_owned(),
+                register: Some(field(channel)),
+            }
+        };
+        Self {
+            columns: recording.channels.iter().map(column).collect(),
+            has_times: recording.samples.iter().all(|sample| sample.time_stamp.time_s.is_some()),
+            has_indices: recording.samples.iter().all(|sample| sample.time_stamp.index.is_some()),
+            recording,
+        }
+    }
+
+    /// Which samples are in a part.
+    pub(crate) fn inside(&self, part: TimeRange, stated_hz: Option<f64>) -> Result<Vec<bool>, TimeBaseError> {
+        let wanted = WantedRows { part: Some(part), ..WantedRows::all(stated_hz) };
+        let mut filter = PartFilter::new(wanted, None);
+        let samples = &self.recording.samples;
+        let is_inside = |sample: &RecordedSample| {
+            let TimeStamp { index, time_s } = sample.time_stamp;
+            let mut batch: Batch = Batch {
+                rows: 1,
+                times: time_s.filter(|_| self.has_times).into_iter().collect(),
+                indices: index.filter(|_| self.has_indices).into_iter().collect(),
+                ..Batch::default()
+            };
+            filter.apply(&mut batch)?;
+            Ok(batch.rows == 1)
+        };
+        let inside = samples.iter().map(is_inside).collect::<Result<_, TimeBaseError>>()?;
+        filter.finish()?;
+        Ok(inside)
+    }
+
+    fn read(&self, wanted: WantedRows, give: &mut dyn FnMut(Batch<Verdict>) -> bool) -> Result<RowsRead, StreamError> {
+        let samples = &self.recording.samples;
+        let samples = &samples[..samples.len().min(usize::try_from(wanted.most_rows).unwrap_or(usize::MAX))];
+        let mut filter = PartFilter::new(wanted, None);
+        for part in samples.chunks(wanted.batch_rows) {
+            let times = part.iter().filter_map(|sample| sample.time_stamp.time_s);
+            let indices = part.iter().filter_map(|sample| sample.time_stamp.index);
+            let column = |&channel: &Channel| part.iter().map(|of| f64::from(of.counts.get(channel))).collect();
+            let mut batch = Batch {
+                rows: part.len(),
+                times: if self.has_times { times.collect() } else { Vec::new() },
+                indices: if self.has_indices { indices.collect() } else { Vec::new() },
+                values: self.recording.channels.iter().map(column).collect(),
+                verdicts: part.iter().map(RecordedSample::verdict).collect(),
+                backwards: Vec::new(),
+            };
+            let may_go_on = filter.apply(&mut batch)?;
+            if !give(batch) || !may_go_on {
+                break;
+            }
+        }
+        filter.finish()?;
+        Ok(RowsRead { rows: samples.len() as u64, ..RowsRead::default() })
+    }
+}

@@ -1,0 +1,233 @@
+//! What is in a file: register counts and bus logs of an ADIS16405, in their own formats, or numbers of any sensor.
+
+use crate::batch_source::{BatchSource, field};
+use crate::counts::{count_table_writer, frame_log, serial, spi_export};
+use adis16405_driver::{Channel, GyroRange};
+use measurement::{SensorProfile, adis16405};
+use readers::inspection::InspectedTable;
+use readers::{
+    ColumnSelection, FileBytes, FileHash, FileRows, HEAD_BYTES, InputError, InputFile, ReadMonitor, ReadOptions,
+    Reason, is_output_register,
+};
+use std::io::{self, BufReader};
+use std::path::Path;
+use std::sync::Arc;
+use tempfile::NamedTempFile;
+
+pub use readers::{FileFormat, TopicDescription, files_of_bag};
+
+/// The format of a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RecordedFormat {
+    /// Register counts of an ADIS16405 in CSV, plain or gzip.
+    CountTable,
+    /// A log of the SPI bus: `time_s,mosi,miso`.
+    FrameLog,
+    /// An export of a logic analyzer's SPI decoder.
+    SpiExport,
+    /// Numbers of any sensor.
+    File(FileFormat),
+}
+
+impl RecordedFormat {
+    /// What it is called in a sentence.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::CountTable => "register counts of an ADIS16405",
+            Self::FrameLog | Self::SpiExport => "a log of the SPI bus of an ADIS16405",
+            Self::File(format) => format.name(),
+        }
+    }
+
+    /// Whether the file is text: a table or a log that may be replayed.
+    #[must_use]
+    pub fn is_text(self) -> bool {
+        matches!(self, Self::CountTable | Self::FrameLog | Self::SpiExport | Self::File(FileFormat::TextTable))
+    }
+}
+
+/// A recording that can be read more than once.
+#[derive(Debug)]
+pub struct RecordedInput {
+    file: InputFile,
+    format: RecordedFormat,
+    /// What a device sent while its raw stream was on, of which the file is the frame log.
+    capture: Option<FileBytes>,
+}
+
+impl RecordedInput {
+    /// Opens `name`, `-` for standard input, and recognises its format, as [`InputFile::open`]. Bytes that a device sent while its raw
+    /// stream was on become a frame log.
+    ///
+    /// # Errors
+    /// The file cannot be read or copied, or it has none of the formats.
+    pub fn open(name: &Path) -> Result<Self, InputError> {
+        Self::open_monitored(name, &ReadMonitor::default())
+    }
+
+    /// As [`open`](Self::open); `monitor` counts the bytes that are read of the recording, and may stop the reading of a pipe, of
+    /// text and of an array.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_monitored(name: &Path, monitor: &ReadMonitor) -> Result<Self, InputError> {
+        Self::recognised(name, InputFile::files(name, monitor)?, monitor)
+    }
+
+    /// Opens bytes in memory that are called `name`.
+    ///
+    /// # Errors
+    /// They have none of the formats, or are too many once they are decompressed.
+    pub fn in_memory(name: &Path, bytes: impl Into<Arc<[u8]>>) -> Result<Self, InputError> {
+        Self::recognised(name, vec![FileBytes::in_memory(name, bytes)], &ReadMonitor::default())
+    }
+
+    fn recognised(name: &Path, mut files: Vec<FileBytes>, monitor: &ReadMonitor) -> Result<Self, InputError> {
+        let fail = |error| InputError::file(name, Reason::Io(error));
+        let mut capture = None;
+        if let [only] = files.as_mut_slice()
+            && serial::is_capture(&only.head(HEAD_BYTES).map_err(fail)?)
+        {
+            let log = NamedTempFile::new().map_err(fail)?;
+            serial::log_of_capture(BufReader::new(only.open().map_err(fail)?), log.path()).map_err(fail)?;
+            capture = Some(std::mem::replace(only, FileBytes::in_temporary_file(name, log)));
+        }
+        let file = InputFile::recognised(name, files, monitor)?;
+        let format = match file.format() {
+            FileFormat::TextTable => match file.first_line()?.as_str() {
+                frame_log::HEADER => RecordedFormat::FrameLog,
+                header if spi_export::is_header(header) => RecordedFormat::SpiExport,
+                header if count_table_writer::is_header(header) => RecordedFormat::CountTable,
+                _ => RecordedFormat::File(FileFormat::TextTable),
+            },
+            format => RecordedFormat::File(format),
+        };
+        Ok(Self { file, format, capture })
+    }
+
+    /// What was recognised.
+    #[must_use]
+    pub fn format(&self) -> RecordedFormat {
+        self.format
+    }
+
+    /// Begins to make the hash of the bytes, as they were given.
+    ///
+    /// # Errors
+    /// The file cannot be opened.
+    pub fn begin_hash(&self) -> io::Result<FileHash> {
+        match &self.capture {
+            Some(capture) => FileHash::begin(std::slice::from_ref(capture)),
+            None => self.file.begin_hash(),
+        }
+    }
+
+    /// As the user named it.
+    #[must_use]
+    pub fn name(&self) -> &Path {
+        self.file.name()
+    }
+
+    /// Who watches the reading.
+    #[must_use]
+    pub fn monitor(&self) -> &ReadMonitor {
+        self.file.monitor()
+    }
+
+    /// The bytes as they are read; of a bag that was split, those of its first file.
+    #[must_use]
+    pub fn bytes(&self) -> &FileBytes {
+        self.file.bytes()
+    }
+
+    /// The rows of any sensor, or of register counts of an ADIS16405.
+    ///
+    /// # Errors
+    /// The file is damaged, its topic or columns cannot be chosen, or it is a log of the SPI bus.
+    pub(crate) fn rows(&self, options: &ReadOptions, are_registers: bool) -> Result<FileRows<'_>, InputError> {
+        self.check_columns()?;
+        rows(&self.file, options, are_registers)
+    }
+
+    /// The same with what the burst validator says of register counts, whose rates were taken in `range`.
+    ///
+    /// # Errors
+    /// As [`rows`](Self::rows).
+    pub(crate) fn batches(
+        &self,
+        options: &ReadOptions,
+        range: Option<GyroRange>,
+    ) -> Result<BatchSource<'_>, InputError> {
+        Ok(BatchSource::file(self.rows(options, range.is_some())?, range))
+    }
+
+    /// Refuses a log of the SPI bus, which has no columns.
+    fn check_columns(&self) -> Result<(), InputError> {
+        match self.format {
+            RecordedFormat::FrameLog | RecordedFormat::SpiExport => {
+                Err(InputError::file(self.name(), Reason::FrameLog))
+            }
+            RecordedFormat::CountTable | RecordedFormat::File(_) => Ok(()),
+        }
+    }
+
+    /// What is in the file without an analysis, of the topic that is named or of all that have an inertial sensor; `selection` is what the
+    /// user says of the columns.
+    ///
+    /// # Errors
+    /// The file is damaged, has no rows of numbers, or is a log of the SPI bus, which has no columns.
+    pub fn inspect(&self, topic: Option<&str>, selection: &ColumnSelection) -> Result<Vec<InspectedTable>, InputError> {
+        self.check_columns()?;
+        let is_of_registers = |names: &[&str]| match self.format {
+            RecordedFormat::CountTable => true,
+            format => format.is_text() && names.iter().any(|name| is_output_register(name)),
+        };
+        let sensor = |names: &[&str]| {
+            if is_of_registers(names) { adis16405::profile(adis16405::GYRO_LSB_300) } else { SensorProfile::generic() }
+        };
+        let mut tables = self.file.inspect(topic, selection, &sensor)?;
+        for table in &mut tables {
+            let has_registers = table.columns.iter().any(|column| is_output_register(&column.name));
+            for proposal in table.proposals.iter_mut().filter(|_| has_registers) {
+                proposal.sensor = Some("adis16405");
+                proposal.is_guessed = true;
+            }
+        }
+        Ok(tables)
+    }
+
+    /// Names of the sensors of one kind that the file has, as [`InputFile::sensors`].
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn sensors(&self) -> Result<Vec<String>, InputError> {
+        self.file.sensors()
+    }
+
+    /// What is in the file, as [`InputFile::contents`].
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn contents(&self) -> Result<Vec<TopicDescription>, InputError> {
+        self.file.contents()
+    }
+}
+
+/// The rows of a file of numbers, or of register counts.
+pub(crate) fn rows<'a>(
+    file: &'a InputFile,
+    options: &ReadOptions,
+    are_registers: bool,
+) -> Result<FileRows<'a>, InputError> {
+    let register = |name: &str| {
+        let channel = Channel::ALL.into_iter().find(|channel| are_registers && channel.name() == name);
+        channel.map(field)
+    };
+    file.rows(options, &register)
+}
+
+/// How a table of register counts of an ADIS16405 is read whose rates were taken in `range`.
+pub(crate) fn options_of_counts(range: GyroRange) -> ReadOptions {
+    ReadOptions::of_sensor(adis16405::profile(range.lsb()))
+}

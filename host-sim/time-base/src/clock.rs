@@ -1,0 +1,518 @@
+//! The sample period of each row of a recording, by its time stamps or its index, and the rows that are one sample that was read twice.
+//!
+//! The first rows tell which rule holds for all: where stamps are finer than the sample period, rows are placed as they come; coarser stamps
+//! are placed when all of them are known. A recording that ends within the first rows is placed with all of them known.
+//! A recording can be read again: its rows then have the same places.
+
+use crate::aligned_stamps::AlignedStamps;
+use crate::irregular_stamps::of_few_digits;
+use crate::lateness_track::COARSE;
+use crate::stamp_alignment::uncertain;
+use crate::stamp_quality::StampQuality;
+use crate::stream_clock::{Placed, Stamp, StreamClock};
+use crate::time_base_error::{MIN_SAMPLES, TimeBaseError};
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+
+/// Rows that tell the clock of the time stamps.
+pub(crate) const FIRST_ROWS: usize = 1 << 17;
+/// Rows with coarse stamps that are held at most: 600 MB.
+const MOST_COARSE_ROWS: usize = 1 << 25;
+
+/// Longest interval, in sample periods, at which a sample equal to the one before is the same sample read twice. Equal samples
+/// farther apart are chance: a filtered output of few counts repeats about once in a thousand samples.
+const MAX_REPEATED_READ_INTERVAL: f64 = 0.75;
+/// Samples whose median duration tells which interval is shorter than a period.
+const REPEATED_READ_WINDOW: usize = 32;
+/// Least part of the rows that equal the one before, sooner than a period, that are more than by chance, for all of them to be left out.
+const LEAST_READ_AGAIN: f64 = 0.5;
+/// Distance before a loss, in widths of the lateness, at which a sample that was taken to be read twice may be what is missing.
+const SEARCHED_WIDTHS: f64 = 4.0;
+
+/// Largest relative difference between the stated and the measured rate: a wrong nominal rate and a clock on a breadboard,
+/// not another rate.
+const MAX_RATE_CONTRADICTION: f64 = 0.1;
+/// Share of samples that follow their neighbour below which the stated rate is doubted.
+const MIN_NEIGHBOURS: f64 = 0.75;
+
+/// Most sample periods of a recording for each of its samples, and beside them. The gaps of a series of this length fit into
+/// memory.
+const MAX_PERIODS_PER_SAMPLE: u64 = 64;
+const MAX_PERIODS: u64 = 1 << 22;
+
+/// When a row arrived, as far as the file says it, and whether its numbers are those of the row before.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RowStamp {
+    pub time_s: Option<f64>,
+    pub index: Option<u64>,
+    pub is_equal: bool,
+}
+
+/// Where a row lies in time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// In this sample period.
+    At(Placed),
+    /// It is the row before, read once more.
+    Repeated,
+}
+
+/// Places the rows of a recording in their order.
+pub struct Clock {
+    stated_hz: Option<f64>,
+    state: State,
+    /// Why the time stamps are ignored, where a stated rate contradicts them.
+    ignored: Option<String>,
+}
+
+enum State {
+    /// The first rows, until there are enough.
+    FirstRows(Vec<RowStamp>),
+    /// Rows are placed as they come.
+    Stream(Box<Stream>),
+    /// Rows are placed when the last one has come.
+    Coarse(Coarse),
+    /// All places are known.
+    Known(Known),
+}
+
+/// Rows that are placed as they come.
+struct Stream {
+    clock: StreamClock,
+    repeats: RepeatRule,
+    before_s: Option<f64>,
+    /// Of each row that is not placed yet, whether it is a repeat.
+    waiting: VecDeque<bool>,
+    has_index: bool,
+    /// What the stamps of the first rows show.
+    first_rows: Option<StampQuality>,
+    /// What all stamps show, where all of them are known.
+    all_rows: Option<StampQuality>,
+}
+
+/// Time stamps, s, and whether each row equals the one before, soon after it.
+struct Coarse {
+    repeats: RepeatRule,
+    times_s: Vec<f64>,
+    repeated: Vec<usize>,
+}
+
+/// Places that are known.
+struct Known {
+    places: Arc<KnownPlaces>,
+    next_row: usize,
+    next_arrived: usize,
+}
+
+struct KnownPlaces {
+    /// Of each row that is no repeat.
+    periods: Vec<u64>,
+    /// Numbers of the rows that are repeats, in ascending order.
+    repeated: Vec<usize>,
+    stamps: StampQuality,
+}
+
+/// Which rows that equal the one before are one sample that was read twice.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct RepeatRule {
+    /// Those that come sooner than this after it, s; 0 where none is.
+    shortest_s: f64,
+}
+
+impl RepeatRule {
+    /// By the first rows. Equal rows that lie a period or more apart are equal by chance: where those that lie closer are equal as often, they
+    /// are samples too.
+    fn new(rows: &[RowStamp], stated_hz: Option<f64>) -> Self {
+        let none = Self { shortest_s: 0.0 };
+        let Some(times) = times_of(rows) else { return none };
+        let period_s = stated_hz.map(f64::recip).or_else(|| usual_interval(&times));
+        let Some(shortest_s) = period_s.map(|period_s| MAX_REPEATED_READ_INTERVAL * period_s) else { return none };
+        let (mut close, mut far) = (EqualPairs::default(), EqualPairs::default());
+        for (at, pair) in times.windows(2).enumerate() {
+            let pairs = if pair[1] - pair[0] < shortest_s { &mut close } else { &mut far };
+            pairs.all += 1.0;
+            pairs.equal += f64::from(u8::from(rows[at + 1].is_equal));
+        }
+        let by_chance = close.all * far.equal / far.all.max(1.0);
+        if close.equal > 0.0 && by_chance >= LEAST_READ_AGAIN * close.equal { none } else { Self { shortest_s } }
+    }
+
+    fn is_repeat(self, row: &RowStamp, before_s: Option<f64>) -> bool {
+        row.is_equal && matches!((before_s, row.time_s), (Some(before), Some(now)) if now - before < self.shortest_s)
+    }
+}
+
+/// Pairs of neighbouring rows, and how many of them are equal.
+#[derive(Debug, Clone, Copy, Default)]
+struct EqualPairs {
+    all: f64,
+    equal: f64,
+}
+
+impl Clock {
+    /// Of a recording of this rate, if it is stated, which overrides the rate that its time stamps show.
+    ///
+    /// # Errors
+    /// The rate is not positive and finite.
+    pub fn new(stated_hz: Option<f64>) -> Result<Self, TimeBaseError> {
+        if let Some(rate) = stated_hz.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
+            return Err(TimeBaseError::InvalidRate(rate));
+        }
+        Ok(Self { stated_hz, state: State::FirstRows(Vec::new()), ignored: None })
+    }
+
+    /// The same for another reading of the rows that were placed.
+    pub fn again(&self) -> Result<Self, TimeBaseError> {
+        let state = match &self.state {
+            State::Stream(stream) => State::Stream(Box::new(stream.again()?)),
+            State::Known(Known { places, .. }) => {
+                State::Known(Known { places: Arc::clone(places), next_row: 0, next_arrived: 0 })
+            }
+            State::FirstRows(_) | State::Coarse(_) => State::FirstRows(Vec::new()),
+        };
+        Ok(Self { stated_hz: self.stated_hz, state, ignored: self.ignored.clone() })
+    }
+
+    /// Takes the next rows, and returns the places of the oldest rows that are not placed yet, as far as they can be told; with `is_last` of
+    /// all of them.
+    ///
+    /// # Errors
+    /// The stamps show no sample period, or another one than the stated rate.
+    pub fn place(&mut self, rows: Vec<RowStamp>, is_last: bool) -> Result<Vec<Place>, TimeBaseError> {
+        match &mut self.state {
+            State::FirstRows(first) => {
+                first.extend(rows);
+                if first.len() < FIRST_ROWS && !is_last {
+                    return Ok(Vec::new());
+                }
+                // The rule is that of the same rows, however many come at once.
+                let mut first = std::mem::take(first);
+                let later = first.split_off(first.len().min(FIRST_ROWS));
+                let is_all = is_last && later.is_empty();
+                self.state = begin(&first, self.stated_hz, is_all).or_else(|error| match self.stated_hz {
+                    Some(_) if is_of_stamps(&error) => {
+                        self.ignored = Some(format!("the time stamps are ignored: {error}"));
+                        self.row_clock()
+                    }
+                    _ => Err(error),
+                })?;
+                let mut places = self.place(first, is_all)?;
+                if !is_all {
+                    places.extend(self.place(later, is_last)?);
+                }
+                Ok(places)
+            }
+            State::Stream(stream) => Ok(stream.place(&rows, is_last)),
+            State::Coarse(coarse) => {
+                coarse.push(&rows)?;
+                if !is_last {
+                    return Ok(Vec::new());
+                }
+                let Coarse { times_s, repeated, .. } = coarse;
+                let (times_s, repeated) = (std::mem::take(times_s), std::mem::take(repeated));
+                let rows = times_s.len();
+                let places = align(&times_s, repeated, self.stated_hz).or_else(|error| match self.stated_hz {
+                    Some(_) if is_of_stamps(&error) => {
+                        self.ignored = Some(format!("the time stamps are ignored: {error}"));
+                        Ok(KnownPlaces::of_rows(rows))
+                    }
+                    _ => Err(error),
+                })?;
+                let count = places.periods.len() + places.repeated.len();
+                let mut known = Known { places: Arc::new(places), next_row: 0, next_arrived: 0 };
+                let placed = known.next(count);
+                self.state = State::Known(known);
+                Ok(placed)
+            }
+            State::Known(known) => Ok(known.next(rows.len())),
+        }
+    }
+
+    /// Places rows by their number alone.
+    fn row_clock(&self) -> Result<State, TimeBaseError> {
+        let (repeats, clock) = (RepeatRule { shortest_s: 0.0 }, StreamClock::new(false, None)?);
+        let (before_s, waiting, first_rows, all_rows) = (None, VecDeque::new(), None, None);
+        let stream = Stream { clock, repeats, before_s, waiting, has_index: false, first_rows, all_rows };
+        Ok(State::Stream(Box::new(stream)))
+    }
+
+    /// Why the time stamps are ignored, in a sentence; `None` where they are not.
+    pub fn note(&self) -> Option<&str> {
+        self.ignored.as_deref()
+    }
+
+    /// What the stamps of the rows that were placed show; `None` where there are none.
+    pub fn stamps(&self) -> Option<StampQuality> {
+        match &self.state {
+            State::Stream(stream) => {
+                stream.all_rows.clone().or_else(|| Some(stream.clock.quality(stream.first_rows.as_ref()?)))
+            }
+            State::Known(Known { places, .. }) => Some(places.stamps.clone()),
+            State::FirstRows(_) | State::Coarse(_) => None,
+        }
+    }
+
+    /// Checks a recording of `samples` usable samples over `periods` periods, and gives its sample rate, Hz.
+    ///
+    /// # Errors
+    /// It has fewer than 4 samples, no two neighbours, gaps that are more than 64 times as long as the samples, or no rate.
+    pub fn rate_hz(
+        &self,
+        samples: u64,
+        periods: u64,
+        dropped: &BTreeMap<&'static str, u64>,
+    ) -> Result<f64, TimeBaseError> {
+        if samples < MIN_SAMPLES {
+            return Err(TimeBaseError::TooShort { used: samples, dropped: dropped.clone() });
+        }
+        if let State::Stream(stream) = &self.state
+            && let Some(least_step) = stream.clock.least_step().filter(|least_step| *least_step > 1)
+        {
+            return Err(TimeBaseError::NoNeighbours(least_step));
+        }
+        if periods < samples || is_too_sparse(samples, periods - 1) {
+            return Err(TimeBaseError::TooSparse { samples, periods });
+        }
+        let measured_hz = || self.stamps()?.rate.map(|rate| rate.hz);
+        self.stated_hz.or_else(measured_hz).ok_or(TimeBaseError::NoRate)
+    }
+}
+
+impl KnownPlaces {
+    /// Of so many rows one after the other.
+    fn of_rows(rows: usize) -> Self {
+        Self { periods: (0..rows as u64).collect(), repeated: Vec::new(), stamps: StampQuality::default() }
+    }
+}
+
+/// Whether it is the stamps that are at fault: a stated rate needs none.
+fn is_of_stamps(error: &TimeBaseError) -> bool {
+    matches!(
+        error,
+        TimeBaseError::RateContradictsStamps { .. } | TimeBaseError::NoPeriod | TimeBaseError::TooSparse { .. }
+    )
+}
+
+/// The rule for all rows by the first ones, which are all where `is_all`.
+fn begin(rows: &[RowStamp], stated_hz: Option<f64>, is_all: bool) -> Result<State, TimeBaseError> {
+    let repeats = RepeatRule::new(rows, stated_hz);
+    let has_index = rows.first().is_some_and(|row| row.index.is_some());
+    let is_short = (rows.len() as u64) < MIN_SAMPLES;
+    let stream = |clock: StreamClock, first_rows: Option<StampQuality>, all_rows: Option<StampQuality>| {
+        let (before_s, waiting) = (None, VecDeque::new());
+        State::Stream(Box::new(Stream { clock, repeats, before_s, waiting, has_index, first_rows, all_rows }))
+    };
+    let Some(times) = times_of(rows).filter(|_| !is_short) else {
+        return Ok(stream(StreamClock::new(has_index, None)?, None, None));
+    };
+    let mut repeated = Vec::new();
+    let mut before_s = None;
+    for (at, row) in rows.iter().enumerate() {
+        if repeats.is_repeat(row, before_s) {
+            repeated.push(at);
+        }
+        before_s = row.time_s;
+    }
+    if has_index {
+        let is_repeat = |at: &usize| repeated.binary_search(at).is_ok();
+        let arrived: Vec<usize> = (0..rows.len()).filter(|at| !is_repeat(at)).collect();
+        let indices: Vec<u64> = arrived.iter().filter_map(|&at| rows[at].index).collect();
+        let times: Vec<f64> = arrived.iter().map(|&at| times[at]).collect();
+        let quality = StampQuality::of_index(&indices, &times);
+        let clock = StreamClock::new(true, Some(&quality))?;
+        return Ok(stream(clock, Some(quality.clone()), Some(quality).filter(|_| is_all)));
+    }
+    let coarse = State::Coarse(Coarse { repeats, times_s: Vec::new(), repeated: Vec::new() });
+    let places = match align(&times, repeated, stated_hz) {
+        // More rows may tell it.
+        Err(TimeBaseError::NoPeriod) if !is_all => return Ok(coarse),
+        places => places?,
+    };
+    if is_all {
+        return Ok(State::Known(Known { places: Arc::new(places), next_row: 0, next_arrived: 0 }));
+    }
+    match StreamClock::new(false, Some(&places.stamps)) {
+        Ok(clock) => Ok(stream(clock, Some(places.stamps), None)),
+        _ if of_few_digits(&times).is_some() => Ok(coarse),
+        Err(TimeBaseError::Irregular(_)) => Ok(coarse),
+        Err(error) => Err(error),
+    }
+}
+
+impl Stream {
+    fn again(&self) -> Result<Self, TimeBaseError> {
+        Ok(Self {
+            clock: StreamClock::new(self.has_index, self.first_rows.as_ref())?,
+            repeats: self.repeats,
+            before_s: None,
+            waiting: VecDeque::new(),
+            has_index: self.has_index,
+            first_rows: self.first_rows.clone(),
+            all_rows: self.all_rows.clone(),
+        })
+    }
+
+    fn place(&mut self, rows: &[RowStamp], is_last: bool) -> Vec<Place> {
+        let mut arrived = Vec::with_capacity(rows.len());
+        for row in rows {
+            let is_repeat = self.repeats.is_repeat(row, self.before_s);
+            self.before_s = row.time_s;
+            self.waiting.push_back(is_repeat);
+            if !is_repeat {
+                arrived.push(Stamp { time_s: row.time_s, index: row.index });
+            }
+        }
+        let mut placed = self.clock.place(arrived.into_iter(), is_last).into_iter();
+        let mut places = Vec::with_capacity(rows.len());
+        while let Some(is_repeat) = self.waiting.front() {
+            let place = if *is_repeat { Some(Place::Repeated) } else { placed.next().map(Place::At) };
+            let Some(place) = place else { break };
+            places.push(place);
+            self.waiting.pop_front();
+        }
+        places
+    }
+}
+
+impl Coarse {
+    fn push(&mut self, rows: &[RowStamp]) -> Result<(), TimeBaseError> {
+        for row in rows {
+            if self.repeats.is_repeat(row, self.times_s.last().copied()) {
+                self.repeated.push(self.times_s.len());
+            }
+            self.times_s.push(row.time_s.unwrap_or_default());
+        }
+        if self.times_s.len() > MOST_COARSE_ROWS {
+            let reason = format!("more than {MOST_COARSE_ROWS} rows whose stamps are coarser than the sample period");
+            return Err(TimeBaseError::Irregular(reason));
+        }
+        Ok(())
+    }
+}
+
+impl Known {
+    /// The places of the next rows.
+    fn next(&mut self, rows: usize) -> Vec<Place> {
+        let KnownPlaces { periods, repeated, .. } = self.places.as_ref();
+        let place = |row: usize| {
+            if repeated.binary_search(&row).is_ok() {
+                return Some(Place::Repeated);
+            }
+            let period = *periods.get(self.next_arrived)?;
+            let missing = period - self.next_arrived as u64;
+            self.next_arrived += 1;
+            Some(Place::At(Placed { period, missing }))
+        };
+        let places = (self.next_row..self.next_row + rows).map_while(place).collect();
+        self.next_row += rows;
+        places
+    }
+}
+
+fn times_of(rows: &[RowStamp]) -> Option<Vec<f64>> {
+    rows.iter().map(|row| row.time_s).collect()
+}
+
+/// The places of rows at `times` (s), of which those at `repeated` equal the row before, soon after it.
+fn align(times: &[f64], mut repeated: Vec<usize>, stated_hz: Option<f64>) -> Result<KnownPlaces, TimeBaseError> {
+    let arrived = |repeated: &[usize]| -> Vec<usize> {
+        (0..times.len()).filter(|at| repeated.binary_search(at).is_err()).collect()
+    };
+    let times_at = |positions: &[usize]| -> Vec<f64> { positions.iter().map(|&at| times[at]).collect() };
+    let mut positions = arrived(&repeated);
+    let mut arrived_s = times_at(&positions);
+    let mut alignment = AlignedStamps::new(&arrived_s, stated_hz).ok_or(TimeBaseError::NoPeriod)?;
+    // Coarse stamps do not tell a sample that was read twice from one that equals the one before by chance; the number of samples does.
+    if alignment.width >= COARSE && take_back(&mut repeated, &positions, &alignment) {
+        positions = arrived(&repeated);
+        arrived_s = times_at(&positions);
+        alignment = AlignedStamps::new(&arrived_s, stated_hz).ok_or(TimeBaseError::NoPeriod)?;
+    }
+    match stated_hz {
+        Some(stated_hz) => contradiction(&arrived_s, &alignment, stated_hz)?,
+        None if alignment.rate.is_none() => return Err(TimeBaseError::NoPeriod),
+        None => {}
+    }
+    let AlignedStamps {
+        periods,
+        late,
+        mut losses,
+        rate,
+        tick_s,
+        width,
+        resolved,
+        least_loss,
+        is_rate_changing,
+        is_of_loop,
+    } = alignment;
+    losses.iter_mut().for_each(|loss| loss.before = positions[loss.before]);
+    let stamps = StampQuality {
+        rate,
+        tick_s,
+        width,
+        uncertain: uncertain(&losses, resolved),
+        losses,
+        resolved,
+        least_loss,
+        is_rate_changing,
+        is_of_loop,
+        late: late.into_iter().filter(|late| *late).count() as u64,
+        clock_steps: Vec::new(),
+    };
+    // Periods beyond the range of u64 are all the same.
+    if !periods.is_sorted_by(|one, next| one < next) {
+        let periods = periods.last().map_or(0, |last| last.saturating_add(1));
+        return Err(TimeBaseError::TooSparse { samples: arrived_s.len() as u64, periods });
+    }
+    Ok(KnownPlaces { periods, repeated, stamps })
+}
+
+/// Takes rows back that equal the one before by chance: where the coarse stamps of the others, which are at `arrived`, show that as many
+/// samples are missing. Returns whether there are any.
+fn take_back(repeated: &mut Vec<usize>, arrived: &[usize], alignment: &AlignedStamps) -> bool {
+    let reach = (SEARCHED_WIDTHS * alignment.width).ceil() as usize;
+    let mut taken = Vec::new();
+    let mut candidates = repeated.iter().copied().peekable();
+    for loss in &alignment.losses {
+        let first = arrived[loss.before.saturating_sub(reach)];
+        let last = arrived[(loss.before + reach / 4).min(arrived.len() - 1)];
+        let mut missing = loss.missing;
+        while let Some(position) = candidates.next_if(|&position| position < last) {
+            if position > first && missing > 0 {
+                taken.push(position);
+                missing -= 1;
+            }
+        }
+    }
+    repeated.retain(|position| taken.binary_search(position).is_err());
+    !taken.is_empty()
+}
+
+/// The mean interval of the window of samples that lasts as long as half of the others, s.
+fn usual_interval(times: &[f64]) -> Option<f64> {
+    let window = if times.len() > 4 * REPEATED_READ_WINDOW { REPEATED_READ_WINDOW } else { 1 };
+    let mut durations: Vec<f64> = times.windows(window + 1).map(|row| row[window] - row[0]).collect();
+    let middle = durations.len() / 2;
+    let duration = (!durations.is_empty()).then(|| *durations.select_nth_unstable_by(middle, f64::total_cmp).1)?;
+    (duration > 0.0 && duration.is_finite()).then_some(duration / window as f64)
+}
+
+/// Checks a stated rate against the stamps.
+fn contradiction(times: &[f64], alignment: &AlignedStamps, stated_hz: f64) -> Result<(), TimeBaseError> {
+    let differs = |measured_hz: f64| (measured_hz / stated_hz - 1.0).abs() > MAX_RATE_CONTRADICTION;
+    let few_neighbours = (alignment.losses.len() as f64) > (1.0 - MIN_NEIGHBOURS) * times.len() as f64;
+    if !few_neighbours && !alignment.rate.is_some_and(|rate| differs(rate.hz)) {
+        return Ok(());
+    }
+    match AlignedStamps::new(times, None) {
+        Some(AlignedStamps { rate: Some(rate), losses, .. }) if differs(rate.hz) && losses.len() <= times.len() / 4 => {
+            Err(TimeBaseError::RateContradictsStamps { stated_hz, measured_hz: rate.hz })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Whether the gaps of `samples` samples that span so many periods are too long.
+fn is_too_sparse(samples: u64, span: u64) -> bool {
+    span / MAX_PERIODS_PER_SAMPLE > samples && span > MAX_PERIODS
+}

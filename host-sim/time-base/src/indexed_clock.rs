@@ -1,0 +1,115 @@
+//! Time stamps beside the index of the samples: the rate, and where index and time contradict each other.
+
+use crate::aligned_stamps::RateEstimate;
+use crate::lateness_track::slope;
+use crate::lower_envelope::minimum_ahead;
+
+/// Samples over which the lower envelope of the lateness is sought, as deep a queue as is read late.
+const MAX_QUEUE: usize = 64;
+/// Windows, in samples, whose median duration gives a first period: the longest that the record has enough of.
+const WINDOWS: [usize; 4] = [4096, 256, 16, 1];
+/// Change of the envelope, in periods and in seconds, that is a step of the clock: more than a tick and a stall make.
+pub(crate) const STEP_PERIODS: f64 = 16.0;
+pub(crate) const STEP_S: f64 = 0.25;
+/// Shift of the phase that is followed, per sample.
+const PHASE_TRACKING: f64 = 1.0 / 64.0;
+/// Blocks whose mean residuals give the interval of the rate.
+const BLOCKS: usize = 16;
+/// Smallest relative half-width of the interval: the rounding of times in f64.
+const MIN_RATE_ERROR: f64 = 1e-9;
+
+/// The host's clock went on by more, or by less, than the index.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClockStep {
+    /// Position of the sample after the step.
+    pub before: usize,
+    /// Time that the stamps show beyond the time that the index shows, s.
+    pub seconds: f64,
+}
+
+/// What the stamps beside an index tell.
+pub(crate) struct IndexedClock {
+    /// The rate; `None` if the samples span no time.
+    pub(crate) rate: Option<RateEstimate>,
+    /// Steps of the clock, in their order.
+    pub(crate) steps: Vec<ClockStep>,
+}
+
+impl IndexedClock {
+    /// Compares strictly growing `indices` with `times` in s, not decreasing.
+    pub(crate) fn new(indices: &[u64], times: &[f64]) -> Self {
+        let none = Self { rate: None, steps: Vec::new() };
+        let Some(mut period_s) = first_period(indices, times) else { return none };
+        let mut steps = steps(indices, times, period_s);
+        let mut corrected = without(times, &steps);
+        // The period of the median window may be some parts in a thousand off, the line through all samples is not.
+        if let Some(refined_s) = slope(indices, &corrected, |_| true) {
+            period_s = refined_s;
+            steps = self::steps(indices, times, period_s);
+            corrected = without(times, &steps);
+        }
+        let Some(slope_s) = slope(indices, &corrected, |_| true) else { return none };
+        let block = (times.len() / BLOCKS).max(1);
+        let residual = |at: usize| (corrected[at] - corrected[0]) / slope_s - (indices[at] - indices[0]) as f64;
+        let positions: Vec<usize> = (0..times.len()).collect();
+        let (low, high) = positions
+            .chunks_exact(block)
+            .map(|block| block.iter().map(|&at| residual(at)).sum::<f64>() / block.len() as f64)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), mean| (mean.min(low), mean.max(high)));
+        let span = (indices[indices.len() - 1] - indices[0]).max(1) as f64;
+        let error = (high - low) / span + MIN_RATE_ERROR;
+        let hz = slope_s.recip();
+        let rate = RateEstimate { hz, low_hz: hz * (1.0 - error), high_hz: hz * (1.0 + error) };
+        Self { rate: (hz.is_finite() && hz > 0.0).then_some(rate), steps }
+    }
+}
+
+/// The median of the durations of windows, by their indices, s.
+fn first_period(indices: &[u64], times: &[f64]) -> Option<f64> {
+    let window = WINDOWS.into_iter().find(|window| 4 * window <= times.len()).unwrap_or(1);
+    let mut periods: Vec<f64> = (window..times.len())
+        .map(|at| (times[at] - times[at - window]) / (indices[at] - indices[at - window]) as f64)
+        .collect();
+    if periods.is_empty() {
+        return None;
+    }
+    let middle = periods.len() / 2;
+    let median = *periods.select_nth_unstable_by(middle, f64::total_cmp).1;
+    (median.is_finite() && median > 0.0).then_some(median)
+}
+
+fn steps(indices: &[u64], times: &[f64], period_s: f64) -> Vec<ClockStep> {
+    let lateness: Vec<f64> = indices
+        .iter()
+        .zip(times)
+        .map(|(index, time)| (time - times[0]) / period_s - (index - indices[0]) as f64)
+        .collect();
+    let least = STEP_PERIODS.max(STEP_S / period_s);
+    let envelope = minimum_ahead(&lateness, MAX_QUEUE);
+    let mut phase = envelope.first().copied().unwrap_or(0.0);
+    let mut steps = Vec::new();
+    for at in 0..lateness.len() {
+        // A clock that is set back, or an index that leaps, shows in the sample itself; the envelope sees it before.
+        let excess = if lateness[at] - phase < -least { lateness[at] - phase } else { envelope[at] - phase };
+        if excess >= least || lateness[at] - phase < -least {
+            steps.push(ClockStep { before: at, seconds: excess * period_s });
+            phase += excess;
+        } else if excess.is_finite() && excess > -least {
+            phase += excess * PHASE_TRACKING;
+        }
+    }
+    steps
+}
+
+/// The times with the steps taken out.
+fn without(times: &[f64], steps: &[ClockStep]) -> Vec<f64> {
+    let mut steps = steps.iter().peekable();
+    let mut offset = 0.0;
+    let shifted = times.iter().enumerate().map(|(at, time)| {
+        while let Some(step) = steps.next_if(|step| step.before <= at) {
+            offset += step.seconds;
+        }
+        time - offset
+    });
+    shifted.collect()
+}

@@ -1,0 +1,207 @@
+//! Time stamps that go back: counters that pass their largest number, single wrong stamps, and clocks that were set or began anew.
+//!
+//! A stamp is judged by the rows around it: what goes on after a wrong one goes on from before it; a clock that was set goes on by itself.
+
+use crate::lateness_track::quantile;
+use std::collections::VecDeque;
+
+/// Intervals whose median is the usual one.
+const USUAL: usize = 32;
+/// Longest interval across the end of a counter, and to the row before a wrong stamp, in usual ones.
+const LONGEST_STEP: f64 = 64.0;
+/// Shortest distance of a wrong stamp from its neighbours, in usual intervals.
+const WRONG: f64 = 16.0;
+/// The same of the first row.
+const FIRST_WRONG: f64 = 1e4;
+/// Rows that go on by themselves after a clock was set; and rows that are needed to doubt the first one.
+pub const ROWS_OF_SET_CLOCK: usize = 32;
+pub const ROWS_OF_FIRST: usize = 8;
+/// Rows before which a clock may be set forward.
+const ROWS_BEFORE_SET: u64 = 256;
+
+/// Numbers at which counters and clocks begin anew: of 15, 16, 24, 31 and 32 bits, and of a second, a minute, an hour, a day and a week, in s,
+/// ms, us and ns.
+fn moduli() -> impl Iterator<Item = f64> {
+    let counters = [15, 16, 24, 31, 32].into_iter().map(|bits| (1u64 << bits) as f64);
+    let periods = [1.0, 60.0, 3600.0, 86_400.0, 604_800.0];
+    let clocks = [1.0, 1e3, 1e6, 1e9].into_iter().flat_map(move |unit| periods.map(|period| period * unit));
+    counters.chain(clocks.filter(|period| *period > 50.0))
+}
+
+/// What a stamp is, after those before it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Order {
+    /// It follows, at this time.
+    Next(f64),
+    /// It follows the row before the last one, at this time: the last stamp is wrong.
+    AfterWrong(f64),
+    /// It follows the last one, at this time, with which the clock was set forward by so much.
+    AfterSet(f64, f64),
+    /// It is before the last one.
+    Back(f64),
+}
+
+/// Watches the order of stamps, in the unit of the file.
+#[derive(Debug, Default)]
+pub struct StampOrder {
+    /// What is added to a stamp.
+    offset: f64,
+    before_last: Option<f64>,
+    last: Option<f64>,
+    intervals: VecDeque<f64>,
+    accepted: u64,
+    /// How often a counter began anew, and the first number at which it did.
+    wraps: u64,
+    modulus: f64,
+    /// How often the clock was set back, or began anew, and the first row after that.
+    sets: u64,
+    first_set: u64,
+    /// The same of a clock that was set forward.
+    sets_forward: u64,
+    first_set_forward: u64,
+    wrong: u64,
+}
+
+impl StampOrder {
+    fn usual(&self) -> Option<f64> {
+        let mut intervals: Vec<f64> = self.intervals.iter().copied().collect();
+        (intervals.len() >= 4).then(|| quantile(&mut intervals, 1, 2))
+    }
+
+    /// Judges the stamp of the next row.
+    pub fn judge(&mut self, stamp: f64) -> Order {
+        let time = stamp + self.offset;
+        let Some(last) = self.last.filter(|last| time < *last) else {
+            return match self.set_forward(time) {
+                Some(by) => Order::AfterSet(time - by, by),
+                None => Order::Next(time),
+            };
+        };
+        let Some(usual) = self.usual() else { return Order::Back(time) };
+        let last_stamp = last - self.offset;
+        let is_passed = |modulus: &f64| {
+            last_stamp < *modulus && stamp >= 0.0 && stamp + modulus - last_stamp <= LONGEST_STEP * usual
+        };
+        if let Some(modulus) = moduli().find(is_passed) {
+            if self.wraps == 0 {
+                self.modulus = modulus;
+            }
+            self.wraps += 1;
+            self.offset += modulus;
+            return Order::Next(time + modulus);
+        }
+        match self.before_last {
+            Some(before)
+                if time >= before && time - before <= LONGEST_STEP * usual && last - before > WRONG * usual =>
+            {
+                self.wrong += 1;
+                Order::AfterWrong(time)
+            }
+            _ => Order::Back(time),
+        }
+    }
+
+    /// By how much the clock was set with the last row, where only few rows are before it: a clock is set soon after it begins, and no recording
+    /// begins with so few samples before such a gap.
+    fn set_forward(&mut self, time: f64) -> Option<f64> {
+        if self.accepted > ROWS_BEFORE_SET {
+            return None;
+        }
+        let (before, last, usual) = (self.before_last?, self.last?, self.usual()?);
+        if last - before <= FIRST_WRONG * usual || time - last > LONGEST_STEP * usual {
+            return None;
+        }
+        let by = last - before - usual;
+        if self.sets_forward == 0 {
+            self.first_set_forward = self.accepted;
+        }
+        self.sets_forward += 1;
+        self.offset -= by;
+        self.last = Some(last - by);
+        Some(by)
+    }
+
+    /// Takes the time of a row that is used.
+    pub fn accept(&mut self, time: f64) {
+        if let Some(interval) = self.last.map(|last| time - last).filter(|interval| *interval > 0.0) {
+            if self.intervals.len() == USUAL {
+                self.intervals.pop_front();
+            }
+            self.intervals.push_back(interval);
+        }
+        self.before_last = self.last;
+        self.last = Some(time);
+        self.accepted += 1;
+    }
+
+    /// Forgets the last row, which is not used.
+    pub fn forget_last(&mut self) {
+        self.last = self.before_last;
+        self.intervals.pop_back();
+        self.accepted = self.accepted.saturating_sub(1);
+    }
+
+    /// Whether the first row is wrong, as the rows after it show, whose times are these.
+    pub fn is_first_wrong(&mut self, times: &[f64]) -> bool {
+        let [first, second, ..] = times else { return false };
+        let mut intervals: Vec<f64> = times[1..].windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let usual = quantile(&mut intervals, 1, 2);
+        let is_wrong = times.len() == ROWS_OF_FIRST && usual > 0.0 && (second - first).abs() > FIRST_WRONG * usual;
+        self.wrong += u64::from(is_wrong);
+        is_wrong
+    }
+
+    /// Whether no row but the first was used, which lies after all others.
+    pub fn has_first_alone(&self) -> bool {
+        self.accepted <= 1
+    }
+
+    /// Begins with the next row, as if there had been none.
+    pub fn begin_anew(&mut self) {
+        self.wrong += 1;
+        *self = Self { wrong: self.wrong, ..Self::default() };
+    }
+
+    /// Goes on at once with a clock that was set back to `time`, or began anew, before the row with this number: how long that took is not
+    /// known, and no sample is taken to be missing there.
+    pub fn set_clock(&mut self, time: f64, row: u64) {
+        let (Some(last), Some(usual)) = (self.last, self.usual()) else { return };
+        if self.sets == 0 {
+            self.first_set = row;
+        }
+        self.sets += 1;
+        self.offset += last + usual - time;
+    }
+
+    /// The time of a stamp, as of [`judge`](Self::judge), after the clock was set.
+    pub fn shift(&self, time: f64, offset_before: f64) -> f64 {
+        time - offset_before + self.offset
+    }
+
+    /// What is added to a stamp.
+    pub fn offset(&self) -> f64 {
+        self.offset
+    }
+
+    /// What a reader of the analysis has to know, one sentence each.
+    pub fn notes(&self) -> Vec<String> {
+        let Self { wraps, modulus, sets, first_set, sets_forward, first_set_forward, wrong, .. } = self;
+        let sentences = [
+            (*wraps, format!("the time stamps begin anew at {modulus} and go on ({wraps} times)")),
+            (
+                *sets,
+                format!(
+                    "the clock was set back {sets} times, first before row {first_set}; how long that took is not known, and no sample is taken to be missing there"
+                ),
+            ),
+            (
+                *sets_forward,
+                format!(
+                    "the clock was set forward before row {first_set_forward}, and no sample is taken to be missing there"
+                ),
+            ),
+            (*wrong, format!("{wrong} rows whose time is far from that of the rows around them are left out")),
+        ];
+        sentences.into_iter().filter(|(count, _)| *count > 0).map(|(_, sentence)| sentence).collect()
+    }
+}

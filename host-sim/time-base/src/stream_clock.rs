@@ -1,0 +1,275 @@
+//! The sample periods of rows that are read in blocks, in memory that does not grow with their number.
+//!
+//! With time stamps alone, the rule is that of [`lateness_track`](crate::lateness_track) for stamps that are finer than the sample
+//! period: a lost sample lifts the lower envelope of the lateness for good, a late delivery for as long as the queue is. The
+//! period is that of the first rows, and the envelope is sought over as many rows as there, so that a row is placed when those
+//! of the queue behind it are known. Before that a rate that changes is [followed](crate::clock_rate).
+
+use crate::aligned_stamps::RateEstimate;
+use crate::clock_rate::SteadyStream;
+use crate::indexed_clock::{ClockStep, STEP_PERIODS, STEP_S};
+use crate::lateness_track::{CERTAIN, COARSE, LOSS, MEMORY, least_growth};
+use crate::lower_envelope::{MinimumBehind, minimum_ahead};
+use crate::stamp_alignment::MAX_QUEUE;
+use crate::stamp_quality::StampQuality;
+use crate::time_base_error::TimeBaseError;
+use std::collections::VecDeque;
+
+/// What tells the sample periods.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Source {
+    /// The number of the row.
+    Rows,
+    /// Its index; beside it there may be stamps with this period, s.
+    Index(Option<f64>),
+    /// Its time stamp, with the period of the first rows, s.
+    Stamps(f64),
+}
+
+/// When a row arrived, as far as the file says it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Stamp {
+    pub(crate) time_s: Option<f64>,
+    pub(crate) index: Option<u64>,
+}
+
+/// The sample period of a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Placed {
+    /// Counted from any origin.
+    pub period: u64,
+    /// Periods without a row between all rows so far.
+    pub missing: u64,
+}
+
+/// Places rows in the order in which they arrived.
+pub(crate) struct StreamClock {
+    source: Source,
+    /// Rows that were placed.
+    placed: u64,
+    missing: u64,
+    /// Time of the first row, s.
+    origin_s: Option<f64>,
+    last: Stamp,
+    /// Lateness of the rows that are not placed yet, and their times, s.
+    ahead: Vec<f64>,
+    times_s: Vec<f64>,
+    /// Growth of the lateness in an interval that a lost sample makes at least.
+    least_growth: f64,
+    /// Lateness of the last rows that were placed.
+    recent: VecDeque<f64>,
+    /// The stamps as a steady clock would have written them; `None` where they do not tell the sample periods.
+    steady: Option<SteadyStream>,
+    level: MinimumBehind,
+    line: Line,
+    /// The last period that was placed, counted from the first row, and its time, s.
+    end: (u64, f64),
+    late: u64,
+    uncertain: u64,
+    /// Smallest step of the index.
+    least_step: u64,
+    /// Where the time leaps against the index, and by how much in all, s.
+    clock_steps: Vec<ClockStep>,
+    leapt_s: f64,
+}
+
+impl StreamClock {
+    /// Of rows that have an index and time stamps, if so; `head` is what the stamps of the first rows show.
+    ///
+    /// # Errors
+    /// The stamps are coarser than the sample period, or show none.
+    pub(crate) fn new(has_index: bool, head: Option<&StampQuality>) -> Result<Self, TimeBaseError> {
+        let period_s = head.and_then(|head| head.rate).map(|rate| rate.hz.recip());
+        let source = match (has_index, head) {
+            (true, _) => Source::Index(period_s),
+            (false, None) => Source::Rows,
+            (false, Some(head)) if head.width >= COARSE || !head.resolved => {
+                let reason = format!("they are {:.1} sample periods wide", head.width);
+                return Err(TimeBaseError::Irregular(reason));
+            }
+            (false, Some(head)) if head.is_of_loop => {
+                return Err(TimeBaseError::Irregular("a loop asks for the samples when it has time".to_owned()));
+            }
+            (false, Some(head)) if head.least_loss > 1 => {
+                return Err(TimeBaseError::Irregular("they come in bursts".to_owned()));
+            }
+            (false, Some(_)) => Source::Stamps(period_s.ok_or(TimeBaseError::NoPeriod)?),
+        };
+        Ok(Self {
+            source,
+            placed: 0,
+            missing: 0,
+            origin_s: None,
+            last: Stamp::default(),
+            ahead: Vec::new(),
+            times_s: Vec::new(),
+            least_growth: least_growth(
+                head.and_then(|head| head.tick_s).zip(period_s).map(|(tick, period)| tick / period),
+            ),
+            recent: VecDeque::new(),
+            steady: if let Source::Stamps(period_s) = source { Some(SteadyStream::new(period_s)) } else { None },
+            end: (0, 0.0),
+            level: MinimumBehind::new(MEMORY),
+            line: Line::default(),
+            late: 0,
+            uncertain: 0,
+            least_step: u64::MAX,
+            clock_steps: Vec::new(),
+            leapt_s: 0.0,
+        })
+    }
+
+    /// Takes the next rows and returns the periods of those that can be placed now: of all with `is_last`.
+    pub(crate) fn place(&mut self, rows: impl Iterator<Item = Stamp>, is_last: bool) -> Vec<Placed> {
+        match self.source {
+            Source::Rows => {
+                let place = |_| {
+                    self.placed += 1;
+                    Placed { period: self.placed - 1, missing: 0 }
+                };
+                rows.map(place).collect()
+            }
+            Source::Index(period_s) => rows.map(|row| self.by_index(row, period_s)).collect(),
+            Source::Stamps(period_s) => {
+                let mut origin_s = self.origin_s;
+                let times = rows.map(|row| {
+                    let time_s = row.time_s.unwrap_or_default();
+                    time_s - *origin_s.get_or_insert(time_s)
+                });
+                let steady = self.steady.as_mut().map(|steady| steady.steady(times, is_last)).unwrap_or_default();
+                self.origin_s = origin_s;
+                for (time_s, steady_s) in steady {
+                    let number = self.placed + self.ahead.len() as u64;
+                    self.ahead.push(steady_s / period_s - number as f64);
+                    self.times_s.push(time_s);
+                }
+                self.by_stamps(is_last)
+            }
+        }
+    }
+
+    fn by_index(&mut self, row: Stamp, period_s: Option<f64>) -> Placed {
+        let index = row.index.unwrap_or_default();
+        if let Some(before) = self.last.index {
+            let step = index - before;
+            self.least_step = self.least_step.min(step);
+            self.missing = self.missing.saturating_add(step - 1);
+            if let (Some(period_s), Some(before), Some(now)) = (period_s, self.last.time_s, row.time_s) {
+                let excess = (now - before) / period_s - step as f64;
+                if excess.abs() >= STEP_PERIODS.max(STEP_S / period_s) {
+                    let seconds = excess * period_s;
+                    self.leapt_s += seconds;
+                    self.clock_steps.push(ClockStep { before: self.placed as usize, seconds });
+                }
+            }
+        }
+        if let Some(time_s) = row.time_s {
+            let origin_s = *self.origin_s.get_or_insert(time_s);
+            self.line.add(index as f64, time_s - origin_s - self.leapt_s);
+        }
+        self.last = row;
+        self.placed += 1;
+        Placed { period: index, missing: self.missing }
+    }
+
+    fn by_stamps(&mut self, is_last: bool) -> Vec<Placed> {
+        let ready = if is_last { self.ahead.len() } else { (self.ahead.len() + 1).saturating_sub(MAX_QUEUE) };
+        let envelope = minimum_ahead(&self.ahead, MAX_QUEUE);
+        let mut placed = Vec::with_capacity(ready);
+        for ((&late, &least), &time_s) in self.ahead.iter().zip(&envelope).zip(&self.times_s).take(ready) {
+            let excess = self.level.minimum().map_or(0.0, |level| least - self.missing as f64 - level);
+            self.recent.push_back(late);
+            if self.recent.len() > MEMORY + 1 {
+                self.recent.pop_front();
+            }
+            if excess >= LOSS && self.has_long_interval() {
+                // A float beyond the range of u64 saturates.
+                self.missing = self.missing.saturating_add((excess.round() as u64).max(1));
+                self.uncertain += u64::from((excess - excess.round()).abs() >= CERTAIN);
+            }
+            self.level.push(least - self.missing as f64);
+            let period = self.missing.saturating_add(self.placed);
+            self.placed += 1;
+            if late - self.missing as f64 - self.level.minimum().unwrap_or(0.0) < 1.0 {
+                self.line.add(period as f64, time_s);
+            } else {
+                self.late += 1;
+            }
+            placed.push(Placed { period, missing: self.missing });
+            self.end = (period, time_s);
+        }
+        self.ahead.drain(..ready);
+        self.times_s.drain(..ready);
+        placed
+    }
+
+    /// Whether one of the last intervals is as long as a lost sample makes it.
+    fn has_long_interval(&self) -> bool {
+        self.recent.iter().zip(self.recent.iter().skip(1)).any(|(one, next)| next - one >= self.least_growth)
+    }
+
+    /// The sample rate by the stamps of the rows that were placed, Hz.
+    fn rate_hz(&self) -> Option<f64> {
+        let changing = self.changing_rate().map(|rate| rate.hz);
+        changing.or(self.line.slope().map(f64::recip)).filter(|hz| hz.is_finite() && *hz > 0.0)
+    }
+
+    /// The mean rate and its range, where it changes.
+    fn changing_rate(&self) -> Option<RateEstimate> {
+        let [shortest_s, longest_s] = self.steady.as_ref()?.periods_s()?;
+        let (period, time_s) = self.end;
+        Some(RateEstimate { hz: period as f64 / time_s, low_hz: longest_s.recip(), high_hz: shortest_s.recip() })
+    }
+
+    /// What the stamps of the rows that were placed show; `first_rows` is what those of the first ones show.
+    pub(crate) fn quality(&self, first_rows: &StampQuality) -> StampQuality {
+        let changing = self.changing_rate();
+        let by_line = || {
+            let hz = self.rate_hz()?;
+            // The interval of the first rows holds for all.
+            let of_first = first_rows.rate?;
+            let (low_hz, high_hz) = (hz * of_first.low_hz / of_first.hz, hz * of_first.high_hz / of_first.hz);
+            Some(RateEstimate { hz, low_hz, high_hz })
+        };
+        StampQuality {
+            rate: changing.or_else(by_line),
+            is_rate_changing: changing.is_some(),
+            late: self.late,
+            uncertain: self.uncertain,
+            losses: Vec::new(),
+            clock_steps: self.clock_steps.clone(),
+            ..first_rows.clone()
+        }
+    }
+
+    /// Smallest step of the index; `None` where there is none, or one row.
+    pub(crate) fn least_step(&self) -> Option<u64> {
+        let has_step = matches!(self.source, Source::Index(_)) && self.placed > 1;
+        has_step.then_some(self.least_step)
+    }
+}
+
+/// The least-squares line through points that come one after the other, by their means and central moments.
+#[derive(Debug, Clone, Copy, Default)]
+struct Line {
+    count: f64,
+    mean: (f64, f64),
+    xx: f64,
+    xy: f64,
+}
+
+impl Line {
+    fn add(&mut self, x: f64, y: f64) {
+        self.count += 1.0;
+        let (from_x, from_y) = (x - self.mean.0, y - self.mean.1);
+        self.mean.0 += from_x / self.count;
+        self.mean.1 += from_y / self.count;
+        self.xx += from_x * (x - self.mean.0);
+        self.xy += from_x * (y - self.mean.1);
+    }
+
+    fn slope(&self) -> Option<f64> {
+        let slope = self.xy / self.xx;
+        (slope.is_finite() && slope > 0.0).then_some(slope)
+    }
+}
