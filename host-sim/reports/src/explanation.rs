@@ -4,7 +4,7 @@
 use crate::finding_text::{FindingText, channel_list};
 use crate::formatting::{capital, count, duration, words, wrap};
 use crate::rounding::{NONE, quantity_digits, signed, significant, span};
-use crate::summary;
+use crate::summary::{self, off_percent};
 use noise_analysis::nonstationarity::{FittedPart, RelatedLine, TrackedSet};
 use noise_analysis::report::{ChannelReport, CommonModeRegression, ModelErrorReport, Nonstationarity, Report};
 use std::io::{self, Write};
@@ -78,11 +78,6 @@ fn found(FindingText { channels, physics, advice, weight, .. }: &FindingText) ->
     format!("{channels}: {physics}{weight} {advice}")
 }
 
-/// Two significant digits of a deviance per point.
-fn deviance(error: &ModelErrorReport) -> String {
-    error.deviance_per_point.map_or_else(|| NONE.to_owned(), per_point)
-}
-
 fn per_point(deviance: f64) -> String {
     significant(deviance, 2)
 }
@@ -114,10 +109,13 @@ pub(crate) fn course(channel: &ChannelReport) -> Vec<String> {
 
 /// The terms, and the errors on the second half.
 fn model(channel: &ChannelReport) -> String {
+    let off = |error: &ModelErrorReport| {
+        error.rms_percent.map_or_else(|| NONE.to_owned(), |of| format!("{} %", off_percent(of)))
+    };
     let terms: Vec<String> = channel.after.terms.iter().map(|term| words(term.kind())).collect();
     let excluding = channel.before.unseen_excluding.as_ref().zip(channel.after.unseen_excluding.as_ref());
     let excluding = excluding.map_or_else(String::new, |(before, after)| {
-        format!(" Without the spikes and knocks of both halves {} become {}.", deviance(before), deviance(after))
+        format!(" Without the spikes and knocks of both halves {} become {}.", off(before), off(after))
     });
     let events = channel.after.events.as_ref().map_or_else(String::new, |events| {
         let rate = &events.rate_per_hour;
@@ -129,13 +127,12 @@ fn model(channel: &ChannelReport) -> String {
         )
     });
     format!(
-        "N, B and K of the first half leave a deviance of {} a point on the second half; 1 is a true model on its own data. The \
-         model with its effects ({}{events}) leaves {}. The curve of the first half itself, taken for a model, leaves {}: a \
-         model of stationary noise cannot be expected to do better.{excluding}",
-        deviance(&channel.before.unseen),
+        "On the second half, which the models had not seen, σ is off by {} with N, B and K, and by {} with what was found ({}{events}). \
+         The curve of the first half itself is off by {}: a model of stationary noise cannot be expected to do better.{excluding}",
+        off(&channel.before.unseen),
+        off(&channel.after.unseen),
         terms.join(", "),
-        deviance(&channel.after.unseen),
-        deviance(&channel.first_half_curve),
+        off(&channel.first_half_curve),
     )
 }
 

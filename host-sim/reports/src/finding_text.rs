@@ -564,12 +564,10 @@ fn part_in_percent(fraction: BoundedEstimate) -> String {
 /// By how much and where the data departs from every model; `percent` has the excess of σ in each channel, if it is known.
 pub(crate) fn departure(of: &Unexplained, percent: &[f64]) -> String {
     let place = match of.place {
-        UnexplainedPlace::LineOfCurve { tau_s, frequency_hz } => format!(
-            "at averaging times around {}, as by a line at {}",
-            span(tau_s.value),
-            quantity(frequency_hz.value, "Hz")
-        ),
-        UnexplainedPlace::AveragingTime(tau_s) => format!("at averaging times around {}", span(tau_s.value)),
+        UnexplainedPlace::LineOfCurve { tau_s, frequency_hz } => {
+            format!("around τ = {}, as by a line at {}", span(tau_s.value), quantity(frequency_hz.value, "Hz"))
+        }
+        UnexplainedPlace::AveragingTime(tau_s) => format!("around τ = {}", span(tau_s.value)),
         UnexplainedPlace::Frequency(frequency_hz) => format!("around {}", quantity(frequency_hz.value, "Hz")),
     };
     let (low, high) =
@@ -650,33 +648,39 @@ mod tests {
         }
     }
 
-    /// What a report says of the examples of a kind: the advice once after all sentences that it follows.
-    fn sentences_of(kind: &str, examples: &[Effect]) -> String {
+    /// What a report says of the examples of a kind, one row for each piece of advice.
+    fn rows_of(kind: &str, examples: &[Effect]) -> String {
         let texts = examples
             .iter()
             .filter(|effect| effect.name() == kind)
             .map(|effect| describe(&finding(effect.clone()), &[]));
         let mut by_advice: Vec<(String, Vec<String>)> = Vec::new();
         for FindingText { physics, advice, .. } in texts {
-            let known = by_advice.iter().position(|(known, _)| *known == advice);
-            let at = known.unwrap_or_else(|| {
-                by_advice.push((advice, Vec::new()));
-                by_advice.len() - 1
-            });
-            by_advice[at].1.push(format!("*{physics}*"));
+            match by_advice.iter_mut().find(|(known, _)| *known == advice) {
+                Some((_, sentences)) => sentences.push(physics),
+                None => by_advice.push((advice, vec![physics])),
+            }
         }
-        let said = by_advice.iter().map(|(advice, all)| format!("Says: {}\n\nAdvice: *{advice}*", all.join(" or\n")));
-        said.collect::<Vec<_>>().join("\n\n")
+        let rows = by_advice.iter().enumerate().map(|(at, (advice, sentences))| {
+            let name = if at == 0 { format!("`{kind}`") } else { String::new() };
+            format!("| {name} | {} | {advice} |\n", sentences.join(" *or* "))
+        });
+        rows.collect()
     }
 
     #[test]
     fn the_sentences_of_every_kind_are_in_the_docs() {
         let examples = examples();
-        for kind in Effect::NAMES {
-            let sentences = sentences_of(kind, &examples);
-            assert!(!sentences.is_empty(), "{kind} has no example");
-            system_tests::generated("docs/findings.md", kind, &sentences);
-        }
+        let rows = Effect::NAMES.iter().map(|kind| {
+            let rows = rows_of(kind, &examples);
+            assert!(!rows.is_empty(), "{kind} has no example");
+            rows
+        });
+        let mut rows: Vec<String> = rows.collect();
+        // Two kinds share a name where the noise model and the samples show the same.
+        rows.dedup();
+        let table = format!("| kind | the report says | what to do |\n|---|---|---|\n{}", rows.concat());
+        system_tests::generated("docs/findings.md", "kinds", &table);
     }
 
     #[test]

@@ -94,7 +94,7 @@ fn verdict(report: &Report, out: &mut impl Write) -> io::Result<()> {
     }
     let contradictions = summary::contradictions(report);
     if !contradictions.is_empty() {
-        writeln!(out, "\nWhat the data contradicts")?;
+        writeln!(out, "\nWhere data and model disagree")?;
         contradictions.iter().try_for_each(|text| paragraph(out, &format!("{text}.")))?;
     }
     Ok(())

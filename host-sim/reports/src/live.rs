@@ -89,7 +89,7 @@ impl LiveView {
             points: channel.curve.iter().map(|point| (point.tau_s, point.adev)).collect(),
         };
         let contradicted = summary::contradictions(report).into_iter().next();
-        let contradicted = contradicted.map(|first| format!("Contradicted: {first}."));
+        let contradicted = contradicted.map(|first| format!("Model is off: {first}."));
         Self {
             headline: summary::headline(report, source).join("   "),
             sentences: summary::record_sentences_in_short(report).join(" "),

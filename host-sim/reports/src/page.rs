@@ -164,12 +164,12 @@ fn unparted(text: &str) -> String {
     text.replace(" %", "\u{a0}%")
 }
 
-/// What the data contradicts, and what to do.
+/// Where data and model disagree, and what to do.
 fn next_steps(report: &Report) -> Markup {
     let (contradictions, steps) = (summary::contradictions(report), summary::next_steps(report));
     html! {
         @if !contradictions.is_empty() {
-            h3 { "What the data contradicts" }
+            h3 { "Where data and model disagree" }
             ul { @for text in &contradictions { li.warning { (text) "." } } }
         }
         @if !steps.is_empty() {

@@ -7,7 +7,7 @@ use noise_analysis::report::PartNote;
 
 /// Beginning of the sentence where no filter was found.
 const NOT_CORRELATED: &str =
-    "No low-pass filter shows: neighbouring samples are not correlated, so N holds down to one sample.";
+    "No low-pass filter found: consecutive samples are uncorrelated, so N is valid from one sample on.";
 /// What a wrong sample rate makes.
 const SCALES: &str = "Every τ and N scale with it.";
 

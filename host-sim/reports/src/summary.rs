@@ -1,12 +1,12 @@
-//! What a report says in short, for the terminal's screen, the page's first screen and the live view: the record in sentences,
-//! the coefficients in the units of their users, what the data contradicts, and what to do next.
+//! What a report says in short, for the terminal's screen, the page's first screen and the live view: whether the record can be trusted,
+//! the coefficients in the units of their users, where data and model disagree, and what to do next.
 
 use crate::coefficients;
 use crate::finding_text::{ALL_CHANNELS, FindingText, channel_list, departure, describe, shown_effects};
 use crate::formatting::{count, enumerated, words};
 use crate::part_note;
 use crate::rounding::{
-    column_prefix, estimate, is_upper_bound, parameter_magnitude, plain, quantity, significant, span, unit,
+    NONE, column_prefix, estimate, is_upper_bound, parameter_magnitude, plain, quantity, significant, span, unit,
 };
 use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::distributions::quantile;
@@ -59,7 +59,7 @@ pub struct CoefficientTableRow {
     pub channel: String,
     /// N, B and K of the model `final`, with their bounds; `–` where the model lacks them.
     pub coefficients: [String; 3],
-    /// Deviance a point on the unseen half before and after.
+    /// By how much σ is off on the unseen half, without and with what was found.
     pub error: String,
     /// Whether that of the model with its effects is far above what chance makes.
     pub is_high: bool,
@@ -95,8 +95,10 @@ pub struct ChannelCoefficients {
     pub unit: String,
     /// N, B and K, as far as the model has them.
     pub coefficients: [Option<Parameter>; 3],
-    /// Deviance a point on unseen data of the model without and with its effects.
-    pub deviance: [Option<f64>; 2],
+    /// [`ModelErrorReport::rms_percent`] on unseen data of the model without and with its effects.
+    pub rms_percent: [Option<f64>; 2],
+    /// Deviance a point on unseen data of the model with its effects.
+    pub deviance: Option<f64>,
 }
 
 impl ChannelCoefficients {
@@ -105,7 +107,8 @@ impl ChannelCoefficients {
             name: channel.name.clone(),
             unit: channel.unit.clone(),
             coefficients: LETTERS.map(|(kind, _)| coefficient(channel, kind)),
-            deviance: unseen_errors(channel),
+            rms_percent: [&channel.before, &channel.after].map(|model| model.unseen.rms_percent),
+            deviance: channel.after.unseen.deviance_per_point,
         }
     }
 }
@@ -158,8 +161,8 @@ fn tables_of(
                         |n| estimate(n.value * scale(index), n.low * scale(index), n.high * scale(index)),
                     )
                 }),
-                error: error_change(channel.deviance),
-                is_high: channel.deviance[1].is_some_and(|of| of > HIGH_DEVIANCE),
+                error: error_change(channel.rms_percent),
+                is_high: channel.deviance.is_some_and(|of| of > HIGH_DEVIANCE),
             })
             .collect();
         rows.extend(sheet(prefix).map(|sheet| CoefficientTableRow {
@@ -213,17 +216,28 @@ pub(crate) fn unseen_errors(channel: &ChannelReport) -> [Option<f64>; 2] {
     [&channel.before, &channel.after].map(|model| model.unseen.deviance_per_point)
 }
 
-/// Deviance a point before and after; nothing where no model has met unseen data yet.
-fn error_change(deviance: [Option<f64>; 2]) -> String {
-    if deviance == [None, None] {
-        return "–".to_owned();
+/// By how much σ is off, before and after; nothing where no model has met unseen data yet.
+fn error_change(rms_percent: [Option<f64>; 2]) -> String {
+    let [before, after] = rms_percent.map(|of| of.map_or_else(|| NONE.to_owned(), off_percent));
+    match (rms_percent, before == after) {
+        ([None, None], _) => NONE.to_owned(),
+        (_, true) => format!("{after} %"),
+        _ => format!("{before} → {after} %"),
     }
-    let [before, after] = deviance.map(|of| of.map_or_else(|| "–".to_owned(), deviance_per_point));
-    format!("{before} → {after}")
 }
 
-/// A deviance a point with the digits that every place of the report gives it. Beyond a thousand the model is no model, and by how much
-/// says nothing.
+/// Largest percentage that is told. Beyond it the model is no model, and by how much says nothing.
+const MOST_PERCENT: f64 = 1000.0;
+
+/// By how much σ is off by a root mean square of the logarithm of its ratio, in percent: a factor of 2 is 100 %.
+pub(crate) fn off_percent(rms_percent: f64) -> String {
+    match 100.0 * (rms_percent / 100.0).exp_m1() {
+        off if off > MOST_PERCENT => "> 1,000".to_owned(),
+        off => significant(off, if off < 100.0 { 2 } else { 3 }),
+    }
+}
+
+/// A deviance a point with the digits that every place of the report gives it.
 pub(crate) fn deviance_per_point(of: f64) -> String {
     match of {
         of if of < 9.95 => format!("{of:.1}"),
@@ -310,21 +324,70 @@ pub fn nothing_found(report: &Report) -> String {
     }
 }
 
-/// The record in sentences: rest, losses, length, and the errors without spikes and knocks.
+/// Whether the record can be trusted, in sentences: the answer, rest and losses, how good the model is on the unseen half, what the
+/// length is good for, and the errors without spikes and knocks.
 #[must_use]
 pub fn record_sentences(report: &Report) -> Vec<String> {
-    sentences(report, Vec::new()).into_iter().chain(without_events(report)).collect()
+    let length = length_advice(report);
+    let length = length.known.into_iter().chain(length.except).chain(length.longer).chain(length.limits);
+    sentences(report, length, Vec::new()).into_iter().chain(without_events(report)).collect()
 }
 
-/// The record in sentences, with those of the part's `notes`, the most important first.
-fn sentences(report: &Report, notes: Vec<String>) -> Vec<String> {
-    let mut sentences = vec![rest(report), losses(report)];
+/// The record in sentences, with those of its length and of the part's `notes`, the most important first.
+fn sentences(report: &Report, length: impl Iterator<Item = String>, notes: Vec<String>) -> Vec<String> {
+    let mut sentences = vec![trust(report), rest(report), losses(report)];
     sentences.extend(report.quick.then(|| QUICK.to_owned()));
-    sentences.extend(length_advice(report));
+    sentences.extend(unseen_half(report));
+    sentences.extend(length);
     sentences.extend(notes);
     sentences.extend(recent_fit(report));
     sentences.retain(|sentence| !sentence.is_empty());
     sentences
+}
+
+/// Part of the samples that may be missing before that is held against a record.
+const MANY_LOST: f64 = 0.01;
+
+/// Whether the record can be trusted, and what speaks against it. Nothing where no channel was looked at.
+fn trust(report: &Report) -> String {
+    if inertial(report).next().is_none() {
+        return String::new();
+    }
+    if has_moved(report) {
+        return "This recording cannot be trusted as it is.".to_owned();
+    }
+    let lost = report.dropped.get("gap").copied().unwrap_or(0) as f64 / periods(report).max(1) as f64;
+    let reasons: Vec<String> = [
+        is_short(report).then(|| "it is short".to_owned()),
+        (lost >= MANY_LOST).then(|| format!("{} % of the samples are missing", significant(100.0 * lost, 2))),
+    ]
+    .into_iter()
+    .flatten()
+    .chain(failures(report))
+    .collect();
+    match reasons.is_empty() {
+        true => "This recording can be trusted.".to_owned(),
+        false => format!("This recording can be trusted in part: {}.", reasons.join("; ")),
+    }
+}
+
+/// By how much the models of the first half are off on the second, over the gyros and accelerometers; `None` without a model that met
+/// unseen data.
+fn unseen_half(report: &Report) -> Option<String> {
+    let range = |of: &dyn Fn(&ChannelReport) -> Option<f64>| {
+        let each: Vec<f64> = inertial(report).filter_map(of).collect();
+        let (low, high) = each.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), &of| (low.min(of), high.max(of)));
+        let [low, high] = [low, high].map(off_percent);
+        let range = if low == high { high } else { format!("{low} to {high}") };
+        (!each.is_empty()).then(|| format!("{range} %"))
+    };
+    let with = range(&|channel| channel.after.unseen.rms_percent)?;
+    let halves = range(&|channel| channel.first_half_curve.rms_percent)
+        .map_or_else(String::new, |halves| format!(" (the two halves differ by {halves})"));
+    let is_changed = inertial(report).any(|channel| channel.before.unseen != channel.after.unseen);
+    let without = range(&|channel| channel.before.unseen.rms_percent).filter(|_| is_changed);
+    let without = without.map_or_else(String::new, |without| format!("; without what was found, by {without}"));
+    Some(format!("On the second half, which the model had not seen, σ is off by {with}{halves}{without}."))
 }
 
 /// Samples from which on neighbours that are correlated by 0.15 or more are so by five standard errors.
@@ -348,35 +411,46 @@ pub fn part_notes(report: &Report) -> Vec<String> {
     told_notes(report).iter().map(part_note::sentence).collect()
 }
 
-/// The record in sentences for the screen: with the part's notes that it has room for, without the errors without spikes and knocks.
+/// The record in sentences for the screen: with the part's notes that it has room for, without what its table shows.
 #[must_use]
 pub fn record_sentences_in_short(report: &Report) -> Vec<String> {
-    sentences(report, part_note::in_short(&told_notes(report)))
+    let length = length_advice(report);
+    sentences(report, length.known.into_iter().chain(length.longer), part_note::in_short(&told_notes(report)))
 }
 
-/// Where and by how much the data departs from every model, one text each. Channels that depart at the same place, to the same side,
-/// are told together, and what a channel shows twice at one place is told once.
-#[must_use]
-pub fn unexplained(report: &Report) -> Vec<String> {
-    struct Departure<'a> {
-        of: &'a Unexplained,
-        channels: Vec<String>,
-        excesses: Vec<f64>,
+/// A departure of the data from every model.
+struct Departure<'a> {
+    of: &'a Unexplained,
+    channels: Vec<String>,
+    excesses: Vec<f64>,
+}
+
+impl Departure<'_> {
+    fn largest(&self) -> f64 {
+        self.excesses.iter().map(|of| of.abs()).fold(0.0, f64::max)
     }
+
+    fn text(&self) -> String {
+        format!("{}: {}", channel_list(&self.channels), departure(self.of, &self.excesses))
+    }
+}
+
+/// Where the data departs from every model. Channels that depart at the same place, to the same side, are one, and what a channel
+/// shows twice at one place is told once.
+fn departures(report: &Report) -> Vec<Departure<'_>> {
     let mut departures: Vec<Departure<'_>> = Vec::new();
-    // Each channel has its own excess at the place of the finding.
-    let in_channels = |number: usize| {
-        let effects = report.channels.iter().flat_map(|channel| &channel.effects);
-        let shown = effects.filter(move |shown| shown.finding == number);
-        shown.filter_map(|shown| match &shown.effect {
-            Effect::Unexplained(of) => Some(of.excess_percent?.value),
-            _ => None,
-        })
-    };
     for (number, finding) in report.findings.iter().enumerate() {
         let Effect::Unexplained(of) = &finding.effect else { continue };
         let excess = of.excess_percent.map(|of| of.value);
-        let excesses = in_channels(number).chain(excess);
+        // Each channel has its own excess at the place of the finding.
+        let own = shown_effects(report, number).into_iter().filter_map(|shown| match shown.effect {
+            Effect::Unexplained(of) => Some(of.excess_percent?.value),
+            _ => None,
+        });
+        let mut excesses: Vec<f64> = own.collect();
+        if excesses.is_empty() {
+            excesses.extend(excess);
+        }
         let is_same_side = |of: &Departure<'_>| match (of.excesses.first(), excess) {
             (Some(first), Some(excess)) => first.signum() == excess.signum(),
             (first, excess) => first.is_none() && excess.is_none(),
@@ -387,17 +461,40 @@ pub fn unexplained(report: &Report) -> Vec<String> {
             continue;
         }
         let of_other_channels = |of: &Departure<'_>| finding.channels.iter().all(|name| !of.channels.contains(name));
-        let known = departures.iter_mut().find(|of| is_same_place(of) && is_same_side(of) && of_other_channels(of));
-        match known {
+        match departures.iter_mut().find(|of| is_same_place(of) && is_same_side(of) && of_other_channels(of)) {
             Some(departure) => {
                 departure.channels.extend(finding.channels.iter().cloned());
                 departure.excesses.extend(excesses);
             }
-            None => departures.push(Departure { of, channels: finding.channels.clone(), excesses: excesses.collect() }),
+            None => departures.push(Departure { of, channels: finding.channels.clone(), excesses }),
         }
     }
-    let told = |of: &Departure<'_>| format!("{}: {}", channel_list(&of.channels), departure(of.of, &of.excesses));
-    departures.iter().map(told).collect()
+    departures
+}
+
+/// Where and by how much the data departs from every model, one text each, in the order of the report.
+#[must_use]
+pub fn unexplained(report: &Report) -> Vec<String> {
+    departures(report).iter().map(Departure::text).collect()
+}
+
+/// How many departures there are, and the largest of them; `None` where there is none.
+pub(crate) fn unexplained_in_short(report: &Report) -> Option<String> {
+    let departures = departures(report);
+    let largest = departures.iter().max_by(|a, b| a.largest().total_cmp(&b.largest()))?;
+    Some(counted(departures.len(), &largest.text()))
+}
+
+/// How many places there are where data and model disagree, and the most serious of them; `None` where there is none.
+pub(crate) fn contradictions_in_short(report: &Report) -> Option<String> {
+    let contradictions = contradictions(report);
+    let first = contradictions.first()?;
+    Some(counted(contradictions.len(), first.split(" (").next().unwrap_or(first)))
+}
+
+/// `text`, with the number of all before it where it is one of several.
+fn counted(all: usize, text: &str) -> String {
+    if all == 1 { text.to_owned() } else { format!("{all} places; {text}") }
 }
 
 /// The longest part at rest: by the file, where it was looked at, and else the longest without a motion.
@@ -418,18 +515,27 @@ pub fn time_options(from_s: f64, to_s: f64) -> String {
     format!("--from {from} --to {to}")
 }
 
+/// The least time at rest of a channel, s; `None` where no channel was looked at.
+fn least_at_rest(report: &Report) -> Option<f64> {
+    let still = |channel: &ChannelReport| channel.at_rest.iter().map(|of| of.to_s - of.from_s).sum::<f64>();
+    let least = inertial(report).filter(|channel| !channel.at_rest.is_empty()).map(still).fold(f64::INFINITY, f64::min);
+    least.is_finite().then_some(least)
+}
+
+/// Whether the platform moved.
+fn has_moved(report: &Report) -> bool {
+    let is_motion = |of: &Finding| matches!(of.effect, Effect::MotionInterval(_));
+    least_at_rest(report)
+        .is_some_and(|least| report.findings.iter().any(is_motion) || least < THROUGHOUT * report_length_s(report))
+}
+
 /// Whether the platform was at rest; with a knock or a motion it was not throughout.
 fn rest(report: &Report) -> String {
     let length = report_length_s(report);
-    let still = |channel: &ChannelReport| channel.at_rest.iter().map(|of| of.to_s - of.from_s).sum::<f64>();
-    let least = inertial(report).filter(|channel| !channel.at_rest.is_empty()).map(still).fold(f64::INFINITY, f64::min);
-    if !least.is_finite() {
-        return String::new();
-    }
-    let found = |is_one: fn(&Effect) -> bool| report.findings.iter().filter(|of| is_one(&of.effect)).count();
-    let knocks = found(|effect| matches!(effect, Effect::NoisyInterval(_)));
-    let has_moved = found(|effect| matches!(effect, Effect::MotionInterval(_))) > 0;
-    if has_moved || least < THROUGHOUT * length {
+    let Some(least) = least_at_rest(report) else { return String::new() };
+    let is_knock = |of: &&Finding| matches!(of.effect, Effect::NoisyInterval(_));
+    let knocks = report.findings.iter().filter(is_knock).count();
+    if has_moved(report) {
         let longest = longest_at_rest(report).map_or_else(String::new, |of| {
             format!("; for the longest part at rest, add {}", time_options(of.from_s, of.to_s))
         });
@@ -531,11 +637,19 @@ fn use_of_short_record(report: &Report) -> String {
     )
 }
 
-/// Which coefficients the record gives to ±20 %, how much longer it should be for the others, and of which it gives a limit only.
-/// Nothing without an inertial channel that says it.
-fn length_advice(report: &Report) -> Vec<String> {
+/// Which coefficients a record gives to ±20 %, how much longer it should be for the others, and of which it gives a limit only.
+#[derive(Default)]
+struct LengthAdvice {
+    known: Option<String>,
+    except: Vec<String>,
+    longer: Option<String>,
+    limits: Option<String>,
+}
+
+/// What the length of a record is good for. Nothing without an inertial channel that says it.
+fn length_advice(report: &Report) -> LengthAdvice {
     if is_short(report) {
-        return vec![use_of_short_record(report)];
+        return LengthAdvice { known: Some(use_of_short_record(report)), ..LengthAdvice::default() };
     }
     let (mut known, mut except, mut longer, mut much_longer) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let (mut bounded, mut in_some) = (Vec::new(), Vec::new());
@@ -578,7 +692,7 @@ fn length_advice(report: &Report) -> Vec<String> {
     let longer = (!longer.is_empty()).then(|| format!("For ±20 %, {}.", enumerated(&longer)));
     let limits =
         (!in_some.is_empty()).then(|| format!("The record gives only an upper limit {}.", enumerated(&in_some)));
-    known.into_iter().chain(except).chain(longer).chain(limits).collect()
+    LengthAdvice { known, except, longer, limits }
 }
 
 /// Which models of the first half are those of its later quarter; `None` where none is.
@@ -587,9 +701,8 @@ fn recent_fit(report: &Report) -> Option<String> {
         inertial(report).filter(|channel| is_fitted_to_later_quarter(channel)).map(|of| of.name.clone()).collect();
     (!recent.is_empty()).then(|| {
         format!(
-            "The noise changed during the record; {} {} therefore predicted from the quarter before the test half.",
-            channel_list(&recent),
-            if recent.len() == 1 { "is" } else { "are" }
+            "Because the noise changed, the model of {} was fitted to the last quarter before the second half alone.",
+            channel_list(&recent)
         )
     })
 }
@@ -598,11 +711,11 @@ fn recent_fit(report: &Report) -> Option<String> {
 fn without_events(report: &Report) -> Option<String> {
     let excluding = inertial(report).filter_map(|channel| {
         let [before, after] = [&channel.before, &channel.after].map(|model| model.unseen_excluding.as_ref());
-        let change = error_change([before?, after?].map(|error| error.deviance_per_point));
+        let change = error_change([before?, after?].map(|error| error.rms_percent));
         Some(format!("{} {change}", channel_list(std::slice::from_ref(&channel.name))))
     });
     let excluding: Vec<String> = excluding.collect();
-    (!excluding.is_empty()).then(|| format!("Without spikes and knocks the errors are: {}.", excluding.join(", ")))
+    (!excluding.is_empty()).then(|| format!("Without spikes and knocks σ is off by: {}.", excluding.join(", ")))
 }
 
 /// Whether the model `after` of a channel is fitted to the later quarter of the first half instead of to all of it.
@@ -640,16 +753,11 @@ pub fn conditions(report: &Report) -> Vec<String> {
             format!("{label} moved by {}", quantity(range, &channel.unit))
         })
     };
-    let unknown = report.channels.iter().all(|channel| channel.name != "temp");
-    [
-        moved("temp", "temperature"),
-        unknown.then(|| "temperature was not recorded".to_owned()),
-        moved("supply", "supply"),
-    ]
-    .into_iter()
-    .flatten()
-    .chain(magnetometers(report))
-    .collect()
+    [moved("temp", "temperature"), moved("supply", "supply")]
+        .into_iter()
+        .flatten()
+        .chain(magnetometers(report))
+        .collect()
 }
 
 /// Whether all samples of a channel are the same, by a curve that is 0. The means of blocks of one value may differ by the rounding of
@@ -687,19 +795,21 @@ fn magnetometers(report: &Report) -> Vec<String> {
     told
 }
 
-/// Positions of the findings in the order in which they are numbered: a cause in a gyro or an accelerometer, one in a channel that is a
-/// condition, then what nothing explains.
+/// Positions of the findings in the order in which they are numbered: a motion, causes in gyros and accelerometers, those in channels that
+/// are conditions, then what nothing explains; of each the one first that makes the largest part of the variance of a channel.
 pub(crate) fn finding_order(report: &Report) -> Vec<usize> {
     let is_inertial = |name: &String| name.starts_with("gyro_") || name.starts_with("accl_");
     let rank = |&index: &usize| {
         let Finding { effect, channels, .. } = &report.findings[index];
         match effect {
-            Effect::Unexplained(_) => 2,
-            _ => u8::from(!channels.iter().any(is_inertial)),
+            Effect::MotionInterval(_) => 0,
+            Effect::Unexplained(_) => 3,
+            _ => 1 + u8::from(!channels.iter().any(is_inertial)),
         }
     };
+    let share = |index: &usize| report.findings[*index].share_percent.values().copied().fold(0.0, f64::max);
     let mut order: Vec<usize> = (0..report.findings.len()).collect();
-    order.sort_by_key(rank);
+    order.sort_by(|a, b| rank(a).cmp(&rank(b)).then(share(b).total_cmp(&share(a))));
     order
 }
 
@@ -814,16 +924,12 @@ pub fn contradictions(report: &Report) -> Vec<String> {
     told
 }
 
-/// The advice of the findings with the largest shares of the variance, the most useful first, each with the numbers of its findings. A
-/// part that moved comes before all: noise needs one at rest.
+/// The advice of the findings in their order, each with the numbers of its findings. Of a part that moved the part at rest is the first.
 fn advice(report: &Report) -> Vec<(String, Vec<usize>)> {
     let is_motion = |index: usize| matches!(report.findings[index].effect, Effect::MotionInterval(_));
-    let share = |index: usize| report.findings[index].share_percent.values().copied().fold(0.0, f64::max);
-    let mut weighed: Vec<(usize, usize)> = named_findings(report).into_iter().enumerate().collect();
-    weighed.sort_by(|(_, a), (_, b)| is_motion(*b).cmp(&is_motion(*a)).then(share(*b).total_cmp(&share(*a))));
     let at_rest = longest_at_rest(report);
     let mut steps: Vec<(String, Vec<usize>)> = Vec::new();
-    for (position, index) in weighed {
+    for (position, index) in named_findings(report).into_iter().enumerate() {
         let step = match at_rest.filter(|_| is_motion(index)) {
             Some(Stretch { from_s, to_s }) => {
                 Some(format!("Analyse the part at rest alone: add {}.", time_options(from_s, to_s)))
@@ -843,11 +949,11 @@ fn advice(report: &Report) -> Vec<(String, Vec<usize>)> {
 /// Pieces of advice of the findings.
 const MOST_STEPS: usize = 3;
 
-/// What to do next, the most useful first; a warning begins with `!`.
+/// What to do next, the most useful first.
 #[must_use]
 pub fn next_steps(report: &Report) -> Vec<String> {
     let steps = advice(report).into_iter().map(|(step, _)| step);
-    steps.chain(for_filter(report)).chain(failures(report)).collect()
+    steps.chain(for_filter(report)).collect()
 }
 
 /// The advice of the findings with the numbers of these: `Look for a fan, a motor or the mains (2, 5).`
@@ -867,40 +973,29 @@ pub(crate) fn for_filter(report: &Report) -> Option<String> {
     Some(format!("For a filter: {how}."))
 }
 
-/// The models that fail on the unseen half. Where the error without spikes and knocks does not, these make it. Where the first half's own
-/// curve fails too, no model of the first half can hold: the noise has changed. Where it does not, the model lacks something.
-pub(crate) fn failures(report: &Report) -> Vec<String> {
+/// What speaks against the models that fail on the unseen half. Where the error without spikes and knocks does not, these make it. Where
+/// the first half's own curve fails too, no model of the first half can hold: the noise has changed. Where it does not, the model lacks
+/// something.
+fn failures(report: &Report) -> Vec<String> {
     let own_curve = |channel: &ChannelReport| channel.first_half_curve.deviance_per_point;
     let excluding = |channel: &ChannelReport| channel.after.unseen_excluding.as_ref()?.deviance_per_point;
-    let failed: Vec<&ChannelReport> = inertial(report).filter(|channel| is_high(channel)).collect();
-    let told = |value: &dyn Fn(&ChannelReport) -> Option<f64>,
-                is_one: &dyn Fn(&ChannelReport) -> bool,
-                reason: &dyn Fn(&str) -> String| {
-        let channels: Vec<&ChannelReport> = failed.iter().copied().filter(|channel| is_one(channel)).collect();
-        let names: Vec<String> = channels.iter().map(|channel| channel.name.clone()).collect();
-        let (low, high) = channels
-            .iter()
-            .filter_map(|channel| value(channel))
-            .fold((f64::INFINITY, 0.0_f64), |(low, high), of| (low.min(of), high.max(of)));
-        let (low, high) = (deviance_per_point(low), deviance_per_point(high));
-        let range = if low == high { low } else { format!("{low} … {high}") };
-        (!names.is_empty())
-            .then(|| format!("! {}: the model fails on the unseen half{}", channel_list(&names), reason(&range)))
-    };
     let is_by_events = |channel: &ChannelReport| excluding(channel).is_some_and(|of| of <= HIGH_DEVIANCE);
-    let changed = |channel: &ChannelReport| own_curve(channel).is_some_and(|of| of > HIGH_DEVIANCE);
-    let lacking = |channel: &ChannelReport| own_curve(channel).is_some_and(|of| of <= HIGH_DEVIANCE);
+    let told = |is_one: &dyn Fn(&ChannelReport) -> bool, reason: &str| {
+        let failed = inertial(report).filter(|channel| is_high(channel) && is_one(channel));
+        let names: Vec<String> = failed.map(|channel| channel.name.clone()).collect();
+        (!names.is_empty()).then(|| format!("{reason} {}", channel_list(&names)))
+    };
     [
-        told(&excluding, &is_by_events, &|range| {
-            format!(" by spikes and knocks alone: without them its error is {range}.")
-        }),
-        told(&own_curve, &|channel| !is_by_events(channel) && changed(channel), &|range| {
-            format!(", and the two halves differ as much ({range}): the noise has changed.")
-        }),
-        told(&own_curve, &|channel| !is_by_events(channel) && lacking(channel), &|range| {
-            format!(", though the two halves agree ({range}): the model lacks something.")
-        }),
-        told(&own_curve, &|channel| !is_by_events(channel) && own_curve(channel).is_none(), &|_| ".".to_owned()),
+        told(&is_by_events, "spikes or knocks came oftener or larger than before in"),
+        told(
+            &|channel| !is_by_events(channel) && own_curve(channel).is_some_and(|of| of > HIGH_DEVIANCE),
+            "the noise changed in",
+        ),
+        told(
+            &|channel| !is_by_events(channel) && own_curve(channel).is_some_and(|of| of <= HIGH_DEVIANCE),
+            "the model lacks something in",
+        ),
+        told(&|channel| !is_by_events(channel) && own_curve(channel).is_none(), "the model fails in"),
     ]
     .into_iter()
     .flatten()

@@ -10,7 +10,7 @@ use noise_analysis::report::Report;
 use std::io::{self, Write};
 
 /// Lines of the screen at most.
-pub const MOST_LINES: usize = 40;
+pub const MOST_LINES: usize = 30;
 /// Columns of the narrowest and of the widest screen. Text is not wider than [`TEXT`].
 const NARROWEST: usize = 80;
 const WIDEST: usize = 200;
@@ -18,12 +18,12 @@ const WIDEST: usize = 200;
 const TEXT: usize = 110;
 /// Columns of the channel's label, and of the error.
 const LABEL: usize = 7;
-const ERROR: usize = 15;
+const ERROR: usize = 17;
 /// Lines of the sentences about the record, and of the conditions, at most.
 const SENTENCES: usize = 5;
-const CONDITIONS: usize = 3;
-/// Lines at most of each of the blocks below the findings: with room for all of these, and where they need the room.
-const BELOW: [usize; 2] = [4, 2];
+const CONDITIONS: usize = 2;
+/// Lines of what to do at most: with room for all findings, and where they need the room.
+const STEPS: [usize; 2] = [4, 2];
 /// Columns of the channels of a finding, with its number.
 const CHANNELS: usize = 17;
 
@@ -72,7 +72,7 @@ impl Screen<'_> {
         if found.is_empty() && summary::unexplained(self.report).is_empty() {
             lines.push(format!(" {}", summary::nothing_found(self.report)));
         }
-        let [roomy, tight] = BELOW.map(|most| self.below(most));
+        let [roomy, tight] = STEPS.map(|most| self.below(most));
         let room = |below: &[String]| MOST_LINES.saturating_sub(lines.len() + below.len());
         let below = if found.len() <= room(&roomy) { roomy } else { tight };
         let room = room(&below);
@@ -110,13 +110,7 @@ impl Screen<'_> {
         // Out of line with the others where both fit.
         let is_long = length >= CHANNELS && length + 1 + brief.chars().count() > self.columns();
         let label = if is_long { format!("{number:>2}  {channel_count} channels") } else { label };
-        let columns = self.columns() - CHANNELS;
-        let text = if brief.chars().count() <= columns {
-            brief.clone()
-        } else {
-            format!("{} …", broken(brief, columns - 2, "")[0])
-        };
-        format!("{}{text}", padded(&label, CHANNELS))
+        format!("{}{}", padded(&label, CHANNELS), within(brief, self.columns() - CHANNELS))
     }
 
     /// Verdict, coefficients and conditions.
@@ -162,29 +156,20 @@ impl Screen<'_> {
             .collect()
     }
 
-    /// What no effect explains, what the data contradicts and what to do, each in `most` lines, but for the warnings.
+    /// What no effect explains and where data and model disagree, in a line each, and what to do in `most` lines.
     fn below(&self, most: usize) -> Vec<String> {
+        let columns = self.text_columns() - CHANNELS;
         let mut lines = Vec::new();
-        for (heading, items) in [
-            ("Not explained", summary::unexplained(self.report)),
-            ("Contradicted", summary::contradictions(self.report)),
+        for (heading, text) in [
+            ("Not explained", summary::unexplained_in_short(self.report)),
+            ("Model is off", summary::contradictions_in_short(self.report)),
         ] {
-            if !items.is_empty() {
-                lines.extend(self.block(heading, &self.list(&items, most), WARNING));
-            }
+            let line = text.map(|text| within(&format!("{text}."), columns));
+            lines.extend(self.block(heading, line.as_slice(), WARNING));
         }
         let export = summary::for_filter(self.report).unwrap_or_default();
-        let columns = self.text_columns() - CHANNELS;
         let steps = capped(&summary::numbered_steps(self.report), " ", &export, (columns, most));
-        // A warning has a line of its own.
-        let paragraphs = [steps].into_iter().filter(|steps| !steps.is_empty());
-        let warnings = summary::failures(self.report).into_iter().map(|warning| broken(&warning, columns, ""));
-        for (index, paragraph) in paragraphs.chain(warnings).enumerate() {
-            if index == 0 {
-                lines.push(String::new());
-            }
-            lines.extend(self.block(if index == 0 { "What to do" } else { "" }, &paragraph, HEADING));
-        }
+        lines.extend(self.block("What to do", &steps, HEADING));
         lines
     }
 
@@ -235,6 +220,11 @@ fn capped(items: &[String], separator: &str, last: &str, (columns, most): (usize
     lines
 }
 
+/// `text` in one line of so many columns: of a longer one the first words.
+fn within(text: &str, columns: usize) -> String {
+    if text.chars().count() <= columns { text.to_owned() } else { format!("{} …", broken(text, columns - 2, "")[0]) }
+}
+
 /// The rows of a table in `columns` columns, each with its style; `is_first` has the heading of the errors.
 pub(crate) fn table_lines(table: &CoefficientTable, is_first: bool, columns: usize) -> Vec<(Style, String)> {
     let width = ((columns - LABEL - ERROR) / 3).min(26);
@@ -248,11 +238,10 @@ pub(crate) fn table_lines(table: &CoefficientTable, is_first: bool, columns: usi
         let line = line.trim_end();
         format!("{line}{}", left_padded(error, total.saturating_sub(line.chars().count()))).trim_end().to_owned()
     };
-    let errors = if is_first { ["model error  ", "(1 = true)  "] } else { [""; 2] };
-    let mut lines = vec![
-        (HEADING, row(table.title, table.names, errors[0])),
-        (FAINT, row("", table.units.each_ref().map(String::as_str), errors[1])),
-    ];
+    let headings: [String; 3] =
+        std::array::from_fn(|index| format!("{}, {}", ["N", "B", "K"][index], table.units[index]));
+    let error = if is_first { "σ off by  " } else { "" };
+    let mut lines = vec![(HEADING, row(table.title, headings.each_ref().map(String::as_str), error))];
     for of in &table.rows {
         let error = if of.is_high { format!("{} !", of.error) } else { format!("{}  ", of.error) };
         let error = format!(" {error}");

@@ -157,7 +157,7 @@ impl LatestMessages {
                 Some(Parameter::new(found.value, found.low, found.high, channel.unit()))
             };
             let validation = self.validations.get(&report.channel);
-            let deviance = |error: Option<link::ReportedModelError>| error.map(|error| error.deviance_per_point);
+            let errors = validation.map_or([None, None], |report| [report.before, report.after]);
             Some(ChannelCoefficients {
                 name: channel.name().to_owned(),
                 unit: channel.unit().to_owned(),
@@ -166,10 +166,8 @@ impl LatestMessages {
                     of(ReportedTerm::BiasInstability),
                     of(ReportedTerm::RateRandomWalk),
                 ],
-                deviance: [
-                    validation.and_then(|report| deviance(report.before)),
-                    validation.and_then(|report| deviance(report.after)),
-                ],
+                rms_percent: errors.map(|error| error.map(|error| error.rms_percent)),
+                deviance: errors[1].map(|error| error.deviance_per_point),
             })
         };
         self.channels.values().filter_map(inertial).collect()

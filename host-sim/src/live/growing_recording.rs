@@ -76,7 +76,10 @@ impl GrowingRecording {
                     let [n, b, k] = &row.coefficients;
                     let [of_n, of_b, of_k] = &table.units;
                     let (title, axis, error) = (table.title, &row.label, &row.error);
-                    writeln!(out, "{time}: {title} {axis}, N {n} {of_n}, B {b} {of_b}, K {k} {of_k}, error {error}")?;
+                    writeln!(
+                        out,
+                        "{time}: {title} {axis}, N {n} {of_n}, B {b} {of_b}, K {k} {of_k}, σ off by {error}"
+                    )?;
                 }
             }
             writeln!(out, "{time}: {} samples, {} findings", count(report.samples), report.findings.len())?;

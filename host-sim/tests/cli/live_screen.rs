@@ -130,7 +130,7 @@ fn the_live_screen_grows_and_every_end_restores_the_terminal() {
     for (end, name) in [(Some(b"q".as_slice()), "q"), (Some(b"\x03"), "Ctrl-C"), (None, "SIGINT")] {
         let mut session = Session::start(&["monitor", file, "--rate", "100", "--speed", "max"], &[]);
         session.wait_for(ENTER);
-        for expected in ["angle random walk", "What was found", "Health", "q ends"] {
+        for expected in ["°/√h", "What was found", "Health", "q ends"] {
             session.wait_for(expected);
         }
         match end {
@@ -180,7 +180,7 @@ fn no_color_is_respected() {
     };
     for (environment, expected) in [(&[][..], true), (&[("NO_COLOR", "1")][..], false)] {
         let mut session = Session::start(&arguments, environment);
-        session.wait_for("angle random walk");
+        session.wait_for("°/√h");
         session.wait_for("Health");
         session.near.write_all(b"q").expect("typed");
         let (_, _, seen) = session.end();

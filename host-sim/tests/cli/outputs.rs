@@ -165,7 +165,7 @@ fn a_full_disk_is_named() {
     let output = host_sim(&["analyze", name(&table(&dir)), "--export", "csv=/dev/full"]);
     let error = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code() == Some(1) && error.contains("No space left"), "{error}");
-    assert!(String::from_utf8_lossy(&output.stdout).contains("angle random walk"));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("°/√h"));
 }
 
 #[test]

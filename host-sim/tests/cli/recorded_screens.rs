@@ -99,9 +99,13 @@ fn the_screens_of_other_sensors_are_whole() {
         ("others/lsm6dso_static.txt", &["--rate", "100"][..], &["At rest throughout", "record at rest for hours"][..]),
         ("others/mpu6050_accelerometer.mat", &["--yes"], &["N is known to ±20 %", "instead of the nominal 100.0 Hz"]),
         ("others/mpu9250_imu1_raw.mat", &[], &["At rest but for", "an hour"]),
-        ("others/px4_sample.ulg", &[], &["It moved for up to", "N is known to ±20 %", "A low-pass filter"]),
+        (
+            "others/px4_sample.ulg",
+            &[],
+            &["cannot be trusted as it is. It moved for up to", "Analyse the part at rest alone: add --from"],
+        ),
         ("others/stampfly_fft_20260114T115628.csv", &["--yes"], &["for strong lines"]),
-        ("others/vn100_nitin.bag", &[], &["so N holds down to one sample", "Nothing"]),
+        ("others/vn100_nitin.bag", &[], &["so N is valid from one sample on", "Nothing"]),
         (
             "others/phone_gyro4.txt",
             &["--columns", "time=time,gyro_x=2,gyro_y=3,gyro_z=4", "--units", "rad/s"],

@@ -4,8 +4,8 @@ use super::axis::{Axis, has_logarithm};
 use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, below_legend, frames, heights, places};
 use crate::finding_text::channel_name;
 use crate::formatting::{capital, words};
-use crate::rounding::{quantity, quantity_digits, span, unit};
-use crate::summary::deviance_per_point;
+use crate::rounding::{NONE, quantity, quantity_digits, span, unit};
+use crate::summary::off_percent;
 use allan_core::model::{FittedTerm, cube_root_deviation};
 use allan_core::{Model, NoiseTerm};
 use noise_analysis::report::{ChannelReport, Finding, ModelReport, Report, SlopeMethodReport, SlopeMethodValue};
@@ -75,23 +75,24 @@ pub(super) fn story_plot(channel: &ChannelReport, [before, after]: [f64; 2]) -> 
     let up = Axis::logarithmic(&label, lines.iter().flat_map(heights), frame);
     lines.extend(slopes(channel).into_iter().flatten());
     let name = capital(&channel_name(channel));
-    let [before, after] = [before, after].map(deviance_per_point);
-    const MEASURED: &str = "A true model has about 1. The curve is that of the whole record with its 95 % bounds, the points are \
-                            those of the second half.";
+    let [before, after] = [&channel.before, &channel.after]
+        .map(|model| model.unseen.rms_percent.map_or_else(|| NONE.to_owned(), off_percent));
+    const MEASURED: &str =
+        "The curve is that of the whole record with its 95 % bounds, the points are those of the second half.";
     let (title, description) = if is_lowered {
         (
             format!("{name}: what was measured, and the model before and after"),
             format!(
-                "Both models are fitted to the first half. Their error on the second half, which they have not seen: {before} before, \
-                 {after} after the effects were added. {MEASURED}"
+                "Both models are fitted to the first half. On the second half, which they had not seen, σ is off by {before} % before and \
+                 by {after} % after the effects were added. {MEASURED}"
             ),
         )
     } else {
         (
             format!("{name}: what was measured, and the model of N, B and K"),
             format!(
-                "The model is fitted to the first half. Its error on the second half, which it has not seen: {before}, the largest of all \
-                 channels. No effect was found that lowers it. {MEASURED}"
+                "The model is fitted to the first half. On the second half, which it had not seen, σ is off by {before} %. No effect was \
+                 found that lowers this. {MEASURED}"
             ),
         )
     };

@@ -47,7 +47,7 @@ pub(super) fn coefficients_of_all(report: &Report) -> Markup {
         let columns = columns.map(|((name, letter), unit)| {
             (html! { (name) "\u{a0}" span.letter { (letter) } span.under { (unit) } }, true)
         });
-        let error = (html! { "error on the unseen half" span.under { "1 = true" } }, true);
+        let error = (html! { "σ off by" span.under { "on the unseen half" } }, true);
         [text(group.title)].into_iter().chain(columns).chain([error]).collect::<Vec<Heading>>()
     };
     let rows = html! {

@@ -22,7 +22,7 @@ fn view() -> LiveView {
         step: None,
         weight: String::new(),
     }];
-    view.unexplained = vec!["gyro z: σ is 9.0 % above the model at averaging times around 80 s".to_owned()];
+    view.unexplained = vec!["gyro z: σ is 9.0 % above the model around τ = 80 s".to_owned()];
     view
 }
 
@@ -43,7 +43,7 @@ fn the_screen_has_verdict_curve_findings_health_and_keys_in_80_columns() {
     for expected in [
         "run1.csv.gz",
         "1,000,000 samples",
-        "angle random walk",
+        "N, °/√h",
         "µg/√Hz",
         "σ(τ) of the gyros, °/s over s",
         "What was found",

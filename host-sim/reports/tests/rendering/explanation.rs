@@ -75,9 +75,9 @@ fn followed() -> Report {
 fn the_explanation_tells_every_figure_of_the_report() {
     let report = followed();
     let text = text(&report);
-    // The fixture's curve of the first half leaves 1.711.
+    // 100·(exp(0.04112) − 1).
     for told in [
-        "The curve of the first half itself, taken for a model, leaves 1.7",
+        "The curve of the first half itself is off by 4.2 %: a model of stationary noise",
         "at τ = 80 ms: by +7.1 %; chance explains it once in",
         "fitted to the later quarter",
         "between 19.66 and 21.87 Hz",
@@ -140,8 +140,8 @@ fn spikes_and_knocks_are_told_with_their_rate_and_the_errors_without_them() {
     channel.after.events = Some(EventsReport { count: 17, rate_per_hour, scatter_percent: 35.0, adev: Vec::new() });
     let text = text(&report);
     for told in [
-        "with 34 spikes and knocks an hour [23, 46], as the first half has them) leaves",
-        "Without the spikes and knocks of both halves 4,500 become 1.4.",
+        "with 34 spikes and knocks an hour [23, 46], as the first half has them). The curve",
+        "Without the spikes and knocks of both halves 24 % become 4.0 %.",
     ] {
         assert!(text.contains(told), "{told:?} is not in\n{text}");
     }
@@ -190,7 +190,7 @@ fn every_report_tells_how_the_noise_changes() {
     );
     assert!(!found[1].weight.contains("accel x"), "{}", found[1].weight);
     let quarter =
-        "The noise changed during the record; gyro z is therefore predicted from the quarter before the test half.";
+        "Because the noise changed, the model of gyro z was fitted to the last quarter before the second half alone.";
     assert!(summary::record_sentences(&report).contains(&quarter.to_owned()));
 
     let mut out = Vec::new();

@@ -279,7 +279,7 @@ fn the_page_shows_every_channel_and_coefficient() {
     }
     // N of `final` in the units of its users: 0.0368 deg/√s (0.0346 … 0.0394) are 2.208 °/√h; 36.8 mg·√s are 36.8 µg/√Hz.
     for expected in
-        ["2.21 ± 0.14", "°/√h", "36.8", "µg/√Hz", "1.4 → 1.4", "14,321", "Markov time by the autocorrelation"]
+        ["2.21 ± 0.14", "°/√h", "36.8", "µg/√Hz", "24 → 4.0 %", "14,321", "Markov time by the autocorrelation"]
     {
         assert!(page.contains(expected), "{expected}");
     }
@@ -351,7 +351,7 @@ fn the_first_picture_is_there_without_a_gain() {
         channel.after = channel.before.clone();
     }
     let story = picture(&report, "story");
-    assert!(story.contains("the model of N, B and K") && story.contains("No effect was found that lowers it."));
+    assert!(story.contains("the model of N, B and K") && story.contains("No effect was found that lowers this."));
     assert!(!story.contains("after: with effects"));
 }
 

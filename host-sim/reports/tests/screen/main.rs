@@ -210,55 +210,76 @@ fn magnetometers_have_their_digits_and_a_prefix_and_those_whose_model_fails_have
 
 #[test]
 fn a_failing_model_is_held_beside_the_first_half_s_own_curve() {
-    let warnings = |own_curve: f64| {
+    let answer = |own_curve: f64| {
         let mut report = report();
         let channel = &mut report.channels[4];
         channel.first_half_curve.deviance_per_point = Some(own_curve);
-        let steps = reports::summary::next_steps(&report);
-        steps.into_iter().filter(|step| step.starts_with('!')).collect::<Vec<_>>()
+        reports::summary::record_sentences(&report).remove(0)
     };
     // The curve of the first half fails as well: nothing that the first half shows holds in the second.
-    assert_eq!(
-        warnings(41.4),
-        [
-            "! accel y: the model fails on the unseen half, and the two halves differ as much (41): the noise has changed."
-        ]
-    );
+    assert_eq!(answer(41.4), "This recording can be trusted in part: the noise changed in accel y.");
     // It holds, so the model is what is wrong.
-    assert_eq!(
-        warnings(1.71),
-        [
-            "! accel y: the model fails on the unseen half, though the two halves agree (1.7): the model lacks something."
-        ]
-    );
+    assert_eq!(answer(1.71), "This recording can be trusted in part: the model lacks something in accel y.");
+    let mut sound = report();
+    sound.channels[4].after.unseen.deviance_per_point = Some(1.4);
+    assert_eq!(reports::summary::record_sentences(&sound)[0], "This recording can be trusted.");
+    sound.dropped.insert("gap".to_owned(), 20_000);
+    for channel in &mut sound.channels {
+        channel.at_rest = vec![Stretch { from_s: 0.0, to_s: 10_200.03 }];
+    }
+    let lost = "This recording can be trusted in part: 2.0 % of the samples are missing.";
+    assert_eq!(reports::summary::record_sentences(&sound)[0], lost);
 }
 
-/// The pair of the table is that of the data as recorded, as in the JSON; the pair without spikes and knocks has its own sentence.
+/// A root mean square r of ln(σ measured over σ of the model) is a factor of exp(r).
+#[test]
+fn the_error_on_the_unseen_half_is_told_in_percent_of_sigma() {
+    let mut report = report();
+    for (channel, [before, after, halves]) in report.channels.iter_mut().zip([[69.315, 9.531, 4.879]; 6]) {
+        channel.before.unseen.rms_percent = Some(before);
+        channel.after.unseen.rms_percent = Some(after);
+        channel.first_half_curve.rms_percent = Some(halves);
+    }
+    report.channels[1].after.unseen.rms_percent = Some(2.956);
+    let sentence = "On the second half, which the model had not seen, σ is off by 3.0 to 10 % (the two halves differ by 5.0 %); without \
+                    what was found, by 100 %.";
+    let sentences = reports::summary::record_sentences(&report);
+    assert!(sentences.iter().any(|told| told == sentence), "{sentences:#?}");
+    let tables = reports::summary::coefficient_tables(&report);
+    assert_eq!(tables[0].rows[0].error, "100 → 10 %");
+    // exp(6.4) is 600.
+    report.channels[0].after.unseen.rms_percent = Some(640.0);
+    report.channels[0].before.unseen.rms_percent = Some(700.0);
+    assert_eq!(reports::summary::coefficient_tables(&report)[0].rows[0].error, "> 1,000 %");
+}
+
+/// The error of the table is that of the data as recorded; that without spikes and knocks has its own sentence.
 #[test]
 fn the_errors_without_spikes_and_knocks_are_told_beside_those_as_recorded() {
     let mut report = report();
     assert!(reports::summary::record_sentences(&report).iter().all(|sentence| !sentence.contains("spikes")));
     let channel = &mut report.channels[0];
-    for (model, [recorded, excluding]) in [(&mut channel.before, [193.0, 104.0]), (&mut channel.after, [2.4, 1.3])] {
-        model.unseen.deviance_per_point = Some(recorded);
-        let error =
-            noise_analysis::report::ModelErrorReport { deviance_per_point: Some(excluding), ..Default::default() };
+    for (model, [recorded, excluding]) in
+        [(&mut channel.before, [69.315, 40.547]), (&mut channel.after, [9.531, 2.956])]
+    {
+        model.unseen.rms_percent = Some(recorded);
+        let error = noise_analysis::report::ModelErrorReport {
+            rms_percent: Some(excluding),
+            deviance_per_point: Some(1.3),
+            ..Default::default()
+        };
         model.unseen_excluding = Some(error);
     }
-    let tables = reports::summary::coefficient_tables(&report);
-    assert_eq!(tables[0].rows[0].error, "193 → 2.4");
     let sentences = reports::summary::record_sentences(&report);
-    let told = "Without spikes and knocks the errors are: gyro x 104 → 1.3.";
+    let told = "Without spikes and knocks σ is off by: gyro x 50 → 3.0 %.";
     assert!(sentences.iter().any(|sentence| sentence == told), "{sentences:#?}");
     // The screen has no room for the list.
     let sentences = reports::summary::record_sentences_in_short(&report);
     assert!(sentences.iter().all(|sentence| !sentence.contains("spikes")), "{sentences:#?}");
     // A model that fails by these alone is no sign of another noise.
     report.channels[0].after.unseen.deviance_per_point = Some(193.0);
-    let steps = reports::summary::next_steps(&report);
-    let by_events =
-        "! gyro x: the model fails on the unseen half by spikes and knocks alone: without them its error is 1.3.";
-    assert!(steps.iter().any(|step| step == by_events), "{steps:#?}");
+    let answer = reports::summary::record_sentences(&report).remove(0);
+    assert!(answer.contains(": spikes or knocks came oftener or larger than before in gyro x; "), "{answer}");
 }
 
 #[test]
@@ -269,11 +290,11 @@ fn departures_at_one_place_are_told_together() {
     };
     report.findings = vec![in_channel("gyro_x", -3.6), in_channel("gyro_y", -2.1), in_channel("gyro_z", -2.1)];
     let told = reports::summary::unexplained(&report);
-    assert_eq!(told, ["gyros: σ is 2.1 to 3.6 % below the model at averaging times around 1.2 ms"]);
+    assert_eq!(told, ["gyros: σ is 2.1 to 3.6 % below the model around τ = 1.2 ms"]);
     // Above and below the model are two departures.
     report.findings[2] = in_channel("gyro_z", 2.1);
     let told = reports::summary::unexplained(&report);
-    assert_eq!(told[1..], ["gyro z: σ is 2.1 % above the model at averaging times around 1.2 ms"]);
+    assert_eq!(told[1..], ["gyro z: σ is 2.1 % above the model around τ = 1.2 ms"]);
     // Two signs of one departure are told once.
     report.findings = vec![in_channel("gyro_x", -3.6), in_channel("gyro_x", -3.7)];
     assert_eq!(reports::summary::unexplained(&report).len(), 1);
@@ -381,9 +402,14 @@ fn a_record_too_short_for_a_model_says_what_it_is_good_for() {
     };
     let told = |report: &Report| reports::summary::record_sentences_in_short(report).join(" ");
     let rough = short([[0.6, 0.0, 0.0], [1.0, 0.0, 0.0]]);
-    assert_eq!(
-        told(&rough),
-        "No sample lost. 5.0 s: good for a rough N (±40 %) and for strong lines; not for B, K or a filter."
+    let sentences = told(&rough);
+    assert!(
+        sentences.starts_with("This recording can be trusted in part: it is short. No sample lost. "),
+        "{sentences}"
+    );
+    assert!(
+        sentences.ends_with(" 5.0 s: good for a rough N (±40 %) and for strong lines; not for B, K or a filter."),
+        "{sentences}"
     );
     let in_one = told(&short([[1.0, 0.0, 0.0], [0.0; 3]]));
     assert!(
@@ -404,7 +430,7 @@ fn a_record_too_short_for_a_model_says_what_it_is_good_for() {
 #[test]
 fn rest_and_losses_are_told_as_they_are() {
     let exact = BoundedEstimate::exact;
-    let sentences = |report: &Report| reports::summary::record_sentences(report)[..2].join(" ");
+    let sentences = |report: &Report| reports::summary::record_sentences(report)[..3].join(" ");
     let mut knocked = report();
     let knock = NoisyInterval {
         from_s: exact(7.0),
@@ -415,7 +441,7 @@ fn rest_and_losses_are_told_as_they_are() {
         channels: vec!["gyro_x"],
     };
     knocked.findings = vec![finding(knock, &["gyro_x"], 0.0)];
-    assert!(sentences(&knocked).starts_with("At rest but for a knock."), "{}", sentences(&knocked));
+    assert!(sentences(&knocked).contains(". At rest but for a knock. "), "{}", sentences(&knocked));
     let mut moved = report();
     let motion = MotionInterval {
         from_s: exact(900.0),
@@ -432,7 +458,7 @@ fn rest_and_losses_are_told_as_they_are() {
     moved.dropped = [("gap", 212), ("repeated", 212)].map(|(cause, samples)| (cause.to_owned(), samples)).into();
     assert_eq!(
         sentences(&moved),
-        "It moved for up to 3.0 s; for the longest part at rest, add --from 903 --to 10002.1. 212 samples (0.021 %) are missing: the one \
+        "This recording cannot be trusted as it is. It moved for up to 3.0 s; for the longest part at rest, add --from 903 --to 10002.1. 212 samples (0.021 %) are missing: the one \
          before was read again instead."
     );
 }
@@ -444,7 +470,7 @@ fn the_screen_tells_of_the_part_in_short_what_bears_on_the_numbers() {
     let told = reports::summary::record_sentences_in_short(&noted);
     for sentence in [
         "The noise is smaller than a count, which hides the part's filter.",
-        "No low-pass filter shows: neighbouring samples are not correlated, so N holds down to one sample.",
+        "No low-pass filter found: consecutive samples are uncorrelated, so N is valid from one sample on.",
         "Without time stamps the sample rate is the stated one. Every τ and N scale with it.",
     ] {
         assert!(told.iter().any(|told| told == sentence), "{sentence}: {told:#?}");
@@ -506,9 +532,11 @@ fn every_finding_of_a_full_screen_has_a_line_or_is_counted() {
         let counted = format!(" … and {} more: --full", 11 - shown);
         assert!(shown >= 4 && (shown == 11 || screen.contains(&counted)), "{shown} findings: {screen:#?}");
         assert!(screen.last().is_some_and(|line| line.ends_with('.')), "{screen:#?}");
-        assert!(screen.join(" ").contains("a motor or the mains (2, 3, 4"), "{screen:#?}");
-        // A warning begins a line.
-        assert!(screen.iter().all(|line| !line.trim_start().contains(" ! ")), "{screen:#?}");
+        // One line each, with the number of all.
+        for line in ["Not explained    10 places; ", "Model is off     6 places; "] {
+            assert_eq!(screen.iter().filter(|of| of.starts_with(line)).count(), 1, "{line}: {screen:#?}");
+        }
+        assert!(screen.join(" ").contains("a motor or the mains (1, 3, 4"), "{screen:#?}");
     }
 }
 
