@@ -2,15 +2,20 @@
 //! sentence.
 
 mod amounts;
+mod channel_names;
 #[cfg(test)]
 mod examples;
+mod shown_effect;
 
 use crate::formatting::{capital, moment, words};
 use crate::rounding::{plain, quantity, quantity_digits, signed, significant, span};
 use amounts::{Amounts, Label};
+pub use channel_names::channel_list;
+pub(crate) use channel_names::{ALL_CHANNELS, channel_name};
 use noise_analysis::bounds::{BoundedEstimate, Parameter};
 use noise_analysis::effects::{Effect, Observation, Unexplained, UnexplainedPlace};
 use noise_analysis::report::{ChannelReport, Finding, Report, Validation};
+pub use shown_effect::{ShownEffect, shown_effects};
 use std::f64::consts::SQRT_2;
 
 /// Frequency of a line below which nothing that turns or hums makes it, Hz.
@@ -36,26 +41,6 @@ pub struct FindingText {
     pub step: Option<String>,
     /// How much of the variance it makes, and whether the second half confirms it; empty where neither is known.
     pub weight: String,
-}
-
-/// A finding as one of its channels shows it.
-#[derive(Debug, Clone, Copy)]
-pub struct ShownEffect<'a> {
-    /// Name of the channel, such as `gyro_z`.
-    pub channel: &'a str,
-    /// With the channel's own numbers.
-    pub effect: &'a Effect,
-}
-
-/// What every channel shows of the finding at `index`, in the order of the finding's channels.
-#[must_use]
-pub fn shown_effects(report: &Report, index: usize) -> Vec<ShownEffect<'_>> {
-    let of_channel = |name: &String| {
-        let channel = report.channels.iter().find(|channel| channel.name == *name)?;
-        let shown = channel.effects.iter().find(|shown| shown.finding == index)?;
-        Some(ShownEffect { channel: &channel.name, effect: &shown.effect })
-    };
-    report.findings.get(index).into_iter().flat_map(|finding| &finding.channels).filter_map(of_channel).collect()
 }
 
 /// What to do about a finding.
@@ -592,36 +577,6 @@ fn relative(difference: f64) -> String {
     } else {
         format!("{} %", signed(100.0 * difference, 2))
     }
-}
-
-/// The name of a channel as the sentences and the tables have it, such as `accel x`.
-pub(crate) fn channel_name(channel: &ChannelReport) -> String {
-    channel_list(std::slice::from_ref(&channel.name))
-}
-
-/// Gyros and accelerometers, in a list of channels.
-pub(crate) const ALL_CHANNELS: &str = "all channels";
-
-/// The channels of a list in few words: `gyros` for all three, `accel x y` for two.
-#[must_use]
-pub fn channel_list(names: &[String]) -> String {
-    let axes = |prefix: &str| -> Vec<&str> { names.iter().filter_map(|name| name.strip_prefix(prefix)).collect() };
-    let (gyros, accelerometers, magnetometers) = (axes("gyro_"), axes("accl_"), axes("magn_"));
-    if gyros.len() == 3 && accelerometers.len() == 3 {
-        return ALL_CHANNELS.to_owned();
-    }
-    let group = |axes: &[&str], one: &str, all: &str| match axes {
-        [] => None,
-        axes if axes.len() == 3 => Some(all.to_owned()),
-        axes => Some(format!("{one} {}", axes.join(" "))),
-    };
-    let groups = [
-        group(&gyros, "gyro", "gyros"),
-        group(&accelerometers, "accel", "accels"),
-        group(&magnetometers, "magn", "magns"),
-    ];
-    let others = names.iter().filter(|name| ["gyro_", "accl_", "magn_"].iter().all(|prefix| !name.starts_with(prefix)));
-    groups.into_iter().flatten().chain(others.map(|name| words(name))).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The numbers of a finding as a sentence has them: one, or each channel's own.
 
-use super::{ShownEffect, channel_list};
+use super::channel_names::channel_list;
+use super::shown_effect::ShownEffect;
 use crate::rounding::{Scale, bounded_quantity, is_upper_bound, parameter_magnitude, rounded_quantity};
 use noise_analysis::report::Parameter;
 use std::f64::consts::FRAC_1_SQRT_2;
