@@ -1,4 +1,4 @@
-//! The configuration: gyro range, filter and sample clock, and the response of the filter. A value that the part would
+//! The configuration: gyro range, filter and sample clock. A value that the part would
 //! not accept cannot be constructed.
 
 use crate::channel::GyroRange;
@@ -79,7 +79,7 @@ impl Config {
         self.filter_taps_log2
     }
 
-    /// The response of the filter.
+    /// The filter.
     pub const fn filter(self) -> BartlettFilter {
         BartlettFilter::new(self.filter_taps_log2)
     }
@@ -154,19 +154,13 @@ impl TryFrom<SerializedConfig> for Config {
 
 /// The digital filter of gyroscopes, accelerometers and magnetometers: two cascaded averages of N = 2^M samples each, a
 /// Bartlett window of 2N + 1 taps, of which the first and the last are 0, with a phase of N samples (data sheet Rev. B,
-/// Figure 15).
-///
-/// The −3 dB frequencies that Linux lists for this part are those of two plain averages, to the digits given. The
-/// analog poles before the filter, at 404 Hz and 757 Hz (0.48 ms of delay by a figure for a sibling part), are not
+/// Figure 15). Its amplitude response at f/fs cycles per sample is |sin(πNf/fs) / (N·sin(πf/fs))|²; the analog poles before it are not
 /// included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BartlettFilter {
     taps_log2: u8,
 }
-
-/// Bisection steps after which a −3 dB frequency is exact in `f64`.
-const BISECTIONS: u32 = 52;
 
 impl BartlettFilter {
     /// `taps_log2` is M, 0 (no filter) to 6; larger values are taken as 6.
@@ -188,61 +182,4 @@ impl BartlettFilter {
     pub const fn group_delay(self) -> u32 {
         self.taps()
     }
-
-    /// Amplitude response at `frequency` in cycles per sample (that is f/fs; 0.5 is the Nyquist frequency):
-    /// |sin(πNf/fs) / (N·sin(πf/fs))|².
-    pub fn gain(self, frequency: f64) -> f64 {
-        // sin(Nx)/(N·sin x) is the product of cos(2ᵏx) over k = 0…M − 1.
-        let mut cosine = cos_pi(frequency);
-        let mut stage = 1.0;
-        for _ in 0..self.taps_log2 {
-            stage *= cosine;
-            cosine = 2.0 * cosine * cosine - 1.0;
-        }
-        stage * stage
-    }
-
-    /// The −3 dB frequency in cycles per sample; multiply by the sample rate for Hz. `None` for M = 0.
-    pub fn cutoff(self) -> Option<f64> {
-        if self.taps_log2 == 0 {
-            return None;
-        }
-        // The gain falls from 1 at frequency 0 to 0 at 1/N.
-        let (mut low, mut high) = (0.0, 1.0 / f64::from(self.taps()));
-        for _ in 0..BISECTIONS {
-            let middle = 0.5 * (low + high);
-            let gain = self.gain(middle);
-            if gain * gain > 0.5 { low = middle } else { high = middle }
-        }
-        Some(low)
-    }
-
-    /// The factor by which the filter changes the variance of white noise, (2N² + 1)/(3N³): the sum of the squared
-    /// weights.
-    pub fn white_noise_gain(self) -> f64 {
-        let n = f64::from(self.taps());
-        (2.0 * n * n + 1.0) / (3.0 * n * n * n)
-    }
-
-    /// Weight of the sample taken `age` samples ago. The weights are a triangle over the ages 0 to 2N, with its peak at N,
-    /// and sum to 1.
-    pub fn weight(self, age: u32) -> f64 {
-        let n = self.taps();
-        let height = if age <= n { age } else { (2 * n).saturating_sub(age) };
-        f64::from(height) / f64::from(n * n)
-    }
-}
-
-/// cos(πx), by its Taylor series after reduction of x to 0…1/2.
-fn cos_pi(x: f64) -> f64 {
-    let turn = x.abs() % 2.0;
-    let half = if turn > 1.0 { 2.0 - turn } else { turn };
-    let (sign, folded) = if half > 0.5 { (-1.0, 1.0 - half) } else { (1.0, half) };
-    let square = (core::f64::consts::PI * folded) * (core::f64::consts::PI * folded);
-    // Horner's scheme from the term of degree 22, which is below 2⁻⁵³ at π/2.
-    let mut sum = 1.0;
-    for k in (1..=11).rev() {
-        sum = 1.0 - square * sum / f64::from((2 * k - 1) * (2 * k));
-    }
-    sign * sum
 }

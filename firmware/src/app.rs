@@ -1,27 +1,29 @@
 //! The application's main loop: commands, checkpoints, epochs and learning, reports.
 
 use crate::bench_console;
-use crate::board::{Board, BoardContext, BrownOutLevel, BusTiming, Chip, HostPort};
-use crate::command::{CommandError, CommandParser, DeviceCommand};
-use crate::console::{Answer, Console, VERSION_LINE};
+use crate::board::{Board, BrownOutLevel, BusTiming};
+use crate::command::{Command, CommandError, CommandParser};
+use crate::console::{Console, SAFE_MODE, VERSION_LINE};
 use crate::counters::CounterLog;
 use crate::device::{
     DeviceState, FIRST_CONFIG, FIRST_SETTINGS, START_UP_US, SensorRecovery, SensorState, config_from_registers, log,
 };
 use crate::epoch::{FinishedEpoch, Regressors, estimate_regressors};
+use crate::event::event;
 use crate::learner::{EpochFit, Learner};
+use crate::receive::HostPort;
 use crate::report_frames::{ReportPart, ReportProgress, running_sums, send};
 use crate::retained::{RetainedRam, RetainedSettings};
 use crate::scale::ReportScale;
 use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, auto_null};
 use crate::settings_store::{MAX_RECORD, StoreError};
 use crate::statistics::CHANNELS;
-use crate::status_flags::StatusFlags;
+use crate::status_flags::{StatusFlags, count};
 use crate::stored_state::{self, StoredSettings};
-use crate::task_monitor::TaskMonitor;
+use crate::watchdog::TaskMonitor;
 use adis16405_driver::{Config, ConfigError, SamplePeriod};
 use core::fmt::Arguments;
-use link::{Boot, BootCause, MessageRef, text_line};
+use link::{Boot, BootCause, Health, MessageRef, text_line};
 
 /// What the start-up code of a board hands to the application.
 pub struct Start {
@@ -35,6 +37,8 @@ pub struct Start {
 
 /// Time for which a write to the sensor's flash stays armed.
 const ARMED_US: u64 = 10_000_000;
+/// Least time between two writes of models without a command.
+const KEEP_US: u64 = 3_600_000_000;
 /// Time between two checkpoints of one channel each.
 const CHECKPOINT_US: u64 = 100_000;
 
@@ -50,16 +54,17 @@ pub struct App {
     next_checkpoint_us: u64,
     /// Channel of the last checkpoint.
     checkpoint_channel: usize,
+    /// Time that retained RAM has been told of.
+    noted_us: u64,
     armed_until_us: u64,
+    /// When models may be kept without power again.
+    next_kept_us: u64,
     tasks: TaskMonitor,
     counter_log: CounterLog,
 }
 
 /// Runs the application on a board, without end.
-pub fn run<'r, C: Chip, T, B, S, D, E, Q>(mut board: BoardContext<'r, C, T, B, S, D, E, Q>, start: Start) -> !
-where
-    BoardContext<'r, C, T, B, S, D, E, Q>: Board,
-{
+pub fn run(mut board: impl Board, start: Start) -> ! {
     let mut app = App::new(start, &mut board);
     loop {
         if !app.turn(&mut board) {
@@ -73,21 +78,30 @@ fn interval_us(settings: RetainedSettings) -> u64 {
 }
 
 impl App {
-    /// Restores settings and statistics from retained RAM, if it holds any.
+    /// Restores settings and statistics from retained RAM, if it holds any; after three crashes within ten minutes nothing that was
+    /// stored, which may be their cause.
     pub fn new(start: Start, board: &mut impl Board) -> Self {
         let Start { mut boot, mut retained, finished } = start;
+        let has_crashed = boot.cause == BootCause::Watchdog || !boot.crash_record.is_empty();
+        boot.safe_mode = has_crashed && retained.note_crash();
+        let starts = retained.settings().map_or(0, |settings| settings.starts);
+        if boot.safe_mode {
+            retained.clear_statistics();
+            event!(error, "safe mode");
+            log(board, format_args!("{SAFE_MODE}"));
+        }
         let restored = retained
             .settings()
             .and_then(|settings| Some((settings, config_from_registers(settings.smpl_prd, settings.sens_avg)?)));
         let first = restored.is_none();
         let mut learner = Learner::new(finished);
-        let stored = read_stored(board, &mut learner);
+        let stored = if boot.safe_mode { None } else { read_stored(board, &mut learner) };
         let kept = || {
             let settings = stored?.apply_to(FIRST_SETTINGS);
             Some((settings, config_from_registers(settings.smpl_prd, settings.sens_avg)?))
         };
         let (mut settings, config) = restored.or_else(kept).unwrap_or((FIRST_SETTINGS, FIRST_CONFIG));
-        settings.starts = settings.starts.saturating_add(1);
+        settings.starts = starts.saturating_add(1);
         boot.starts = settings.starts;
         board.estimators(|estimators| estimators.restart(config));
         for index in 0..CHANNELS.len() {
@@ -126,7 +140,7 @@ impl App {
                 sensor: SensorState::Probing { at_us: probe_us, step: None },
                 learner,
                 epoch_start_us: now_us as i64 - settings.epoch_age_us as i64,
-                bad_commands: 0,
+                counters: Health::default(),
                 recovery: SensorRecovery::default(),
                 status_flags: StatusFlags::new(),
                 report_scale: ReportScale::new(config, None),
@@ -138,9 +152,11 @@ impl App {
             next_report_us: now_us + interval_us(settings),
             next_checkpoint_us: now_us + CHECKPOINT_US,
             checkpoint_channel: 0,
+            noted_us: now_us,
             armed_until_us: 0,
+            next_kept_us: 0,
             tasks: TaskMonitor::new(now_us),
-            counter_log: CounterLog::new(),
+            counter_log: CounterLog::default(),
         }
     }
 
@@ -159,7 +175,10 @@ impl App {
         board.feed_watchdog();
         while let Some((port, byte)) = board.receive() {
             match self.parsers[port as usize].push(byte) {
-                Some(Ok(command)) => self.execute(command, board),
+                Some(Ok(command)) => {
+                    event!(debug, "command {}", command);
+                    self.execute(command, board);
+                }
                 Some(Err(error)) => self.reject(error, board),
                 None => {}
             }
@@ -197,50 +216,46 @@ impl App {
 
     // Commands
 
-    fn execute(&mut self, command: DeviceCommand, board: &mut impl Board) {
+    fn execute(&mut self, command: Command, board: &mut impl Board) {
         let now_us = board.now_us();
         let (range, taps, period) =
             (self.state.config.range(), self.state.config.filter_taps_log2(), self.state.config.sample_period());
         match command {
-            DeviceCommand::Help => self.console.answer(board, Answer::Help),
-            DeviceCommand::Table => self.console.answer(board, Answer::Table),
-            DeviceCommand::Counters => self.console.answer(board, Answer::Counters),
-            DeviceCommand::Status => self.console.answer(board, Answer::Status),
-            DeviceCommand::Version => self.print(board, format_args!("{VERSION_LINE}")),
-            DeviceCommand::Report => self.report.start(),
-            DeviceCommand::ResetStatistics => {
+            Command::Answer(answer) => self.console.answer(board, answer),
+            Command::Version => self.print(board, format_args!("{VERSION_LINE}")),
+            Command::Report => self.report.start(),
+            Command::ResetStatistics => {
                 self.reset_statistics(board);
-                self.state.recovery.reset_counters();
+                self.state.counters = Health::default();
                 self.state.status_flags = StatusFlags::new();
-                self.state.bad_commands = 0;
                 self.print(board, format_args!("statistics reset"));
             }
-            DeviceCommand::Rate(millihertz) => match SamplePeriod::nearest(f64::from(millihertz) / 1000.0) {
+            Command::Rate(millihertz) => match SamplePeriod::nearest(f64::from(millihertz) / 1000.0) {
                 Ok(period) => self.configure(board, Config::new(range, taps, period)),
                 Err(error) => self.print(board, format_args!("{error}")),
             },
-            DeviceCommand::Range(range) => {
+            Command::Range(range) => {
                 self.configure(board, Config::new(range, taps.max(range.min_filter_taps_log2()), period));
             }
-            DeviceCommand::Filter(taps) => self.configure(board, Config::new(range, taps, period)),
-            DeviceCommand::Epoch(seconds) => {
+            Command::Filter(taps) => self.configure(board, Config::new(range, taps, period)),
+            Command::Epoch(seconds) => {
                 self.state.settings.epoch_s = seconds;
                 self.retained.write_settings(self.state.settings, false);
                 let age_s = self.state.epoch_age_s(now_us);
                 self.print(board, format_args!("epoch of {seconds} s; this one began {age_s} s ago"));
             }
-            DeviceCommand::Interval(seconds) => {
+            Command::Interval(seconds) => {
                 self.state.settings.interval_s = seconds;
                 self.next_report_us = now_us + interval_us(self.state.settings);
                 self.retained.write_settings(self.state.settings, false);
                 self.print(board, format_args!("reports every {seconds} s"));
             }
-            DeviceCommand::RawStream(on) => {
+            Command::RawStream(on) => {
                 board.estimators(|estimators| estimators.set_raw_stream(on));
                 self.print(board, format_args!("stream of raw bursts {}", if on { "on" } else { "off" }));
             }
-            DeviceCommand::SelfTest => self.state.request_check(now_us, board),
-            DeviceCommand::ProductId(prod_id) => {
+            Command::SelfTest => self.state.request_check(now_us, board),
+            Command::ProductId(prod_id) => {
                 self.state.settings.prod_id = prod_id;
                 self.retained.write_settings(self.state.settings, false);
                 match prod_id {
@@ -249,7 +264,7 @@ impl App {
                 }
                 self.state.request_check(now_us, board);
             }
-            DeviceCommand::BrownOut => match board.program_brown_out() {
+            Command::BrownOut => match board.program_brown_out() {
                 BrownOutLevel::Fixed => self.print(board, format_args!("this board sets its brown-out level itself")),
                 BrownOutLevel::Set => self.print(board, format_args!("brown-out: 2.7 V, as before")),
                 BrownOutLevel::Programmed => {
@@ -257,17 +272,16 @@ impl App {
                 }
                 BrownOutLevel::Failed => log(board, format_args!("option bytes not written")),
             },
-            DeviceCommand::ArmAutoNull => {
+            Command::Arm => {
                 self.armed_until_us = now_us + ARMED_US;
                 self.print(board, format_args!("keep the sensor still; autonull within 10 s nulls its bias"));
             }
-            DeviceCommand::AutoNull => self.auto_null(board, now_us),
-            DeviceCommand::DumpRegisters => self.console.answer(board, Answer::Registers),
-            DeviceCommand::ReadRegister(register) => {
+            Command::AutoNull => self.auto_null(board, now_us),
+            Command::ReadRegister(register) => {
                 let line = bench_console::read_register(register, &self.state, board);
                 self.print(board, format_args!("{line}"));
             }
-            DeviceCommand::WriteRegister(register, value)
+            Command::WriteRegister(register, value)
                 if bench_console::writes_flash(register, value) && !self.disarm(now_us) =>
             {
                 self.print(
@@ -275,13 +289,11 @@ impl App {
                     format_args!("not armed: this writes the sensor's flash; arm, then poke within 10 s"),
                 );
             }
-            DeviceCommand::WriteRegister(register, value) => {
+            Command::WriteRegister(register, value) => {
                 let line = bench_console::write_register(register, value, &self.state, board);
                 self.print(board, format_args!("{line}"));
             }
-            DeviceCommand::Measure => self.console.answer(board, Answer::Measurement),
-            DeviceCommand::Deflections => self.console.answer(board, Answer::Deflections),
-            DeviceCommand::CarefulBus(careful) => {
+            Command::CarefulBus(careful) => {
                 board.set_sampling(false);
                 let set = board.set_bus_timing(if careful { BusTiming::CAREFUL } else { BusTiming::SAFE });
                 self.state.request_probe(now_us);
@@ -291,16 +303,16 @@ impl App {
                     (false, _) => self.print(board, format_args!("this board has one timing of its bus")),
                 }
             }
-            DeviceCommand::Persist => {
+            Command::Persist => {
                 let written = self.persist(board);
                 self.tell_written(written, "settings and models are kept without power", board);
             }
-            DeviceCommand::Forget => {
+            Command::Forget => {
                 let erased = self.write_record(&[], board);
                 self.tell_written(erased, "nothing is kept without power", board);
             }
-            DeviceCommand::Restart => self.restart(board),
-            DeviceCommand::BootLoader => {
+            Command::Restart => self.restart(board),
+            Command::BootLoader => {
                 self.checkpoint_all(board);
                 if !board.start_boot_loader() {
                     self.print(
@@ -323,12 +335,13 @@ impl App {
     }
 
     fn reject(&mut self, error: CommandError, board: &mut impl Board) {
-        self.state.bad_commands = self.state.bad_commands.saturating_add(1);
+        count(&mut self.state.counters.bad_commands);
         match error {
             CommandError::UnknownKey(byte) => {
                 let key = char::from(byte).escape_default();
                 self.print(board, format_args!("{key} is no command; ? lists them"));
             }
+            CommandError::LostBytes => self.print(board, format_args!("bytes were lost: repeat the command")),
             CommandError::InvalidLine(letter) => {
                 self.print(board, format_args!("no such {} command; ? lists them", char::from(letter)));
             }
@@ -371,9 +384,16 @@ impl App {
         let done = auto_null(board.sensor_bus(), self.state.config, sck_hz)
             .map_err(|error| text_line(format_args!("{error}")));
         match done {
-            Ok(()) => {
+            Ok(bias) => {
                 self.reset_statistics(board);
-                self.print(board, format_args!("bias nulled, statistics reset"));
+                match bias.host_x {
+                    0 => self.print(board, format_args!("bias nulled, statistics reset")),
+                    // Kept by a driver, as bursts would lose the sign of x (erratum); the Allan variance does not depend on it.
+                    x => self.print(
+                        board,
+                        format_args!("bias of y and z nulled, statistics reset; x: {x} counts not applied by the part"),
+                    ),
+                }
             }
             Err(error) => self.print(board, format_args!("bias not nulled: {error}")),
         }
@@ -390,6 +410,20 @@ impl App {
         let record =
             stored_state::encode(&settings, &self.state.learner.models, &mut record).ok_or(StoreError::TooLong)?;
         self.write_record(record, board)
+    }
+
+    /// Keeps the models of an epoch, once an hour at most: a write costs samples.
+    fn keep_models(&mut self, board: &mut impl Board) {
+        let now_us = board.now_us();
+        if now_us < self.next_kept_us {
+            return;
+        }
+        self.next_kept_us = now_us + KEEP_US;
+        match self.persist(board) {
+            Ok(us) => log(board, format_args!("models kept without power, not sampled for {} ms", us.div_ceil(1000))),
+            Err(StoreError::NoMemory) => {}
+            Err(error) => log(board, format_args!("models not kept without power: {error}")),
+        }
     }
 
     /// Writes a record while nothing is sampled; the samples that this costs are a gap.
@@ -437,6 +471,9 @@ impl App {
     }
 
     fn checkpoint_age(&mut self, now_us: u64) {
+        let seconds = (now_us - self.noted_us) / 1_000_000;
+        self.noted_us += seconds * 1_000_000;
+        self.retained.note_time(seconds as u32);
         self.state.settings.epoch_age_us = self.state.epoch_age_us(now_us);
         self.retained.write_settings(self.state.settings, false);
     }
@@ -481,6 +518,7 @@ impl App {
         let Some(finished) = finished.filter(|_| !self.report.ends_epoch()) else { return };
         board.estimators(|estimators| finished.fill(estimators));
         finished.number = self.state.settings.epoch;
+        event!(info, "epoch {=u32} finished", finished.number);
         // Before the settings, so that a restart in between finds the epoch either running or finished.
         self.retained.write_epoch(finished);
         self.state.settings.epoch = self.state.settings.epoch.saturating_add(1);
@@ -500,13 +538,7 @@ impl App {
         let Some(part) = self.report.part() else {
             if ends_epoch {
                 self.retained.clear_epoch(); // it has been learned from
-                match self.persist(board) {
-                    Ok(us) => {
-                        log(board, format_args!("models kept without power, not sampled for {} ms", us.div_ceil(1000)))
-                    }
-                    Err(StoreError::NoMemory) => {}
-                    Err(error) => log(board, format_args!("models not kept without power: {error}")),
-                }
+                self.keep_models(board);
             }
             return;
         };

@@ -1,14 +1,12 @@
 //! What a person at a bench asks for: registers by name, the times of the bus and of the data-ready line as they are, and the
 //! deflections of the self-test. Everything is read while nothing is sampled; the samples that this costs are a gap.
 
+use crate::answer::AnswerLine;
 use crate::board::{Board, FrameTimes};
 use crate::device::{DeviceState, clock_limit_hz};
 use crate::number_text::Decimal;
-use crate::report_text::AnswerLine;
 use crate::sensor::{LOW_POWER_LIMIT_HZ, addressed};
-use adis16405_driver::{Access, Adis16405, BURST_BYTES, Config, Error, Register, Stimulus};
-use embedded_hal::delay::DelayNs;
-use embedded_hal::spi::SpiDevice;
+use adis16405_driver::{Access, BURST_BYTES, Config, Register, Stimulus};
 use link::{TextLine, text_line};
 
 /// The register with this name, or with this address in hexadecimal: `smpl_prd`, `36`, `0x36`.
@@ -28,51 +26,27 @@ pub(crate) fn hexadecimal(digits: &str) -> Option<u16> {
 }
 
 /// What is asked of the sensor.
-trait Request {
-    type Answer;
-    fn ask<SPI: SpiDevice<u8>, D: DelayNs>(
-        self,
-        sensor: &mut Adis16405<SPI, D>,
-    ) -> Result<Self::Answer, Error<SPI::Error>>;
+enum Request {
+    Read(Register),
+    Write(Register, u16),
+    Deflections(Stimulus),
 }
 
-struct Read(Register);
-
-impl Request for Read {
-    type Answer = u16;
-    fn ask<SPI: SpiDevice<u8>, D: DelayNs>(self, sensor: &mut Adis16405<SPI, D>) -> Result<u16, Error<SPI::Error>> {
-        sensor.read_register(self.0)
-    }
-}
-
-struct Write(Register, u16);
-
-impl Request for Write {
-    type Answer = ();
-    fn ask<SPI: SpiDevice<u8>, D: DelayNs>(self, sensor: &mut Adis16405<SPI, D>) -> Result<(), Error<SPI::Error>> {
-        sensor.write_register(self.0, self.1)
-    }
-}
-
-impl Request for Stimulus {
-    type Answer = [i16; 6];
-    fn ask<SPI: SpiDevice<u8>, D: DelayNs>(
-        self,
-        sensor: &mut Adis16405<SPI, D>,
-    ) -> Result<[i16; 6], Error<SPI::Error>> {
-        sensor.stimulus_response(self)
-    }
-}
-
-/// Asks the sensor while nothing is sampled, at the clock and with the stall that it takes in either power mode. The error is one to be
-/// printed.
+/// Asks the sensor while nothing is sampled, at the clock and with the stall that it takes in either power mode. The answer is the value
+/// of a register, or six deflections; the error is one to be printed.
 #[allow(clippy::result_large_err, reason = "the text of an error is made where its type is known, and printed")]
-fn ask<R: Request>(request: R, state: &DeviceState, board: &mut impl Board) -> Result<R::Answer, TextLine> {
+fn ask(request: Request, state: &DeviceState, board: &mut impl Board) -> Result<[i16; 6], TextLine> {
     board.set_sampling(false);
     let sck_hz = board.set_clock_limit(LOW_POWER_LIMIT_HZ);
-    let answer = request
-        .ask(&mut addressed(board.sensor_bus(), state.config, sck_hz))
-        .map_err(|error| text_line(format_args!("{error}")));
+    let answer = {
+        let mut sensor = addressed(board.sensor_bus(), state.config, sck_hz);
+        let answer = match request {
+            Request::Read(register) => sensor.read_register(register).map(|value| [value as i16, 0, 0, 0, 0, 0]),
+            Request::Write(register, value) => sensor.write_register(register, value).map(|()| [0; 6]),
+            Request::Deflections(stimulus) => sensor.stimulus_response(stimulus),
+        };
+        answer.map_err(|error| text_line(format_args!("{error}")))
+    };
     board.set_clock_limit(clock_limit_hz(state.config));
     resume(state, board);
     answer
@@ -87,10 +61,10 @@ fn resume(state: &DeviceState, board: &mut impl Board) {
     }
 }
 
-fn line(register: Register, read: Result<u16, TextLine>) -> TextLine {
+fn line(register: Register, state: &DeviceState, board: &mut impl Board) -> TextLine {
     let (name, address) = (register.name(), register.address());
-    match read {
-        Ok(value) => text_line(format_args!("{name:<10} {address:#04x}  {value:#06x}  {}", value as i16)),
+    match ask(Request::Read(register), state, board) {
+        Ok([value, ..]) => text_line(format_args!("{name:<10} {address:#04x}  {:#06x}  {value}", value as u16)),
         Err(error) => text_line(format_args!("{name:<10} {address:#04x}  {error}")),
     }
 }
@@ -100,7 +74,7 @@ pub(crate) fn read_register(register: Register, state: &DeviceState, board: &mut
     if register.access() == Access::Write {
         return text_line(format_args!("{} cannot be read", register.name()));
     }
-    line(register, ask(Read(register), state, board))
+    line(register, state, board)
 }
 
 /// The bits of GLOB_CMD by which the sensor writes its flash memory: auto-null, factory restore, flash update, precision auto-null
@@ -117,9 +91,9 @@ pub(crate) fn writes_flash(register: Register, value: u16) -> bool {
 pub(crate) fn write_register(register: Register, value: u16, state: &DeviceState, board: &mut impl Board) -> TextLine {
     match register.access() {
         Access::Read => text_line(format_args!("{} cannot be written", register.name())),
-        access => match ask(Write(register, value), state, board) {
-            Ok(()) if access == Access::Write => text_line(format_args!("{} written", register.name())),
-            Ok(()) => line(register, ask(Read(register), state, board)),
+        access => match ask(Request::Write(register, value), state, board) {
+            Ok(_) if access == Access::Write => text_line(format_args!("{} written", register.name())),
+            Ok(_) => line(register, state, board),
             Err(error) => text_line(format_args!("{}: {error}", register.name())),
         },
     }
@@ -134,7 +108,8 @@ pub(crate) fn dump_line(state: &DeviceState, board: &mut impl Board, index: usiz
     }
 }
 
-/// Longest time for which a pulse of data ready is waited for, in µs.
+/// Sample periods for which a pulse of data ready is waited for, and the least time in µs.
+const PULSE_PERIODS: f64 = 2.5;
 const PULSE_US: u32 = 250_000;
 
 /// The line at an index of the measurement.
@@ -176,11 +151,12 @@ pub(crate) fn measurement_line(state: &DeviceState, board: &mut impl Board, inde
         }
         3 => {
             board.set_sampling(false);
-            let width = board.data_ready_width_us(PULSE_US);
+            let limit_us = PULSE_US.max((1e6 * PULSE_PERIODS / state.config.sample_period().hz()) as u32);
+            let width = board.data_ready_width_us(limit_us);
             resume(state, board);
             match width {
                 Some(us) => text_line(format_args!("DRDY: high for {us} us, within some us")),
-                None => text_line(format_args!("DRDY: no pulse in {} ms", PULSE_US / 1000)),
+                None => text_line(format_args!("DRDY: no pulse in {} ms", limit_us / 1000)),
             }
         }
         _ => return AnswerLine::End,
@@ -190,7 +166,7 @@ pub(crate) fn measurement_line(state: &DeviceState, board: &mut impl Board, inde
 /// Reads a register as often as makes the times of single frames known.
 fn register_frames(state: &DeviceState, board: &mut impl Board) -> Option<FrameTimes> {
     board.frame_times()?;
-    ask(Read(Register::ProdId), state, board).ok()?;
+    ask(Request::Read(Register::ProdId), state, board).ok()?;
     board.frame_times()
 }
 
@@ -213,7 +189,7 @@ pub(crate) fn deflection_line(state: &DeviceState, board: &mut impl Board, index
             "{sign} not run, it takes {test_s} s: another rate or filter"
         )));
     }
-    let response = ask(stimulus, state, board);
+    let response = ask(Request::Deflections(stimulus), state, board);
     // The filter holds samples that were displaced.
     let now_us = board.now_us();
     board.estimators(|estimators| estimators.mark_probed(now_us));

@@ -1,21 +1,12 @@
-//! The board as the main loop sees it: the trait, and the board context that implements it over a microcontroller's
-//! resources and interrupt locks.
+//! The board as the main loop sees it.
 
-use crate::acquisition::{Sampler, SamplingActivity};
+use crate::acquisition::SamplingActivity;
+use crate::receive::HostPort;
 use crate::sample_intake::Estimators;
 use crate::settings_store::StoreError;
 use crate::transmit::TransmitQueue;
 use embedded_hal::delay::DelayNs;
-use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
-use heapless::spsc;
-use rtic_core::Mutex;
-
-/// Time before the first frame after a burst in µs: the sensor's longest stall time, that of its low-power mode.
-const STALL_US: u32 = 75;
-/// Time in µs for which the sensor's RST line is low, as with the driver of Linux; the data sheet has no least time.
-const RESET_US: u32 = 100;
-/// Time in µs after which a burst is abandoned: the longest one, at 164 kHz with gaps of 16 µs, takes 1.5 ms.
-const BURST_US: u32 = 5_000;
+use embedded_hal::spi::SpiDevice;
 
 /// Times of chip select between two frames in one of the sensor's power modes, in ns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,7 +76,7 @@ pub trait SensorBus: SpiDevice<u8> {
     fn take_frame_times(&mut self) -> FrameTimes;
 }
 
-/// What the application needs of a board: a [`BoardContext`] on a microcontroller, or a virtual sensor on the host.
+/// What the application needs of a board: its microcontroller, or a virtual sensor on the host.
 pub trait Board {
     /// The sensor's bus, for registers.
     type Bus<'a>: SpiDevice<u8>
@@ -98,6 +89,8 @@ pub trait Board {
 
     /// Time since the start in microseconds.
     fn now_us(&mut self) -> u64;
+    /// Sleeps until the next interrupt.
+    fn sleep(&mut self) {}
     /// The sensor's bus and a delay. To be used only while sampling is disabled.
     fn sensor_bus(&mut self) -> (Self::Bus<'_>, Self::Delay<'_>);
     /// Sets the fastest serial clock of at most `limit_hz`, or the slowest one if none is slow enough; returns it in Hz. To be
@@ -165,35 +158,6 @@ pub trait Board {
     }
 }
 
-/// A serial port to the host.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum HostPort {
-    /// On pins of the board.
-    Uart,
-    /// On its USB connector.
-    Usb,
-}
-
-impl HostPort {
-    /// Number of ports.
-    pub const COUNT: usize = 2;
-}
-
-/// The queues of received bytes.
-pub struct ReceivedBytes<'q> {
-    /// From the UART.
-    pub uart: spsc::Consumer<'q, u8>,
-    /// From the USB port of a board that has one.
-    pub usb: Option<spsc::Consumer<'q, u8>>,
-}
-
-impl ReceivedBytes<'_> {
-    fn next(&mut self) -> Option<(HostPort, u8)> {
-        let usb = || self.usb.as_mut().and_then(|queue| queue.dequeue()).map(|byte| (HostPort::Usb, byte));
-        self.uart.dequeue().map(|byte| (HostPort::Uart, byte)).or_else(usb)
-    }
-}
-
 /// The brown-out level of a microcontroller after the request to program it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BrownOutLevel {
@@ -246,295 +210,12 @@ impl Uptime {
     }
 }
 
-/// What differs from one microcontroller to the next.
-pub trait Chip {
-    /// A counter of microseconds that wraps at 2³².
-    fn microseconds(&mut self) -> u32;
-    /// Sleeps until an interrupt is pending and returns before it is served. `clock` is called with the counter right before
-    /// and right after the sleep, while interrupts are disabled.
-    fn sleep(&mut self, clock: impl FnMut(u32));
-    /// Requests the interrupt that transmits what is queued.
-    fn transmit(&mut self);
-    /// Requests the interrupt of the end of a burst, which then fails if it is still being transferred.
-    fn abandon_burst(&mut self);
-    /// Feeds the watchdog.
-    fn feed(&mut self);
-    /// Restarts the microcontroller.
-    fn restart(&mut self);
-    /// Load figures, without the time asleep.
-    fn meters(&mut self) -> BoardMeters;
-    /// Sets the sensor's RST line active, which is low, or inactive. Returns false if it is not connected.
-    fn set_reset_line(&mut self, active: bool) -> bool;
-    /// Programs the brown-out level.
-    fn program_brown_out(&mut self) -> BrownOutLevel;
-    /// As [`Board::keeps_record`].
-    fn keeps_record(&mut self) -> bool;
-    /// As [`Board::read_record`].
-    fn read_record(&mut self, record: &mut [u8]) -> Option<usize>;
-    /// As [`Board::write_record`].
-    fn write_record(&mut self, record: &[u8]) -> Result<(), StoreError>;
-    /// Starts the boot loader. Returns false if there is none.
-    fn start_boot_loader(&mut self) -> bool;
-}
-
 /// The data-ready line, whose edges raise an interrupt.
 pub trait DataReadyLine {
     /// Ignores edges, or takes them again; those that came meanwhile are forgotten.
     fn set_masked(&mut self, masked: bool);
     /// The level of the line.
     fn is_active(&mut self) -> bool;
-}
-
-/// What the main loop shares with the interrupts. Each lock disables only the interrupts that share the resource.
-pub struct Locks<T, B, S, D, E, Q> {
-    /// [`Uptime`], shared with sampling.
-    pub uptime: T,
-    /// The sensor's bus, shared with sampling.
-    pub bus: B,
-    /// [`Sampler`], shared with sampling.
-    pub sampler: S,
-    /// The data-ready line, shared with sampling.
-    pub data_ready: D,
-    /// [`Estimators`], shared with the estimators' interrupt.
-    pub estimators: E,
-    /// [`TransmitQueue`], shared with the estimators' interrupt.
-    pub transmit_queue: Q,
-}
-
-/// A [`Board`] made of a chip and of what it shares with its interrupts.
-pub struct BoardContext<'r, C, T, B, S, D, E, Q> {
-    chip: C,
-    locks: Locks<T, B, S, D, E, Q>,
-    received: &'r mut ReceivedBytes<'static>,
-    asleep_us: u64,
-    watchdog: WatchdogFeeder,
-}
-
-/// Feeds the watchdog only when the microsecond counter has advanced since the last time: without a running counter no wait
-/// would end, and the watchdog must restart the microcontroller.
-#[derive(Clone, Copy)]
-struct WatchdogFeeder {
-    /// The counter when the watchdog was fed last.
-    fed_at: u32,
-}
-
-impl WatchdogFeeder {
-    fn feed(&mut self, chip: &mut impl Chip) {
-        let now = chip.microseconds();
-        if now != self.fed_at {
-            self.fed_at = now;
-            chip.feed();
-        }
-    }
-}
-
-/// Prolongs the time of a watchdog that is shorter than a step of the main loop: a periodic interrupt feeds it as long as the
-/// main loop has done so within the last ticks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct WatchdogExtension {
-    /// Feedings by the main loop that have been seen.
-    feedings: u32,
-    ticks_left: u32,
-}
-
-impl WatchdogExtension {
-    /// Before the first feeding.
-    pub const START: Self = Self { feedings: 0, ticks_left: 0 };
-
-    /// To be called at every tick with the number of feedings by the main loop so far. Returns whether the watchdog is to be
-    /// fed: for `ticks` ticks after each of them.
-    pub fn tick(&mut self, feedings: u32, ticks: u32) -> bool {
-        self.ticks_left = if feedings == self.feedings { self.ticks_left.saturating_sub(1) } else { ticks };
-        self.feedings = feedings;
-        self.ticks_left > 0
-    }
-}
-
-impl<'r, C: Chip, T, B, S, D, E, Q> BoardContext<'r, C, T, B, S, D, E, Q> {
-    /// `received` has the bytes from the serial ports.
-    pub fn new(chip: C, locks: Locks<T, B, S, D, E, Q>, received: &'r mut ReceivedBytes<'static>) -> Self {
-        Self { chip, locks, received, asleep_us: 0, watchdog: WatchdogFeeder { fed_at: 0 } }
-    }
-
-    /// Sleeps until the next interrupt.
-    pub(crate) fn sleep(&mut self) {
-        let mut fell_asleep = None;
-        let asleep_us = &mut self.asleep_us;
-        self.chip.sleep(|now| match fell_asleep {
-            None => fell_asleep = Some(now),
-            Some(then) => *asleep_us += u64::from(now.wrapping_sub(then)),
-        });
-    }
-}
-
-impl<C, T, B, S, D, E, Q> Board for BoardContext<'_, C, T, B, S, D, E, Q>
-where
-    C: Chip,
-    T: Mutex<T = Uptime>,
-    B: Mutex<T: SensorBus>,
-    S: Mutex<T = Sampler<'static>>,
-    D: Mutex<T: DataReadyLine>,
-    E: Mutex<T = Estimators<'static>>,
-    Q: Mutex<T = TransmitQueue<'static>>,
-{
-    type Bus<'a>
-        = LockedBus<'a, B>
-    where
-        Self: 'a;
-
-    type Delay<'a>
-        = FeedingDelay<'a, C>
-    where
-        Self: 'a;
-
-    fn now_us(&mut self) -> u64 {
-        let chip = &mut self.chip;
-        self.locks.uptime.lock(|uptime| uptime.at(chip.microseconds()))
-    }
-
-    fn sensor_bus(&mut self) -> (Self::Bus<'_>, Self::Delay<'_>) {
-        (LockedBus(&mut self.locks.bus), FeedingDelay { chip: &mut self.chip, watchdog: &mut self.watchdog })
-    }
-
-    fn set_clock_limit(&mut self, limit_hz: u32) -> u32 {
-        self.locks.bus.lock(|bus| bus.set_clock_limit(limit_hz))
-    }
-
-    fn reset_bus(&mut self) {
-        self.locks.bus.lock(SensorBus::reset);
-    }
-
-    fn reset_sensor(&mut self) -> bool {
-        let is_connected = self.chip.set_reset_line(true);
-        if is_connected {
-            FeedingDelay { chip: &mut self.chip, watchdog: &mut self.watchdog }.delay_us(RESET_US);
-            self.chip.set_reset_line(false);
-        }
-        is_connected
-    }
-
-    fn set_bus_timing(&mut self, timing: BusTiming) -> bool {
-        self.locks.bus.lock(|bus| bus.set_timing(timing));
-        true
-    }
-
-    fn frame_times(&mut self) -> Option<FrameTimes> {
-        Some(self.locks.bus.lock(SensorBus::take_frame_times))
-    }
-
-    fn data_ready_width_us(&mut self, limit_us: u32) -> Option<u32> {
-        let start = self.chip.microseconds();
-        let mut edge = |active: bool| loop {
-            let now = self.chip.microseconds();
-            if self.locks.data_ready.lock(DataReadyLine::is_active) == active {
-                return Some(now);
-            }
-            if now.wrapping_sub(start) > limit_us {
-                return None;
-            }
-            self.watchdog.feed(&mut self.chip);
-        };
-        edge(false)?;
-        let risen = edge(true)?;
-        Some(edge(false)?.wrapping_sub(risen))
-    }
-
-    fn set_sampling(&mut self, enabled: bool) {
-        self.locks.sampler.lock(|sampler| sampler.set_enabled(enabled));
-        if enabled {
-            self.locks.data_ready.lock(|line| line.set_masked(false));
-        } else {
-            let start = self.chip.microseconds();
-            while self.locks.sampler.lock(|sampler| sampler.is_reading()) {
-                if self.chip.microseconds().wrapping_sub(start) > BURST_US {
-                    self.chip.abandon_burst();
-                }
-            }
-            FeedingDelay { chip: &mut self.chip, watchdog: &mut self.watchdog }.delay_us(STALL_US);
-        }
-    }
-
-    fn sampling_activity(&mut self) -> SamplingActivity {
-        self.locks.sampler.lock(|sampler| sampler.activity())
-    }
-
-    fn estimators<R>(&mut self, access: impl FnOnce(&mut Estimators<'static>) -> R) -> R {
-        self.locks.estimators.lock(access)
-    }
-
-    fn transmit_queue<R>(&mut self, access: impl FnOnce(&mut TransmitQueue<'static>) -> R) -> R {
-        let result = self.locks.transmit_queue.lock(access);
-        self.chip.transmit();
-        result
-    }
-
-    fn receive(&mut self) -> Option<(HostPort, u8)> {
-        self.received.next()
-    }
-
-    fn meters(&mut self) -> BoardMeters {
-        BoardMeters { asleep_us: self.asleep_us, ..self.chip.meters() }
-    }
-
-    fn feed_watchdog(&mut self) {
-        self.watchdog.feed(&mut self.chip);
-    }
-
-    fn restart(&mut self) {
-        self.chip.restart();
-    }
-
-    fn program_brown_out(&mut self) -> BrownOutLevel {
-        self.chip.program_brown_out()
-    }
-
-    fn keeps_record(&mut self) -> bool {
-        self.chip.keeps_record()
-    }
-
-    fn read_record(&mut self, record: &mut [u8]) -> Option<usize> {
-        self.chip.read_record(record)
-    }
-
-    fn write_record(&mut self, record: &[u8]) -> Result<(), StoreError> {
-        self.chip.write_record(record)
-    }
-
-    fn start_boot_loader(&mut self) -> bool {
-        self.chip.start_boot_loader()
-    }
-}
-
-/// Waits by the chip's counter and feeds the watchdog meanwhile.
-pub struct FeedingDelay<'a, C> {
-    chip: &'a mut C,
-    watchdog: &'a mut WatchdogFeeder,
-}
-
-impl<C: Chip> DelayNs for FeedingDelay<'_, C> {
-    fn delay_ns(&mut self, ns: u32) {
-        self.delay_us(ns.div_ceil(1000));
-    }
-
-    fn delay_us(&mut self, us: u32) {
-        let start = self.chip.microseconds();
-        while self.chip.microseconds().wrapping_sub(start) <= us {
-            self.watchdog.feed(self.chip);
-        }
-    }
-}
-
-/// The shared bus, locked for one transaction at a time.
-pub struct LockedBus<'a, B>(&'a mut B);
-
-impl<B: Mutex<T: SpiDevice<u8>>> ErrorType for LockedBus<'_, B> {
-    type Error = <B::T as ErrorType>::Error;
-}
-
-impl<B: Mutex<T: SpiDevice<u8>>> SpiDevice<u8> for LockedBus<'_, B> {
-    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Self::Error> {
-        self.0.lock(|bus| bus.transaction(operations))
-    }
 }
 
 #[cfg(test)]
@@ -549,74 +230,5 @@ mod tests {
         assert_eq!(uptime.at(5), 21);
         assert_eq!(uptime.at(5), 21);
         assert_eq!(uptime.at(4), 0x1_0000_0014);
-    }
-
-    /// A chip whose counter does not advance for its first readings; counts how often the watchdog is fed until then and
-    /// afterwards.
-    #[derive(Default)]
-    struct StoppedCounter {
-        readings: u32,
-        feedings: [u32; 2],
-    }
-
-    const STOPPED_READINGS: u32 = 10_000;
-
-    impl Chip for StoppedCounter {
-        fn microseconds(&mut self) -> u32 {
-            self.readings += 1;
-            self.readings.saturating_sub(STOPPED_READINGS)
-        }
-
-        fn feed(&mut self) {
-            self.feedings[usize::from(self.readings > STOPPED_READINGS)] += 1;
-        }
-
-        fn sleep(&mut self, _: impl FnMut(u32)) {}
-        fn transmit(&mut self) {}
-        fn abandon_burst(&mut self) {}
-        fn restart(&mut self) {}
-        fn set_reset_line(&mut self, _: bool) -> bool {
-            false
-        }
-        fn program_brown_out(&mut self) -> BrownOutLevel {
-            BrownOutLevel::Fixed
-        }
-        fn keeps_record(&mut self) -> bool {
-            false
-        }
-        fn read_record(&mut self, _: &mut [u8]) -> Option<usize> {
-            None
-        }
-        fn write_record(&mut self, _: &[u8]) -> Result<(), StoreError> {
-            Err(StoreError::NoMemory)
-        }
-        fn start_boot_loader(&mut self) -> bool {
-            false
-        }
-        fn meters(&mut self) -> BoardMeters {
-            BoardMeters::default()
-        }
-    }
-
-    #[test]
-    fn a_long_step_is_fed_through_and_a_hang_is_not() {
-        let mut extension = WatchdogExtension::START;
-        let fed = |extension: &mut WatchdogExtension, feedings, ticks| {
-            (0..ticks).filter(|_| extension.tick(feedings, 480)).count()
-        };
-        assert_eq!(fed(&mut extension, 0, 100), 0, "nothing has been fed yet");
-        assert_eq!(fed(&mut extension, 1, 400), 400, "25 s at 16 ticks a second");
-        assert_eq!(fed(&mut extension, 2, 1000), 480, "the main loop hangs");
-        assert_eq!(fed(&mut extension, 2, 1000), 0);
-        assert_eq!(fed(&mut extension, 3, 1), 1);
-    }
-
-    #[test]
-    fn the_watchdog_is_not_fed_while_the_counter_stands_still() {
-        let (mut chip, mut watchdog) = (StoppedCounter::default(), WatchdogFeeder { fed_at: 0 });
-        FeedingDelay { chip: &mut chip, watchdog: &mut watchdog }.delay_us(50);
-        let [stopped, running] = chip.feedings;
-        assert_eq!(stopped, 0);
-        assert!(running > 20, "{running} times in 50 us");
     }
 }

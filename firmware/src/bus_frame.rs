@@ -51,7 +51,7 @@ pub(crate) fn wait_ns<M: MicrosecondCounter>(ns: u32) {
 }
 
 /// Exchanges single bytes with the sensor, without chip select.
-pub(crate) trait ByteExchange {
+pub trait ByteExchange {
     /// Sends a byte and returns the one received meanwhile.
     fn exchange(&mut self, byte: u8) -> Result<u8, BusFault>;
     /// Waits until the last clock period of the last byte has ended.

@@ -1,114 +1,150 @@
 //! Commands of the serial port: keys that act at once, and lines that end with Enter.
 
+use crate::answer::Answer;
 use crate::bench_console::{hexadecimal, register};
+use crate::receive::LOST;
 use adis16405_driver::{GyroRange, Register};
 use heapless::Vec;
-
-/// The lines that `?` prints, each in 80 columns.
-pub const HELP: [&str; 33] = [
-    "at the press of a key:",
-    "?          this list",
-    "t          report as a table",
-    "s          status: sensor, rate, epoch, start",
-    "k          counters of what was lost and why",
-    "v          version",
-    "r          report in frames, for a program",
-    "settings, with Enter:",
-    "f RATE     sample rate in Hz, such as f 819.2",
-    "g RANGE    gyro range in deg/s: 75, 150 or 300",
-    "n TAPS     filter, log2 of the taps of each stage: 0 to 6",
-    "e SECONDS  length of an epoch, 0 for one without end",
-    "i SECONDS  time between reports, 0 for none",
-    "w 1, w 0   start and stop the raw stream of bursts",
-    "p ID       take a part with this PROD_ID for an ADIS16405, 0 for none",
-    "persist    keep settings and learned models without power",
-    "forget     erase what is kept",
-    "clear      reset the statistics",
-    "the sensor, which must be still, with Enter:",
-    "check      self-test: passed or failed",
-    "deflect    self-test with the deflection of each axis",
-    "arm        allow one write to the sensor's flash within 10 s, such as autonull",
-    "autonull   store the gyro output as the bias",
-    "the bench, with Enter:",
-    "dump       all registers of the sensor by name, in hexadecimal",
-    "peek REG   read one: peek smpl_prd, or by its address peek 36",
-    "poke R V   write one: poke smpl_prd 0007; check undoes it",
-    "measure    SCK, stall and read rate, period and width of data ready",
-    "careful 1  longer times on the bus, if the sensor answers wrongly; careful 0",
-    "help       this list",
-    "boot       restart; the statistics are kept",
-    "bootsel    start the boot loader, which takes a UF2 file over USB",
-    "brownout   program a reset below 2.7 V into the microcontroller",
-];
+use link::{TextLine, text_line};
 
 /// A valid command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum DeviceCommand {
-    /// List the commands.
-    Help,
+#[cfg_attr(all(target_os = "none", feature = "microcontroller"), derive(defmt::Format))]
+pub(crate) enum Command {
+    /// Give an answer of several lines.
+    Answer(Answer),
     /// Send a report in frames.
     Report,
-    /// Print the report as a table.
-    Table,
-    /// Print the state of the device.
-    Status,
-    /// Print the version of the firmware.
     Version,
-    /// Print the counters that are not 0.
-    Counters,
     /// Reset statistics, models and counters.
     ResetStatistics,
-    /// Set the sample rate, in 1/1000 Hz.
+    /// In 1/1000 Hz.
     Rate(u32),
-    /// Set the full scale of the gyros.
     Range(GyroRange),
-    /// Set the base-2 logarithm of the filter's taps.
+    /// The base-2 logarithm of the filter's taps.
     Filter(u8),
-    /// Set the length of an epoch in s, 0 for no end.
+    /// In s, 0 for no end.
     Epoch(u32),
-    /// Set the seconds between reports, 0 for none.
+    /// In s, 0 for none.
     Interval(u32),
-    /// Start or stop the stream of raw bursts.
     RawStream(bool),
     /// Take a part that answers this PROD_ID for an ADIS16405, 0 for none.
     ProductId(u16),
-    /// Probe the sensor, self-test included.
     SelfTest,
-    /// Program the brown-out level into the microcontroller's option bytes.
     BrownOut,
-    /// Allow auto-null for 10 s.
-    ArmAutoNull,
-    /// Store the present gyro output as the bias in the sensor.
+    /// Allow a write to the sensor's flash.
+    Arm,
     AutoNull,
-    /// Print all registers of the sensor.
-    DumpRegisters,
-    /// Read a register of the sensor.
     ReadRegister(Register),
-    /// Write a register of the sensor.
     WriteRegister(Register, u16),
-    /// Print the times of the bus and of data ready.
-    Measure,
-    /// Run the self-test with its deflections.
-    Deflections,
-    /// Keep longer times on the sensor's bus, or the usual ones.
     CarefulBus(bool),
-    /// Keep settings and models in flash memory.
     Persist,
-    /// Erase what is kept there.
     Forget,
-    /// Restart the microcontroller.
     Restart,
-    /// Start the boot loader that takes an image over USB.
     BootLoader,
+}
+
+/// What follows the word of a command, and the command that both make.
+#[derive(Clone, Copy)]
+enum Form {
+    /// The title of a group of commands.
+    Title,
+    /// Nothing: a key that acts at once.
+    Key(Command),
+    /// Nothing, and Enter.
+    Word(Command),
+    /// A number in thousandths.
+    Thousandths(fn(u32) -> Command),
+    /// A whole number.
+    Number(fn(u32) -> Option<Command>),
+    Register(fn(Register) -> Command),
+    /// A register and its value.
+    RegisterValue(fn(Register, u16) -> Command),
+}
+
+/// The commands: usage, which begins with the word, form, and help, in the order of the list that `?` prints. A line has 80 columns.
+static COMMANDS: [(&str, Form, &str); 33] = {
+    use Command as C;
+    use Form::{Key, Number, RegisterValue, Thousandths, Title, Word};
+    [
+        ("at the press of a key:", Title, ""),
+        ("?", Key(C::Answer(Answer::Help)), "this list"),
+        ("t", Key(C::Answer(Answer::Table)), "report as a table"),
+        ("s", Key(C::Answer(Answer::Status)), "status: sensor, rate, epoch, start"),
+        ("k", Key(C::Answer(Answer::Counters)), "counters of what was lost and why"),
+        ("v", Key(C::Version), "version"),
+        ("r", Key(C::Report), "report in frames, for a program"),
+        ("settings, with Enter:", Title, ""),
+        ("f RATE", Thousandths(C::Rate), "sample rate in Hz, such as f 819.2"),
+        ("g RANGE", Number(range), "gyro range in deg/s: 75, 150 or 300"),
+        ("n TAPS", Number(filter), "filter, log2 of the taps of each stage: 0 to 6"),
+        ("e SECONDS", Number(|s| Some(C::Epoch(s))), "length of an epoch, 0 for one without end"),
+        ("i SECONDS", Number(|s| Some(C::Interval(s))), "time between reports, 0 for none"),
+        ("w 1, w 0", Number(|on| switch(on, C::RawStream)), "start and stop the raw stream of bursts"),
+        ("p ID", Number(product_id), "take a part with this PROD_ID for an ADIS16405, 0 for none"),
+        ("persist", Word(C::Persist), "keep settings and learned models without power"),
+        ("forget", Word(C::Forget), "erase what is kept"),
+        ("clear", Word(C::ResetStatistics), "reset the statistics"),
+        ("the sensor, which must be still, with Enter:", Title, ""),
+        ("check", Word(C::SelfTest), "self-test: passed or failed"),
+        ("deflect", Word(C::Answer(Answer::Deflections)), "self-test with the deflection of each axis"),
+        ("arm", Word(C::Arm), "allow one write to the sensor's flash within 10 s, such as autonull"),
+        ("autonull", Word(C::AutoNull), "store the gyro output as the bias"),
+        ("the bench, with Enter:", Title, ""),
+        ("dump", Word(C::Answer(Answer::Registers)), "all registers of the sensor by name, in hexadecimal"),
+        ("peek REG", Form::Register(C::ReadRegister), "read one: peek smpl_prd, or by its address peek 36"),
+        ("poke R V", RegisterValue(C::WriteRegister), "write one: poke smpl_prd 0007; check undoes it"),
+        ("measure", Word(C::Answer(Answer::Measurement)), "SCK, stall and read rate, period and width of data ready"),
+        (
+            "careful 1",
+            Number(|on| switch(on, C::CarefulBus)),
+            "longer times on the bus, if the sensor answers wrongly; careful 0",
+        ),
+        ("help", Word(C::Answer(Answer::Help)), "this list"),
+        ("boot", Word(C::Restart), "restart; the statistics are kept"),
+        ("bootsel", Word(C::BootLoader), "start the boot loader, which takes an image over USB"),
+        ("brownout", Word(C::BrownOut), "program a reset below 2.7 V into the microcontroller"),
+    ]
+};
+
+/// The line of the list at an index.
+pub fn help(index: usize) -> Option<TextLine> {
+    COMMANDS.get(index).map(|(usage, form, help)| match form {
+        Form::Title => text_line(format_args!("{usage}")),
+        _ => text_line(format_args!("{usage:<10} {help}")),
+    })
+}
+
+fn range(degrees: u32) -> Option<Command> {
+    Some(Command::Range(match degrees {
+        300 => GyroRange::Dps300,
+        150 => GyroRange::Dps150,
+        75 => GyroRange::Dps75,
+        _ => return None,
+    }))
+}
+
+fn filter(taps_log2: u32) -> Option<Command> {
+    (taps_log2 <= 6).then_some(Command::Filter(taps_log2 as u8))
+}
+
+fn product_id(number: u32) -> Option<Command> {
+    u16::try_from(number).ok().map(Command::ProductId)
+}
+
+fn switch(number: u32, command: fn(bool) -> Command) -> Option<Command> {
+    (number <= 1).then(|| command(number == 1))
 }
 
 /// Why input is no command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CommandError {
+pub(crate) enum CommandError {
     /// No command begins with this byte. The rest of the line is ignored, except keys that act at once.
     UnknownKey(u8),
     /// The line, which begins with this letter, is no command.
     InvalidLine(u8),
+    /// Bytes were lost: the line is ignored.
+    LostBytes,
 }
 
 /// Longest line in bytes.
@@ -118,7 +154,7 @@ const MAX_LINE: usize = 32;
 ///
 /// Commands that change or interrupt something are whole lines, so that noise on an unconnected input does not trigger them.
 #[derive(Debug, Clone, Default)]
-pub struct CommandParser {
+pub(crate) struct CommandParser {
     line: Vec<u8, MAX_LINE>,
     /// The line is invalid: ignored up to its end.
     invalid: bool,
@@ -126,7 +162,7 @@ pub struct CommandParser {
 
 impl CommandParser {
     /// Takes one byte and returns the command or error that it completes, if any.
-    pub fn push(&mut self, byte: u8) -> Option<Result<DeviceCommand, CommandError>> {
+    pub(crate) fn push(&mut self, byte: u8) -> Option<Result<Command, CommandError>> {
         match byte {
             b'\r' | b'\n' => {
                 let invalid = core::mem::take(&mut self.invalid);
@@ -135,6 +171,10 @@ impl CommandParser {
                 self.line.clear();
                 Some(command)
             }
+            LOST => {
+                self.line.clear();
+                (!core::mem::replace(&mut self.invalid, true)).then_some(Err(CommandError::LostBytes))
+            }
             0x08 | 0x7F => {
                 self.line.pop();
                 None
@@ -142,14 +182,14 @@ impl CommandParser {
             _ if self.line.is_empty() && key(byte).is_some() => key(byte).map(Ok),
             _ if self.invalid => None,
             b' ' if self.line.is_empty() => None,
-            b'a'..=b'z' | b'0'..=b'9' | b'.' | b'_' | b' ' if !self.line.is_empty() || LINE_STARTS.contains(&byte) => {
+            b'a'..=b'z' | b'0'..=b'9' | b'.' | b'_' | b' ' if !self.line.is_empty() || begins_line(byte) => {
                 self.line.push(byte).err().map(|byte| self.reject(byte))
             }
             _ => Some(self.reject(byte)),
         }
     }
 
-    fn reject(&mut self, byte: u8) -> Result<DeviceCommand, CommandError> {
+    fn reject(&mut self, byte: u8) -> Result<Command, CommandError> {
         let error =
             self.line.first().map_or(CommandError::UnknownKey(byte), |&letter| CommandError::InvalidLine(letter));
         self.line.clear();
@@ -158,90 +198,64 @@ impl CommandParser {
     }
 }
 
-fn key(byte: u8) -> Option<DeviceCommand> {
-    Some(match byte {
-        b'?' => DeviceCommand::Help,
-        b'r' => DeviceCommand::Report,
-        b't' => DeviceCommand::Table,
-        b's' => DeviceCommand::Status,
-        b'k' => DeviceCommand::Counters,
-        b'v' => DeviceCommand::Version,
-        _ => return None,
+/// The command of a key that acts at once.
+fn key(byte: u8) -> Option<Command> {
+    COMMANDS.iter().find_map(|(usage, form, _)| match form {
+        Form::Key(command) if usage.as_bytes() == [byte] => Some(*command),
+        _ => None,
     })
 }
 
-/// Letters that a line may begin with.
-const LINE_STARTS: &[u8] = b"fgneiwcabpdhm";
-
-fn whole_line(line: &[u8]) -> Option<DeviceCommand> {
-    let words = core::str::from_utf8(line).ok()?.split_ascii_whitespace();
-    if let Some(command) = register_command(words) {
-        return Some(command);
-    }
-    let line: Vec<u8, MAX_LINE> = line.iter().copied().filter(|&byte| byte != b' ').collect();
-    match line.as_slice() {
-        b"help" => return Some(DeviceCommand::Help),
-        b"dump" => return Some(DeviceCommand::DumpRegisters),
-        b"measure" => return Some(DeviceCommand::Measure),
-        b"deflect" => return Some(DeviceCommand::Deflections),
-        b"careful1" => return Some(DeviceCommand::CarefulBus(true)),
-        b"careful0" => return Some(DeviceCommand::CarefulBus(false)),
-        b"check" => return Some(DeviceCommand::SelfTest),
-        b"arm" => return Some(DeviceCommand::ArmAutoNull),
-        b"autonull" => return Some(DeviceCommand::AutoNull),
-        b"clear" => return Some(DeviceCommand::ResetStatistics),
-        b"persist" => return Some(DeviceCommand::Persist),
-        b"forget" => return Some(DeviceCommand::Forget),
-        b"boot" => return Some(DeviceCommand::Restart),
-        b"bootsel" => return Some(DeviceCommand::BootLoader),
-        b"brownout" => return Some(DeviceCommand::BrownOut),
-        _ => {}
-    }
-    let (&letter, digits) = line.split_first()?;
-    let thousandths = thousandths(digits)?;
-    if letter == b'f' {
-        return Some(DeviceCommand::Rate(thousandths));
-    }
-    let number = if thousandths % 1000 == 0 { thousandths / 1000 } else { return None };
-    match (letter, number) {
-        (b'g', 300) => Some(DeviceCommand::Range(GyroRange::Dps300)),
-        (b'g', 150) => Some(DeviceCommand::Range(GyroRange::Dps150)),
-        (b'g', 75) => Some(DeviceCommand::Range(GyroRange::Dps75)),
-        (b'n', 0..=6) => Some(DeviceCommand::Filter(number as u8)),
-        (b'e', _) => Some(DeviceCommand::Epoch(number)),
-        (b'i', _) => Some(DeviceCommand::Interval(number)),
-        (b'p', _) => u16::try_from(number).ok().map(DeviceCommand::ProductId),
-        (b'w', 0) => Some(DeviceCommand::RawStream(false)),
-        (b'w', 1) => Some(DeviceCommand::RawStream(true)),
-        _ => None,
-    }
+/// Whether a command with Enter begins with this byte.
+fn begins_line(byte: u8) -> bool {
+    let is_line = |form: &Form| !matches!(form, Form::Title | Form::Key(_));
+    COMMANDS.iter().any(|(usage, form, _)| is_line(form) && usage.as_bytes()[0] == byte)
 }
 
-/// `peek REGISTER` or `poke REGISTER VALUE`.
-fn register_command<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<DeviceCommand> {
-    let (verb, register) = (words.next()?, register(words.next()?)?);
-    let command = match verb {
-        "peek" => DeviceCommand::ReadRegister(register),
-        "poke" => DeviceCommand::WriteRegister(register, hexadecimal(words.next()?)?),
-        _ => return None,
-    };
-    words.next().is_none().then_some(command)
+fn whole_line(line: &[u8]) -> Option<Command> {
+    let line = core::str::from_utf8(line).ok()?;
+    COMMANDS.iter().find_map(|(usage, form, _)| form.parse(line.trim_start().strip_prefix(word(usage))?))
+}
+
+/// The word that a usage begins with.
+fn word(usage: &str) -> &str {
+    usage.split(' ').next().unwrap_or_default()
+}
+
+impl Form {
+    /// The command with what follows its word.
+    fn parse(self, rest: &str) -> Option<Command> {
+        let mut words = rest.split_ascii_whitespace();
+        let first = words.next();
+        let command = match self {
+            Self::Word(command) => first.is_none().then_some(command)?,
+            Self::Thousandths(command) => command(thousandths(first?)?),
+            Self::Number(command) => {
+                let thousandths = thousandths(first?)?;
+                command(thousandths.is_multiple_of(1000).then_some(thousandths / 1000)?)?
+            }
+            Self::Register(command) => command(register(first?)?),
+            Self::RegisterValue(command) => command(register(first?)?, hexadecimal(words.next()?)?),
+            Self::Title | Self::Key(_) => return None,
+        };
+        words.next().is_none().then_some(command)
+    }
 }
 
 /// Parses a decimal number as thousandths, truncated after the third decimal; the largest is 4 294 967.295.
-fn thousandths(digits: &[u8]) -> Option<u32> {
-    let mut parts = digits.split(|&byte| byte == b'.');
+fn thousandths(digits: &str) -> Option<u32> {
+    let mut parts = digits.split('.');
     let (whole, fraction) = (parts.next()?, parts.next().unwrap_or_default());
     if parts.next().is_some() || whole.is_empty() && fraction.is_empty() {
         return None;
     }
     let digit = |byte: u8| byte.is_ascii_digit().then(|| u32::from(byte - b'0'));
     let append = |number: u32, byte: u8| number.checked_mul(10)?.checked_add(digit(byte)?);
-    if !fraction.iter().all(u8::is_ascii_digit) {
+    if !fraction.bytes().all(|byte| byte.is_ascii_digit()) {
         return None;
     }
-    let decimals = fraction.iter().copied().chain(core::iter::repeat(b'0')).take(3);
-    whole.iter().copied().chain(decimals).try_fold(0, append)
+    let decimals = fraction.bytes().chain(core::iter::repeat(b'0')).take(3);
+    whole.bytes().chain(decimals).try_fold(0, append)
 }
 
 #[cfg(test)]
@@ -251,34 +265,30 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    fn parse(text: &str) -> Vec<Result<DeviceCommand, CommandError>> {
+    fn parse(text: &str) -> Vec<Result<Command, CommandError>> {
         let mut parser = CommandParser::default();
         text.bytes().filter_map(|byte| parser.push(byte)).collect()
     }
 
     #[test]
     fn single_letters_act_at_once_and_numbers_with_enter() {
-        assert_eq!(parse("r?"), [Ok(DeviceCommand::Report), Ok(DeviceCommand::Help)]);
+        assert_eq!(parse("r?"), [Ok(Command::Report), Ok(Command::Answer(Answer::Help))]);
         assert_eq!(
             parse("f 819.2\rn4\ng 75\r\n"),
-            [
-                Ok(DeviceCommand::Rate(819_200)),
-                Ok(DeviceCommand::Filter(4)),
-                Ok(DeviceCommand::Range(GyroRange::Dps75)),
-            ]
+            [Ok(Command::Rate(819_200)), Ok(Command::Filter(4)), Ok(Command::Range(GyroRange::Dps75)),]
         );
         assert_eq!(
             parse("e3600\ri0\rw1\rw 0\r"),
             [
-                Ok(DeviceCommand::Epoch(3600)),
-                Ok(DeviceCommand::Interval(0)),
-                Ok(DeviceCommand::RawStream(true)),
-                Ok(DeviceCommand::RawStream(false)),
+                Ok(Command::Epoch(3600)),
+                Ok(Command::Interval(0)),
+                Ok(Command::RawStream(true)),
+                Ok(Command::RawStream(false)),
             ]
         );
         assert_eq!(
             parse("f.5\rf5.\rf1.23456\r"),
-            [Ok(DeviceCommand::Rate(500)), Ok(DeviceCommand::Rate(5000)), Ok(DeviceCommand::Rate(1234)),]
+            [Ok(Command::Rate(500)), Ok(Command::Rate(5000)), Ok(Command::Rate(1234)),]
         );
     }
 
@@ -287,52 +297,49 @@ mod tests {
         assert_eq!(
             parse("clear\rcheck\narm\rautonull\rboot\rbrownout\rbootsel\rp 3\r"),
             [
-                Ok(DeviceCommand::ResetStatistics),
-                Ok(DeviceCommand::SelfTest),
-                Ok(DeviceCommand::ArmAutoNull),
-                Ok(DeviceCommand::AutoNull),
-                Ok(DeviceCommand::Restart),
-                Ok(DeviceCommand::BrownOut),
-                Ok(DeviceCommand::BootLoader),
-                Ok(DeviceCommand::ProductId(3)),
+                Ok(Command::ResetStatistics),
+                Ok(Command::SelfTest),
+                Ok(Command::Arm),
+                Ok(Command::AutoNull),
+                Ok(Command::Restart),
+                Ok(Command::BrownOut),
+                Ok(Command::BootLoader),
+                Ok(Command::ProductId(3)),
             ]
         );
         assert_eq!(
             parse("dump\rmeasure\rdeflect\rcareful 1\rcareful 0\rpersist\rforget\rhelp\r"),
             [
-                Ok(DeviceCommand::DumpRegisters),
-                Ok(DeviceCommand::Measure),
-                Ok(DeviceCommand::Deflections),
-                Ok(DeviceCommand::CarefulBus(true)),
-                Ok(DeviceCommand::CarefulBus(false)),
-                Ok(DeviceCommand::Persist),
-                Ok(DeviceCommand::Forget),
-                Ok(DeviceCommand::Help),
+                Ok(Command::Answer(Answer::Registers)),
+                Ok(Command::Answer(Answer::Measurement)),
+                Ok(Command::Answer(Answer::Deflections)),
+                Ok(Command::CarefulBus(true)),
+                Ok(Command::CarefulBus(false)),
+                Ok(Command::Persist),
+                Ok(Command::Forget),
+                Ok(Command::Answer(Answer::Help)),
             ]
         );
         assert_eq!(
             parse("peek smpl_prd\rpeek 36\rpoke sens_avg 0x0402\rpoke 3e 80 \r"),
             [
-                Ok(DeviceCommand::ReadRegister(Register::SmplPrd)),
-                Ok(DeviceCommand::ReadRegister(Register::SmplPrd)),
-                Ok(DeviceCommand::WriteRegister(Register::SensAvg, 0x0402)),
-                Ok(DeviceCommand::WriteRegister(Register::GlobCmd, 0x0080)),
+                Ok(Command::ReadRegister(Register::SmplPrd)),
+                Ok(Command::ReadRegister(Register::SmplPrd)),
+                Ok(Command::WriteRegister(Register::SensAvg, 0x0402)),
+                Ok(Command::WriteRegister(Register::GlobCmd, 0x0080)),
             ]
         );
         // After an unknown key the line is ignored, except the key `t`, which acts at once.
         assert_eq!(
             parse("xautonull\rclear\r"),
-            [Err(CommandError::UnknownKey(b'x')), Ok(DeviceCommand::Table), Ok(DeviceCommand::ResetStatistics),]
+            [Err(CommandError::UnknownKey(b'x')), Ok(Command::Answer(Answer::Table)), Ok(Command::ResetStatistics),]
         );
     }
 
     #[test]
     fn an_error_is_reported_once_and_ends_with_the_line() {
-        assert_eq!(
-            parse("xyXY5r\rr"),
-            [Err(CommandError::UnknownKey(b'x')), Ok(DeviceCommand::Report), Ok(DeviceCommand::Report)]
-        );
-        assert_eq!(parse("f1\u{8}\u{8}r"), [Ok(DeviceCommand::Report)], "backspace deletes a letter");
+        assert_eq!(parse("xyXY5r\rr"), [Err(CommandError::UnknownKey(b'x')), Ok(Command::Report), Ok(Command::Report)]);
+        assert_eq!(parse("f1\u{8}\u{8}r"), [Ok(Command::Report)], "backspace deletes a letter");
         let long = "f000000000000000000000000000000000\r";
         for wrong in [
             "f\r",
@@ -360,15 +367,28 @@ mod tests {
         }
     }
 
-    /// The first letters in the help are exactly the keys and the letters that a line may begin with.
+    /// No command hides another: each word gives its own, and each line of the list fits a terminal.
     #[test]
-    fn the_help_is_complete() {
-        let first = |line: &&str| line.split([' ', ',']).next().unwrap().as_bytes()[0];
-        let listed: Vec<u8> = HELP.iter().filter(|line| !line.ends_with(':')).map(first).collect();
-        for letter in b'!'..=b'~' {
-            let known = key(letter).is_some() || LINE_STARTS.contains(&letter);
-            assert_eq!(known, listed.contains(&letter), "{}", letter as char);
+    fn every_command_of_the_list_is_parsed() {
+        for (index, (usage, form, _)) in COMMANDS.iter().enumerate() {
+            assert!(help(index).is_some_and(|line| line.len() <= 80), "{usage}");
+            let argument = match form {
+                Form::Title => continue,
+                Form::Key(command) => {
+                    assert_eq!(parse(usage), [Ok(*command)], "{usage}");
+                    continue;
+                }
+                Form::Word(_) => "",
+                Form::Thousandths(_) | Form::Number(_) if *usage == "g RANGE" => "300",
+                Form::Thousandths(_) | Form::Number(_) => "1",
+                Form::Register(_) => "36",
+                Form::RegisterValue(_) => "36 7",
+            };
+            let typed = std::format!("{} {argument}\r", word(usage));
+            let expected = form.parse(argument).expect("a command");
+            assert_eq!(parse(&typed), [Ok(expected)], "{typed}");
         }
+        assert!(help(COMMANDS.len()).is_none());
     }
 
     /// A million random bytes give keys, but no command that changes something.
@@ -379,8 +399,8 @@ mod tests {
         for _ in 0..1_000_000 {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             if let Some(Ok(command)) = parser.push((state >> 56) as u8) {
-                use DeviceCommand::{Counters, Help, Report, Status, Table, Version};
-                assert!(matches!(command, Help | Report | Table | Status | Counters | Version), "{command:?}");
+                let is_key = COMMANDS.iter().any(|(_, form, _)| matches!(form, Form::Key(key) if *key == command));
+                assert!(is_key, "{command:?}");
             }
         }
     }

@@ -1,13 +1,12 @@
 //! Text for a person at a terminal: single lines, and answers of several lines that are made and sent one line at a time.
 
+use crate::answer::{Answer, AnswerLine};
 use crate::bench_console::{deflection_line, dump_line, measurement_line};
-use crate::bench_log::bench_log;
 use crate::board::Board;
-use crate::command::HELP;
-use crate::counters::counters;
+use crate::command::help;
 use crate::device::DeviceState;
 use crate::number_text::Decimal;
-use crate::report_text::{self, AnswerLine};
+use crate::report_text;
 use core::fmt::Arguments;
 use heapless::Deque;
 use link::{ClockSource, Health, TextLine, text_line};
@@ -15,26 +14,13 @@ use link::{ClockSource, Health, TextLine, text_line};
 /// Answer to the version command.
 pub(crate) const VERSION_LINE: &str = concat!("ADIS16405 noise observatory ", env!("CARGO_PKG_VERSION"));
 
+/// What the device says of a start without anything that was stored.
+pub(crate) const SAFE_MODE: &str = "safe mode after three crashes: stored settings and models are not used";
+
 /// Text lines that may wait for room in the transmit queue.
 const WAITING_LINES: usize = 4;
 /// Answers that may wait, the one that is being sent included.
 const WAITING_ANSWERS: usize = 4;
-
-/// An answer of several lines.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Answer {
-    Help,
-    /// The report as a table.
-    Table,
-    Counters,
-    Status,
-    /// All registers of the sensor.
-    Registers,
-    /// The times of the bus and of data ready.
-    Measurement,
-    /// The self-test with its deflections.
-    Deflections,
-}
 
 /// Text lines and answers that wait to be sent.
 pub(crate) struct Console {
@@ -43,17 +29,18 @@ pub(crate) struct Console {
     answers: Deque<Answer, WAITING_ANSWERS>,
     /// Index of the next line of the first answer.
     next_line: usize,
+    /// The counters as they were when their answer began: reading them searches the stack, which takes a millisecond.
+    counted: Health,
 }
 
 impl Console {
-    pub(crate) const fn new() -> Self {
-        Self { lines: Deque::new(), answers: Deque::new(), next_line: 0 }
+    pub(crate) fn new() -> Self {
+        Self { lines: Deque::new(), answers: Deque::new(), next_line: 0, counted: Health::default() }
     }
 
     /// Sends a text line, after those that wait. If too many wait, the oldest is dropped.
     pub(crate) fn print(&mut self, board: &mut impl Board, text: Arguments<'_>) {
         let line = text_line(text);
-        bench_log(&line);
         if self.lines.is_empty() && board.transmit_queue(|queue| queue.send_text(&line)) {
             return;
         }
@@ -97,11 +84,14 @@ impl Console {
         let Some(&answer) = self.answers.front() else { return };
         let index = self.next_line;
         let line = match answer {
-            Answer::Help => {
-                HELP.get(index).map_or(AnswerLine::End, |text| AnswerLine::Text(text_line(format_args!("{text}"))))
-            }
+            Answer::Help => help(index).map_or(AnswerLine::End, AnswerLine::Text),
             Answer::Table => report_text::line(state, board, index),
-            Answer::Counters => counter_line(&state.health(board), index),
+            Answer::Counters => {
+                if index == 0 {
+                    self.counted = state.health(board);
+                }
+                counter_line(&self.counted, index)
+            }
             Answer::Status => status_line(state, board, index),
             Answer::Registers => dump_line(state, board, index),
             Answer::Measurement => measurement_line(state, board, index),
@@ -157,14 +147,16 @@ fn status_line(state: &DeviceState, board: &mut impl Board, index: usize) -> Ans
             ClockSource::Crystal => text_line(format_args!("clock: crystal")),
             ClockSource::Internal => text_line(format_args!("clock: internal oscillator, the crystal did not start")),
         },
-        6 if !boot.crash_record.is_empty() => text_line(format_args!("crash record: {}", boot.crash_record)),
+        6 if boot.safe_mode => text_line(format_args!("{SAFE_MODE}")),
+        7 if !boot.crash_record.is_empty() => text_line(format_args!("crash record: {}", boot.crash_record)),
+        6 | 7 => return AnswerLine::Skip,
         _ => return AnswerLine::End,
     })
 }
 
 /// A line for each counter that is not 0.
 fn counter_line(health: &Health, index: usize) -> AnswerLine {
-    match counters(health).get(index) {
+    match health.counters().get(index) {
         Some(counter) => {
             (counter.value > 0).then(|| text_line(format_args!("{} {}", counter.name, counter.value))).into()
         }

@@ -1,49 +1,42 @@
 //! Crash record: the text that a panic or fault leaves in retained RAM for the next start.
 
+use crate::slot::Slot;
 use core::fmt;
-use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use heapless::Vec;
 use link::{MAX_TEXT, TextLine, text_line};
 
 const TEXT_WORDS: usize = MAX_TEXT / 4;
-const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+/// Of no build: what a program leaves is told by the one that was flashed next.
+const KEY: u32 = 0xC4A5_4EC0;
 
-/// A line of text in memory that a warm reset does not clear: length, text, and the checksum of both.
-pub struct CrashRecord([AtomicU32; TEXT_WORDS + 2]);
+/// A line of text in memory that a warm reset does not clear: its length and its bytes.
+pub struct CrashRecord(Slot<{ 1 + TEXT_WORDS }>);
 
 impl CrashRecord {
     /// A record without text.
     #[must_use]
     pub const fn blank() -> Self {
-        Self([const { AtomicU32::new(0) }; TEXT_WORDS + 2])
+        Self(Slot::blank())
     }
 
-    /// Writes `text`, truncated to [`MAX_TEXT`] bytes.
+    /// Writes `text`, truncated to [`MAX_TEXT`] bytes, unless there is one already: what crashes later, such as the report of a panic,
+    /// is not the cause.
     pub fn write(&self, text: fmt::Arguments<'_>) {
-        let line = text_line(text);
-        self.0[0].store(line.len() as u32, Relaxed);
-        let mut bytes = line.bytes();
-        for cell in &self.0[1..=TEXT_WORDS] {
-            cell.store(u32::from_le_bytes(core::array::from_fn(|_| bytes.next().unwrap_or(0))), Relaxed);
+        if self.0.read(KEY).is_none() {
+            let line = text_line(text);
+            let mut bytes = line.bytes();
+            let word = |_| u32::from_le_bytes(core::array::from_fn(|_| bytes.next().unwrap_or(0)));
+            self.0.write(KEY, [line.len() as u32].into_iter().chain((0..TEXT_WORDS).map(word)));
         }
-        self.0[TEXT_WORDS + 1].store(self.checksum(), Relaxed);
     }
 
     /// Returns the text and erases it; empty if there was none or it was damaged.
     pub fn take(&self) -> TextLine {
-        let intact = self.0[TEXT_WORDS + 1].load(Relaxed) == self.checksum();
-        let length = self.0[0].load(Relaxed) as usize;
-        let bytes = self.0[1..=TEXT_WORDS].iter().flat_map(|cell| cell.load(Relaxed).to_le_bytes());
-        let text: heapless::Vec<u8, { 4 * TEXT_WORDS }> = bytes.take(if intact { length } else { 0 }).collect();
-        self.0[TEXT_WORDS + 1].store(!self.checksum(), Relaxed);
+        let Some(mut words) = self.0.read(KEY) else { return TextLine::new() };
+        let length = words.word() as usize;
+        let text: Vec<u8, { 4 * TEXT_WORDS }> = words.0.flat_map(u32::to_le_bytes).take(length).collect();
+        self.0.clear();
         core::str::from_utf8(&text).ok().and_then(|text| TextLine::try_from(text).ok()).unwrap_or_default()
-    }
-
-    fn checksum(&self) -> u32 {
-        let mut digest = CRC.digest();
-        for cell in &self.0[..=TEXT_WORDS] {
-            digest.update(&cell.load(Relaxed).to_le_bytes());
-        }
-        digest.finalize()
     }
 }
 
@@ -60,13 +53,24 @@ mod tests {
         assert_eq!(record.take(), "");
     }
 
+    /// A panic whose report overflows the stack.
+    #[test]
+    fn the_first_crash_of_a_run_is_kept() {
+        let record = CrashRecord::blank();
+        record.write(format_args!("panic at app.rs:7"));
+        record.write(format_args!("stack overflow"));
+        assert_eq!(record.take(), "panic at app.rs:7");
+        record.write(format_args!("stack overflow"));
+        assert_eq!(record.take(), "stack overflow");
+    }
+
     #[test]
     fn a_damaged_record_is_not_read() {
-        for cell in 0..TEXT_WORDS + 2 {
+        for word in 0..TEXT_WORDS + 2 {
             let record = CrashRecord::blank();
             record.write(format_args!("{:>200}", "°C"));
-            record.0[cell].fetch_xor(1 << 9, Relaxed);
-            assert_eq!(record.take(), "", "word {cell}");
+            record.0.flip(word, 9);
+            assert_eq!(record.take(), "", "word {word}");
         }
     }
 

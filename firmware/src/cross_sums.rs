@@ -35,9 +35,9 @@ pub(crate) struct CrossSums {
     /// Products in each sum: one in 32 samples at most.
     counts: [[u32; PAIRS.len()]; CROSS_OCTAVES],
     totals: [i64; CHANNELS.len()],
-    /// Samples that at least one channel has taken, and how many of them each channel lacks.
+    /// Samples that at least one channel has taken, and how many of them were refused in each channel.
     samples: u64,
-    lacking: [u64; CHANNELS.len()],
+    refused_counts: [u64; CHANNELS.len()],
     /// A channel has samples of before a restart, which are not in these sums.
     incomplete: bool,
 }
@@ -50,7 +50,7 @@ impl CrossSums {
             counts: [[0; PAIRS.len()]; CROSS_OCTAVES],
             totals: [0; CHANNELS.len()],
             samples: 0,
-            lacking: [0; CHANNELS.len()],
+            refused_counts: [0; CHANNELS.len()],
             incomplete: false,
         }
     }
@@ -60,7 +60,7 @@ impl CrossSums {
         self.low.fill([0; PAIRS.len()]);
         self.high.fill([0; PAIRS.len()]);
         self.counts.fill([0; PAIRS.len()]);
-        (self.totals, self.samples, self.lacking) = ([0; CHANNELS.len()], 0, [0; CHANNELS.len()]);
+        (self.totals, self.samples, self.refused_counts) = ([0; CHANNELS.len()], 0, [0; CHANNELS.len()]);
         self.incomplete = false;
     }
 
@@ -85,7 +85,7 @@ impl CrossSums {
             *total += i64::from(count);
         }
         if !refused.is_empty() {
-            self.take_back(counts, refused);
+            self.subtract_refused(counts, refused);
         }
         // All channels with a sample are at the same time, so the same octaves are due in them.
         let due =
@@ -99,10 +99,10 @@ impl CrossSums {
 
     /// Takes refused counts out of the totals again. Not inlined: they are rare.
     #[inline(never)]
-    fn take_back(&mut self, counts: [i32; CHANNELS.len()], refused: ChannelSet) {
-        for (index, (total, lacking)) in self.totals.iter_mut().zip(&mut self.lacking).enumerate() {
+    fn subtract_refused(&mut self, counts: [i32; CHANNELS.len()], refused: ChannelSet) {
+        for (index, (total, refused_counts)) in self.totals.iter_mut().zip(&mut self.refused_counts).enumerate() {
             if refused.contains(index) {
-                (*total, *lacking) = (*total - i64::from(counts[index]), *lacking + 1);
+                (*total, *refused_counts) = (*total - i64::from(counts[index]), *refused_counts + 1);
             }
         }
     }
@@ -126,13 +126,17 @@ fn wide(low: u64, high: i32) -> i128 {
     i128::from(high) << 64 | i128::from(low)
 }
 
+/// The covariance of a pair that was not observed.
+const NOT_OBSERVED: f64 = 0.0;
+
 /// Mean of every channel of [`CHANNELS`] in counts.
 pub(crate) type ChannelMeans = [f64; CHANNELS.len()];
 
 /// Allan covariances and means of a finished epoch, rounded from its [`CrossSums`]: nothing is added to them any more.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllanCovariances {
-    /// Allan covariance of each pair at each octave in counts²; infinite where the pair was not observed.
+    /// Allan covariance of each pair at each octave in counts²; 0 where the pair was not observed, and −0 for a covariance of 0: an epoch
+    /// of no samples is then memory of zeros, which takes no flash.
     pub(crate) pairs: [[f64; CROSS_OCTAVES]; PAIRS.len()],
     /// Mean of every channel; 0 without samples.
     pub means: ChannelMeans,
@@ -143,18 +147,20 @@ pub struct AllanCovariances {
 impl AllanCovariances {
     /// Covariances of no samples.
     pub const EMPTY: Self =
-        Self { pairs: [[f64::INFINITY; CROSS_OCTAVES]; PAIRS.len()], means: [0.0; CHANNELS.len()], complete: false };
+        Self { pairs: [[NOT_OBSERVED; CROSS_OCTAVES]; PAIRS.len()], means: [0.0; CHANNELS.len()], complete: false };
 
     /// Overwrites them with those of an epoch's sums, in place: 2.5 kB.
     pub(crate) fn fill(&mut self, sums: &CrossSums) {
         self.complete = !sums.incomplete;
-        let samples = |index: usize| (sums.samples - sums.lacking[index]).max(1);
+        let samples = |index: usize| (sums.samples - sums.refused_counts[index]).max(1);
         self.means = core::array::from_fn(|index| sums.totals[index] as f64 / samples(index) as f64);
         for (pair, covariances) in self.pairs.iter_mut().enumerate() {
             for (k, covariance) in covariances.iter_mut().enumerate() {
                 let (n, count) = ((1_u64 << (FIRST_CROSS_OCTAVE + k)) as f64, f64::from(sums.counts[k][pair]));
                 let sum = wide(sums.low[k][pair], sums.high[k][pair]) as f64;
-                *covariance = if count > 0.0 { sum / (2.0 * count * n * n) } else { f64::INFINITY };
+                // A sum of 0 is none of −0.
+                let sum = if sum == 0.0 { -0.0 } else { sum };
+                *covariance = if count > 0.0 { sum / (2.0 * count * n * n) } else { NOT_OBSERVED };
             }
         }
     }
@@ -165,7 +171,7 @@ impl AllanCovariances {
     pub fn covariance(&self, a: usize, b: usize, n: u64) -> Option<f64> {
         let pair = PAIRS.iter().position(|&pair| pair == (a.min(b), a.max(b)))?;
         let octave = (n.trailing_zeros() as usize).checked_sub(FIRST_CROSS_OCTAVE).filter(|_| n.is_power_of_two())?;
-        self.pairs[pair].get(octave).copied().filter(|covariance| covariance.is_finite())
+        self.pairs[pair].get(octave).copied().filter(|covariance| covariance.to_bits() != NOT_OBSERVED.to_bits())
     }
 }
 
@@ -235,5 +241,20 @@ mod tests {
         assert_eq!(covariances.covariance(GYRO_X, TEMPERATURE, 256), None);
         assert!(covariances.covariance(TEMPERATURE, SUPPLY, 256).is_some());
         assert_eq!(covariances.means[GYRO_X], 0.0);
+    }
+
+    /// Samples that do not vary have a covariance of 0, which is not the same as none.
+    #[test]
+    fn a_covariance_of_zero_is_one() {
+        let mut estimators = Box::new([const { ChannelEstimator::new() }; CHANNELS.len()]);
+        let mut sums = Box::new(CrossSums::new());
+        for _ in 0..2048 {
+            estimators.iter_mut().for_each(|estimator| estimator.push(0));
+            sums.add(&estimators, [0; CHANNELS.len()], ChannelSet::EMPTY);
+        }
+        let mut covariances = Box::new(AllanCovariances::EMPTY);
+        assert_eq!(covariances.covariance(GYRO_X, TEMPERATURE, 256), None);
+        covariances.fill(&sums);
+        assert_eq!(covariances.covariance(GYRO_X, TEMPERATURE, 256), Some(0.0));
     }
 }

@@ -1,16 +1,16 @@
 //! State of the device, and supervision of the sensor: it is probed before its samples are used, recovered when it is in
 //! trouble, and its status register is read when it reports an error.
 
-use crate::bench_log::bench_log;
 use crate::board::{Board, BusTiming};
 use crate::channels::{CHANNELS, ChannelSet};
+use crate::event::event;
 use crate::learner::Learner;
 use crate::recovery::{RecoveryLadder, RecoveryStep};
 use crate::retained::RetainedSettings;
 use crate::sample_intake::SensorTrouble;
 use crate::scale::ReportScale;
 use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, ProbeScope, SensorIdentity, probe, read_diagnosis};
-use crate::status_flags::StatusFlags;
+use crate::status_flags::{StatusFlags, count};
 use adis16405_driver::{ClockMode, Config, GyroRange, SamplePeriod, TimeBase, Timing};
 use core::fmt::Arguments;
 use link::{Boot, Health, MessageRef, text_line};
@@ -55,7 +55,8 @@ pub(crate) struct DeviceState {
     pub(crate) learner: Learner,
     /// When the running epoch began, in µs since the start; negative if that was before.
     pub(crate) epoch_start_us: i64,
-    pub(crate) bad_commands: u32,
+    /// The counters of the application; those of sampling and estimating, and the load, are 0.
+    pub(crate) counters: Health,
     pub(crate) recovery: SensorRecovery,
     pub(crate) status_flags: StatusFlags,
     /// ReportScale of the report that is being sent.
@@ -64,6 +65,7 @@ pub(crate) struct DeviceState {
 
 /// Whether the sensor is in use.
 #[derive(Debug, Clone, Copy)]
+#[cfg_attr(all(target_os = "none", feature = "microcontroller"), derive(defmt::Format))]
 pub(crate) enum SensorState {
     /// To be probed at this time, as this step of recovery or, with `None`, because it was requested.
     Probing { at_us: u64, step: Option<RecoveryStep> },
@@ -83,20 +85,6 @@ pub(crate) struct SensorRecovery {
     pub(crate) failed_test: ChannelSet,
     /// The result of the next self-test was asked for.
     check_requested: bool,
-    /// Times that the sensor was lost after it had delivered samples.
-    recoveries: u32,
-    rereads: u32,
-    bus_resets: u32,
-    sensor_resets: u32,
-    reset_lines: u32,
-}
-
-impl SensorRecovery {
-    /// Resets the counters.
-    pub(crate) fn reset_counters(&mut self) {
-        let Self { ladder, tested, failed_test, check_requested, .. } = *self;
-        *self = Self { ladder, tested, failed_test, check_requested, ..Self::default() };
-    }
 }
 
 impl DeviceState {
@@ -116,26 +104,18 @@ impl DeviceState {
     pub(crate) fn health(&self, board: &mut impl Board) -> Health {
         let (meters, now_us) = (board.meters(), board.now_us());
         let asleep_permille = (1000 * meters.asleep_us).checked_div(now_us).unwrap_or(0);
-        let recovery = &self.recovery;
-        let mut health = Health {
-            recoveries: recovery.recoveries,
-            rereads: recovery.rereads,
-            bus_resets: recovery.bus_resets,
-            sensor_resets: recovery.sensor_resets,
-            reset_lines: recovery.reset_lines,
+        let of_board = Health {
             data_ready_masked: board.sampling_activity().masked,
             usb_dropped: board.transmit_queue(|queue| queue.usb_dropped()),
-            bad_commands: self.bad_commands,
             serial_overruns: meters.serial_overruns,
             awake_permille: 1000_u32.saturating_sub(asleep_permille as u32),
             sampling_cycles: meters.sampling_cycles,
             estimator_cycles: meters.estimator_cycles,
             stack_bytes: meters.stack_bytes,
             stack_size: meters.stack_size,
-            ..board.estimators(|estimators| estimators.health())
+            ..Health::default()
         };
-        self.status_flags.fill(&mut health);
-        health
+        board.estimators(|estimators| estimators.health()).with(&self.counters).with(&of_board)
     }
 
     /// Probes the sensor when that is due, and stops using one that is in trouble. Returns true if the microcontroller is to
@@ -156,7 +136,7 @@ impl DeviceState {
                     panic!("memory is damaged: the sample period is 0");
                 }
                 if let Some(trouble) = trouble {
-                    self.recovery.recoveries = self.recovery.recoveries.saturating_add(u32::from(used));
+                    self.counters.recoveries = self.counters.recoveries.saturating_add(u32::from(used));
                     self.recover(trouble, since_us + RETRY_US, board);
                 } else {
                     if settled {
@@ -183,6 +163,7 @@ impl DeviceState {
 
     /// Stops using the sensor and begins the next step of recovery, not before `earliest_us`.
     fn recover(&mut self, trouble: SensorTrouble, earliest_us: u64, board: &mut impl Board) {
+        event!(warn, "sensor in trouble: {}", trouble);
         let last_edge_us = board.estimators(|estimators| estimators.last_edge_us());
         board.set_sampling(false);
         let (reason, cause, left_alone_us) = match trouble {
@@ -199,6 +180,7 @@ impl DeviceState {
     fn take_step(&mut self, at_us: u64, board: &mut impl Board, reason: Arguments<'_>) {
         let now_us = board.now_us();
         let step = self.recovery.ladder.next_step();
+        event!(warn, "recovery step {}", step);
         if self.recovery.ladder.is_logged() || step == RecoveryStep::Restart {
             log(board, format_args!("sensor: {reason}; {}", step.name()));
         }
@@ -210,12 +192,12 @@ impl DeviceState {
 
     fn probe(&mut self, step: Option<RecoveryStep>, board: &mut impl Board) {
         let mut scope = ProbeScope { pulse: false, reset: false, self_test: !self.recovery.tested };
-        let recovery = &mut self.recovery;
+        let counters = &mut self.counters;
         match step {
             None | Some(RecoveryStep::Restart) => {}
-            Some(RecoveryStep::Reread) => count(&mut recovery.rereads),
+            Some(RecoveryStep::Reread) => count(&mut counters.rereads),
             Some(step @ (RecoveryStep::BusReset | RecoveryStep::CarefulBus)) => {
-                count(&mut recovery.bus_resets);
+                count(&mut counters.bus_resets);
                 board.reset_bus();
                 if step == RecoveryStep::CarefulBus {
                     board.set_bus_timing(BusTiming::CAREFUL);
@@ -223,12 +205,12 @@ impl DeviceState {
                 scope = ProbeScope { pulse: true, reset: false, self_test: true };
             }
             Some(RecoveryStep::ResetLine) if board.reset_sensor() => {
-                count(&mut recovery.reset_lines);
-                recovery.tested = false;
+                count(&mut counters.reset_lines);
+                self.recovery.tested = false;
                 return self.request_probe(board.now_us() + START_UP_US);
             }
             Some(RecoveryStep::SoftwareReset | RecoveryStep::ResetLine) => {
-                count(&mut recovery.sensor_resets);
+                count(&mut counters.sensor_resets);
                 scope = ProbeScope { pulse: true, reset: true, self_test: true };
             }
         }
@@ -244,6 +226,7 @@ impl DeviceState {
                 board.estimators(|estimators| estimators.mark_probed(now_us));
                 board.set_sampling(true);
                 self.sensor = SensorState::Sampled { since_us: now_us };
+                event!(info, "sensor {}", self.sensor);
             }
             Err(error) => {
                 let retry_us = board.now_us() + RETRY_US;
@@ -256,6 +239,7 @@ impl DeviceState {
     fn report_identity(&mut self, identity: SensorIdentity, board: &mut impl Board) {
         let product = identity.product.prod_id();
         self.product_id = product;
+        event!(info, "ADIS{=u16}, self-test {}", product, identity.test);
         let requested = core::mem::take(&mut self.recovery.check_requested);
         let Some(test) = identity.test else {
             return log(board, format_args!("sensor: ADIS{product}, configured"));
@@ -312,7 +296,8 @@ impl DeviceState {
         let diagnosis = read_diagnosis(board.sensor_bus(), self.config);
         board.set_sampling(true);
         board.estimators(|estimators| estimators.clear_error_flag());
-        if let Some(causes) = self.status_flags.add(diagnosis, now_us) {
+        if let Some(causes) = self.status_flags.add(diagnosis, now_us, &mut self.counters) {
+            event!(warn, "DIAG_STAT {}", causes);
             log(board, format_args!("sensor: DIAG_STAT {causes}"));
         }
     }
@@ -326,14 +311,9 @@ pub(crate) fn clock_limit_hz(config: Config) -> u32 {
     }
 }
 
-fn count(counter: &mut u32) {
-    *counter = counter.saturating_add(1);
-}
-
 /// Sends a text as a log message, which host programs receive too.
 pub(crate) fn log(board: &mut impl Board, text: Arguments<'_>) {
     let line = text_line(text);
-    bench_log(&line);
     board.transmit_queue(|queue| queue.send(MessageRef::Log(&line)));
 }
 

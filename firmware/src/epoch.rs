@@ -60,12 +60,6 @@ impl FinishedEpoch {
         self.sums.get(index)
     }
 
-    /// Samples of [`CHANNELS`]`[index]`; 0 if there is no such channel.
-    #[must_use]
-    pub fn samples(&self, index: usize) -> u64 {
-        self.sums(index).map_or(0, |sums| sums.samples)
-    }
-
     /// Rebuilds the Allan variance curve of [`CHANNELS`]`[index]` in its unit.
     pub fn rebuild_curve(&self, curve: &mut Curve<OCTAVES>, index: usize, scale: ReportScale) {
         self.sums[index].rebuild_curve(curve, CHANNELS[index], scale);

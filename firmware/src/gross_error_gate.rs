@@ -10,17 +10,7 @@
 //! numbers hold half of their sum (0.498), and the four largest have room for two gross errors, as each makes two differences.
 //! Blocks of 64 and 128 judged samples replace this estimate, and those of 256 take a quarter of the weight each.
 //!
-//! **False alarms.** The rms is that of about 1,792 differences, which in white noise are correlated by −1/2 with their neighbours,
-//! so that its square has ν = 1,792/1.5 = 1,195 degrees of freedom. A difference over its estimated rms then has Student's
-//! distribution: beyond ±7 it has a probability of 4·10⁻¹², one sample of eight channels at 819.2 samples a second in a year. Noise
-//! behind the sensor's filter has fewer degrees of freedom, ν = 1,792/N at least, and rounding to counts, for which the limit is
-//! three counts wider. The first estimate has ν = 17, and a limit twice as wide, beyond which are 3·10⁻¹² of the samples; the second
-//! has ν = 43, and beyond ±7 are 9·10⁻⁹, 10⁻⁵ of the 128 samples of eight channels that it judges. So one start in 100,000 costs a
-//! sample.
-//!
-//! **What passes.** Of the flips of single bits those by less than the limit: with a noise of 10 counts the lower 7 of 14 bits, whose
-//! flips add (4⁷ − 1)/3·10⁻⁶ = 0.005 counts² to a variance of 110 at a bit error rate of 10⁻⁶; one bit more in the 64 samples after the
-//! first block. Of larger ones those that repeat the error of the sample before within the limit, and a ninth within 128 samples.
+//! The probability of false alarms, and what passes, are derived at the tests.
 
 use crate::channels::{CHANNELS, ChannelSet};
 
@@ -199,6 +189,17 @@ impl ChannelGate {
 
 #[cfg(test)]
 mod tests {
+    //! **False alarms.** The rms is that of about 1,792 differences, which in white noise are correlated by −1/2 with their neighbours, so that
+    //! its square has ν = 1,792/1.5 = 1,195 degrees of freedom. A difference over its estimated rms then has Student's distribution: beyond ±7
+    //! it has a probability of 4·10⁻¹², one sample of eight channels at 819.2 samples a second in a year. Noise behind the sensor's filter has
+    //! fewer degrees of freedom, ν = 1,792/N at least, and rounding to counts, for which the limit is three counts wider. The first estimate
+    //! has ν = 17, and a limit twice as wide, beyond which are 3·10⁻¹² of the samples; the second has ν = 43, and beyond ±7 are 9·10⁻⁹, 10⁻⁵ of
+    //! the 128 samples of eight channels that it judges. So one start in 100,000 costs a sample.
+    //!
+    //! **What passes.** Bit flips smaller than the limit are not detected: with a noise of 10 counts the lower 7 of 14 bits, whose flips add
+    //! (4⁷ − 1)/3·10⁻⁶ = 0.005 counts² to a variance of 110 at a bit error rate of 10⁻⁶; one bit more in the 64 samples after the first
+    //! block. A larger error passes if it repeats that of the sample before within the limit, or if it is the ninth within 128 samples.
+
     extern crate std;
 
     use super::*;

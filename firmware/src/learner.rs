@@ -14,8 +14,8 @@ use allan_core::trace::{AddedTerm, LineCandidates, MAX_ADDED, Trace, trace_while
 use allan_core::{Curve, Model, NoiseTerm};
 use heapless::Vec;
 use link::{
-    LearnedMessage, MAX_DEVIATIONS, ReportedAddedTerm, ReportedCoefficient, ReportedDeviations, ReportedModelError,
-    ReportedParameter, ReportedRegressor, ValidationMessage,
+    LearnedMessage, MAX_COVARIATES, MAX_DEVIATIONS, ReportedAddedTerm, ReportedCoefficient, ReportedDeviations,
+    ReportedModelError, ReportedParameter, ReportedRegressor, ValidationMessage,
 };
 use serde::{Deserialize, Serialize};
 
@@ -26,6 +26,8 @@ use serde::{Deserialize, Serialize};
 const P_VALUE_SUFFICIENT: f64 = 0.2;
 
 const _: () = assert!(MAX_ADDED == link::MAX_ADDED_TERMS);
+/// Most that a model has beyond N, B and K.
+pub(crate) const MAX_FINDINGS: usize = MAX_COVARIATES + MAX_ADDED;
 
 /// The model of one channel: only coefficients, since the device stores six of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -251,27 +253,8 @@ pub(crate) struct Learner {
     pub(crate) models: [EpochModel; INERTIAL],
     /// Channel means of the epoch that the models were fitted to.
     means: Option<ChannelMeans>,
-    /// Results on the last finished epoch.
-    pub(crate) results: [Option<ValidationResult>; INERTIAL],
-}
-
-/// Main figures of a validation.
-#[derive(Clone, Copy)]
-pub(crate) struct ValidationResult {
-    /// Deviance per point of N, B and K on the stream, and of the full model on the compensated stream.
-    pub(crate) deviance_per_point: (f64, f64),
-    /// Allan deviations at the longest averaging time that the epoch holds eight times.
-    pub(crate) drift: ReportedDeviations,
-    /// That averaging time in s.
-    pub(crate) tau_s: f64,
-}
-
-impl ValidationResult {
-    fn from_message(message: &ValidationMessage, samples: u64, scale: ReportScale) -> Option<Self> {
-        let deviance_per_point = (message.before?.deviance_per_point, message.after?.deviance_per_point);
-        let drift = *message.drift.iter().rfind(|drift| drift.n <= samples / 8)?;
-        Some(Self { deviance_per_point, drift, tau_s: drift.n as f64 * scale.period_s() })
-    }
+    /// Deviance per point on the last finished epoch, of N, B and K on the stream, and of the full model on the compensated stream.
+    pub(crate) errors: [Option<(f64, f64)>; INERTIAL],
 }
 
 impl Learner {
@@ -281,14 +264,14 @@ impl Learner {
             finished: Some(finished),
             models: [const { EpochModel::EMPTY }; INERTIAL],
             means: None,
-            results: [const { None }; INERTIAL],
+            errors: [None; INERTIAL],
         }
     }
 
     /// Discards the models and the results.
     pub(crate) fn reset(&mut self) {
         self.models = [const { EpochModel::EMPTY }; INERTIAL];
-        self.results = [const { None }; INERTIAL];
+        self.errors = [None; INERTIAL];
         self.means = None;
     }
 
@@ -302,8 +285,9 @@ impl Learner {
         let epoch = self.finished.as_deref()?;
         let scale = epoch.scale(config);
         let message = validate(&self.models[index], self.means.as_ref(), epoch, index, scale);
-        self.results[index] =
-            message.as_ref().and_then(|message| ValidationResult::from_message(message, epoch.samples(index), scale));
+        let deviance = |error: Option<ReportedModelError>| Some(error?.deviance_per_point);
+        self.errors[index] =
+            message.as_ref().and_then(|message| Some((deviance(message.before)?, deviance(message.after)?)));
         message
     }
 

@@ -21,14 +21,14 @@
 //! | [`learner`] | models fitted to a finished epoch and validated on the next |
 //! | `device` | state of the device, supervision of the sensor |
 //! | `recovery`, `status_flags` | steps by which a sensor in trouble is recovered; what its status register has shown |
-//! | `task_monitor` | proof that every task is alive, for the watchdog |
+//! | `watchdog` | proof that every task is alive and the clock runs, for the watchdog |
 //! | `report_messages`, `report_frames` | the messages of a report; the report in frames, message by message |
 //! | `report_text`, [`number_text`] | the report as a table that people read; numbers in it |
-//! | [`console`], `bench_console` | answers in text; registers, bus times and deflections for a bench |
-//! | `counters`, `bench_log` | the counters by name; what a debug probe reads |
-//! | `transmit`, [`usb_port`] | the queues to the serial ports, raw stream; the USB port |
+//! | [`console`], `answer`, `bench_console` | answers in text; registers, bus times and deflections for a bench |
+//! | `event`, `counters` | what a debug probe reads: events, and counters that have risen |
+//! | `transmit`, `receive`, [`usb_port`] | the queues to and from the serial ports, raw stream; the USB port |
 //! | [`command`], `app` | commands, main loop |
-//! | [`retained`], `epoch_record`, `crash_record` | what survives a warm reset |
+//! | [`retained`], `slot`, `epoch_record`, `crash_record` | what survives a warm reset |
 //! | `stored_state`, [`settings_store`] | what survives the loss of power, and the flash memory that keeps it |
 //!
 //! Sampling has a higher priority than the estimators, and these a higher one than the main loop. While a lower priority
@@ -38,9 +38,9 @@
 #![deny(missing_docs)]
 
 pub mod acquisition;
+mod answer;
 mod app;
 mod bench_console;
-mod bench_log;
 mod board;
 #[cfg_attr(
     not(target_os = "none"),
@@ -57,12 +57,14 @@ mod cross_sums;
 mod device;
 pub mod epoch;
 mod epoch_record;
+mod event;
 mod gross_error_gate;
 pub mod learner;
 #[cfg(all(target_os = "none", feature = "microcontroller"))]
 #[allow(unsafe_code, reason = "registers, and memory that is not initialised at the start")]
 pub mod microcontroller;
 pub mod number_text;
+mod receive;
 mod recovery;
 mod report_frames;
 mod report_messages;
@@ -72,25 +74,31 @@ mod sample_intake;
 mod scale;
 pub mod sensor;
 pub mod settings_store;
+mod slot;
 mod statistics;
 mod status_flags;
 mod stored_state;
-mod task_monitor;
 mod transmit;
 pub mod usb_port;
+#[cfg_attr(
+    not(target_os = "none"),
+    allow(dead_code, reason = "the images use all of it, and its tests what they test")
+)]
+mod watchdog;
 
 pub use acquisition::{BurstQueue, EdgeAction, Sampler, SamplingActivity, TimedBurst};
 pub use app::{App, Start, run};
 pub use board::{
-    Board, BoardContext, BoardMeters, BrownOutLevel, BusTiming, Chip, DataReadyLine, FrameTimes, HostPort, Locks,
-    ReceivedBytes, SelectTiming, SensorBus, Uptime, WatchdogExtension,
+    Board, BoardMeters, BrownOutLevel, BusTiming, DataReadyLine, FrameTimes, SelectTiming, SensorBus, Uptime,
 };
-pub use bus_frame::{BusFault, MicrosecondCounter};
+pub use bus_frame::{BusFault, ByteExchange, MicrosecondCounter};
 pub use crash_record::CrashRecord;
 pub use device::FIRST_CONFIG;
 pub use epoch::FinishedEpoch;
+pub use receive::{HostPort, ReceiveBuffer, ReceivedBytes, Receiver};
 pub use retained::RetainedRam;
 pub use sample_intake::{Estimators, estimate};
 pub use scale::ReportScale;
 pub use statistics::{CHANNELS, ChannelEstimator, ChannelSums, OCTAVES, OVERLAP, Statistics};
 pub use transmit::{TransmitBuffer, TransmitQueue};
+pub use watchdog::{Feeder, FeedingDelay, Watchdog, WatchdogExtension};

@@ -1,41 +1,41 @@
 //! What the images of all boards share beside the application: traits of a microcontroller and its peripherals, in this
-//! file; start-up, interrupts and panics (`image`); load figures and the LED (`processor`); the flash memory that keeps the settings
+//! file; start-up, interrupts and panics (`image`); the board as the main loop sees it (`context`); the sensor's bus (`sensor_spi`); load figures and the LED (`processor`); the flash memory that keeps the settings
 //! (`settings_flash`); and one module for each microcontroller.
 //!
 //! A board is an implementation of [`BoardSupport`], and names its interrupts in [`observatory!`](crate::observatory).
 
+pub mod context;
 pub mod image;
 pub mod processor;
 #[cfg(feature = "rp2040")]
 pub mod rp2040;
+pub mod sensor_spi;
 pub mod settings_flash;
 #[cfg(feature = "stm32f4")]
 pub mod stm32f4;
 
-use crate::board::{BrownOutLevel, DataReadyLine, SensorBus, WatchdogExtension};
-use crate::bus_frame::MicrosecondCounter;
+use crate::board::{BrownOutLevel, DataReadyLine, SensorBus};
+use crate::receive::{ReceiveBuffer, Receiver};
 use crate::transmit::TransmitBuffer;
 use crate::usb_port::{UsbIdentity, UsbPort};
+use crate::watchdog::{Watchdog, WatchdogExtension};
 use adis16405_driver::BURST_BYTES;
 use core::convert::Infallible;
 use core::fmt::Write;
 use defmt_rtt as _;
 use embedded_hal::digital::OutputPin;
 use heapless::String;
-use heapless::spsc::{Consumer, Producer, Queue};
+use heapless::spsc::{Consumer, Producer};
 use link::{BootCause, ClockSource};
 use settings_flash::FlashMemory;
 use usb_device::bus::{UsbBus, UsbBusAllocator};
-
-/// The bytes from the serial port to the application.
-pub type ReceiveBuffer = Queue<u8, 64>;
 
 /// The UART's ends of the queues to and from the application.
 pub struct UartQueues {
     /// Bytes to be sent.
     pub transmit: Consumer<'static, u8>,
     /// Bytes received.
-    pub receive: Producer<'static, u8>,
+    pub receive: Receiver<'static>,
 }
 
 /// A USB port, and the application's ends of its queues.
@@ -50,11 +50,13 @@ pub struct UsbParts<U> {
 
 impl<B: UsbBus> UsbParts<UsbPort<'static, B>> {
     /// Starts the port of a `vendor`'s `product` on a bus, with the number of the board in hexadecimal as its serial number: at most
-    /// twelve bytes. To be called once; `None` afterwards, or if the bus has too few endpoints.
+    /// twelve bytes. `reconnect` resets the controller and keeps it off the bus (false), and starts it again (true). To be called once; `None`
+    /// afterwards, or if the bus has too few endpoints.
     pub fn start(
         bus: &'static UsbBusAllocator<B>,
         (vendor, product): (u16, u16),
         board_number: impl IntoIterator<Item = u8>,
+        reconnect: fn(bool),
     ) -> Option<Self> {
         let serial_number = cortex_m::singleton!(SERIAL_NUMBER: String<24> = String::new())?;
         for byte in board_number {
@@ -63,14 +65,19 @@ impl<B: UsbBus> UsbParts<UsbPort<'static, B>> {
         let to_port = cortex_m::singleton!(USB_TRANSMIT: TransmitBuffer = TransmitBuffer::new())?;
         let from_port = cortex_m::singleton!(USB_RECEIVE: ReceiveBuffer = ReceiveBuffer::new())?;
         let ((transmit, to_port), (from_port, receive)) = (to_port.split(), from_port.split());
-        let port = UsbPort::new(bus, UsbIdentity { vendor, product, serial_number }, (to_port, from_port))?;
+        let port = UsbPort::new(
+            bus,
+            UsbIdentity { vendor, product, serial_number },
+            (to_port, Receiver::new(from_port)),
+            reconnect,
+        )?;
         Some(Self { port, transmit, receive })
     }
 }
 
 impl<B: UsbBus> ServedPort for UsbPort<'static, B> {
-    fn serve(&mut self) -> u32 {
-        UsbPort::serve(self)
+    fn serve(&mut self, now_us: u32) -> u32 {
+        UsbPort::serve(self, now_us)
     }
 }
 
@@ -100,7 +107,7 @@ impl OutputPin for NotConnected {
 }
 
 impl ServedPort for NotConnected {
-    fn serve(&mut self) -> u32 {
+    fn serve(&mut self, _now_us: u32) -> u32 {
         match *self {}
     }
 }
@@ -136,8 +143,6 @@ pub struct BoardParts<B: BoardSupport> {
     pub clock: ClockSource,
     /// Clock of the processor in Hz.
     pub core_hz: u32,
-    /// The microcontroller, with running watchdog.
-    pub microcontroller: B::Microcontroller,
     /// The data-ready pin.
     pub data_ready: B::DataReady,
     /// The sensor's bus.
@@ -153,20 +158,18 @@ pub struct BoardParts<B: BoardSupport> {
 }
 
 /// Clock, watchdog and restart of a microcontroller.
-pub trait Microcontroller: MicrosecondCounter {
+pub trait Microcontroller: Watchdog {
     /// The flash memory, of which the memory map leaves a part for the settings.
     type Flash: FlashMemory;
 
-    /// Feeds the watchdog.
-    fn feed(&mut self);
     /// Restarts processor and peripherals; the RAM keeps its content.
     fn restart() -> !;
     /// Programs the level of the supply below which the microcontroller is reset.
     fn program_brown_out() -> BrownOutLevel {
         BrownOutLevel::Fixed
     }
-    /// Starts the boot loader that takes an image over USB; returns if there is none.
-    fn start_boot_loader() {}
+    /// Starts the boot loader that takes an image over USB.
+    fn start_boot_loader() -> !;
     /// To be called at every interrupt of SysTick, of which there are [`processor::WAKE_HZ`] a second: prolongs the time of a
     /// watchdog that is shorter than a step of the main loop.
     fn extend_watchdog(_extension: &mut WatchdogExtension) {}
@@ -198,6 +201,7 @@ pub enum BurstEnd<'a> {
 
 /// A serial port to the host, served in its interrupt.
 pub trait ServedPort {
-    /// Moves bytes between the peripheral and its queues as far as possible; returns how many received bytes were lost.
-    fn serve(&mut self) -> u32;
+    /// Moves bytes between the peripheral and its queues as far as possible; returns how many received bytes were lost. `now_us` is the
+    /// counter of microseconds.
+    fn serve(&mut self, now_us: u32) -> u32;
 }

@@ -1,5 +1,4 @@
-//! Numbers as a person reads them, in the words of the host's screen: decimals without an exponent, estimates with as many
-//! digits as their bounds support, quantities with a prefix in their unit.
+//! Numbers as a person reads them: decimals without an exponent, and estimates with as many digits as their bounds support.
 //!
 //! The formatting of floating-point numbers in `core` takes 20 kB of flash; this takes 2 kB.
 
@@ -136,54 +135,6 @@ impl Display for Estimate {
     }
 }
 
-/// An estimate in `unit`, whose prefix `m` or `u` keeps the value at 0.1 or above.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EstimateInUnit<'a> {
-    /// Value and bounds in the unit; bounds that equal the value are not written.
-    pub estimate: Estimate,
-    /// The unit without a prefix.
-    pub unit: &'a str,
-}
-
-impl<'a> EstimateInUnit<'a> {
-    /// A value without bounds.
-    #[must_use]
-    pub const fn new(value: f64, unit: &'a str) -> Self {
-        Self { estimate: Estimate { value, bounds: (value, value) }, unit }
-    }
-}
-
-impl Display for EstimateInUnit<'_> {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Estimate { value, bounds: (low, high) } = self.estimate;
-        let (prefix, factor) = match libm::fabs(value) {
-            magnitude if magnitude >= 0.0995 || magnitude == 0.0 => ("", 1.0),
-            magnitude if magnitude >= 0.995e-3 => ("m", 1e3),
-            _ => ("u", 1e6),
-        };
-        let scaled = Estimate { value: value * factor, bounds: (low * factor, high * factor) };
-        write!(f, "{scaled} {prefix}{}", self.unit)
-    }
-}
-
-/// A duration: `9.0 s`, `10 min`, `3 h 02 min`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Span(pub f64);
-
-impl Display for Span {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        if self.0 < 99.5 {
-            return write!(f, "{} s", Decimal::significant(self.0, 2));
-        }
-        let minutes = (self.0 / 60.0 + 0.5) as u64;
-        match (minutes / 60, minutes % 60) {
-            (0, minutes) => write!(f, "{minutes} min"),
-            (hours, 0) => write!(f, "{hours} h"),
-            (hours, minutes) => write!(f, "{hours} h {minutes:02} min"),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     extern crate std;
@@ -239,10 +190,6 @@ mod tests {
             assert_eq!(Decimal::significant(value, digits).to_string(), text, "{value}");
         }
         assert_eq!([0, 999, 1000, 1_002_003].map(|count| Count(count).to_string()), ["0", "999", "1,000", "1,002,003"]);
-        let spans = [(0.02, "0.020 s"), (80.0, "80 s"), (600.0, "10 min"), (10_940.0, "3 h 02 min"), (32_400.0, "9 h")];
-        for (seconds, text) in spans {
-            assert_eq!(Span(seconds).to_string(), text);
-        }
     }
 
     /// The same cases as in the test of the host's screen, in ASCII.
@@ -261,18 +208,6 @@ mod tests {
             (-52.3, -59.0, -45.0, "-52 +- 7"),
         ] {
             assert_eq!(Estimate { value, bounds: (low, high) }.to_string(), text, "{value} ({low} .. {high})");
-        }
-    }
-
-    #[test]
-    fn quantities_have_prefixes_in_their_units() {
-        let line =
-            EstimateInUnit { estimate: Estimate { value: 0.0516, bounds: (0.0446, 0.0586) }, unit: "deg/s/degC" };
-        assert_eq!(line.to_string(), "52 +- 7 mdeg/s/degC");
-        for (value, unit, text) in
-            [(0.4, "deg/s", "0.400 deg/s"), (22.0e-6, "g", "22.0 ug"), (20.62, "Hz", "20.6 Hz"), (0.0, "g", "0 g")]
-        {
-            assert_eq!(EstimateInUnit::new(value, unit).to_string(), text);
         }
     }
 }

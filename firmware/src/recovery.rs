@@ -6,6 +6,7 @@ pub(crate) const FAILURES_BEFORE_RESTART: u32 = 30;
 
 /// A step of recovery, by rising effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(all(target_os = "none", feature = "microcontroller"), derive(defmt::Format))]
 pub(crate) enum RecoveryStep {
     /// Read identity and configuration, and set what differs.
     Reread,

@@ -3,19 +3,17 @@
 //! The checksum also covers a hash of the build, so that a program of other sources finds no record, and records of samples carry
 //! the settings of the sensor that took them.
 //!
-//! The memory is an array of atomic words, so that any content after power-on is a valid value. There is one slot more than
-//! there are records. A record is always written into a slot that is not the newest version of any record, so that a reset
-//! during the write loses that version and not the one before.
+//! There is one slot more than there are records. A record is always written into a slot that is not the newest version of any
+//! record, so that a reset during the write loses that version and not the one before.
 
+use crate::channels::CHANNELS;
 use crate::epoch::FinishedEpoch;
-use crate::epoch_record::{EpochRecord, SUMS_WORDS, checksum, sums_from_words, sums_words};
-use crate::statistics::{CHANNELS, ChannelSums};
-use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use crate::epoch_record::{EPOCH_WORDS, SUMS_WORDS, epoch_from_words, epoch_words, sums_from_words, sums_words};
+use crate::slot::{Slot, halves};
+use crate::statistics::ChannelSums;
 
-/// Words of a slot before the payload: kind, version, generation, the sensor's settings.
+/// Words of a record before the payload: kind, version, generation, the sensor's settings.
 const HEAD: usize = 4;
-/// Words of a slot: those, payload, checksum.
-const SLOT_WORDS: usize = HEAD + SUMS_WORDS + 1;
 /// Hash of what this program was built from.
 const BUILD: u32 = match u32::from_str_radix(env!("FIRMWARE_BUILD"), 10) {
     Ok(hash) => hash,
@@ -24,20 +22,23 @@ const BUILD: u32 = match u32::from_str_radix(env!("FIRMWARE_BUILD"), 10) {
 /// Kinds of records: the settings, then the channels.
 const KINDS: usize = 1 + CHANNELS.len();
 const SETTINGS: usize = 0;
-/// Marks a record, in the upper half of a slot's first word. Changes with the layout.
-const MAGIC: u32 = 0xAD17_0000;
+/// Crashes within this time, in s, after which the device starts without anything that was stored.
+const CRASHES_S: u32 = 600;
+/// Crashes after which a finished epoch is not learned from again.
+const CRASHES_OF_EPOCH: u32 = 2;
 
 /// The memory, to be placed in a linker section that is not initialised at the start.
 pub struct RetainedMemory {
-    slots: [Slot; KINDS + 1],
-    epoch: EpochRecord,
+    records: [Slot<{ HEAD + SUMS_WORDS }>; KINDS + 1],
+    epoch: Slot<EPOCH_WORDS>,
+    crashes: Slot<3>,
 }
 
 /// A [`RetainedMemory`] without records.
 #[must_use]
 pub const fn blank_memory() -> RetainedMemory {
-    let slots = [const { [const { AtomicU32::new(0) }; SLOT_WORDS] }; KINDS + 1];
-    RetainedMemory { slots, epoch: EpochRecord::blank() }
+    let records = [const { Slot::blank() }; KINDS + 1];
+    RetainedMemory { records, epoch: Slot::blank(), crashes: Slot::blank() }
 }
 
 /// The settings of the application.
@@ -68,6 +69,19 @@ impl RetainedSettings {
     }
 }
 
+/// The latest crashes: each a panic, a fault, or a hang that the watchdog has ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Crashes {
+    /// Time since the last one and since the one before, in s.
+    ages_s: [u32; 2],
+    /// Crashes while the finished epoch was not learned from.
+    of_epoch: u32,
+}
+
+impl Crashes {
+    const NONE: Self = Self { ages_s: [u32::MAX; 2], of_epoch: 0 };
+}
+
 /// The records in a [`RetainedMemory`].
 pub struct RetainedRam {
     memory: &'static RetainedMemory,
@@ -76,9 +90,10 @@ pub struct RetainedRam {
     /// Channel records of another generation are out of date.
     generation: u32,
     version: u32,
-    /// Slot of the newest version of each record.
-    newest: [Option<usize>; KINDS],
+    /// Slot of the newest version of each record, and that version.
+    newest: [Option<(usize, u32)>; KINDS],
     settings: Option<RetainedSettings>,
+    crashes: Crashes,
 }
 
 impl RetainedRam {
@@ -90,27 +105,36 @@ impl RetainedRam {
 
     /// As [`open`](Self::open), as a program with this hash does.
     fn open_by(build: u32, memory: &'static RetainedMemory) -> Self {
-        let mut retained = Self { memory, build, generation: 0, version: 0, newest: [None; KINDS], settings: None };
-        for (index, slot) in memory.slots.iter().enumerate() {
-            let Some((kind, version)) = valid_record(slot, build) else { continue };
-            let newer = retained.newest[kind].is_none_or(|other| word(&memory.slots[other], 1) < version);
-            if newer {
-                retained.newest[kind] = Some(index);
+        let crashes = memory
+            .crashes
+            .read(build)
+            .map(|mut words| Crashes { ages_s: [words.word(), words.word()], of_epoch: words.word() });
+        let crashes = crashes.unwrap_or(Crashes::NONE);
+        let mut retained =
+            Self { memory, build, generation: 0, version: 0, newest: [None; KINDS], settings: None, crashes };
+        for (index, slot) in memory.records.iter().enumerate() {
+            let Some(mut words) = slot.read(build) else { continue };
+            let (kind, version) = (words.word() as usize, words.word());
+            if let Some(newest) = retained.newest.get_mut(kind)
+                && newest.is_none_or(|(_, other)| other < version)
+            {
+                *newest = Some((index, version));
+                retained.version = retained.version.max(version);
             }
-            retained.version = retained.version.max(version);
         }
-        if let Some(slot) = retained.newest[SETTINGS].map(|index| &memory.slots[index]) {
-            retained.generation = word(slot, 2);
-            let at = |index: usize| word(slot, HEAD + index);
+        if let Some((index, _)) = retained.newest[SETTINGS] {
+            let mut words = memory.records[index].words();
+            let [_kind, _version, generation, _of_sensor] = core::array::from_fn(|_| words.word());
+            retained.generation = generation;
             retained.settings = Some(RetainedSettings {
-                smpl_prd: at(0) as u8,
-                sens_avg: at(1) as u16,
-                epoch_s: at(2),
-                epoch: at(3),
-                interval_s: at(4),
-                starts: at(5),
-                epoch_age_us: u64::from(at(6)) | u64::from(at(7)) << 32,
-                prod_id: at(8) as u16,
+                smpl_prd: words.word() as u8,
+                sens_avg: words.word() as u16,
+                epoch_s: words.word(),
+                epoch: words.word(),
+                interval_s: words.word(),
+                starts: words.word(),
+                epoch_age_us: words.wide(),
+                prod_id: words.word() as u16,
             });
         }
         retained
@@ -118,11 +142,37 @@ impl RetainedRam {
 
     /// Erases all records, as after power-on.
     pub fn clear(&mut self) {
-        for slot in &self.memory.slots {
-            slot[0].store(0, Relaxed);
-        }
-        self.memory.epoch.clear();
+        self.write_crashes(Crashes::NONE);
+        self.clear_statistics();
+    }
+
+    /// Erases settings, statistics and the finished epoch.
+    pub(crate) fn clear_statistics(&mut self) {
+        self.clear_epoch();
+        self.memory.records.iter().for_each(Slot::clear);
         *self = Self::open_by(self.build, self.memory);
+    }
+
+    /// Notes that the program before has crashed. Returns whether that was the third crash within ten minutes: what is stored may be the
+    /// cause, and is not to be used.
+    pub(crate) fn note_crash(&mut self) -> bool {
+        let Crashes { ages_s: [last, before], of_epoch } = self.crashes;
+        self.write_crashes(Crashes { ages_s: [0, last], of_epoch: of_epoch.saturating_add(1) });
+        before <= CRASHES_S
+    }
+
+    /// Notes that the program has run for some time, in s.
+    pub(crate) fn note_time(&mut self, seconds: u32) {
+        let ages_s = self.crashes.ages_s.map(|age| age.saturating_add(seconds));
+        if ages_s != self.crashes.ages_s {
+            self.write_crashes(Crashes { ages_s, ..self.crashes });
+        }
+    }
+
+    fn write_crashes(&mut self, crashes: Crashes) {
+        self.crashes = crashes;
+        let [last, before] = crashes.ages_s;
+        self.memory.crashes.write(self.build, [last, before, crashes.of_epoch]);
     }
 
     /// The settings that were written last.
@@ -135,25 +185,34 @@ impl RetainedRam {
     /// sensor.
     #[must_use]
     pub fn restore(&self, index: usize) -> Option<ChannelSums> {
-        let slot = &self.memory.slots[self.newest.get(1 + index).copied()??];
-        let words = slot[HEAD..].iter().map(|cell| cell.load(Relaxed));
-        (word(slot, 2) == self.generation && word(slot, 3) == self.of_sensor()).then(|| sums_from_words(words))
+        let (slot, _) = self.newest.get(1 + index).copied()??;
+        let mut words = self.memory.records[slot].words();
+        let [_kind, _version, generation, of_sensor] = core::array::from_fn(|_| words.word());
+        (generation == self.generation && of_sensor == self.of_sensor()).then(|| sums_from_words(&mut words))
     }
 
     /// Writes a finished epoch in the place of the one before. A reset during the write loses it.
     pub fn write_epoch(&mut self, epoch: &FinishedEpoch) {
-        self.memory.epoch.write(epoch, self.build, self.of_sensor());
+        self.write_crashes(Crashes { of_epoch: 0, ..self.crashes });
+        self.memory.epoch.write(self.epoch_key(), epoch_words(epoch));
     }
 
-    /// Overwrites `epoch` with the finished epoch. Returns false, and leaves `epoch` alone, if there is none.
+    /// Overwrites `epoch` with the finished epoch. Returns false, and leaves `epoch` alone, if there is none, or if the program has crashed
+    /// twice before it was learned from.
     #[must_use]
     pub fn restore_epoch(&self, epoch: &mut FinishedEpoch) -> bool {
-        self.memory.epoch.restore(epoch, self.build, self.of_sensor())
+        let words = self.memory.epoch.read(self.epoch_key()).filter(|_| self.crashes.of_epoch < CRASHES_OF_EPOCH);
+        words.map(|mut words| epoch_from_words(epoch, &mut words)).is_some()
     }
 
     /// Erases the finished epoch: nothing is left to be learned from it.
     pub fn clear_epoch(&mut self) {
         self.memory.epoch.clear();
+    }
+
+    /// Samples of a sensor with other settings are not of the same epoch.
+    fn epoch_key(&self) -> u32 {
+        self.build ^ self.of_sensor()
     }
 
     /// Writes the settings; with `new_generation` the channel records written before are out of date.
@@ -162,7 +221,7 @@ impl RetainedRam {
         self.settings = Some(settings);
         let RetainedSettings { smpl_prd, sens_avg, epoch_s, epoch, interval_s, starts, epoch_age_us, prod_id } =
             settings;
-        let (age, age_high) = (epoch_age_us as u32, (epoch_age_us >> 32) as u32);
+        let [age, age_high] = halves(epoch_age_us);
         let sensor = [u32::from(smpl_prd), u32::from(sens_avg)];
         let words = sensor.into_iter().chain([epoch_s, epoch, interval_s, starts, age, age_high, u32::from(prod_id)]);
         self.write(SETTINGS, words);
@@ -181,35 +240,13 @@ impl RetainedRam {
 
     fn write(&mut self, kind: usize, words: impl IntoIterator<Item = u32>) {
         // There is one slot more than kinds, so at least one holds no newest version.
-        let Some(free) = (0..self.memory.slots.len()).find(|index| !self.newest.contains(&Some(*index))) else {
-            return;
-        };
-        let slot = &self.memory.slots[free];
+        let is_newest = |index| self.newest.iter().flatten().any(|(newest, _)| *newest == index);
+        let Some(free) = (0..=KINDS).find(|&index| !is_newest(index)) else { return };
         self.version = self.version.wrapping_add(1);
-        slot[0].store(MAGIC | kind as u32, Relaxed);
-        slot[1].store(self.version, Relaxed);
-        slot[2].store(self.generation, Relaxed);
-        slot[3].store(self.of_sensor(), Relaxed);
-        let words = words.into_iter().chain(core::iter::repeat(0));
-        for (cell, word) in slot[HEAD..SLOT_WORDS - 1].iter().zip(words) {
-            cell.store(word, Relaxed);
-        }
-        slot[SLOT_WORDS - 1].store(checksum(self.build, &slot[..SLOT_WORDS - 1]), Relaxed);
-        self.newest[kind] = Some(free);
+        let head = [kind as u32, self.version, self.generation, self.of_sensor()];
+        self.memory.records[free].write(self.build, head.into_iter().chain(words));
+        self.newest[kind] = Some((free, self.version));
     }
-}
-
-type Slot = [AtomicU32; SLOT_WORDS];
-
-fn word(slot: &[AtomicU32], index: usize) -> u32 {
-    slot[index].load(Relaxed)
-}
-
-/// The kind and version of the record in a slot, if its checksum is right.
-fn valid_record(slot: &Slot, build: u32) -> Option<(usize, u32)> {
-    let kind = (word(slot, 0) ^ MAGIC) as usize;
-    let intact = kind < KINDS && word(slot, SLOT_WORDS - 1) == checksum(build, &slot[..SLOT_WORDS - 1]);
-    intact.then(|| (kind, word(slot, 1)))
 }
 
 #[cfg(test)]
@@ -217,8 +254,8 @@ mod tests {
     extern crate std;
 
     use super::*;
+    use crate::channels::{ChannelEstimator, OCTAVES};
     use crate::epoch_record::MAX_SUM;
-    use crate::statistics::{ChannelEstimator, OCTAVES};
     use allan_core::Interpolation;
     use std::boxed::Box;
 
@@ -330,14 +367,14 @@ mod tests {
     /// A bit flips in any word of the slot written last: the version before is found.
     #[test]
     fn damage_loses_one_version_only() {
-        for word in 0..SLOT_WORDS {
+        for word in 0..=HEAD + SUMS_WORDS {
             let memory = memory();
             let mut retained = RetainedRam::open(memory);
             retained.write_settings(SETTINGS_WRITTEN, true);
             retained.checkpoint(2, &sums(100));
             retained.checkpoint(2, &sums(200));
-            let slot = retained.newest[3].unwrap();
-            memory.slots[slot][word].fetch_xor(0x10, Relaxed);
+            let (slot, _) = retained.newest[3].unwrap();
+            memory.records[slot].flip(word, 4);
             assert_eq!(RetainedRam::open(memory).restore(2).map(|sums| sums.samples), Some(100), "word {word}");
         }
     }
@@ -350,11 +387,43 @@ mod tests {
         retained.write_settings(SETTINGS_WRITTEN, true);
         retained.checkpoint(0, &sums(100));
         retained.checkpoint(0, &sums(200));
-        let newest = retained.newest[1].unwrap();
-        let free = (0..memory.slots.len()).find(|index| !retained.newest.contains(&Some(*index))).unwrap();
-        for (written, (to, from)) in memory.slots[free].iter().zip(&memory.slots[newest]).enumerate() {
+        let is_newest = |index| retained.newest.iter().flatten().any(|(newest, _)| *newest == index);
+        let free = (0..=KINDS).find(|&index| !is_newest(index)).unwrap();
+        for written in 0..=HEAD + SUMS_WORDS {
+            memory.records[free].begin_to_write(written);
             assert_eq!(RetainedRam::open(memory).restore(0).map(|sums| sums.samples), Some(200), "{written} words");
-            to.store(!from.load(Relaxed), Relaxed);
         }
+    }
+
+    /// A second crash before a finished epoch was learned from: it may be the cause.
+    #[test]
+    fn an_epoch_is_not_learned_from_after_two_crashes() {
+        let memory = memory();
+        let mut retained = RetainedRam::open(memory);
+        retained.write_settings(SETTINGS_WRITTEN, true);
+        retained.write_epoch(&FinishedEpoch::EMPTY);
+        let restored = || RetainedRam::open(memory).restore_epoch(&mut FinishedEpoch::EMPTY.clone());
+        assert!(restored());
+        retained.note_crash();
+        assert!(restored(), "after one crash");
+        retained.note_crash();
+        assert!(!restored(), "after two");
+        retained.write_epoch(&FinishedEpoch::EMPTY);
+        assert!(restored(), "the next epoch");
+    }
+
+    /// Three crashes within ten minutes, and three in eleven.
+    #[test]
+    fn the_third_crash_within_ten_minutes_is_told() {
+        let memory = memory();
+        let crash_after = |seconds: u32| {
+            let mut retained = RetainedRam::open(memory);
+            (0..seconds).for_each(|_| retained.note_time(1));
+            RetainedRam::open(memory).note_crash()
+        };
+        assert_eq!([0, 300, 300, 301, 299].map(crash_after), [false, false, true, false, true]);
+        assert!(!crash_after(u32::from(u16::MAX)));
+        RetainedRam::open(memory).clear();
+        assert_eq!([0, 1, 1].map(crash_after), [false, false, true], "after power-on");
     }
 }

@@ -39,6 +39,7 @@ fn settling_samples(config: Config) -> u32 {
 
 /// Why the sensor must be probed before its samples are used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(all(target_os = "none", feature = "microcontroller"), derive(defmt::Format))]
 pub(crate) enum SensorTrouble {
     /// No data-ready edge has come for several periods.
     NoEdges,

@@ -1,6 +1,6 @@
 //! The sensor's bus apart from sampling: serial clock, probing (identify, test, configure), auto-null.
 
-use adis16405_driver::{Adis16405, Channel, Config, Diagnosis, DioSignal, Error, Product, Register, Timing};
+use adis16405_driver::{Adis16405, Channel, Config, Diagnosis, DioSignal, Error, GyroBias, Product, Register, Timing};
 use core::fmt;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::SpiDevice;
@@ -10,25 +10,14 @@ pub const BURST_LIMIT_HZ: u32 = 1_000_000;
 /// Largest serial clock in the sensor's low-power mode in Hz (data sheet Rev. B, page 10).
 pub(crate) const LOW_POWER_LIMIT_HZ: u32 = 300_000;
 
-/// The largest clock of at most `limit_hz` that a divider by 2, 4, 8 … 256 makes of `bus_hz`; `None` if 256 is not enough.
-///
-/// HALs round a request to the nearest prescaler, which may exceed the sensor's limit.
+/// The field of an STM32's CR1 that selects the largest serial clock of at most `limit_hz`, or the slowest one if none is slow enough,
+/// and that clock in Hz, rounded up: a divider by `2^(field + 1)` makes it of `bus_hz`. Some HALs round the requested clock up, above the
+/// sensor's limit.
 #[must_use]
-pub const fn largest_clock_hz(bus_hz: u32, limit_hz: u32) -> Option<u32> {
-    let mut shift = 1;
-    while shift <= 8 {
-        if bus_hz.div_ceil(1 << shift) <= limit_hz {
-            return Some(bus_hz >> shift);
-        }
-        shift += 1;
-    }
-    None
-}
-
-/// The clock that a divider by `2^(field + 1)` makes of `bus_hz`, in Hz, rounded up; `field` as in an STM32's CR1.
-#[must_use]
-pub const fn prescaled_clock_hz(bus_hz: u32, field: u8) -> u32 {
-    bus_hz.div_ceil(1 << (field as u32 % 8 + 1))
+pub fn prescaled_clock(bus_hz: u32, limit_hz: u32) -> (u8, u32) {
+    let clock_hz = |field: u8| bus_hz.div_ceil(2 << field);
+    let field = (0..8).find(|&field| clock_hz(field) <= limit_hz).unwrap_or(7);
+    (field, clock_hz(field))
 }
 
 /// How thoroughly a sensor is probed.
@@ -90,6 +79,21 @@ impl TestOutcome {
     }
 }
 
+#[cfg(all(target_os = "none", feature = "microcontroller"))]
+impl defmt::Format for TestOutcome {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        match self {
+            Self::Ended(_) if self.passed() => defmt::write!(f, "passed"),
+            Self::Ended(_) => {
+                defmt::write!(f, "failed:");
+                self.failed_sensors().for_each(|channel| defmt::write!(f, " {=str}", channel.name()));
+            }
+            Self::NotSeen(_) => defmt::write!(f, "did not run"),
+            Self::Endless => defmt::write!(f, "did not end"),
+        }
+    }
+}
+
 impl fmt::Display for TestOutcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -122,15 +126,11 @@ pub fn probe<SPI: SpiDevice<u8>>(
         sensor = sensor.with_prod_id(prod_id);
     }
     if scope.pulse {
-        // Whether the sensor answers is for the steps below to find out.
+        // Ignore errors: `init` below checks that the sensor answers.
         let _ = sensor.wake();
     }
     let product = if scope.reset { sensor.software_reset()? } else { sensor.init()? };
     let test = if scope.self_test { Some(self_test(&mut sensor)?) } else { None };
-    // With such a bias, bursts lose the sign of negative x rates (erratum). The Allan variance does not depend on the bias.
-    if sensor.x_sign_at_risk() {
-        sensor.keep_negative_x_bias_on_host()?;
-    }
     sensor.set_data_ready(Some(DioSignal::default()))?;
     Ok(SensorIdentity { product, test })
 }
@@ -154,7 +154,8 @@ pub(crate) fn read_diagnosis<SPI: SpiDevice<u8>>(
     (answer != u16::MAX).then(|| Diagnosis::from_bits_truncate(answer))
 }
 
-/// Has the sensor store its present gyro output as the bias; it must be still.
+/// Has the sensor store its present gyro output as the bias; it must be still. Returns the correction: a negative one of x is not
+/// applied.
 ///
 /// # Errors
 /// The bus failed, or the sensor does not answer afterwards.
@@ -162,29 +163,22 @@ pub fn auto_null<SPI: SpiDevice<u8>>(
     bus: (SPI, impl DelayNs),
     config: Config,
     sck_hz: u32,
-) -> Result<(), Error<SPI::Error>> {
-    addressed(bus, config, sck_hz).auto_null().map(|_offsets| ())
+) -> Result<GyroBias, Error<SPI::Error>> {
+    addressed(bus, config, sck_hz).auto_null()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// The fields are those of the reference manual (RM0090 section 28.5.1): 0b000 is a division by 2, 0b111 by 256.
     #[test]
     fn the_clock_does_not_exceed_the_limit() {
-        assert_eq!(largest_clock_hz(84_000_000, 1_000_000), Some(656_250));
-        assert_eq!(largest_clock_hz(64_000_000, 1_000_000), Some(1_000_000));
-        assert_eq!(largest_clock_hz(64_000_001, 1_000_000), Some(500_000));
-        assert_eq!(largest_clock_hz(1_000_000, 1_000_000), Some(500_000));
-        assert_eq!(largest_clock_hz(257_000_000, 1_000_000), None);
-        assert_eq!(largest_clock_hz(u32::MAX, 0), None);
-    }
-
-    #[test]
-    fn a_prescaler_field_is_decoded_as_in_the_reference_manual() {
-        assert_eq!(prescaled_clock_hz(84_000_000, 0b000), 42_000_000);
-        assert_eq!(prescaled_clock_hz(84_000_000, 0b101), 1_312_500);
-        assert_eq!(prescaled_clock_hz(84_000_000, 0b110), 656_250);
-        assert_eq!(prescaled_clock_hz(84_000_000, 0b111), 328_125);
+        assert_eq!(prescaled_clock(84_000_000, 1_000_000), (0b110, 656_250));
+        assert_eq!(prescaled_clock(84_000_000, 2_000_000), (0b101, 1_312_500));
+        assert_eq!(prescaled_clock(84_000_000, 42_000_000), (0b000, 42_000_000));
+        assert_eq!(prescaled_clock(64_000_000, 1_000_000), (0b101, 1_000_000));
+        assert_eq!(prescaled_clock(64_000_001, 1_000_000), (0b110, 500_001));
+        assert_eq!(prescaled_clock(257_000_000, 1_000_000), (0b111, 1_003_907), "none is slow enough");
     }
 }

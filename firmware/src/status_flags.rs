@@ -11,32 +11,32 @@ const READ_US: u64 = 1_000_000;
 /// Time after which a cause that persists is logged again.
 const LOG_US: u64 = 600_000_000;
 
-/// The causes with their names, in the order of the counters.
-const CAUSES: [(Diagnosis, &str); 8] = [
-    (Diagnosis::SUPPLY_LOW, "supply_low"),
-    (Diagnosis::SUPPLY_HIGH, "supply_high"),
-    (Diagnosis::FLASH_UPDATE, "flash_update"),
-    (Diagnosis::SPI, "spi"),
-    (Diagnosis::OVER_RANGE, "over_range"),
-    (Diagnosis::SELF_TEST_FAILURES, "self_test"),
-    (Diagnosis::FLASH_CHECKSUM, "flash_checksum"),
-    (Diagnosis::ALARM_1.union(Diagnosis::ALARM_2), "alarm"),
+type CounterOf = fn(&mut Health) -> &mut u32;
+
+/// The causes with their names and counters.
+const CAUSES: [(Diagnosis, &str, CounterOf); 8] = [
+    (Diagnosis::SUPPLY_LOW, "supply_low", |health| &mut health.diag_supply_low),
+    (Diagnosis::SUPPLY_HIGH, "supply_high", |health| &mut health.diag_supply_high),
+    (Diagnosis::FLASH_UPDATE, "flash_update", |health| &mut health.diag_flash_update),
+    (Diagnosis::SPI, "spi", |health| &mut health.diag_spi),
+    (Diagnosis::OVER_RANGE, "over_range", |health| &mut health.diag_over_range),
+    (Diagnosis::SELF_TEST_FAILURES, "self_test", |health| &mut health.diag_self_test),
+    (Diagnosis::FLASH_CHECKSUM, "flash_checksum", |health| &mut health.diag_flash_checksum),
+    (Diagnosis::ALARM_1.union(Diagnosis::ALARM_2), "alarm", |health| &mut health.diag_alarm),
 ];
 
-/// Counts what DIAG_STAT has shown while sampling.
+/// When DIAG_STAT was read while sampling, and what of it was logged.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StatusFlags {
     next_read_us: u64,
     /// Flags that were logged since [`LOG_US`] before `forget_us`.
     logged: Diagnosis,
     forget_us: u64,
-    reads: u32,
-    counts: [u32; CAUSES.len()],
 }
 
 impl StatusFlags {
     pub(crate) const fn new() -> Self {
-        Self { next_read_us: 0, logged: Diagnosis::empty(), forget_us: 0, reads: 0, counts: [0; CAUSES.len()] }
+        Self { next_read_us: 0, logged: Diagnosis::empty(), forget_us: 0 }
     }
 
     /// Whether the register may be read at `now_us`.
@@ -44,14 +44,19 @@ impl StatusFlags {
         now_us >= self.next_read_us
     }
 
-    /// The register was read at `now_us`, with this content if the sensor has answered. Returns the causes if they are to be
-    /// logged.
-    pub(crate) fn add(&mut self, diagnosis: Option<Diagnosis>, now_us: u64) -> Option<CauseList> {
+    /// The register was read at `now_us`, with this content if the sensor has answered. Counts the causes, and returns them if they are
+    /// to be logged.
+    pub(crate) fn add(
+        &mut self,
+        diagnosis: Option<Diagnosis>,
+        now_us: u64,
+        counters: &mut Health,
+    ) -> Option<CauseList> {
         self.next_read_us = now_us + READ_US;
         let diagnosis = diagnosis?;
-        self.reads = self.reads.saturating_add(1);
-        for (count, (cause, _)) in self.counts.iter_mut().zip(CAUSES) {
-            *count = count.saturating_add(u32::from(diagnosis.intersects(cause)));
+        count(&mut counters.diag_reads);
+        for (_, _, counter) in CAUSES.iter().filter(|(cause, ..)| diagnosis.intersects(*cause)) {
+            count(counter(counters));
         }
         if now_us >= self.forget_us {
             (self.logged, self.forget_us) = (Diagnosis::empty(), now_us + LOG_US);
@@ -60,37 +65,34 @@ impl StatusFlags {
         self.logged |= diagnosis;
         news.then_some(CauseList(diagnosis))
     }
+}
 
-    /// Sets the counters of a health message.
-    pub(crate) fn fill(&self, health: &mut Health) {
-        health.diag_reads = self.reads;
-        let counters = [
-            &mut health.diag_supply_low,
-            &mut health.diag_supply_high,
-            &mut health.diag_flash_update,
-            &mut health.diag_spi,
-            &mut health.diag_over_range,
-            &mut health.diag_self_test,
-            &mut health.diag_flash_checksum,
-            &mut health.diag_alarm,
-        ];
-        for (counter, count) in counters.into_iter().zip(self.counts) {
-            *counter = count;
-        }
-    }
+/// Adds one to a counter.
+pub(crate) fn count(counter: &mut u32) {
+    *counter = counter.saturating_add(1);
 }
 
 /// The causes in a value of DIAG_STAT, displayed as a list of names after the value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct CauseList(Diagnosis);
 
+impl CauseList {
+    fn names(self) -> impl Iterator<Item = &'static str> {
+        CAUSES.into_iter().filter(move |(cause, ..)| self.0.intersects(*cause)).map(|(_, name, _)| name)
+    }
+}
+
+#[cfg(all(target_os = "none", feature = "microcontroller"))]
+impl defmt::Format for CauseList {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        self.names().for_each(|name| defmt::write!(f, "{=str} ", name));
+    }
+}
+
 impl fmt::Display for CauseList {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:#06x}", self.0.bits())?;
-        for (_, name) in CAUSES.iter().filter(|(cause, _)| self.0.intersects(*cause)) {
-            write!(f, " {name}")?;
-        }
-        Ok(())
+        self.names().try_for_each(|name| write!(f, " {name}"))
     }
 }
 
@@ -105,12 +107,10 @@ mod tests {
 
     #[test]
     fn every_cause_is_counted_apart() {
-        let mut flags = StatusFlags::new();
+        let (mut flags, mut health) = (StatusFlags::new(), Health::default());
         for bit in 0..16 {
-            flags.add(Some(Diagnosis::from_bits_truncate(1 << bit)), 0);
+            flags.add(Some(Diagnosis::from_bits_truncate(1 << bit)), 0, &mut health);
         }
-        let mut health = Health::default();
-        flags.fill(&mut health);
         let low_bits = [health.diag_supply_low, health.diag_supply_high, health.diag_flash_update, health.diag_spi];
         assert_eq!((low_bits, health.diag_over_range, health.diag_flash_checksum), ([1; 4], 1, 1), "{health:?}");
         // Bit 5 and the six sensors; two alarms. Bit 7 is not defined.
@@ -119,15 +119,18 @@ mod tests {
 
     #[test]
     fn the_register_is_read_once_a_second_and_a_cause_is_logged_once_in_ten_minutes() {
-        let mut flags = StatusFlags::new();
+        let (mut flags, mut health) = (StatusFlags::new(), Health::default());
         assert!(flags.is_due(0));
+        let mut add = |flags: &mut StatusFlags, diagnosis, now_us| {
+            flags.add(diagnosis, now_us, &mut health).map(|causes| causes.to_string())
+        };
         let low = Some(Diagnosis::SUPPLY_LOW);
-        assert_eq!(flags.add(low, SECOND).map(|causes| causes.to_string()).as_deref(), Some("0x0001 supply_low"));
+        assert_eq!(add(&mut flags, low, SECOND).as_deref(), Some("0x0001 supply_low"));
         assert!(!flags.is_due(2 * SECOND - 1) && flags.is_due(2 * SECOND));
-        assert_eq!(flags.add(low, 2 * SECOND), None);
-        let both = flags.add(Some(Diagnosis::SUPPLY_LOW | Diagnosis::OVER_RANGE), 3 * SECOND);
-        assert_eq!(both.map(|causes| causes.to_string()).as_deref(), Some("0x0011 supply_low over_range"));
-        assert_eq!(flags.add(None, 4 * SECOND), None);
-        assert!(flags.add(low, 602 * SECOND).is_some());
+        assert_eq!(add(&mut flags, low, 2 * SECOND), None);
+        let both = add(&mut flags, Some(Diagnosis::SUPPLY_LOW | Diagnosis::OVER_RANGE), 3 * SECOND);
+        assert_eq!(both.as_deref(), Some("0x0011 supply_low over_range"));
+        assert_eq!(add(&mut flags, None, 4 * SECOND), None);
+        assert!(add(&mut flags, low, 602 * SECOND).is_some());
     }
 }

@@ -22,8 +22,9 @@ struct Board {
 }
 
 /// STM32: in its boot loader, which the pin BOOT0 selects, the board is a device for dfu-util (https://dfu-util.sourceforge.net).
-const DFU: &str = "connect BOOT0 to 3.3 V, press reset, and type
-  dfu-util --alt 0 --dfuse-address 0x08000000:leave --download FILE";
+const DFU: &str = "connect BOOT0 to 3.3 V and press reset, or type bootsel at a board that runs this firmware, and then
+  dfu-util --alt 0 --dfuse-address 0x08000000:leave --download FILE
+and take BOOT0 to ground: the next restart would end in the boot loader";
 
 const BOARDS: [Board; 4] = [
     Board {

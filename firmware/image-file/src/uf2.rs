@@ -3,10 +3,12 @@
 //! The format is <https://github.com/microsoft/uf2>: blocks of 512 bytes, each with a page of 256 bytes of flash.
 
 use crate::flash_contents::{ImageError, segments};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Bytes of flash in a block.
 const PAGE_BYTES: usize = 256;
+/// Bytes of flash that are erased at once.
+const SECTOR_BYTES: u32 = 4096;
 /// Length of a block, bytes.
 const BLOCK_BYTES: usize = 512;
 /// First two and last word of every block.
@@ -19,7 +21,8 @@ const RP2040: u32 = 0xE48B_FF56;
 const FLASH: std::ops::Range<u32> = 0x1000_0000..0x1100_0000;
 
 /// Converts those loadable segments of an ELF image that lie in flash to the blocks of a UF2 file, in the order of their
-/// addresses. Bytes of a page that no segment fills are zero.
+/// addresses. Bytes that no segment fills are zero, up to the ends of the sectors: the boot ROM erases a sector with the first block that it
+/// gets of it, and may program the pages of one with gaps without erasing it (github.com/raspberrypi/pico-sdk, pull request 800).
 ///
 /// # Errors
 /// Those of [`segments`].
@@ -30,6 +33,10 @@ pub fn from_elf(elf: &[u8]) -> Result<Vec<u8>, ImageError> {
             let page = pages.entry(at & !(PAGE_BYTES as u32 - 1)).or_insert([0; PAGE_BYTES]);
             page[at as usize % PAGE_BYTES] = byte;
         }
+    }
+    let sectors: BTreeSet<u32> = pages.keys().map(|page| page & !(SECTOR_BYTES - 1)).collect();
+    for page in sectors.into_iter().flat_map(|sector| (sector..sector + SECTOR_BYTES).step_by(PAGE_BYTES)) {
+        pages.entry(page).or_insert([0; PAGE_BYTES]);
     }
     let count = pages.len() as u32;
     let block = |(number, (address, page)): (u32, (u32, [u8; PAGE_BYTES]))| {
@@ -50,17 +57,25 @@ mod tests {
 
     /// An ELF with one segment of `bytes` at `address`.
     fn elf(address: u32, bytes: &[u8]) -> Vec<u8> {
+        elf_of(&[(address, bytes)])
+    }
+
+    fn elf_of(segments: &[(u32, &[u8])]) -> Vec<u8> {
         let mut elf = vec![0; 52];
         elf[..7].copy_from_slice(b"\x7FELF\x01\x01\x01");
         elf[20] = 1; // version
         elf[28..32].copy_from_slice(&52_u32.to_le_bytes());
         elf[40] = 52; // length of the header
         elf[42] = 32; // length of a program header
-        elf[44] = 1;
-        for field in [1, 84, address, address, bytes.len() as u32, bytes.len() as u32, 5, 4] {
-            elf.extend(u32::to_le_bytes(field));
+        elf[44] = segments.len() as u8;
+        let mut offset = 52 + 32 * segments.len() as u32;
+        for (address, bytes) in segments {
+            let length = bytes.len() as u32;
+            let header = [1, offset, *address, *address, length, length, 5, 4];
+            elf.extend(header.into_iter().flat_map(u32::to_le_bytes));
+            offset += length;
         }
-        elf.extend(bytes);
+        segments.iter().for_each(|(_, bytes)| elf.extend(*bytes));
         elf
     }
 
@@ -69,17 +84,29 @@ mod tests {
     fn the_blocks_follow_the_specification() {
         let bytes: Vec<u8> = (0..300_u32).map(|k| k as u8).collect();
         let uf2 = from_elf(&elf(0x1000_0100, &bytes)).unwrap();
-        assert_eq!(uf2.len(), 2 * 512);
+        assert_eq!(uf2.len(), 16 * 512, "a sector");
         for (number, block) in uf2.chunks(512).enumerate() {
             let word = |at: usize| u32::from_le_bytes(block[at..at + 4].try_into().unwrap());
             assert_eq!((word(0), word(4), word(508)), (0x0A324655, 0x9E5D5157, 0x0AB16F30));
             assert_eq!((word(8), word(28)), (0x2000, 0xE48BFF56));
-            assert_eq!((word(12), word(16)), (0x1000_0100 + 256 * number as u32, 256));
-            assert_eq!((word(20), word(24)), (number as u32, 2));
+            assert_eq!((word(12), word(16)), (0x1000_0000 + 256 * number as u32, 256));
+            assert_eq!((word(20), word(24)), (number as u32, 16));
         }
-        assert_eq!(uf2[32..288], bytes[..256]);
-        assert_eq!(uf2[512 + 32..512 + 32 + 44], bytes[256..]);
-        assert!(uf2[512 + 76..1020].iter().all(|&byte| byte == 0));
+        assert_eq!(uf2[512 + 32..512 + 288], bytes[..256]);
+        assert_eq!(uf2[1024 + 32..1024 + 32 + 44], bytes[256..]);
+        assert!(uf2[1024 + 76..1532].iter().all(|&byte| byte == 0));
+    }
+
+    /// Two segments 8 KiB apart: every sector that is touched has all of its pages, and the one between has none.
+    #[test]
+    fn sectors_have_no_gaps() {
+        let segments: [(u32, &[u8]); 3] = [(0x1000_0010, &[1; 8]), (0x1000_0F00, &[2; 8]), (0x1000_2100, &[3; 300])];
+        let uf2 = from_elf(&elf_of(&segments)).unwrap();
+        let address = |block: &[u8]| u32::from_le_bytes(block[12..16].try_into().unwrap());
+        let pages: Vec<u32> = uf2.chunks(512).map(address).collect();
+        let expected = (0..16).chain(32..48).map(|page| 0x1000_0000 + 256 * page);
+        assert_eq!(pages, expected.collect::<Vec<u32>>());
+        assert_eq!((uf2[32 + 16], uf2[15 * 512 + 32], uf2[17 * 512 + 32], uf2[16 * 512 + 32]), (1, 2, 3, 0));
     }
 
     #[test]

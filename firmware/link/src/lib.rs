@@ -20,9 +20,9 @@ mod text;
 
 pub use frame::{Decoder, DecoderCounters, Encoder, MAX_FRAME, MAX_RAW_FRAME, Received, VERSION};
 pub use message::{
-    Boot, BootCause, ChannelMessage, ClockSource, Health, Hello, LearnedMessage, MAX_ADDED_TERMS, MAX_COEFFICIENTS,
-    MAX_COVARIATES, MAX_DEVIATIONS, MAX_OCTAVES, MAX_RAW_BURSTS, Message, MessageRef, RawBurst, RawMessage,
-    ReportedAddedTerm, ReportedCoefficient, ReportedDeviations, ReportedModelError, ReportedOctave, ReportedParameter,
-    ReportedRegressor, ReportedShift, ReportedTerm, ValidationMessage,
+    Boot, BootCause, ChannelMessage, ClockSource, Counter, Health, Hello, LearnedMessage, MAX_ADDED_TERMS,
+    MAX_COEFFICIENTS, MAX_COVARIATES, MAX_DEVIATIONS, MAX_OCTAVES, MAX_RAW_BURSTS, Message, MessageRef, RawBurst,
+    RawMessage, ReportedAddedTerm, ReportedCoefficient, ReportedDeviations, ReportedModelError, ReportedOctave,
+    ReportedParameter, ReportedRegressor, ReportedShift, ReportedTerm, ValidationMessage,
 };
 pub use text::{MAX_TEXT, TextLine, text_line, wire_bytes};

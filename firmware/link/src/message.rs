@@ -119,6 +119,10 @@ pub struct Boot {
     pub crash_record: String<MAX_TEXT>,
     /// What the microcontroller's clocks, and with them all times and rates of the report, are derived from.
     pub clock: ClockSource,
+    /// The start follows the third crash within ten minutes: nothing that was stored is used. Appended to version 4: false of a device
+    /// that does not send it.
+    #[serde(deserialize_with = "default_if_absent")]
+    pub safe_mode: bool,
 }
 
 /// Why the microcontroller started.
@@ -352,112 +356,151 @@ pub struct RawBurst {
     pub words: [[u8; 2]; 12],
 }
 
-/// Counters since the application started or the statistics were reset, and load figures. Counters saturate.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Health {
+/// A counter or figure of [`Health`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Counter {
+    /// The name of its field.
+    pub name: &'static str,
+    /// Its value.
+    pub value: u32,
+    /// It counts events, and stands still while all is well. The others count samples, or are figures of the load.
+    pub counts_events: bool,
+}
+
+/// Makes [`Health`] and all that goes through its fields of a list of them.
+macro_rules! health {
+    ($($(#[$attribute:meta])* $kind:ident $name:ident,)*) => {
+        /// Counters since the application started or the statistics were reset, and load figures. Counters saturate.
+        #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+        pub struct Health {
+            $($(#[$attribute])* pub $name: u32,)*
+        }
+
+        impl Health {
+            /// Number of counters and figures.
+            pub const COUNTERS: usize = [$(stringify!($name)),*].len();
+
+            /// All of them, in the order of the message.
+            #[must_use]
+            pub fn counters(&self) -> [Counter; Self::COUNTERS] {
+                [$(Counter { name: stringify!($name), value: self.$name, counts_events: health!($kind) }),*]
+            }
+
+            /// The sums of all counters, of which each is counted in one place: the others have 0.
+            #[must_use]
+            pub fn with(&self, others: &Self) -> Self {
+                Self { $($name: self.$name.saturating_add(others.$name)),* }
+            }
+        }
+    };
+    (event) => { true };
+    (figure) => { false };
+}
+
+health! {
     /// Bursts that arrived, usable or not.
-    pub bursts: u32,
+    figure bursts,
     /// Bursts of which at least one inertial channel was used.
-    pub used: u32,
+    figure used,
     /// Bursts with an inertial word whose new-data bit was clear.
-    pub no_new_data: u32,
+    event no_new_data,
     /// Bursts with a word whose error bit was set; a warning, the samples are used. The `diag_` counters have the causes.
-    pub error_alarm: u32,
+    event error_alarm,
     /// Bursts with a supply outside 4.75 V to 5.25 V; a warning, the samples are used.
-    pub supply: u32,
+    event supply,
     /// Bursts in which every bit was 0.
-    pub stuck_low: u32,
+    event stuck_low,
     /// Bursts whose last two words were all ones.
-    pub stuck_high: u32,
+    event stuck_high,
     /// Bursts whose bits were shifted by 1 to 15 clocks.
-    pub shifted: u32,
+    event shifted,
     /// Bursts of a frozen sensor: the inertial words equal for four lengths of the filter and at least 16 bursts, or all twelve
     /// words for 512.
-    pub frozen: u32,
+    event frozen,
     /// Bursts with a rate beyond the sensor's range.
-    pub impossible_rate: u32,
+    event impossible_rate,
     /// Bursts whose x rate may have lost its sign.
-    pub x_sign: u32,
+    event x_sign,
     /// Bursts whose inertial words equal those of the burst before.
-    pub repeated: u32,
+    event repeated,
     /// Bursts whose bus transfer failed.
-    pub bus_errors: u32,
+    event bus_errors,
     /// Bursts dropped because the queue was full.
-    pub queue_full: u32,
+    event queue_full,
     /// Largest number of bursts in the queue.
-    pub queue_peak: u32,
+    figure queue_peak,
     /// Data-ready edges missing, by the time between those that came.
-    pub lost_edges: u32,
+    event lost_edges,
     /// Data-ready edges at no multiple of the sample period.
-    pub spurious_edges: u32,
+    event spurious_edges,
     /// Bursts not used because the sensor was suspect and had not been probed yet.
-    pub suspect: u32,
+    event suspect,
     /// Times that the sensor was lost after it had delivered samples.
-    pub recoveries: u32,
+    event recoveries,
     /// Raw messages dropped because the transmit queue was full.
-    pub raw_dropped: u32,
+    event raw_dropped,
     /// Received bytes lost because they came faster than they were read.
-    pub serial_overruns: u32,
+    event serial_overruns,
     /// Commands that were not understood.
-    pub bad_commands: u32,
+    event bad_commands,
     /// Share of the time that the processor was awake, in 1/1000.
-    pub awake_permille: u32,
+    figure awake_permille,
     /// Longest sampling interrupt in processor cycles.
-    pub sampling_cycles: u32,
+    figure sampling_cycles,
     /// Longest run of the estimators in processor cycles, preemption included.
-    pub estimator_cycles: u32,
+    figure estimator_cycles,
     /// Largest stack depth in bytes.
-    pub stack_bytes: u32,
+    figure stack_bytes,
     /// Size of the stack in bytes.
-    pub stack_size: u32,
+    figure stack_size,
     /// Used bursts of which a channel was refused.
-    pub partly_used: u32,
+    event partly_used,
     /// Used bursts with a warning: error bit set, or supply outside 4.75 V to 5.25 V.
-    pub marked: u32,
+    event marked,
     /// Bursts refused because their supply was below 3 V or above 6 V, at which the sensor does not run.
-    pub implausible_supply: u32,
+    event implausible_supply,
     /// Reads of DIAG_STAT because the error bit was set, at most one a second.
-    pub diag_reads: u32,
+    event diag_reads,
     /// Of these, reads with bit 0: supply below 4.75 V.
-    pub diag_supply_low: u32,
+    event diag_supply_low,
     /// With bit 1: supply above 5.25 V.
-    pub diag_supply_high: u32,
+    event diag_supply_high,
     /// With bit 2: a flash update failed.
-    pub diag_flash_update: u32,
+    event diag_flash_update,
     /// With bit 3: a frame had a wrong number of clocks.
-    pub diag_spi: u32,
+    event diag_spi,
     /// With bit 4: a sensor was beyond its range.
-    pub diag_over_range: u32,
+    event diag_over_range,
     /// With bit 5 or one of bits 10 to 15: a self-test failed.
-    pub diag_self_test: u32,
+    event diag_self_test,
     /// With bit 6: the checksum of the flash memory is wrong.
-    pub diag_flash_checksum: u32,
+    event diag_flash_checksum,
     /// With bit 8 or 9: an alarm was raised.
-    pub diag_alarm: u32,
+    event diag_alarm,
     /// Steps of recovery: the registers were read again and set where they differed.
-    pub rereads: u32,
+    event rereads,
     /// Steps of recovery: the microcontroller's SPI was reset and the sensor probed.
-    pub bus_resets: u32,
+    event bus_resets,
     /// Steps of recovery: the sensor was reset by its software command.
-    pub sensor_resets: u32,
+    event sensor_resets,
     /// Steps of recovery: the sensor was reset by its RST line.
-    pub reset_lines: u32,
+    event reset_lines,
     /// Bursts not used because the sensor's filter still mixed them with what was before a self-test, a reset or a change of
     /// settings; and 32 after a start or such a change, from which the gate against gross errors learns the noise.
-    pub settling: u32,
+    event settling,
     /// Times that the data-ready line was masked because it oscillated.
-    pub data_ready_masked: u32,
+    event data_ready_masked,
     /// Bursts of which a channel was refused as a gross error: further from the sample before than its noise makes likely.
-    pub gross_errors: u32,
+    event gross_errors,
     /// Messages and text lines that were not copied to the USB port, since the host did not read it.
-    pub usb_dropped: u32,
+    event usb_dropped,
     /// Bursts refused because the error flag was set in some of their words and clear in others, which no sensor sends. Appended to
     /// version 4: 0 of a device that does not send it.
-    #[serde(deserialize_with = "zero_if_absent")]
-    pub mixed_alarm: u32,
+    #[serde(deserialize_with = "default_if_absent")]
+    event mixed_alarm,
 }
 
 /// A last field that the sender may not know. Nothing else makes it unreadable, since the frame's checksum is right.
-fn zero_if_absent<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
-    Ok(u32::deserialize(deserializer).unwrap_or_default())
+fn default_if_absent<'de, T: Deserialize<'de> + Default, D: Deserializer<'de>>(deserializer: D) -> Result<T, D::Error> {
+    Ok(T::deserialize(deserializer).unwrap_or_default())
 }

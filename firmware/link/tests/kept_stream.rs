@@ -5,8 +5,11 @@
 use link::{Decoder, DecoderCounters, Encoder, Message, Received};
 
 /// One message of each kind, numbered from 0.
-const VERSION_4: &[u8] = include_bytes!("kept_stream/version-4-mixed-alarm.bin");
-const VERSION_4_MESSAGES: &str = include_str!("kept_stream/version-4-mixed-alarm.txt");
+const VERSION_4: &[u8] = include_bytes!("kept_stream/version-4-safe-mode.bin");
+const VERSION_4_MESSAGES: &str = include_str!("kept_stream/version-4-safe-mode.txt");
+/// The same before `Boot` had its last field, `safe_mode`, which is false.
+const SECOND_VERSION_4: &[u8] = include_bytes!("kept_stream/version-4-mixed-alarm.bin");
+const SECOND_VERSION_4_MESSAGES: &str = include_str!("kept_stream/version-4-mixed-alarm.txt");
 /// The same before `Health` had its last field, `mixed_alarm`, which is 0.
 const FIRST_VERSION_4: &[u8] = include_bytes!("kept_stream/version-4.bin");
 const FIRST_VERSION_4_MESSAGES: &str = include_str!("kept_stream/version-4.txt");
@@ -44,7 +47,11 @@ fn frame(body: &[u8]) -> Vec<u8> {
 
 #[test]
 fn the_kept_streams_say_what_they_said() {
-    for (stream, said) in [(VERSION_4, VERSION_4_MESSAGES), (FIRST_VERSION_4, FIRST_VERSION_4_MESSAGES)] {
+    for (stream, said) in [
+        (VERSION_4, VERSION_4_MESSAGES),
+        (SECOND_VERSION_4, SECOND_VERSION_4_MESSAGES),
+        (FIRST_VERSION_4, FIRST_VERSION_4_MESSAGES),
+    ] {
         let (messages, counters) = decode(stream);
         assert_eq!(counters, DecoderCounters { frames: 7, ..DecoderCounters::default() });
         assert_eq!(format!("{messages:#?}\n"), said);

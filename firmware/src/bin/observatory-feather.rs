@@ -8,19 +8,21 @@
 //! | TX, RX | PB10, PB11 | USART3, 460 800 Bd 8N1 | to the host |
 //! | USB | PA11, PA12 | with the feature `feather-usb`, which has not run yet: serial port (CDC-ACM) | to the host |
 //!
-//! SCK, MO and MI of the board are SPI2 and not used. The sensor runs from 5 V, which USB gives; its outputs are connected to
-//! 5 V tolerant pins without a pull, and its inputs accept 3.3 V.
+//! SCK, MO and MI of the board are SPI2 and not used; USB gives the 5 V.
+//!
+//! The sensor runs from 5 V and drives its outputs from an internal 3.3 V: connect every signal directly, without a divider or a level
+//! shifter (data sheet Rev. B, page 5).
 #![no_std]
 #![no_main]
 
 use firmware::microcontroller::stm32f4::bus::Spi1Bus;
 use firmware::microcontroller::stm32f4::port::UsartPort;
-use firmware::microcontroller::stm32f4::sensor_wires::SensorWires;
 use firmware::microcontroller::stm32f4::start::Stm32f4;
 #[cfg(feature = "feather-usb")]
 use firmware::microcontroller::stm32f4::usb::{Stm32UsbPort, usb_port};
+use firmware::microcontroller::stm32f4::wires::SensorWires;
 use firmware::microcontroller::{BoardParts, BoardSupport, NotConnected, UartQueues};
-use stm32f4xx_hal::gpio::{Input, Output, PA4, PC1, PC4};
+use stm32f4xx_hal::gpio::{Input, Output, PC1, PC4};
 use stm32f4xx_hal::pac::{self, USART3};
 use stm32f4xx_hal::prelude::*;
 
@@ -33,7 +35,7 @@ impl BoardSupport for Feather {
     type Device = pac::Peripherals;
     type Microcontroller = Stm32f4;
     type DataReady = PC4<Input>;
-    type Bus = Spi1Bus<PA4<Output>>;
+    type Bus = Spi1Bus;
     type Uart = UsartPort<USART3>;
     #[cfg(feature = "feather-usb")]
     type Usb = Stm32UsbPort;
@@ -46,7 +48,7 @@ impl BoardSupport for Feather {
         let mut started = Stm32f4::start((device.RCC, device.FLASH, device.TIM2, device.IWDG), CRYSTAL_HZ);
         let rcc = &mut started.rcc;
         let (a, b, c) = (device.GPIOA.split(rcc), device.GPIOB.split(rcc), device.GPIOC.split(rcc));
-        let uart = UsartPort::new(device.USART3, (b.pb10, b.pb11), queues, rcc);
+        let uart = UsartPort::new(device.USART3, (b.pb10, b.pb11.into_pull_up_input()), queues, rcc);
         #[cfg(not(feature = "feather-usb"))]
         let usb = None;
         #[cfg(feature = "feather-usb")]

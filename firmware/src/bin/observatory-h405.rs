@@ -7,16 +7,17 @@
 //! | PB0 | data ready, rising edge | DIO1 |
 //! | PA2, PA3 | USART2 TX, RX, 460 800 Bd 8N1 | to the host |
 //!
-//! The sensor runs from 5 V; its outputs are connected to 5 V tolerant pins without a pull, and its inputs accept 3.3 V.
+//! The sensor runs from 5 V and drives its outputs from an internal 3.3 V: connect every signal directly, without a divider or a level
+//! shifter (data sheet Rev. B, page 5).
 #![no_std]
 #![no_main]
 
 use firmware::microcontroller::stm32f4::bus::Spi1Bus;
 use firmware::microcontroller::stm32f4::port::UsartPort;
-use firmware::microcontroller::stm32f4::sensor_wires::SensorWires;
 use firmware::microcontroller::stm32f4::start::Stm32f4;
+use firmware::microcontroller::stm32f4::wires::SensorWires;
 use firmware::microcontroller::{BoardParts, BoardSupport, NotConnected, UartQueues};
-use stm32f4xx_hal::gpio::{Input, Output, PA4, PB0, PC12};
+use stm32f4xx_hal::gpio::{Input, Output, PB0, PC12};
 use stm32f4xx_hal::pac::{self, USART2};
 use stm32f4xx_hal::prelude::*;
 
@@ -29,7 +30,7 @@ impl BoardSupport for H405 {
     type Device = pac::Peripherals;
     type Microcontroller = Stm32f4;
     type DataReady = PB0<Input>;
-    type Bus = Spi1Bus<PA4<Output>>;
+    type Bus = Spi1Bus;
     type Uart = UsartPort<USART2>;
     type Usb = NotConnected;
     type Led = PC12<Output>;
@@ -39,7 +40,7 @@ impl BoardSupport for H405 {
         let mut started = Stm32f4::start((device.RCC, device.FLASH, device.TIM2, device.IWDG), CRYSTAL_HZ);
         let rcc = &mut started.rcc;
         let (a, b, c) = (device.GPIOA.split(rcc), device.GPIOB.split(rcc), device.GPIOC.split(rcc));
-        let uart = UsartPort::new(device.USART2, (a.pa2, a.pa3), queues, rcc);
+        let uart = UsartPort::new(device.USART2, (a.pa2, a.pa3.into_pull_up_input()), queues, rcc);
         let sensor = SensorWires {
             spi: (device.SPI1, device.DMA2),
             pins: (a.pa4, a.pa5, a.pa6, a.pa7),

@@ -21,8 +21,16 @@ pub fn restore(cause: BootCause, clock: ClockSource) -> (Boot, RetainedRam) {
         retained.clear();
     }
     let boot = Boot { cause, crash_record: CRASH_RECORD.take(), clock, ..Boot::default() };
+    let cause = match cause {
+        BootCause::Unknown => "of unknown cause",
+        BootCause::PowerOn => "by power-on",
+        BootCause::BrownOut => "by brown-out",
+        BootCause::Pin => "by the reset pin",
+        BootCause::Software => "by the program",
+        BootCause::Watchdog => "by the watchdog",
+    };
     let (crystal, record) = (clock == ClockSource::Crystal, boot.crash_record.as_str());
-    defmt::info!("start {=u8}, crystal {=bool}, crash record: {=str}", cause as u8, crystal, record);
+    defmt::info!("start {=str}, crystal {=bool}, crash record: {=str}", cause, crystal, record);
     (boot, retained)
 }
 
@@ -32,17 +40,34 @@ pub fn record_panic(info: &PanicInfo<'_>) {
     // The paths of dependencies are longer than the record.
     let file = path.rsplit('/').next().unwrap_or(path);
     CRASH_RECORD.write(format_args!("panic at {file}:{line}: {}", info.message()));
-    defmt::error!("panic at {=str}:{=u32}: {}", path, line, defmt::Display2Format(&info.message()));
+    // Its message, which would be formatted here, is in the crash record.
+    defmt::error!("panic at {=str}:{=u32}", path, line);
 }
 
 /// Writes the place of a fault into the crash record; there is no frame if the stack has overflowed.
 pub fn record_fault(frame: Option<&ExceptionFrame>) {
     match frame {
         Some(frame) => {
+            defmt::error!("hard fault at {=u32:#010x}", frame.pc());
             CRASH_RECORD.write(format_args!("hard fault at {:#010x}, called from {:#010x}", frame.pc(), frame.lr()));
         }
         None => CRASH_RECORD.write(format_args!("stack overflow")),
     }
+}
+
+/// Gives the main loop access to each of its resources, and the interrupts that it requests.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! shared_resources {
+    ($board:ty, $($resource:ident: $kind:ty),*; { $($request:tt)* }) => {
+        impl SharedResources for idle::SharedResources<'_> {
+            type Board = $board;
+            $(fn $resource<R>(&mut self, access: impl FnOnce(&mut $kind) -> R) -> R {
+                rtic::Mutex::lock(&mut self.$resource, access)
+            })*
+            $($request)*
+        }
+    };
 }
 
 /// Defines the image of a board: start-up, interrupts and main loop.
@@ -75,16 +100,17 @@ macro_rules! observatory {
             use super::*;
             use $($device)::+::Interrupt;
             use heapless::spsc::Consumer;
+            use $crate::microcontroller::context::{BoardContext, SharedResources};
             use $crate::microcontroller::image::restore;
             use $crate::microcontroller::processor::{
-                Blinker, ESTIMATOR_CYCLES, Interrupts, Processor, SAMPLING_CYCLES, count_lost_bytes, measure,
+                Blinker, ESTIMATOR_CYCLES, SAMPLING_CYCLES, count_lost_bytes, measure, start_systick,
             };
             use $crate::microcontroller::{
-                BoardParts, BoardSupport, BurstBus as _, BurstEnd, DataReadyPin as _, Microcontroller, ReceiveBuffer,
-                ServedPort as _, UartQueues, UsbParts,
+                BoardParts, BoardSupport, BurstBus as _, BurstEnd, DataReadyPin as _, Microcontroller, ServedPort as _,
+                UartQueues, UsbParts,
             };
             use $crate::{
-                BoardContext, BurstQueue, DataReadyLine as _, EdgeAction, Estimators, FIRST_CONFIG, FinishedEpoch, HostPort, Locks, MicrosecondCounter as _, ReceivedBytes, Sampler, Start,
+                BurstQueue, DataReadyLine as _, EdgeAction, Estimators, FIRST_CONFIG, FinishedEpoch, HostPort, MicrosecondCounter as _, ReceiveBuffer, ReceivedBytes, Receiver, Sampler, Start,
                 Statistics, TimedBurst, TransmitBuffer, TransmitQueue, Uptime, WatchdogExtension, estimate, run,
             };
 
@@ -105,7 +131,7 @@ macro_rules! observatory {
                 bursts: Consumer<'static, TimedBurst>,
                 uart: <$board as BoardSupport>::Uart,
                 usb: Option<<$board as BoardSupport>::Usb>,
-                processor: Processor<Mcu, <$board as BoardSupport>::ResetLine>,
+                reset_line: Option<<$board as BoardSupport>::ResetLine>,
                 blinker: Blinker<<$board as BoardSupport>::Led>,
                 received: ReceivedBytes<'static>,
                 start: Option<Start>,
@@ -122,17 +148,10 @@ macro_rules! observatory {
                 let (to_port, transmit) = context.local.transmit_buffer.split();
                 let (receive, received) = context.local.receive_buffer.split();
                 let (to_estimators, bursts) = context.local.burst_queue.split();
-                let BoardParts { cause, clock, core_hz, microcontroller, data_ready, bus, uart, usb, led, reset_line } =
-                    <$board>::start(context.device, UartQueues { transmit, receive });
+                let BoardParts { cause, clock, core_hz, data_ready, bus, uart, usb, led, reset_line } =
+                    <$board>::start(context.device, UartQueues { transmit, receive: Receiver::new(receive) });
                 let (usb, to_usb, from_usb) = UsbParts::split(usb);
-                let interrupts = Interrupts {
-                    transmit: || {
-                        rtic::pend(Interrupt::$serial);
-                        $(rtic::pend(Interrupt::$usb_interrupt);)?
-                    },
-                    end_burst: || rtic::pend(Interrupt::$burst_end),
-                };
-                let processor = Processor::new((microcontroller, core_hz), context.core.SYST, interrupts, reset_line);
+                start_systick(context.core.SYST, core_hz);
                 let (boot, retained) = restore(cause, clock);
                 let shared = Shared {
                     uptime: Uptime::new(Mcu::counter()),
@@ -144,22 +163,29 @@ macro_rules! observatory {
                 };
                 let start = Some(Start { boot, retained, finished: context.local.finished });
                 let (blinker, received) = (Blinker::new(led, clock), ReceivedBytes { uart: received, usb: from_usb });
-                (shared, Local { bursts, uart, usb, processor, blinker, received, start })
+                (shared, Local { bursts, uart, usb, reset_line, blinker, received, start })
             }
 
-            #[idle(local = [processor, received, start], shared = [uptime, bus, sampler, line, estimators, transmit_queue])]
+            #[idle(local = [reset_line, received, start], shared = [uptime, bus, sampler, line, estimators, transmit_queue])]
             fn idle(context: idle::Context) -> ! {
-                let shared = context.shared;
-                let locks = Locks {
-                    uptime: shared.uptime,
-                    bus: shared.bus,
-                    sampler: shared.sampler,
-                    data_ready: shared.line,
-                    estimators: shared.estimators,
-                    transmit_queue: shared.transmit_queue,
-                };
                 let start = context.local.start.take().expect("the main loop starts once");
-                run(BoardContext::new(context.local.processor, locks, context.local.received), start)
+                run(BoardContext::new(context.shared, context.local.reset_line, context.local.received), start)
+            }
+
+            $crate::shared_resources! {
+                $board, uptime: Uptime, bus: <$board as BoardSupport>::Bus, sampler: Sampler<'static>,
+                line: <$board as BoardSupport>::DataReady, estimators: Estimators<'static>,
+                transmit_queue: TransmitQueue<'static>;
+                {
+                    fn request_transmission() {
+                        rtic::pend(Interrupt::$serial);
+                        $(rtic::pend(Interrupt::$usb_interrupt);)?
+                    }
+
+                    fn abandon_burst() {
+                        rtic::pend(Interrupt::$burst_end);
+                    }
+                }
             }
 
             /// A new sample: starts the transfer of a burst by DMA.
@@ -206,13 +232,13 @@ macro_rules! observatory {
 
             #[task(binds = $serial, priority = 4, local = [uart])]
             fn uart(context: uart::Context) {
-                count_lost_bytes(HostPort::Uart, context.local.uart.serve());
+                count_lost_bytes(HostPort::Uart, context.local.uart.serve(Mcu::counter()));
             }
 
             $(#[task(binds = $usb_interrupt, priority = 1, local = [usb])]
             fn usb(context: usb::Context) {
                 if let Some(port) = context.local.usb {
-                    count_lost_bytes(HostPort::Usb, port.serve());
+                    count_lost_bytes(HostPort::Usb, port.serve(Mcu::counter()));
                 }
             })?
 
@@ -220,6 +246,8 @@ macro_rules! observatory {
             fn wake(context: wake::Context) {
                 context.local.blinker.tick();
                 Mcu::extend_watchdog(context.local.extension);
+                // A port that has stalled raises no interrupt.
+                $(rtic::pend(Interrupt::$usb_interrupt);)?
             }
         }
 

@@ -1,9 +1,6 @@
 //! The Cortex-M core: sleep, SysTick as the cycle counter, load figures, and the LED, which SysTick blinks.
 
-use super::Microcontroller;
-use super::settings_flash::SettingsFlash;
-use crate::board::{BoardMeters, BrownOutLevel, Chip, HostPort};
-use crate::settings_store::StoreError;
+use crate::receive::HostPort;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
@@ -15,7 +12,7 @@ pub static SAMPLING_CYCLES: AtomicU32 = AtomicU32::new(0);
 /// Longest run of the estimators in cycles; written by their interrupt only.
 pub static ESTIMATOR_CYCLES: AtomicU32 = AtomicU32::new(0);
 /// Received bytes that each port has lost; written by its interrupt only.
-static SERIAL_OVERRUNS: [AtomicU32; HostPort::COUNT] = [const { AtomicU32::new(0) }; HostPort::COUNT];
+pub(super) static LOST_BYTES: [AtomicU32; HostPort::COUNT] = [const { AtomicU32::new(0) }; HostPort::COUNT];
 
 /// Rate in Hz at which SysTick wakes the main loop, also without a sensor. At 168 MHz the reload value fits SysTick's 24 bits.
 pub const WAKE_HZ: u32 = 16;
@@ -34,8 +31,8 @@ pub fn measure(longest: &AtomicU32, work: impl FnOnce()) {
 
 /// Counts received bytes that `port` has lost.
 pub fn count_lost_bytes(port: HostPort, lost: u32) {
-    let overruns = &SERIAL_OVERRUNS[port as usize];
-    overruns.store(overruns.load(Relaxed).saturating_add(lost), Relaxed);
+    let all = &LOST_BYTES[port as usize];
+    all.store(all.load(Relaxed).saturating_add(lost), Relaxed);
 }
 
 /// An LED that blinks once a second while the clocks come from the crystal, and eight times a second while they come from the
@@ -65,109 +62,18 @@ impl<L: OutputPin> Blinker<L> {
     }
 }
 
-/// Requests of interrupts.
-pub struct Interrupts {
-    /// Those of the serial ports, which transmit what is queued.
-    pub transmit: fn(),
-    /// That of the end of a burst.
-    pub end_burst: fn(),
-}
-
-/// The processor of a microcontroller.
-pub struct Processor<M, R> {
-    microcontroller: M,
-    interrupts: Interrupts,
-    reset_line: Option<R>,
-}
-
-impl<M: Microcontroller, R: OutputPin> Processor<M, R> {
-    /// Starts SysTick.
-    pub fn new(
-        (microcontroller, core_hz): (M, u32),
-        mut systick: SYST,
-        interrupts: Interrupts,
-        reset_line: Option<R>,
-    ) -> Self {
-        systick.set_clock_source(SystClkSource::Core);
-        systick.set_reload(core_hz / WAKE_HZ - 1);
-        systick.clear_current();
-        systick.enable_interrupt();
-        systick.enable_counter();
-        Self { microcontroller, interrupts, reset_line }
-    }
-}
-
-impl<M: Microcontroller, R: OutputPin> Chip for &mut Processor<M, R> {
-    fn microseconds(&mut self) -> u32 {
-        M::counter()
-    }
-
-    fn sleep(&mut self, mut clock: impl FnMut(u32)) {
-        cortex_m::interrupt::free(|_| {
-            clock(M::counter());
-            cortex_m::asm::wfi();
-            clock(M::counter());
-        });
-    }
-
-    fn transmit(&mut self) {
-        (self.interrupts.transmit)();
-    }
-
-    fn abandon_burst(&mut self) {
-        (self.interrupts.end_burst)();
-    }
-
-    fn feed(&mut self) {
-        self.microcontroller.feed();
-    }
-
-    fn restart(&mut self) {
-        M::restart()
-    }
-
-    fn set_reset_line(&mut self, active: bool) -> bool {
-        let Some(line) = &mut self.reset_line else { return false };
-        if active { line.set_low() } else { line.set_high() }.is_ok()
-    }
-
-    fn program_brown_out(&mut self) -> BrownOutLevel {
-        M::program_brown_out()
-    }
-
-    fn keeps_record(&mut self) -> bool {
-        SettingsFlash::<M::Flash>::store().is_some()
-    }
-
-    fn read_record(&mut self, record: &mut [u8]) -> Option<usize> {
-        SettingsFlash::<M::Flash>::store()?.read(record)
-    }
-
-    fn write_record(&mut self, record: &[u8]) -> Result<(), StoreError> {
-        SettingsFlash::<M::Flash>::store().ok_or(StoreError::NoMemory)?.replace(record)
-    }
-
-    fn start_boot_loader(&mut self) -> bool {
-        M::start_boot_loader();
-        false
-    }
-
-    fn meters(&mut self) -> BoardMeters {
-        let (stack_bytes, stack_size) = stack();
-        BoardMeters {
-            asleep_us: 0,
-            serial_overruns: SERIAL_OVERRUNS.iter().map(|overruns| overruns.load(Relaxed)).fold(0, u32::saturating_add),
-            sampling_cycles: SAMPLING_CYCLES.load(Relaxed),
-            estimator_cycles: ESTIMATOR_CYCLES.load(Relaxed),
-            stack_bytes,
-            stack_size,
-        }
-    }
+/// Starts SysTick, of which there are [`WAKE_HZ`] interrupts a second.
+pub fn start_systick(mut systick: SYST, core_hz: u32) {
+    systick.set_clock_source(SystClkSource::Core);
+    systick.set_reload(core_hz / WAKE_HZ - 1);
+    systick.clear_current();
+    systick.enable_interrupt();
+    systick.enable_counter();
 }
 
 /// Largest depth and size of the stack in bytes. The start-up code fills the stack with a pattern; the depth is what lies
 /// above the last word that still holds it, counted from the end of the stack.
-fn stack() -> (u32, u32) {
+pub(super) fn stack() -> (u32, u32) {
     unsafe extern "C" {
         static _stack_start: u32;
         static _stack_end: u32;

@@ -5,3 +5,4 @@ pub mod flash;
 pub mod port;
 pub mod start;
 pub mod usb;
+pub mod wires;

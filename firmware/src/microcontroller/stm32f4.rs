@@ -3,7 +3,8 @@
 pub mod bus;
 pub mod flash;
 pub mod port;
-pub mod sensor_wires;
 pub mod start;
 #[cfg(feature = "feather-usb")]
 pub mod usb;
+mod watchdog;
+pub mod wires;

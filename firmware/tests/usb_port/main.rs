@@ -3,11 +3,12 @@
 
 mod host;
 
-use firmware::usb_port::{PRODUCT, UsbIdentity, UsbPort};
-use firmware::{TransmitBuffer, TransmitQueue};
-use heapless::spsc::{Consumer, Queue};
+use firmware::usb_port::{MANUFACTURER, PRODUCT, UsbIdentity, UsbPort};
+use firmware::{ReceiveBuffer, Receiver, TransmitBuffer, TransmitQueue};
+use heapless::spsc::Consumer;
 use host::MockBus;
 use link::{Decoder, MessageRef, Received, text_line};
+use std::cell::RefCell;
 use usb_device::bus::UsbBusAllocator;
 
 const IDENTITY: UsbIdentity<'static> =
@@ -34,6 +35,12 @@ struct Bench {
     queue: TransmitQueue<'static>,
     uart: Consumer<'static, u8>,
     received: Consumer<'static, u8>,
+    now_us: u32,
+}
+
+thread_local! {
+    /// What the port has asked of its controller, in order: to go off the bus (false), or to start again.
+    static RECONNECTED: RefCell<Vec<bool>> = const { RefCell::new(Vec::new()) };
 }
 
 fn leak<T>(value: T) -> &'static mut T {
@@ -46,22 +53,37 @@ impl Bench {
         let allocator = leak(UsbBusAllocator::new(bus.clone()));
         let (to_uart, uart) = leak(TransmitBuffer::new()).split();
         let (to_usb, usb) = leak(TransmitBuffer::new()).split();
-        let (receive, received) = leak(Queue::<u8, 64>::new()).split();
-        let port = UsbPort::new(allocator, IDENTITY, (usb, receive)).expect("enough endpoints");
-        Self { bus, port, queue: TransmitQueue::new(to_uart).with_usb(Some(to_usb)), uart, received }
+        let (receive, received) = leak(ReceiveBuffer::new()).split();
+        let reconnect = |connected| RECONNECTED.with_borrow_mut(|calls| calls.push(connected));
+        let ends = (usb, Receiver::new(receive));
+        let port = UsbPort::new(allocator, IDENTITY, ends, reconnect).expect("enough endpoints");
+        let queue = TransmitQueue::new(to_uart).with_usb(Some(to_usb));
+        Self { bus, port, queue, uart, received, now_us: u32::MAX - 5_000_000 }
+    }
+
+    fn serve(&mut self) -> u32 {
+        self.port.serve(self.now_us)
     }
 
     fn control(&mut self, setup: [u8; 8], data: &[u8]) -> Option<Vec<u8>> {
-        let port = &mut self.port;
+        let (port, now_us) = (&mut self.port, self.now_us);
         self.bus.control(setup, data, || {
-            port.serve();
+            port.serve(now_us);
         })
+    }
+
+    /// Serves the port every 0.1 s, as the board does 16 times a second.
+    fn pass_tenths_of_a_second(&mut self, count: u32) {
+        for _ in 0..count {
+            self.now_us = self.now_us.wrapping_add(100_000);
+            self.serve();
+        }
     }
 
     /// The host finds the device and configures it.
     fn enumerate(&mut self) {
         self.bus.reset_bus();
-        self.port.serve();
+        self.serve();
         assert_eq!(self.control(SET_ADDRESS, &[]), Some(vec![]));
         assert_eq!(self.control(SET_CONFIGURATION, &[]), Some(vec![]));
     }
@@ -73,7 +95,7 @@ impl Bench {
     /// Sends a text, which the UART has sent on return.
     fn print(&mut self, text: &str) -> Vec<u8> {
         assert!(self.queue.send_text(&text_line(format_args!("{text}"))), "the UART has room");
-        self.port.serve();
+        self.serve();
         self.uart()
     }
 
@@ -86,7 +108,7 @@ impl Bench {
         let mut bytes = Vec::new();
         while let Some(packet) = self.bus.read(DATA_IN) {
             bytes.extend(packet);
-            self.port.serve();
+            self.serve();
         }
         bytes
     }
@@ -119,7 +141,7 @@ fn the_host_finds_a_serial_port_with_a_name_and_a_number() {
     assert_eq!((device[0], device[1], device[4]), (18, 1, 2));
     assert_eq!(device[8..12], [0x8A, 0x2E, 0x0A, 0x00]);
     let strings = [14, 15, 16].map(|field| bench.string(device[field]));
-    assert_eq!(strings, [PRODUCT, PRODUCT, IDENTITY.serial_number]);
+    assert_eq!(strings, [MANUFACTURER, PRODUCT, IDENTITY.serial_number]);
 }
 
 /// The baud rate has no meaning on USB; a terminal that sets it must get it back.
@@ -150,10 +172,10 @@ fn usb_has_the_bytes_of_the_uart_and_takes_commands() {
     }
     assert_eq!(usb, uart);
     assert!(bench.queue.send(MessageRef::Log("a message")));
-    bench.port.serve();
+    bench.serve();
     assert_eq!(bench.read(), bench.uart());
     bench.bus.send(DATA_OUT, b"f 819.2\r");
-    assert_eq!(bench.port.serve(), 0);
+    assert_eq!(bench.serve(), 0);
     let typed: Vec<u8> = std::iter::from_fn(|| bench.received.dequeue()).collect();
     assert_eq!(typed, b"f 819.2\r");
 }
@@ -164,13 +186,13 @@ fn usb_has_the_bytes_of_the_uart_and_takes_commands() {
 fn too_much_input_is_counted() {
     let mut bench = Bench::new();
     bench.enumerate();
-    (0..3).for_each(|_| bench.bus.send(DATA_OUT, &[b'?'; 64]));
-    let lost: u32 = (0..8).map(|_| bench.port.serve()).sum();
-    assert_eq!(lost, 3 * 64 - 63);
-    assert_eq!(std::iter::from_fn(|| bench.received.dequeue()).count(), 63);
+    (0..5).for_each(|_| bench.bus.send(DATA_OUT, &[b'?'; 64]));
+    let lost: u32 = (0..8).map(|_| bench.serve()).sum();
+    assert_eq!(lost, 5 * 64 - 255);
+    assert_eq!(std::iter::from_fn(|| bench.received.dequeue()).count(), 255);
 }
 
-/// Nobody reads for an hour, in which 600 lines are printed a minute; then a terminal reads on. It has the lines that the
+/// Nobody reads while 36,000 lines are printed; then a terminal reads on. It has the lines that the
 /// queue held, whole, and what is sent from then on; the others are counted.
 #[test]
 fn a_host_that_does_not_read_costs_what_it_does_not_read() {
@@ -223,13 +245,13 @@ fn a_suspended_bus_is_survived() {
     bench.enumerate();
     bench.open();
     bench.bus.suspend_bus();
-    bench.port.serve();
+    bench.serve();
     for number in 0..1000 {
         bench.print(&format!("line {number}"));
         assert_eq!(bench.bus.read(DATA_IN), None, "nothing is sent on a suspended bus");
     }
     bench.bus.resume_bus();
-    bench.port.serve();
+    bench.serve();
     let kept = lines(&bench.read());
     assert!(kept.len() > 100 && kept[0] == "line 0", "{} lines", kept.len());
     assert_eq!(kept.len() + bench.queue.usb_dropped() as usize, 1000);
@@ -250,9 +272,65 @@ fn unplugging_is_survived() {
         bench.print(&"y".repeat(attempt));
         bench.print(&"z".repeat(110));
         (0..attempt % 4).for_each(|_| drop(bench.bus.read(DATA_IN)));
-        bench.port.serve();
+        bench.serve();
         bench.bus.suspend_bus();
-        bench.port.serve();
+        bench.serve();
         bench.print("nobody is there");
     }
+}
+
+/// The controller takes no packet any more, though the host has the port open: after half a minute it is reset and stays off the bus until
+/// the host has noticed; then it is found again and carries what is sent.
+#[test]
+fn a_controller_that_hangs_is_reset() {
+    let mut bench = Bench::new();
+    bench.enumerate();
+    bench.open();
+    let reconnected = || RECONNECTED.with_borrow(Vec::clone);
+    for number in 0..200 {
+        bench.print(&format!("line {number}"));
+    }
+    bench.pass_tenths_of_a_second(299);
+    assert_eq!(reconnected(), [false; 0], "a host may be slow");
+    bench.pass_tenths_of_a_second(3);
+    assert_eq!(reconnected(), [false]);
+    bench.bus.read(DATA_IN);
+    bench.pass_tenths_of_a_second(3);
+    assert_eq!(bench.bus.read(DATA_IN), None, "the controller is held in reset");
+    bench.pass_tenths_of_a_second(2);
+    assert_eq!(reconnected(), [false, true]);
+    bench.enumerate();
+    bench.open();
+    let sent = bench.print("found again");
+    assert_eq!(bench.read(), sent);
+    bench.pass_tenths_of_a_second(36_000);
+    assert_eq!(reconnected(), [false, true], "nothing waits");
+}
+
+/// A port that nobody has opened, a suspended bus, and one without a host do not stall.
+#[test]
+fn a_port_without_a_reader_is_left_alone() {
+    let mut bench = Bench::new();
+    let print_and_pass = |bench: &mut Bench| {
+        bench.print(&"x".repeat(100));
+        bench.print(&"y".repeat(100));
+        bench.pass_tenths_of_a_second(1_000);
+    };
+    print_and_pass(&mut bench);
+    bench.enumerate();
+    print_and_pass(&mut bench);
+    bench.open();
+    bench.bus.suspend_bus();
+    bench.serve();
+    print_and_pass(&mut bench);
+    assert_eq!(RECONNECTED.with_borrow(Vec::clone), [false; 0]);
+}
+
+/// The rule by which Linux's ModemManager leaves the port alone names the product.
+#[test]
+fn the_rule_for_udev_names_the_product() {
+    let rule = include_str!("../../udev/60-adis16405-observatory.rules");
+    let line = rule.lines().find(|line| !line.starts_with('#') && !line.is_empty()).expect("a rule");
+    assert!(line.contains(&format!("ATTRS{{product}}==\"{PRODUCT}\"")), "{line}");
+    assert!(line.contains("ENV{ID_MM_DEVICE_IGNORE}=\"1\""), "{line}");
 }

@@ -65,6 +65,7 @@ struct SimulatedBoard {
     audit: SampleAudit,
     /// What is kept without power.
     record: Option<Vec<u8>>,
+    meter_readings: u32,
 }
 
 impl Device {
@@ -125,6 +126,11 @@ impl Device {
     /// What became of the samples since the last call.
     pub fn take_audit(&mut self) -> SampleAudit {
         std::mem::take(&mut self.board.audit)
+    }
+
+    /// Times that the application has read the load figures of the board.
+    pub fn meter_readings(&self) -> u32 {
+        self.board.meter_readings
     }
 
     /// Data-ready edges that have raised an interrupt.
@@ -221,6 +227,7 @@ impl SimulatedBoard {
             edges: 0,
             audit: SampleAudit::default(),
             record: None,
+            meter_readings: 0,
         }
     }
 
@@ -365,6 +372,7 @@ impl Board for SimulatedBoard {
     }
 
     fn meters(&mut self) -> BoardMeters {
+        self.meter_readings += 1;
         BoardMeters::default()
     }
 

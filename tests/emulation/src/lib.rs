@@ -17,7 +17,8 @@ pub const BURST_BYTES: usize = 26;
 pub const fn gpio(port: usize, offset: u64) -> u64 {
     0x4002_0000 + 0x400 * port as u64 + offset
 }
-/// Offsets of GPIOx_PUPDR and GPIOx_ODR (RM0090 section 8.4).
+/// Offsets of GPIOx_OSPEEDR, GPIOx_PUPDR and GPIOx_ODR (RM0090 section 8.4).
+pub const OSPEEDR: u64 = 0x08;
 pub const PUPDR: u64 = 0x0C;
 pub const ODR: u64 = 0x14;
 /// Status and control of the flash interface (RM0090 sections 3.9.6 and 3.9.8).
@@ -36,6 +37,9 @@ pub const EXTI_FTSR: u64 = 0x4001_3C0C;
 /// What stops while a debugger has halted the processor; bit 12 is the watchdog (RM0090 section 38.16.4).
 pub const DBGMCU_APB1_FZ: u64 = 0xE004_2008;
 
+/// Which memory is at address 0; 1 in its lowest two bits is system memory (RM0090 section 9.2.1).
+pub const SYSCFG_MEMRMP: u64 = 0x4001_3800;
+
 /// The bus clock of the boards, 42 MHz, divided by the first power of two that brings it to 1 MHz or less, and to 300 kHz or less.
 pub const SCK_HZ: u32 = 42_000_000 / 64;
 pub const SLOW_SCK_HZ: u32 = 42_000_000 / 256;
@@ -48,14 +52,26 @@ pub struct Wiring {
     pub data_ready: (usize, u8),
     /// Index of the USART that is connected to the host: 1 for USART2.
     pub usart: usize,
+    /// Port and pin of its receiver.
+    pub receiver: (usize, u8),
     /// Port and pin of the LED.
     pub led: (usize, u8),
 }
 
 /// Olimex STM32-H405: 8 MHz, PB0, USART2, PC12.
-pub const H405: Wiring = Wiring { crystal_hz: 8_000_000, data_ready: (1, 0), usart: 1, led: (2, 12) };
+pub const H405: Wiring = Wiring { crystal_hz: 8_000_000, data_ready: (1, 0), usart: 1, receiver: (0, 3), led: (2, 12) };
 /// Adafruit Feather STM32F405 Express: 12 MHz, PC4 (A4), USART3 (TX, RX), PC1 (D13).
-pub const FEATHER: Wiring = Wiring { crystal_hz: 12_000_000, data_ready: (2, 4), usart: 2, led: (2, 1) };
+pub const FEATHER: Wiring =
+    Wiring { crystal_hz: 12_000_000, data_ready: (2, 4), usart: 2, receiver: (1, 11), led: (2, 1) };
+
+/// A debug probe.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Probe {
+    /// It reads the log.
+    Reads,
+    /// It asks the image to wait for it when the log is full, as probe-rs does, and reads nothing.
+    Stalls,
+}
 
 /// An event that happens to the device during a run.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
@@ -102,8 +118,7 @@ pub struct Scenario {
     /// By rising time in s.
     pub events: Vec<(f64, Event)>,
     pub seconds: f64,
-    /// A debug probe reads the log.
-    pub has_probe: bool,
+    pub probe: Option<Probe>,
 }
 
 impl Default for Scenario {
@@ -115,7 +130,7 @@ impl Default for Scenario {
             keys: vec![],
             events: vec![],
             seconds: 0.0,
-            has_probe: false,
+            probe: None,
         }
     }
 }
@@ -171,7 +186,7 @@ pub struct Outcome {
     pub work: Vec<Work>,
     /// Changes of the LED's level.
     pub led_changes: u32,
-    /// Registers at the end, by address: pulls of ports A to C, and the others that this crate names.
+    /// Registers at the end, by address: speeds and pulls of ports A to C, and the others that this crate names.
     pub registers: BTreeMap<u64, u64>,
     /// What a debug probe has read of the log.
     pub log: Vec<LogLine>,

@@ -51,6 +51,8 @@ pub(crate) fn assert_within_budget(costs: &Costs<'_>) {
     println!("{HEAD}");
     files.iter().for_each(|file| println!("{}", std::fs::read_to_string(file).expect("a row")));
 
+    println!("{} B of static variables are copied from flash", size.initialised);
+    assert!(size.initialised <= 2048, "{} B of static variables are copied from flash", size.initialised);
     assert!(size.flash <= memory.flash / 4, "{row}");
     assert!(size.statics <= memory.ram / 4 * 3, "{row}");
     assert!(free_percent >= 25, "{row}");

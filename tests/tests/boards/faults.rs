@@ -5,8 +5,8 @@ use super::bench::{image, run};
 use super::costs::counter;
 use super::decoded::{Decoded, in_stretches};
 use super::images;
-use emulation::{Event, Outcome, RATE_HZ, Scenario, Sensor};
-use link::{BootCause, Health, Hello, Message};
+use emulation::{Event, Outcome, RATE_HZ, SYSCFG_MEMRMP, Scenario, Sensor};
+use link::{Boot, BootCause, Health, Hello, Message};
 
 /// Upper bound on the time that a report takes.
 const REPORT_S: f64 = 2.5;
@@ -280,4 +280,74 @@ fn an_oscillating_data_ready_line_is_masked() {
     let health = **decoded.healths().last().expect("a report");
     assert_eq!((health.data_ready_masked, health.recoveries, health.queue_full), (1, 1, 0), "{health:?}");
     assert!(f64::from(health.used) > 3.3 * RATE_HZ, "{health:?}");
+}
+
+/// A fit that takes more stack than there is crashes whenever the epoch is learned from: after the second time it is not, and the device
+/// samples on with its statistics.
+#[test]
+fn an_epoch_whose_fit_crashes_is_given_up() {
+    let sensor = Some(Sensor::Published(33));
+    let keys = vec![(0.1, b"i 0\re 10\r".to_vec()), (11.5, b"e 0\r".to_vec())];
+    let scenario = Scenario { sensor, keys, seconds: 30.0, ..Scenario::default() };
+    let whole = run(image(), scenario.clone());
+    let healths =
+        Decoded::decode(&whole.received).healths().iter().map(|health| health.stack_bytes).collect::<Vec<_>>();
+    let learned = *healths.last().expect("the report of the epoch");
+    let keys = vec![(0.1, b"i 0\r".to_vec()), (8.0, b"r".to_vec())];
+    let reported = run(image(), Scenario { keys, seconds: 11.0, ..scenario.clone() });
+    let reported = Decoded::decode(&reported.received).healths()[0].stack_bytes;
+    assert!(learned > reported + 2048, "{learned} B to learn, {reported} B to report");
+
+    let shallow = images::with_stack(image(), (learned - 1024) & !7);
+    // Keys may come while the device starts.
+    let typed = [(13.0, "\re 0\r"), (15.0, "\re 0\r"), (24.0, "s"), (24.5, "r")];
+    let typed = typed.map(|(at_s, keys)| (at_s, keys.as_bytes().to_vec()));
+    let keys = [&scenario.keys[..], &typed].concat();
+    let Outcome { received, diagnostics, .. } = run(&shallow, Scenario { keys, seconds: 30.0, ..scenario });
+    let decoded = Decoded::decode(&received);
+    println!("{diagnostics:?}; {:#?}", decoded.lines);
+    let restarts = diagnostics.iter().filter(|diagnostic| diagnostic.starts_with("reset")).count();
+    assert_eq!(restarts, 2, "{diagnostics:?}");
+    for expected in ["start 3: Software, ", "crash record: stack overflow", "sensor sampled"] {
+        assert!(decoded.lines.iter().any(|line| line.contains(expected)), "{expected}: {:?}", decoded.lines);
+    }
+    let (hello, health) = (decoded.hellos(), decoded.healths());
+    let (hello, health) = (hello.last().expect("a report"), health.last().expect("a report"));
+    assert_eq!((hello.epoch, hello.boot.safe_mode), (1, false), "{hello:?}");
+    assert_eq!((health.used, health.lost_edges), (health.bursts, 0), "{health:?}");
+}
+
+/// After the third crash within ten minutes the device starts without anything that was stored, says so, and takes commands.
+#[test]
+fn the_third_crash_in_a_row_is_followed_by_safe_mode() {
+    let keys =
+        vec![(0.1, b"i 0\re 3600\r".to_vec()), (6.5, b"s".to_vec()), (7.0, b"e 60\r".to_vec()), (7.5, b"r".to_vec())];
+    let events = [1.5, 3.0, 4.5].map(|at_s| (at_s, Event::ClearInMemory(PERIOD))).to_vec();
+    let scenario = Scenario { sensor: Some(Sensor::Published(34)), keys, events, seconds: 10.0, ..Scenario::default() };
+    let Outcome { received, diagnostics, .. } = run(image(), scenario);
+    let decoded = Decoded::decode(&received);
+    println!("{diagnostics:?}; {:#?} {:#?}", decoded.logs(), decoded.lines);
+    assert_eq!(diagnostics.iter().filter(|diagnostic| diagnostic.starts_with("reset")).count(), 3, "{diagnostics:?}");
+    assert_eq!(decoded.logs().iter().filter(|log| log.starts_with("safe mode")).count(), 1, "{:?}", decoded.logs());
+    assert!(decoded.lines.iter().any(|line| line.starts_with("safe mode after three crashes")), "{:?}", decoded.lines);
+    let hello = decoded.hellos()[0];
+    let Boot { starts, restored_channels, safe_mode, ref crash_record, .. } = hello.boot;
+    assert_eq!((starts, restored_channels, safe_mode), (4, 0, true), "{hello:?}");
+    assert!(crash_record.starts_with("panic at device.rs:"), "{crash_record}");
+    assert_eq!((hello.epoch_s, hello.sampling), (60, true), "it takes commands: {hello:?}");
+    let health = **decoded.healths().last().expect("a report");
+    assert_eq!((health.used, health.recoveries), (health.bursts, 0), "{health:?}");
+}
+
+/// The boot loader in the system memory of the part is started from a reset, with that memory at address 0. In the emulator it is empty: the
+/// stack pointer that is loaded from there is 0, and the first push goes to the word below.
+#[test]
+fn the_boot_loader_is_started_on_command() {
+    let keys = vec![(0.1, b"i 0\r".to_vec()), (1.5, b"bootsel\r".to_vec())];
+    let scenario = Scenario { sensor: Some(Sensor::Published(35)), keys, seconds: 2.0, ..Scenario::default() };
+    let Outcome { diagnostics, registers, .. } = run(image(), scenario);
+    println!("{diagnostics:#?}");
+    assert_eq!(diagnostics.iter().filter(|diagnostic| diagnostic.starts_with("reset")).count(), 1, "{diagnostics:?}");
+    assert!(diagnostics.iter().any(|diagnostic| diagnostic.starts_with("unmapped at=0xfffffffc")), "{diagnostics:?}");
+    assert_eq!(registers[&SYSCFG_MEMRMP] & 0b11, 0b01, "the memory at address 0");
 }

@@ -46,18 +46,21 @@ pub(crate) struct Size {
     pub(crate) flash: u32,
     /// Static variables, retained memory among them; without the stack.
     pub(crate) statics: u32,
+    /// Those of them whose contents are copied from flash at the start.
+    pub(crate) initialised: u32,
 }
 
 /// The size of an image by the section headers of its ELF.
 pub(crate) fn size(image: &Path) -> Size {
     let elf = Elf::read(image);
-    let mut size = Size { flash: 0, statics: 0 };
+    let mut size = Size { flash: 0, statics: 0, initialised: 0 };
     for section in 0..elf.half(48) {
         let header = elf.word(32) as usize + section * elf.half(46);
         let [kind, flags, address, bytes] = [4, 8, 12, 20].map(|field| elf.word(header + field));
         let (allocated, without_bits) = (flags & 2 != 0, kind == 8);
         if allocated && RAM.contains(&address) {
             size.statics += bytes;
+            size.initialised += if without_bits { 0 } else { bytes };
         }
         if allocated && !without_bits {
             size.flash += bytes;

@@ -3,6 +3,7 @@
 use super::bench::{TARGET, feather_image, image};
 use super::images;
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 use std::path::Path;
 use std::process::Command;
 
@@ -133,4 +134,41 @@ fn the_main_loop_has_panics() {
     let functions = functions(image());
     let calls = functions.values().filter(|of| of.name.starts_with("firmware::app::run"));
     assert!(calls.flat_map(|of| &of.calls).any(|call| functions.get(&call.to).is_some_and(|of| is_panic(&of.name))));
+}
+
+/// The functions that run while the flash of the Pico takes commands.
+const IN_RAM: [&str; 3] = ["read_unique_id", "erase_sector", "program_page"];
+/// Where the flash is read.
+const FLASH: Range<u32> = 0x1000_0000..0x1100_0000;
+
+/// While the flash takes commands nothing can be read from it: the functions that command it lie in RAM, call nothing in flash by its
+/// address, and know no address there. They call the boot ROM and the copy of the second stage through pointers.
+#[test]
+fn what_runs_while_the_flash_is_busy_does_not_use_it() {
+    let image = images::build("pico", PICO, &[]);
+    let output = Command::new("arm-none-eabi-objdump")
+        .args(["--disassemble-all", "--section=.data", "--demangle", "--no-show-raw-insn"])
+        .arg(&image)
+        .output()
+        .expect("arm-none-eabi-objdump, of the package binutils-arm-none-eabi");
+    let listing = String::from_utf8(output.stdout).expect("names in UTF-8");
+    let mut functions = BTreeMap::<&str, usize>::new();
+    let mut inside = None;
+    for line in listing.lines() {
+        if let Some((start, name)) = line.strip_suffix(">:").and_then(|line| line.split_once(" <")) {
+            inside = IN_RAM.into_iter().find(|function| name.ends_with(function));
+            let start = u32::from_str_radix(start, 16).expect("an address");
+            assert!(inside.is_none() || (0x2000_0000..0x2004_2000).contains(&start), "{line}");
+        } else if let Some(function) = inside
+            && let [_, instruction @ ..] = &line.split('\t').collect::<Vec<_>>()[..]
+        {
+            *functions.entry(function).or_default() += 1;
+            let numbers = instruction.iter().flat_map(|part| part.split(|c: char| !c.is_ascii_alphanumeric()));
+            let in_flash = numbers.filter_map(|word| u32::from_str_radix(word.trim_start_matches("0x"), 16).ok());
+            let in_flash: Vec<u32> = in_flash.filter(|number| FLASH.contains(number)).collect();
+            assert!(in_flash.is_empty(), "{function} uses {in_flash:x?}: {line}");
+            assert!(instruction.first().is_none_or(|mnemonic| *mnemonic != "bl"), "{function} calls: {line}");
+        }
+    }
+    assert!(functions.len() == IN_RAM.len() && functions.values().all(|&lines| lines > 10), "{functions:?}");
 }

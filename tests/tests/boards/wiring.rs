@@ -5,8 +5,8 @@ use super::costs::{Costs, Memory, assert_within_budget, counter};
 use super::decoded::Decoded;
 use super::images;
 use emulation::{
-    DBGMCU_APB1_FZ, EXTI_FTSR, EXTI_IMR, EXTI_RTSR, FEATHER, FLASH_CR, FLASH_OPTCR, FLASH_SR, H405, Outcome, PUPDR,
-    SPI1_CR1, SYSCFG_EXTICR, Scenario, Sensor, Wiring, gpio,
+    DBGMCU_APB1_FZ, EXTI_FTSR, EXTI_IMR, EXTI_RTSR, FEATHER, FLASH_CR, FLASH_OPTCR, FLASH_SR, H405, OSPEEDR, Outcome,
+    PUPDR, SPI1_CR1, SYSCFG_EXTICR, Scenario, Sensor, Wiring, gpio,
 };
 use link::{BootCause, ClockSource};
 use std::path::Path;
@@ -29,10 +29,15 @@ fn each_board_samples_with_its_crystal_and_pins() {
         assert_eq!((health.used, health.lost_edges), (health.bursts, 0), "{name}: {health:?}");
         assert!((9..=11).contains(&led_changes), "{name}: {led_changes} changes of the LED in 5 s");
 
-        // MISO (PA6) and data ready: 5 V tolerant without a pull (STM32F405 data sheet, table 7).
+        // MISO (PA6) and data ready are pulled down: an unplugged sensor gives neither bits nor edges.
         for (port, pin) in [(0, 6), wiring.data_ready] {
-            assert_eq!(registers[&gpio(port, PUPDR)] >> (2 * pin) & 3, 0, "{name}: port {port}, pin {pin}");
+            assert_eq!(registers[&gpio(port, PUPDR)] >> (2 * pin) & 3, 0b10, "{name}: port {port}, pin {pin}");
         }
+        // Nothing may be connected to the receiver: a pull-up makes it idle.
+        let (port, pin) = wiring.receiver;
+        assert_eq!(registers[&gpio(port, PUPDR)] >> (2 * pin) & 3, 0b01, "{name}: pull of the receiver");
+        // The pad of SCK (PA5) is of medium speed at least: 42 MHz at the SPI need it (ES0182, section 2.12.4).
+        assert!(registers[&gpio(0, OSPEEDR)] >> 10 & 3 >= 0b01, "{name}: speed of SCK");
         // SPI mode 3: CPOL and CPHA are set.
         assert_eq!(registers[&SPI1_CR1] & 0b11, 0b11, "{name}: SPI mode");
         // The line of the data-ready pin is connected to its port, and interrupts at rising edges alone.
@@ -146,7 +151,11 @@ fn settings_that_the_flash_does_not_take_are_not_called_kept() {
     // A sector of 128 kB takes 1 s typically and 2 s at most, 32 bits at once (STM32F405 data sheet, flash memory programming).
     let erased = "nothing is kept without power; not sampled for ";
     let told = lines.iter().find_map(|line| line.strip_prefix(erased)?.strip_suffix(" ms")?.parse::<u32>().ok());
-    assert!((2_000..4_000).contains(&told.expect("an answer to forget")), "{told:?} ms");
+    let told = told.expect("an answer to forget");
+    assert!((2_000..4_000).contains(&told), "{told} ms");
+    // Less than the watchdog's time at the upper limit of its oscillator, 47 kHz in the place of 32 (STM32F405 data sheet, LSI); it is fed
+    // before each sector.
+    assert!(f64::from(told) < 8_000.0 * 32.0 / 47.0, "{told} ms");
     // LOCK is set; PG, SER and STRT are clear (RM0090 section 3.9.8). No error flag stands (section 3.9.6).
     assert_eq!((registers[&FLASH_CR] >> 31, registers[&FLASH_CR] & 0x1_0003, registers[&FLASH_SR] & 0xF2), (1, 0, 0));
     let counter = |name: &str| counter(&lines, name).unwrap_or(0);
@@ -182,4 +191,30 @@ fn the_feather_is_within_its_budget() {
     assert_board_within_budget("Feather STM32F405", feather_image(), FEATHER);
     let usb = images::build("feather", TARGET, &["feather-usb"]);
     assert_board_within_budget("Feather STM32F405, USB", &usb, FEATHER);
+}
+
+/// Data ready is measured at the slowest rates too: its next pulse comes within a period.
+#[test]
+fn the_pulse_of_data_ready_is_measured_at_a_slow_rate() {
+    let keys = vec![(0.5, b"i 0\rf 1.65\r".to_vec()), (3.0, b"measure\r".to_vec())];
+    let sensor = Some(Sensor::Published(29));
+    let Outcome { received, diagnostics, .. } =
+        run(image(), Scenario { sensor, keys, seconds: 6.0, ..Scenario::default() });
+    assert_eq!(diagnostics, [""; 0]);
+    let lines = Decoded::decode(&received).lines;
+    let width = lines.iter().find_map(|line| line.strip_prefix("DRDY: high for ")?.split_once(" us")?.0.parse().ok());
+    // The pulse of the emulated board has 100 us.
+    assert!((90..115).contains(&width.unwrap_or(0)), "{lines:?}");
+}
+
+/// A boot loader that jumps to the image leaves its own vector table selected: the start-up code selects that of the image, at the beginning
+/// of flash, by the register at 0xE000_ED08 (ARMv7-M Architecture Reference Manual, B3.2.5). Both are constants beside the code.
+#[test]
+fn each_image_selects_its_vector_table() {
+    let constants = [0xE000_ED08_u32, 0x0800_0000].map(u32::to_le_bytes);
+    for image in [image(), feather_image()] {
+        let elf = std::fs::read(image).expect("the image");
+        let found = elf.windows(8).filter(|window| *window == constants.as_flattened()).count();
+        assert_eq!(found, 1, "{}", image.display());
+    }
 }

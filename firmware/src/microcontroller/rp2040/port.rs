@@ -19,12 +19,12 @@ impl<W: ValidUartPinout<UART0>> Uart0Port<W> {
 }
 
 impl<W: ValidUartPinout<UART0>> ServedPort for Uart0Port<W> {
-    fn serve(&mut self) -> u32 {
+    fn serve(&mut self, _now_us: u32) -> u32 {
         let mut byte = [0];
         let mut lost = 0;
         while self.uart.uart_is_readable() {
-            let queued = self.uart.read_raw(&mut byte).is_ok() && self.queues.receive.enqueue(byte[0]).is_ok();
-            lost += u32::from(!queued);
+            let received = self.uart.read_raw(&mut byte).is_ok().then_some(byte[0]);
+            lost += self.queues.receive.push(received);
         }
         while self.uart.uart_is_writable()
             && let Some(byte) = self.queues.transmit.dequeue()

@@ -1,18 +1,19 @@
 //! Start of an RP2040: cause, watchdog, brown-out level, crystal, clocks; and the data-ready input.
 
 use super::flash::Rp2040Flash;
-use crate::board::{DataReadyLine, WatchdogExtension};
+use crate::board::DataReadyLine;
 use crate::bus_frame::MicrosecondCounter;
 use crate::microcontroller::processor::WAKE_HZ;
 use crate::microcontroller::{DataReadyPin, Microcontroller};
+use crate::watchdog::{Watchdog, WatchdogExtension};
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use embedded_hal::digital::{InputPin, StatefulOutputPin};
 use link::BootCause;
+use rp2040_hal::Timer;
 use rp2040_hal::clocks::{ClocksManager, InitError, init_clocks_and_plls};
 use rp2040_hal::fugit::ExtU32;
-use rp2040_hal::gpio::{FunctionSioInput, Interrupt, Pin, PinId, PullNone};
+use rp2040_hal::gpio::{FunctionSioInput, Interrupt, Pin, PinId, PullDown};
 use rp2040_hal::pac::{CLOCKS, PLL_SYS, PLL_USB, RESETS, TIMER, VREG_AND_CHIP_RESET, WATCHDOG, XOSC};
-use rp2040_hal::{Timer, Watchdog};
 
 /// Crystal of the Pico.
 const CRYSTAL_HZ: u32 = 12_000_000;
@@ -53,9 +54,7 @@ pub fn boot_cause(chip: &VREG_AND_CHIP_RESET, watchdog: &WATCHDOG) -> BootCause 
 }
 
 /// An RP2040 with running clock and watchdog.
-pub struct Rp2040 {
-    watchdog: Watchdog,
-}
+pub struct Rp2040;
 
 /// The peripherals that clocks are made with.
 pub struct ClockParts {
@@ -82,8 +81,8 @@ impl Rp2040 {
         (watchdog, chip): (WATCHDOG, &VREG_AND_CHIP_RESET),
         resets: &mut RESETS,
         led: &mut impl StatefulOutputPin,
-    ) -> Result<(Self, ClocksManager), InitError> {
-        let mut watchdog = Watchdog::new(watchdog);
+    ) -> Result<ClocksManager, InitError> {
+        let mut watchdog = rp2040_hal::Watchdog::new(watchdog);
         // From the ring oscillator, until the crystal runs: the watchdog's time is then 5.7 s or more.
         watchdog.enable_tick_generation((CRYSTAL_HZ / 1_000_000) as u8);
         // While a debugger has halted the processor.
@@ -104,7 +103,7 @@ impl Rp2040 {
         let ClockParts { crystal, clocks, plls, timer } = parts;
         let clocks = init_clocks_and_plls(CRYSTAL_HZ, crystal, clocks, plls.0, plls.1, resets, &mut watchdog)?;
         let _timer_runs_on = Timer::new(timer, resets, &clocks);
-        Ok((Self { watchdog }, clocks))
+        Ok(clocks)
     }
 }
 
@@ -122,19 +121,25 @@ impl MicrosecondCounter for Rp2040 {
     }
 }
 
+impl Watchdog for Rp2040 {
+    fn feed() {
+        reload_watchdog();
+        FEEDINGS.store(FEEDINGS.load(Relaxed).wrapping_add(1), Relaxed);
+    }
+}
+
+/// The counter falls by two a microsecond (erratum RP2040-E1).
+fn reload_watchdog() {
+    // SAFETY: feeds the watchdog, and nothing else.
+    unsafe { (*WATCHDOG::ptr()).load().write(|w| w.bits(2 * 1000 * WATCHDOG_MS)) };
+}
+
 impl Microcontroller for Rp2040 {
     type Flash = Rp2040Flash;
 
-    fn feed(&mut self) {
-        self.watchdog.feed();
-        FEEDINGS.store(FEEDINGS.load(Relaxed).wrapping_add(1), Relaxed);
-    }
-
     fn extend_watchdog(extension: &mut WatchdogExtension) {
         if extension.tick(FEEDINGS.load(Relaxed), EXTENSION_S * WAKE_HZ) {
-            // The counter falls by two a microsecond (erratum RP2040-E1).
-            // SAFETY: feeds the watchdog, as the main loop does.
-            unsafe { (*WATCHDOG::ptr()).load().write(|w| w.bits(2 * 1000 * WATCHDOG_MS)) };
+            reload_watchdog();
         }
     }
 
@@ -148,20 +153,20 @@ impl Microcontroller for Rp2040 {
     }
 
     /// Has the boot ROM show itself as a drive and to picotool, without an LED for its activity.
-    fn start_boot_loader() {
+    fn start_boot_loader() -> ! {
         // SAFETY: the boot ROM, which does not feed the watchdog, takes over.
         unsafe { (*WATCHDOG::ptr()).ctrl().modify(|_, w| w.enable().clear_bit()) };
-        rp2040_hal::rom_data::reset_to_usb_boot(0, 0);
+        rp2040_hal::rom_data::reset_to_usb_boot(0, 0)
     }
 }
 
-impl<I: PinId> DataReadyPin for Pin<I, FunctionSioInput, PullNone> {
+impl<I: PinId> DataReadyPin for Pin<I, FunctionSioInput, PullDown> {
     fn clear(&mut self) {
         self.clear_interrupt(Interrupt::EdgeHigh);
     }
 }
 
-impl<I: PinId> DataReadyLine for Pin<I, FunctionSioInput, PullNone> {
+impl<I: PinId> DataReadyLine for Pin<I, FunctionSioInput, PullDown> {
     fn set_masked(&mut self, masked: bool) {
         if self.is_interrupt_enabled(Interrupt::EdgeHigh) == masked {
             self.clear_interrupt(Interrupt::EdgeHigh);

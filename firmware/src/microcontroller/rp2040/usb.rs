@@ -1,6 +1,7 @@
 //! The USB port of an RP2040.
 
 use super::flash::unique_id;
+use crate::bus_frame::wait_for;
 use crate::microcontroller::UsbParts;
 use crate::usb_port::UsbPort;
 use rp2040_hal::clocks::UsbClock;
@@ -24,5 +25,25 @@ pub fn usb_port(
 ) -> Option<UsbParts<Rp2040UsbPort>> {
     let bus = UsbBus::new(registers, memory, clock, true, resets);
     let bus = cortex_m::singleton!(USB_BUS: UsbBusAllocator<UsbBus> = UsbBusAllocator::new(bus))?;
-    UsbParts::start(bus, PRODUCT_ID, unique_id())
+    UsbParts::start(bus, PRODUCT_ID, unique_id(), reconnect)
+}
+
+/// Resets the controller, which takes the device off the bus, or starts it again as [`UsbBus::new`] does. The endpoints, which are set up
+/// in its memory, and the address follow when the host resets the bus.
+fn reconnect(connected: bool) {
+    // SAFETY: no other program part uses the reset of the controller, and the interrupt that uses the controller waits meanwhile.
+    let (resets, controller) = unsafe { (&*RESETS::ptr(), &*USBCTRL_REGS::ptr()) };
+    resets.reset().modify(|_, w| w.usbctrl().bit(!connected));
+    if !connected {
+        return;
+    }
+    let _in_reset_otherwise = wait_for(|| resets.reset_done().read().usbctrl().bit_is_set());
+    controller.usb_muxing().write(|w| w.to_phy().set_bit().softcon().set_bit());
+    controller.usb_pwr().write(|w| w.vbus_detect().set_bit().vbus_detect_override_en().set_bit());
+    controller.main_ctrl().write(|w| w.controller_en().set_bit());
+    controller.inte().write(|w| {
+        w.buff_status().set_bit().bus_reset().set_bit().dev_resume_from_host().set_bit();
+        w.dev_suspend().set_bit().setup_req().set_bit()
+    });
+    controller.sie_ctrl().write(|w| w.ep0_int_1buf().set_bit().pullup_en().set_bit());
 }

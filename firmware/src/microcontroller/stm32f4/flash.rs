@@ -3,6 +3,7 @@
 //! The program is in the same memory: while a sector is erased or a word programmed, the processor waits at the next instruction
 //! that it fetches (section 3.6), interrupts included.
 
+use super::watchdog;
 use crate::bus_frame::wait_for;
 use crate::microcontroller::settings_flash::{FlashError, FlashMemory};
 use stm32f4xx_hal::pac::{FLASH, flash::RegisterBlock};
@@ -27,6 +28,7 @@ impl FlashMemory for Stm32Flash {
 
     fn erase(offset: u32) -> Result<(), FlashError> {
         let sector = SECTORS_BEFORE + offset as usize / Self::SECTOR;
+        watchdog::feed();
         operate(|flash| {
             // SAFETY: a width that the supply allows, and the number of a sector.
             flash.cr().modify(|_, w| unsafe { w.psize().bits(PSIZE_32).snb().bits(sector as u8).ser().set_bit() });

@@ -19,7 +19,7 @@ pub struct UsartPort<U: Instance> {
 }
 
 impl<U: Instance> UsartPort<U> {
-    /// Starts the port and its receive interrupt.
+    /// Starts the port and its receive interrupt. Nothing may be connected to the receiver: a pin with a pull-up is then idle.
     pub fn new(
         usart: U,
         pins: (impl Into<U::Tx<PushPull>>, impl Into<U::Rx<PushPull>>),
@@ -35,12 +35,12 @@ impl<U: Instance> UsartPort<U> {
 }
 
 impl<U: Instance> ServedPort for UsartPort<U> {
-    fn serve(&mut self) -> u32 {
+    fn serve(&mut self, _now_us: u32) -> u32 {
         // Read regardless of the flags: an overrun raises the interrupt too, and only a read clears it.
         let lost = match self.rx.read() {
-            Ok(byte) => self.queues.receive.enqueue(byte).is_err(),
-            Err(nb::Error::Other(_)) => true,
-            Err(nb::Error::WouldBlock) => false,
+            Ok(byte) => self.queues.receive.push(Some(byte)),
+            Err(nb::Error::Other(_)) => self.queues.receive.push(None),
+            Err(nb::Error::WouldBlock) => 0,
         };
         if self.tx.is_tx_empty() {
             match self.queues.transmit.dequeue() {
@@ -51,6 +51,6 @@ impl<U: Instance> ServedPort for UsartPort<U> {
                 None => self.tx.unlisten(),
             }
         }
-        u32::from(lost)
+        lost
     }
 }

@@ -1,17 +1,21 @@
 //! Start of an STM32F4: cause, watchdog, brown-out level, clocks.
 
 use super::flash::Stm32Flash;
+use super::watchdog;
 use crate::board::BrownOutLevel;
 use crate::bus_frame::{MicrosecondCounter, wait_for};
 use crate::microcontroller::Microcontroller;
-use cortex_m::peripheral::SCB;
+use crate::watchdog::Watchdog;
+use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use cortex_m::peripheral::{NVIC, SCB};
 use link::{BootCause, ClockSource};
-use stm32f4xx_hal::pac::{DBGMCU, FLASH, IWDG, RCC, TIM2};
+use stm32f4xx_hal::pac::{DBGMCU, FLASH, IWDG, RCC, SYSCFG, TIM2};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Enable, Rcc, Reset};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-/// Time without feeding after which the watchdog restarts; a report of all channels takes less.
+/// Time without feeding after which the watchdog restarts, by an oscillator of 32 kHz: 5.4 s at its upper limit of 47 kHz (STM32F405 data
+/// sheet, LSI). A report of all channels takes less, and so does a sector of flash.
 const WATCHDOG_MS: u32 = 8_000;
 /// Clock of the processor, from the crystal as from the internal oscillator.
 const CORE_HZ: u32 = 168_000_000;
@@ -46,8 +50,12 @@ pub fn boot_cause(rcc: &RCC) -> BootCause {
 }
 
 /// An STM32F4 with running clock and watchdog.
-pub struct Stm32f4 {
-    watchdog: IndependentWatchdog,
+pub struct Stm32f4;
+
+impl Watchdog for Stm32f4 {
+    fn feed() {
+        watchdog::feed();
+    }
 }
 
 /// What a start gives.
@@ -58,8 +66,6 @@ pub struct Started {
     pub clock: ClockSource,
     /// The clocks.
     pub rcc: Rcc,
-    /// The microcontroller.
-    pub microcontroller: Stm32f4,
 }
 
 impl Stm32f4 {
@@ -67,8 +73,10 @@ impl Stm32f4 {
     /// that does not start is replaced by the internal oscillator.
     pub fn start((rcc, flash, timer, watchdog): (RCC, FLASH, TIM2, IWDG), crystal_hz: u32) -> Started {
         let cause = boot_cause(&rcc);
-        let mut watchdog = IndependentWatchdog::new(watchdog);
-        watchdog.start(WATCHDOG_MS.millis());
+        if cause == BootCause::Software && REQUEST.load(Relaxed) == BOOT_LOADER_REQUEST {
+            enter_boot_loader(&rcc);
+        }
+        IndependentWatchdog::new(watchdog).start(WATCHDOG_MS.millis());
         stop_watchdog_with_debugger();
         // The option bytes keep the level; they are not written without being asked to.
         let programmed = flash.optcr().read().bor_lev().bits() == BROWN_OUT_LEVEL_3;
@@ -88,7 +96,7 @@ impl Stm32f4 {
         timer.psc().write(|w| w.psc().set((timer_hz / 1_000_000 - 1) as u16));
         timer.egr().write(|w| w.ug().set_bit()); // loads the prescaler; the counter still wraps at 2³²
         timer.cr1().write(|w| w.cen().set_bit());
-        Started { cause, clock, rcc, microcontroller: Self { watchdog } }
+        Started { cause, clock, rcc }
     }
 }
 
@@ -109,6 +117,32 @@ fn stop_watchdog_with_debugger() {
     unsafe { (*DBGMCU::ptr()).apb1_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit()) };
 }
 
+/// What the program before has asked for, in memory that a reset does not clear.
+#[unsafe(link_section = ".uninit.request")]
+static REQUEST: AtomicU32 = AtomicU32::new(0);
+/// That the boot loader be started; any number that memory is not likely to hold.
+const BOOT_LOADER_REQUEST: u32 = 0xB007_10AD;
+/// The system memory with the boot loader, which begins with its vector table (RM0090 section 2.4; AN2606).
+const SYSTEM_MEMORY: *const u32 = 0x1FFF_0000 as *const u32;
+/// MEM_MODE of SYSCFG_MEMRMP: system memory at address 0 (RM0090 section 9.2.1).
+const SYSTEM_MEMORY_AT_0: u8 = 0b01;
+
+/// Starts the boot loader of the ROM as a reset with BOOT0 high does: all peripherals are as after a reset, no interrupt is enabled, and
+/// system memory is at address 0.
+fn enter_boot_loader(rcc: &RCC) -> ! {
+    REQUEST.store(0, Relaxed);
+    rcc.apb2enr().modify(|_, w| w.syscfgen().set_bit());
+    // SAFETY: one of the modes; nothing else runs, and the boot loader never returns.
+    unsafe {
+        (*SYSCFG::ptr()).memrmp().write(|w| w.mem_mode().bits(SYSTEM_MEMORY_AT_0));
+        (*NVIC::PTR).icer.iter().for_each(|enabled| enabled.write(u32::MAX));
+        let [stack, reset] = [SYSTEM_MEMORY, SYSTEM_MEMORY.add(1)].map(|vector| vector.read_volatile());
+        (*SCB::PTR).vtor.write(SYSTEM_MEMORY as u32);
+        cortex_m::interrupt::enable();
+        cortex_m::asm::bootstrap(stack as *const u32, reset as *const u32)
+    }
+}
+
 impl MicrosecondCounter for Stm32f4 {
     fn counter() -> u32 {
         // SAFETY: a read without side effects.
@@ -119,11 +153,13 @@ impl MicrosecondCounter for Stm32f4 {
 impl Microcontroller for Stm32f4 {
     type Flash = Stm32Flash;
 
-    fn feed(&mut self) {
-        self.watchdog.feed();
+    fn restart() -> ! {
+        SCB::sys_reset()
     }
 
-    fn restart() -> ! {
+    /// Has the next start begin with the boot loader of the ROM, for which everything has to be as after a reset.
+    fn start_boot_loader() -> ! {
+        REQUEST.store(BOOT_LOADER_REQUEST, Relaxed);
         SCB::sys_reset()
     }
 

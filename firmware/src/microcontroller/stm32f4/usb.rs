@@ -30,5 +30,11 @@ pub fn usb_port(
     let bus = cortex_m::singleton!(USB_BUS: UsbBusAllocator<UsbBus<USB>> = bus)?;
     // SAFETY: read-only memory.
     let unique_id = unsafe { UNIQUE_ID.read_volatile() };
-    UsbParts::start(bus, PRODUCT_ID, unique_id.into_iter().flat_map(u32::to_be_bytes))
+    UsbParts::start(bus, PRODUCT_ID, unique_id.into_iter().flat_map(u32::to_be_bytes), reconnect)
+}
+
+/// Takes the device off the bus, or connects it again (SDIS, RM0090 section 34.16.4). The host then resets the bus.
+fn reconnect(connected: bool) {
+    // SAFETY: the interrupt that uses the controller waits meanwhile.
+    unsafe { (*OTG_FS_DEVICE::ptr()).dctl().modify(|_, w| w.sdis().bit(!connected)) };
 }

@@ -108,7 +108,7 @@ pub(crate) struct Outcome {
     pub(crate) led_changes: u64,
     /// Longest time for which the watchdog was not fed, in s.
     pub(crate) longest_unfed_s: f64,
-    /// SSPCR0 of SPI0, PROC0_INTE2 of the pins, and CTRL of the watchdog, at the end.
+    /// SSPCR0 of SPI0, PROC0_INTE2 of the pins, CTRL of the watchdog, and the pads of GP16 and GP20, at the end.
     pub(crate) registers: Vec<u32>,
     /// Shortest time from one falling edge of chip select to the next while SCK was at most 300 kHz, in ns.
     pub(crate) shortest_slow_read_ns: u64,

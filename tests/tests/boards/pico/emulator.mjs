@@ -11,7 +11,7 @@
 // the falling and the rising edge of chip select, `b` and a further byte a transfer over SPI, `u` and a further byte an
 // output of the UART, `v` and a further byte one of the USB port, `x` and a further byte a letter of what its descriptors say, `o`
 // the start of the boot loader, which ends the run, `z` and `Z` the falling and the rising edge of the sensor's RST. At the end follow, in the place of the time, `r` with the registers of which the test asserts bits
-// (SSPCR0 of SPI0, PROC0_INTE2 of the pins, CTRL of the watchdog), `l` with the number of changes of the LED, `w` with
+// (SSPCR0 of SPI0, PROC0_INTE2 of the pins, CTRL of the watchdog, the pads of GP16 and GP20), `l` with the number of changes of the LED, `w` with
 // the longest time in ns for which the watchdog was not fed, and `e` with the number of instructions. The answer to `n` is
 // the number of samples and the time of the next one (two f64), that to `b` a byte; the others have none.
 import fs from 'node:fs';
@@ -26,6 +26,7 @@ const bootRom = await import(pathToFileURL(path.join(import.meta.dirname, 'boot-
 const usbHost = await import(pathToFileURL(path.join(import.meta.dirname, 'usb-host.mjs')));
 
 const PIN_SELECT = 17, PIN_DATA_READY = 20, PIN_RESET = 21, PIN_LED = 25, PULSE_NS = 100_000, STRIDE_NS = 1_000_000;
+const PIN_CLOCK = 18, PINS = 0x40014, FUNCTION_SPI = 1; // IO_BANK0 (data sheet, section 2.19.6.1)
 const USB_INTERRUPT = 5; // of the NVIC (data sheet, section 2.3.2)
 const SETTINGS = 0x1f0000; // in flash, to the end of 2 MiB
 const FLASH = 0x10000000, WATCHDOG = 0x40058;
@@ -104,6 +105,16 @@ const run = (retained, reason) => {
     // XOSC STATUS (offset 4) never says that the oscillator is stable.
     mcu.peripherals[0x40024] = { readUint32: () => 0, writeUint32() {}, writeUint32Atomic() {} };
   }
+
+  // A pin is pulled down after a reset: an edge of SCK before chip select is driven would be one within a frame.
+  const pins = mcu.peripherals[PINS];
+  const writePins = pins.writeUint32.bind(pins);
+  pins.writeUint32 = (offset, value) => {
+    if (offset === 8 * PIN_CLOCK + 4 && (value & 0x1f) === FUNCTION_SPI && mcu.gpio[PIN_SELECT].value !== GPIOPinState.High) {
+      report('SPI', 'SCK is driven before chip select is high');
+    }
+    writePins(offset, value);
+  };
 
   const watchdog = mcu.peripherals[WATCHDOG];
   watchdog.reason = reason;
@@ -229,7 +240,7 @@ let mcu = run(undefined, 0);
 while (startedAt < end) mcu = run(mcu.sram, mcu.peripherals[WATCHDOG].reason);
 if (settingsFile !== 'none') fs.writeFileSync(settingsFile, settings);
 for (const diagnostic of diagnostics.keys()) console.error(diagnostic);
-for (const address of [0x4003c000, 0x40014108, 0x40058000]) ask('r', mcu.readUint32(address), undefined, 0);
+for (const address of [0x4003c000, 0x40014108, 0x40058000, 0x4001c044, 0x4001c054]) ask('r', mcu.readUint32(address), undefined, 0);
 ask('l', ledChanges, undefined, 0);
 ask('w', longestUnfed, undefined, 0);
 ask('e', instructions, undefined, 0);

@@ -4,8 +4,8 @@ use crate::microcontroller::{Microcontroller, clear_bits, clear_in_memory, fill_
 use crate::probe::Probe;
 use crate::sensor::{Sensor, Terminal};
 use emulation::{
-    DBGMCU_APB1_FZ, EXTI_FTSR, EXTI_IMR, EXTI_RTSR, Event, FLASH_CR, FLASH_OPTCR, FLASH_SR, ODR, Outcome, PUPDR,
-    SPI1_CR1, SYSCFG_EXTICR, Scenario, Wiring, Work, gpio,
+    DBGMCU_APB1_FZ, EXTI_FTSR, EXTI_IMR, EXTI_RTSR, Event, FLASH_CR, FLASH_OPTCR, FLASH_SR, ODR, OSPEEDR, Outcome,
+    PUPDR, SPI1_CR1, SYSCFG_EXTICR, SYSCFG_MEMRMP, Scenario, Wiring, Work, gpio,
 };
 use rigless::cpu::armv7m as cpu;
 use rigless::device::Level;
@@ -37,8 +37,8 @@ const DMA2_S0CR: u64 = 0x4002_6410;
 const TCIE: u64 = 1 << 4;
 /// Its bit that lets the stream run.
 const EN: u64 = 1;
-/// Registers that a run returns beside the pulls.
-const CONFIGURATION: [u64; 10] = [
+/// Registers that a run returns beside those of the ports.
+const CONFIGURATION: [u64; 11] = [
     FLASH_SR,
     FLASH_CR,
     FLASH_OPTCR,
@@ -49,6 +49,7 @@ const CONFIGURATION: [u64; 10] = [
     EXTI_RTSR,
     EXTI_FTSR,
     DBGMCU_APB1_FZ,
+    SYSCFG_MEMRMP,
 ];
 /// Longest time that the emulator runs between two looks at the sensor's clock and the events.
 const STRIDE_NS: u64 = 1_000_000;
@@ -143,6 +144,7 @@ impl Plant {
 
     fn carry_out(&mut self, event: Event, session: &mut Session<Bench>, stop: Stop, host: &mut dyn Host) {
         let Some(sensor) = session.board_mut().sensor() else { return };
+        sensor.advance_to(stop.at.0);
         match event {
             Event::SensorReset => {
                 sensor.part.select();
@@ -195,8 +197,8 @@ impl Driver<Bench> for Plant {
         let led_level = read(session, host, gpio(port, ODR)) >> pin & 1;
         self.led_changes += u32::from(std::mem::replace(&mut self.led_level, led_level) != led_level);
         if now >= self.end {
-            let pulls = [gpio(0, PUPDR), gpio(1, PUPDR), gpio(2, PUPDR)];
-            for address in pulls.into_iter().chain(CONFIGURATION) {
+            let ports = (0..3).flat_map(|port| [gpio(port, OSPEEDR), gpio(port, PUPDR)]);
+            for address in ports.chain(CONFIGURATION) {
                 self.registers.insert(address, read(session, host, address));
             }
             return None;
@@ -260,7 +262,7 @@ pub(crate) fn run(image: &Path, scenario: Scenario) -> Outcome {
         led_level: 0,
         led_changes: 0,
         registers: BTreeMap::new(),
-        probe: scenario.has_probe.then(Probe::default),
+        probe: scenario.probe.map(Probe::new),
         events: scenario.events.into_iter().map(|(at, event)| (ns(at), event)).collect(),
         work: Vec::new(),
     };

@@ -2,7 +2,7 @@
 
 use crate::microcontroller::RAM;
 use defmt_decoder::{DecodeError, Table};
-use emulation::LogLine;
+use emulation::{LogLine, Probe as Conduct};
 use rigless::emulator::Host;
 use rigless::soc::Width;
 use std::path::Path;
@@ -15,21 +15,33 @@ const BUFFER: u64 = 28;
 const SIZE: u64 = 32;
 const WRITTEN: u64 = 36;
 const READ: u64 = 40;
+/// Offset of the mode of that buffer, and the mode in which the target waits for the probe while it is full.
+const MODE: u64 = 44;
+const BLOCKS: u64 = 2;
 
 /// Takes the bytes of the log out of the memory of the image, as often as it is asked to.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Probe {
+    conduct: Conduct,
     block: Option<u64>,
     bytes: Vec<u8>,
 }
 
 impl Probe {
+    pub(crate) const fn new(conduct: Conduct) -> Self {
+        Self { conduct, block: None, bytes: Vec::new() }
+    }
+
     pub(crate) fn poll(&mut self, host: &mut dyn Host) {
         let word = |host: &mut dyn Host, at| host.read(at, Width::W32).expect("memory");
         if self.block.is_none() {
             self.block = RAM.step_by(4).find(|at| [0, 4].map(|offset| word(host, at + offset)) == IDENTIFIER);
         }
         let Some(block) = self.block else { return };
+        if self.conduct == Conduct::Stalls {
+            host.write(block + MODE, Width::W32, BLOCKS).expect("memory");
+            return;
+        }
         let [buffer, size, written, mut read] = [BUFFER, SIZE, WRITTEN, READ].map(|offset| word(host, block + offset));
         while read != written {
             self.bytes.push(host.read(buffer + read, Width::W8).expect("memory") as u8);

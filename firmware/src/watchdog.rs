@@ -1,8 +1,12 @@
-//! Proof that every task is alive, without which the watchdog is not fed.
+//! The watchdog: it is fed only with proof that every task is alive and that the clock runs, in long waits too.
 
 use crate::acquisition::SamplingActivity;
 use crate::board::Board;
+use crate::bus_frame::MicrosecondCounter;
 use crate::device::log;
+use crate::event::event;
+use core::marker::PhantomData;
+use embedded_hal::delay::DelayNs;
 
 /// Time for which a burst may take to arrive, or a queued burst to be processed. Both take less than a millisecond.
 const SAMPLING_US: u64 = 2_000_000;
@@ -11,6 +15,7 @@ const REPORT_US: u64 = 10_000_000;
 
 /// A task that has stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(all(target_os = "none", feature = "microcontroller"), derive(defmt::Format))]
 enum StoppedTask {
     /// The transfer of a burst does not end.
     Sampling,
@@ -18,17 +23,6 @@ enum StoppedTask {
     Estimators,
     /// Nothing that waits is transmitted.
     Reports,
-}
-
-impl StoppedTask {
-    /// Name for a log.
-    const fn name(self) -> &'static str {
-        match self {
-            Self::Sampling => "sampling",
-            Self::Estimators => "estimators",
-            Self::Reports => "reports",
-        }
-    }
 }
 
 /// Compares counters of the tasks with those of earlier passes of the main loop.
@@ -75,7 +69,8 @@ impl TaskMonitor {
         let processed = board.estimators(|estimators| estimators.processed());
         let stopped = self.find_stopped(now_us, activity, processed);
         if let Some(task) = stopped.filter(|_| self.stopped != stopped) {
-            log(board, format_args!("{} stopped; waiting for the watchdog", task.name()));
+            event!(error, "{} stopped", task);
+            log(board, format_args!("{task:?} stopped; waiting for the watchdog"));
         }
         self.stopped = stopped;
         stopped.is_none()
@@ -105,9 +100,78 @@ impl TaskMonitor {
     }
 }
 
+/// The watchdog of a microcontroller.
+pub trait Watchdog: MicrosecondCounter {
+    /// Prolongs its time.
+    fn feed();
+}
+
+/// Feeds the watchdog only when the microsecond counter has advanced since the last time: without a running counter no wait
+/// would end, and the watchdog must restart the microcontroller.
+pub struct Feeder<M> {
+    /// The counter when the watchdog was fed last.
+    fed_at: u32,
+    microcontroller: PhantomData<M>,
+}
+
+impl<M> Default for Feeder<M> {
+    fn default() -> Self {
+        Self { fed_at: 0, microcontroller: PhantomData }
+    }
+}
+
+impl<M: Watchdog> Feeder<M> {
+    /// Feeds the watchdog.
+    pub fn feed(&mut self) {
+        let now = M::counter();
+        if core::mem::replace(&mut self.fed_at, now) != now {
+            M::feed();
+        }
+    }
+}
+
+/// Waits by the microsecond counter and feeds the watchdog meanwhile.
+pub struct FeedingDelay<'a, M>(pub &'a mut Feeder<M>);
+
+impl<M: Watchdog> DelayNs for FeedingDelay<'_, M> {
+    fn delay_ns(&mut self, ns: u32) {
+        self.delay_us(ns.div_ceil(1000));
+    }
+
+    fn delay_us(&mut self, us: u32) {
+        let start = M::counter();
+        while M::counter().wrapping_sub(start) <= us {
+            self.0.feed();
+        }
+    }
+}
+
+/// Prolongs the time of a watchdog that is shorter than a step of the main loop: a periodic interrupt feeds it as long as the
+/// main loop has done so within the last ticks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WatchdogExtension {
+    /// Feedings by the main loop that have been seen.
+    feedings: u32,
+    ticks_left: u32,
+}
+
+impl WatchdogExtension {
+    /// Before the first feeding.
+    pub const START: Self = Self { feedings: 0, ticks_left: 0 };
+
+    /// To be called at every tick with the number of feedings by the main loop so far. Returns whether the watchdog is to be
+    /// fed: for `ticks` ticks after each of them.
+    pub fn tick(&mut self, feedings: u32, ticks: u32) -> bool {
+        self.ticks_left = if feedings == self.feedings { self.ticks_left.saturating_sub(1) } else { ticks };
+        self.feedings = feedings;
+        self.ticks_left > 0
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
     const MS: u64 = 1000;
     const PERIOD_US: u64 = 5 * MS;
@@ -171,5 +235,46 @@ mod tests {
         within(first_stop(true, |pass| (ended(pass), pass.min(stop))), StoppedTask::Estimators, SAMPLING_US);
         let (task, at_us) = first_stop(false, |pass| (ended(pass), pass)).expect("a stopped task");
         assert_eq!((task, at_us), (StoppedTask::Reports, REPORT_US + PERIOD_US));
+    }
+
+    #[test]
+    fn a_long_step_is_fed_through_and_a_hang_is_not() {
+        let mut extension = WatchdogExtension::START;
+        let fed = |extension: &mut WatchdogExtension, feedings, ticks| {
+            (0..ticks).filter(|_| extension.tick(feedings, 480)).count()
+        };
+        assert_eq!(fed(&mut extension, 0, 100), 0, "nothing has been fed yet");
+        assert_eq!(fed(&mut extension, 1, 400), 400, "25 s at 16 ticks a second");
+        assert_eq!(fed(&mut extension, 2, 1000), 480, "the main loop hangs");
+        assert_eq!(fed(&mut extension, 2, 1000), 0);
+        assert_eq!(fed(&mut extension, 3, 1), 1);
+    }
+
+    /// A counter that does not advance for its first readings.
+    struct StoppedCounter;
+
+    const STOPPED_READINGS: u32 = 10_000;
+    static READINGS: AtomicU32 = AtomicU32::new(0);
+    /// How often the watchdog is fed while the counter stands still, and afterwards.
+    static FEEDINGS: [AtomicU32; 2] = [const { AtomicU32::new(0) }; 2];
+
+    impl MicrosecondCounter for StoppedCounter {
+        fn counter() -> u32 {
+            READINGS.fetch_add(1, Relaxed).saturating_sub(STOPPED_READINGS)
+        }
+    }
+
+    impl Watchdog for StoppedCounter {
+        fn feed() {
+            FEEDINGS[usize::from(READINGS.load(Relaxed) > STOPPED_READINGS + 1)].fetch_add(1, Relaxed);
+        }
+    }
+
+    #[test]
+    fn the_watchdog_is_not_fed_while_the_counter_stands_still() {
+        FeedingDelay(&mut Feeder::<StoppedCounter>::default()).delay_us(50);
+        let [stopped, running] = [0, 1].map(|index| FEEDINGS[index].load(Relaxed));
+        assert_eq!(stopped, 0);
+        assert!(running > 20, "{running} times in 50 us");
     }
 }

@@ -2,9 +2,9 @@
 
 use super::bus::{Spi1Bus, spi1_bus};
 use super::start::{Started, Stm32f4};
-use crate::board::{BusTiming, DataReadyLine};
+use crate::board::DataReadyLine;
 use crate::microcontroller::{BoardParts, BoardSupport, DataReadyPin, UsbParts};
-use stm32f4xx_hal::gpio::{Edge, ExtiPin, Input, Output, PA4, PA5, PA6, PA7, Pin};
+use stm32f4xx_hal::gpio::{Edge, ExtiPin, Input, PA4, PA5, PA6, PA7, Pin};
 use stm32f4xx_hal::pac::{DMA2, EXTI, SPI1, SYSCFG};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
@@ -32,18 +32,17 @@ impl Started {
     ) -> BoardParts<B>
     where
         Pin<P, N, Input>: ExtiPin,
-        B: BoardSupport<Microcontroller = Stm32f4, DataReady = Pin<P, N, Input>, Bus = Spi1Bus<PA4<Output>>>,
+        B: BoardSupport<Microcontroller = Stm32f4, DataReady = Pin<P, N, Input>, Bus = Spi1Bus>,
     {
-        let Self { cause, clock, mut rcc, microcontroller } = self;
-        let bus = spi1_bus(sensor.spi, sensor.pins, &mut rcc, BusTiming::SAFE);
+        let Self { cause, clock, mut rcc } = self;
+        let bus = spi1_bus(sensor.spi, sensor.pins, &mut rcc);
         let data_ready = data_ready_input(sensor.data_ready, sensor.edges, &mut rcc);
         let core_hz = rcc.clocks.hclk().raw();
-        BoardParts { cause, clock, core_hz, microcontroller, data_ready, bus, uart, usb, led, reset_line: None }
+        BoardParts { cause, clock, core_hz, data_ready, bus, uart, usb, led, reset_line: None }
     }
 }
 
-/// Makes a pin the data-ready input. It floats: the sensor drives it, with 3.3 V, and a pin tolerates more only without a
-/// pull-up or pull-down (STM32F405 data sheet, table 7, FT).
+/// Makes a pin the data-ready input. It is pulled down, so that an unplugged sensor gives no edges.
 fn data_ready_input<const P: char, const N: u8>(
     pin: Pin<P, N>,
     (mut exti, syscfg): (EXTI, SYSCFG),
@@ -52,7 +51,7 @@ fn data_ready_input<const P: char, const N: u8>(
 where
     Pin<P, N, Input>: ExtiPin,
 {
-    let mut pin = pin.into_floating_input();
+    let mut pin = pin.into_pull_down_input();
     pin.make_interrupt_source(&mut syscfg.constrain(rcc));
     pin.trigger_on_edge(&mut exti, Edge::Rising);
     pin.enable_interrupt(&mut exti);

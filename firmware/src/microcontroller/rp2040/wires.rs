@@ -1,0 +1,109 @@
+//! An RP2040 that is wired to the sensor as a Raspberry Pi Pico is: the pins, and the start of all that is connected to them.
+//!
+//! | pin | signal | at the sensor |
+//! |---|---|---|
+//! | GP17 | chip select, active low | CS |
+//! | GP18, GP16, GP19 | SPI0 SCK, MISO, MOSI, mode 3 | SCLK, DOUT, DIN |
+//! | GP20 | data ready, rising edge | DIO1 |
+//! | GP21 | reset, active low, on a board that connects it | RST |
+//! | GP0, GP1 | UART0 TX, RX, 460 800 Bd 8N1 | to the host |
+//! | USB | serial port (CDC-ACM), the same messages | to the host |
+//! | GP25 | LED | |
+//!
+//! The sensor runs from 5 V and drives its outputs from an internal 3.3 V: connect every signal directly, without a divider or a level
+//! shifter (data sheet Rev. B, page 5). VBUS gives the 5 V. GP16 and GP20 are pulled down, so that an unplugged
+//! sensor gives neither edges nor bits.
+
+use super::bus::Spi0;
+use super::port::Uart0Port;
+use super::start::{ClockParts, Rp2040, boot_cause};
+use super::usb::{Rp2040UsbPort, usb_port};
+use crate::microcontroller::sensor_spi::SensorSpi;
+use crate::microcontroller::{BoardParts, BoardSupport, UartQueues};
+use crate::sensor::BURST_LIMIT_HZ;
+use link::ClockSource;
+use rp2040_hal::clocks::Clock;
+use rp2040_hal::fugit::RateExtU32;
+use rp2040_hal::gpio::bank0::{Gpio0, Gpio1, Gpio16, Gpio17, Gpio18, Gpio19, Gpio20, Gpio21, Gpio25};
+use rp2040_hal::gpio::{
+    self, FunctionNull, FunctionSioInput, FunctionSioOutput, FunctionSpi, FunctionUart, PullDown, PullUp,
+};
+use rp2040_hal::{Sio, Spi, pac, spi, uart};
+
+const BAUD: u32 = 460_800;
+
+type Pin<I, F, P = PullDown> = gpio::Pin<I, F, P>;
+type SpiPins = (Pin<Gpio19, FunctionSpi>, Pin<Gpio16, FunctionSpi>, Pin<Gpio18, FunctionSpi>);
+/// The sensor's bus.
+pub type SensorBus = SensorSpi<Spi0<SpiPins>, Pin<Gpio17, FunctionSioOutput>>;
+/// The data-ready input.
+pub type DataReady = Pin<Gpio20, FunctionSioInput>;
+/// The serial port on pins.
+pub type Uart = Uart0Port<(Pin<Gpio0, FunctionUart>, Pin<Gpio1, FunctionUart, PullUp>)>;
+/// The serial port on USB.
+pub type Usb = Rp2040UsbPort;
+/// The LED.
+pub type Led = Pin<Gpio25, FunctionSioOutput>;
+/// The pin at RST of the sensor, as it is after a reset.
+pub type ResetPin = Pin<Gpio21, FunctionNull>;
+/// The same, driven.
+pub type ResetLine = Pin<Gpio21, FunctionSioOutput>;
+
+/// Starts a board with these wires. `has_usb` starts the port on USB, and `reset_line` drives the pin at RST high.
+pub fn start<B>(
+    device: pac::Peripherals,
+    queues: UartQueues,
+    has_usb: bool,
+    reset_line: impl FnOnce(ResetPin) -> Option<B::ResetLine>,
+) -> BoardParts<B>
+where
+    B: BoardSupport<
+            Microcontroller = Rp2040,
+            DataReady = DataReady,
+            Bus = SensorBus,
+            Uart = Uart,
+            Usb = Usb,
+            Led = Led,
+        >,
+{
+    let cause = boot_cause(&device.VREG_AND_CHIP_RESET, &device.WATCHDOG);
+    let mut resets = device.RESETS;
+    let sio = Sio::new(device.SIO);
+    let pins = gpio::Pins::new(device.IO_BANK0, device.PADS_BANK0, sio.gpio_bank0, &mut resets);
+    // Before SCK goes high, which the sensor would take for a clock edge: a pin is pulled down until it is driven.
+    let select = pins.gpio17.into_push_pull_output_in_state(gpio::PinState::High);
+    let reset_line = reset_line(pins.gpio21);
+    let mut led = pins.gpio25.into_push_pull_output();
+    let parts = ClockParts {
+        crystal: device.XOSC,
+        clocks: device.CLOCKS,
+        plls: (device.PLL_SYS, device.PLL_USB),
+        timer: device.TIMER,
+    };
+    let supervision = (device.WATCHDOG, &device.VREG_AND_CHIP_RESET);
+    let Ok(clocks) = Rp2040::start(parts, supervision, &mut resets, &mut led) else {
+        panic!("the clocks do not start");
+    };
+    let (peripheral, core_hz) = (clocks.peripheral_clock.freq(), clocks.system_clock.freq().to_Hz());
+
+    let settings = uart::UartConfig::new(BAUD.Hz(), uart::DataBits::Eight, None, uart::StopBits::One);
+    // Nothing may be connected to the receiver: pulled up it is idle.
+    let lines = (pins.gpio0.into_function(), pins.gpio1.reconfigure());
+    let serial = uart::UartPeripheral::new(device.UART0, lines, &mut resets)
+        .enable(settings, peripheral)
+        .expect("the baud rate is in range");
+
+    let wires = (pins.gpio19.into_function(), pins.gpio16.into_function(), pins.gpio18.into_function());
+    let spi = Spi::<_, _, _, 8>::new(device.SPI0, wires);
+    let mode = spi::FrameFormat::MotorolaSpi(embedded_hal::spi::MODE_3);
+    let spi = spi.init(&mut resets, peripheral, BURST_LIMIT_HZ.Hz(), mode);
+    let usb_registers = (device.USBCTRL_REGS, device.USBCTRL_DPRAM);
+    let usb = if has_usb { usb_port(usb_registers, clocks.usb_clock, &mut resets) } else { None };
+    let bus = SensorSpi::new(Spi0::new(spi, peripheral, device.DMA, &mut resets), select);
+
+    let data_ready = pins.gpio20.into_pull_down_input();
+    data_ready.set_interrupt_enabled(gpio::Interrupt::EdgeHigh, true);
+
+    let (uart, clock) = (Uart0Port::new(serial, queues), ClockSource::Crystal);
+    BoardParts { cause, clock, core_hz, data_ready, bus, uart, usb, led, reset_line }
+}

@@ -1,0 +1,119 @@
+//! The sensor's bus on any microcontroller: registers byte by byte, bursts by DMA, and chip select with its times.
+
+use super::{BurstBus, BurstEnd};
+use crate::board::{BusTiming, FrameTimes, SensorBus};
+use crate::bus_frame::{BusFault, ByteExchange, ChipSelect, MicrosecondCounter, transfer, wait_ns};
+use adis16405_driver::{BURST_BYTES, BURST_REQUEST};
+use core::convert::Infallible;
+use core::sync::atomic::{Ordering, compiler_fence};
+use embedded_hal::digital::OutputPin;
+use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
+
+/// The bytes that request a burst. DMA reads them, so they must not be on the stack.
+static REQUEST: [u8; BURST_BYTES] = BURST_REQUEST;
+
+/// An SPI peripheral with the two DMA channels that serve it.
+pub trait SpiPeripheral: ByteExchange {
+    /// Times the bus.
+    type Clock: MicrosecondCounter;
+    /// Sets the fastest serial clock of at most `limit_hz`, or the slowest one if none is slow enough; returns it in Hz.
+    fn set_clock_limit(&mut self, limit_hz: u32) -> u32;
+    /// Resets the peripheral and keeps its settings.
+    fn reset(&mut self);
+    /// Waits for a byte under way and drops what was received: a byte left in the receive buffer would shift the next burst.
+    fn drain(&mut self);
+    /// Starts the transfer of bytes, as many as `request` has, whose end raises an interrupt. Both slices must outlive it, and nothing may
+    /// use `received` before it is [stopped](Self::stop).
+    fn start(&mut self, request: &'static [u8], received: &mut [u8]);
+    /// Stops both channels. Returns whether all bytes were received without an error.
+    fn stop(&mut self) -> bool;
+}
+
+/// The sensor on an SPI peripheral, with its chip select.
+pub struct SensorSpi<P, S> {
+    peripheral: P,
+    select: ChipSelect<S>,
+    /// In static memory, as DMA does not reach the stack.
+    received: &'static mut [u8; BURST_BYTES],
+    /// Bytes of the burst that have been transferred, or are being transferred.
+    started: usize,
+}
+
+impl<P: SpiPeripheral, S: OutputPin<Error = Infallible>> SensorSpi<P, S> {
+    /// A bus with the chip select `select`, which must be high. To be called once.
+    pub fn new(peripheral: P, select: S) -> Self {
+        let received = cortex_m::singleton!(: [u8; BURST_BYTES] = [0; BURST_BYTES]).expect("the bus is created once");
+        Self { peripheral, select: ChipSelect::new(select, BusTiming::SAFE), received, started: 0 }
+    }
+
+    /// Transfers the next bytes of the burst: all of them, or one word if there is to be a gap between words.
+    fn start_bytes(&mut self) {
+        let count = if self.select.timing.word_gap_ns == 0 { BURST_BYTES } else { 2 };
+        let from = self.started.min(BURST_BYTES - count);
+        self.started += count;
+        if let (Some(request), Some(received)) =
+            (REQUEST.get(from..from + count), self.received.get_mut(from..from + count))
+        {
+            compiler_fence(Ordering::SeqCst);
+            self.peripheral.start(request, received);
+        }
+    }
+}
+
+impl<P: SpiPeripheral, S: OutputPin<Error = Infallible>> SensorBus for SensorSpi<P, S> {
+    fn set_clock_limit(&mut self, limit_hz: u32) -> u32 {
+        self.select.set_clock_limit(limit_hz);
+        self.peripheral.drain();
+        self.peripheral.set_clock_limit(limit_hz)
+    }
+
+    fn set_timing(&mut self, timing: BusTiming) {
+        self.select.timing = timing;
+    }
+
+    fn take_frame_times(&mut self) -> FrameTimes {
+        self.select.take_times()
+    }
+
+    fn reset(&mut self) {
+        self.peripheral.drain();
+        self.peripheral.reset();
+    }
+}
+
+impl<P: SpiPeripheral, S: OutputPin<Error = Infallible>> BurstBus for SensorSpi<P, S> {
+    fn start_burst(&mut self) {
+        self.select.select::<P::Clock>();
+        self.started = 0;
+        self.start_bytes();
+    }
+
+    fn end_burst(&mut self) -> BurstEnd<'_> {
+        let complete = self.peripheral.stop();
+        compiler_fence(Ordering::SeqCst);
+        if complete && self.started < BURST_BYTES {
+            wait_ns::<P::Clock>(self.select.timing.word_gap_ns);
+            self.start_bytes();
+            return BurstEnd::MoreWords;
+        }
+        if !complete {
+            self.peripheral.drain();
+        }
+        self.select.deselect::<P::Clock>();
+        if complete { BurstEnd::Complete(self.received) } else { BurstEnd::Failed }
+    }
+}
+
+impl<P, S> ErrorType for SensorSpi<P, S> {
+    type Error = BusFault;
+}
+
+impl<P: SpiPeripheral, S: OutputPin<Error = Infallible>> SpiDevice<u8> for SensorSpi<P, S> {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), BusFault> {
+        let done = transfer::<P::Clock, _>(&mut self.peripheral, &mut self.select, operations);
+        if done.is_err() {
+            self.peripheral.drain();
+        }
+        done
+    }
+}
