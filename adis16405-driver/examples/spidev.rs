@@ -4,9 +4,12 @@
 //! |---|---|---|
 //! | 24, GPIO 8 | CE0 | CS |
 //! | 23, GPIO 11 | SCLK | SCLK |
-//! | 21, GPIO 9 | MISO | DOUT, through a divider or level shifter, since the sensor may drive 5 V |
+//! | 21, GPIO 9 | MISO | DOUT |
 //! | 19, GPIO 10 | MOSI | DIN |
 //! | 2 (5 V), 6 (ground) | supply | VCC, GND |
+//!
+//! The sensor runs from 5 V and drives its outputs from an internal 3.3 V: connect every signal directly, without a divider
+//! or a level shifter (data sheet Rev. B, page 5).
 //!
 //! ```console
 //! $ cargo run -p adis16405-driver --example spidev -- /dev/spidev0.0

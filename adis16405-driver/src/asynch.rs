@@ -5,6 +5,7 @@ use core::task::Poll;
 
 use embedded_hal::digital::OutputPin;
 use embedded_hal_async::delay::DelayNs;
+use embedded_hal_async::digital::Wait;
 use embedded_hal_async::spi::{Operation, SpiDevice};
 
 use crate::alarms::{Alarm, AlarmNumber};
@@ -23,7 +24,7 @@ use crate::protocol::{BusRequest, Protocol, ProtocolError, RequestSlot, resume};
 use crate::register::Register;
 use crate::sample::ImuSample;
 use crate::self_test::{FlashTest, SelfTest, Stimulus};
-use crate::spacing::{FramePauses, SensorBus};
+use crate::spacing::{FramePauses, LONGEST_DELAY_US, SensorBus};
 
 impl<SPI: SpiDevice<u8>, D: DelayNs> Adis16405<SPI, D, Async> {
     /// A driver on `spi` for a part that is to be configured with `config`; `delay` keeps the pauses between frames and
@@ -71,20 +72,41 @@ impl<SPI: SpiDevice<u8>, D: DelayNs> Adis16405<SPI, D, Async> {
         self.checked_sample(burst).map_err(Error::Unusable)
     }
 
+    /// Waits until `line`, the input of data ready, is high, then does what [`read`](Self::read) does: a sample a pulse. With
+    /// [data ready active low](Self::set_data_ready) pass an input that is inverted.
+    ///
+    /// The level is waited for. A pulse is high for 100 to 200 µs (data sheet Rev. B, page 14), and a burst takes at least 208 µs,
+    /// so none is read twice:
+    ///
+    /// - A pulse that has begun before the call is read at once: no first sample is lost.
+    /// - A pulse that begins during a read is read by the next call if the line is still high by then. If its sample was in
+    ///   the burst before already, the next burst is refused for [`Faults::NO_NEW_DATA`](crate::Faults::NO_NEW_DATA).
+    /// - A pulse that begins and ends between two calls is lost with its sample. The part does not count samples: compare the
+    ///   times of two samples with the sample period.
+    /// - A line that stays high gives [`Faults::NO_NEW_DATA`](crate::Faults::NO_NEW_DATA) until the next sample. A line that
+    ///   stays low is waited for without end: set a timeout. A future that is dropped while it waits has sent nothing.
+    ///
+    /// # Errors
+    /// [`Error::Pin`] if the line cannot be waited for, and those of [`read`](Self::read).
+    pub async fn read_on(&mut self, line: &mut impl Wait) -> Result<ImuSample, Error<SPI::Error>> {
+        line.wait_for_high().await.map_err(|_| Error::Pin)?;
+        self.read().await
+    }
+
     /// Resets the part by its reset line (RST, active low): drives `line` low for [`Timing::reset_pulse_us`], leaves the
-    /// bus silent for [`Timing::reset_us`], and configures the part as [`init`](Self::init) does. The way out where the
-    /// part does not answer any more, and cannot receive the command of [`software_reset`](Self::software_reset).
+    /// bus silent for [`Timing::reset_us`], and configures the part as [`init`](Self::init) does. Use it when the part no
+    /// longer answers: it does not receive the command of [`software_reset`](Self::software_reset) then.
     ///
     /// The line must be high before; `line` may be an open-drain output. As after every reset, the registers are loaded
     /// from flash, and SMPL_PRD there may select low-power mode.
     ///
     /// # Errors
-    /// [`Error::ResetLine`] if the pin cannot be driven, and those of [`init`](Self::init).
+    /// [`Error::Pin`] if the line cannot be driven, and those of [`init`](Self::init).
     pub async fn hardware_reset(&mut self, line: &mut impl OutputPin) -> Result<Product, Error<SPI::Error>> {
-        self.state.forget_registers();
-        line.set_low().map_err(|_| Error::ResetLine)?;
+        self.state.mark_registers_unknown();
+        line.set_low().map_err(|_| Error::Pin)?;
         self.bus.delay.delay_us(self.state.timing.reset_pulse_us).await;
-        line.set_high().map_err(|_| Error::ResetLine)?;
+        line.set_high().map_err(|_| Error::Pin)?;
         self.bus.delay.delay_us(self.state.timing.reset_us).await;
         self.init().await
     }
@@ -154,7 +176,13 @@ async fn perform<SPI: SpiDevice<u8>, D: DelayNs>(
         BusRequest::ChipSelectPulse { pauses } => {
             transact(bus, pauses, &mut [Operation::DelayNs(pauses.low_ns)]).await?;
         }
-        BusRequest::Pause { us } => bus.delay.delay_us(us).await,
+        BusRequest::Pause { mut us } => {
+            while us > 0 {
+                let step_us = us.min(LONGEST_DELAY_US);
+                bus.delay.delay_us(step_us).await;
+                us -= step_us;
+            }
+        }
     }
     slot.respond(answer);
     Ok(())
@@ -168,16 +196,16 @@ async fn transact<SPI: SpiDevice<u8>, D: DelayNs>(
     operations: &mut [Operation<'_, u8>],
 ) -> Result<(), SPI::Error> {
     pause(bus).await;
-    bus.owed_ns = pauses.high_ns;
+    bus.pending_pause_ns = pauses.high_ns;
     let result = bus.spi.transaction(pauses.operations(operations)).await;
     pause(bus).await;
     result
 }
 
-/// Waits for the pause that is owed to the part.
+/// Waits for the pause that the part still needs.
 async fn pause<SPI, D: DelayNs>(bus: &mut SensorBus<SPI, D>) {
-    if bus.owed_ns > 0 {
-        bus.delay.delay_ns(bus.owed_ns).await;
-        bus.owed_ns = 0;
+    if bus.pending_pause_ns > 0 {
+        bus.delay.delay_ns(bus.pending_pause_ns).await;
+        bus.pending_pause_ns = 0;
     }
 }

@@ -23,7 +23,7 @@ use crate::protocol::{BusRequest, Protocol, ProtocolError, RequestSlot, resume};
 use crate::register::Register;
 use crate::sample::ImuSample;
 use crate::self_test::{FlashTest, SelfTest, Stimulus};
-use crate::spacing::{FramePauses, SensorBus};
+use crate::spacing::{FramePauses, LONGEST_DELAY_US, SensorBus};
 
 impl<SPI: SpiDevice<u8>, D: DelayNs> Adis16405<SPI, D, Blocking> {
     /// A driver on `spi` for a part that is to be configured with `config`; `delay` keeps the pauses between frames and
@@ -72,19 +72,19 @@ impl<SPI: SpiDevice<u8>, D: DelayNs> Adis16405<SPI, D, Blocking> {
     }
 
     /// Resets the part by its reset line (RST, active low): drives `line` low for [`Timing::reset_pulse_us`], leaves the
-    /// bus silent for [`Timing::reset_us`], and configures the part as [`init`](Self::init) does. The way out where the
-    /// part does not answer any more, and cannot receive the command of [`software_reset`](Self::software_reset).
+    /// bus silent for [`Timing::reset_us`], and configures the part as [`init`](Self::init) does. Use it when the part no
+    /// longer answers: it does not receive the command of [`software_reset`](Self::software_reset) then.
     ///
     /// The line must be high before; `line` may be an open-drain output. As after every reset, the registers are loaded
     /// from flash, and SMPL_PRD there may select low-power mode.
     ///
     /// # Errors
-    /// [`Error::ResetLine`] if the pin cannot be driven, and those of [`init`](Self::init).
+    /// [`Error::Pin`] if the line cannot be driven, and those of [`init`](Self::init).
     pub fn hardware_reset(&mut self, line: &mut impl OutputPin) -> Result<Product, Error<SPI::Error>> {
-        self.state.forget_registers();
-        line.set_low().map_err(|_| Error::ResetLine)?;
+        self.state.mark_registers_unknown();
+        line.set_low().map_err(|_| Error::Pin)?;
         self.bus.delay.delay_us(self.state.timing.reset_pulse_us);
-        line.set_high().map_err(|_| Error::ResetLine)?;
+        line.set_high().map_err(|_| Error::Pin)?;
         self.bus.delay.delay_us(self.state.timing.reset_us);
         self.init()
     }
@@ -151,7 +151,13 @@ fn perform<SPI: SpiDevice<u8>, D: DelayNs>(bus: &mut SensorBus<SPI, D>, slot: &R
         BusRequest::ChipSelectPulse { pauses } => {
             transact(bus, pauses, &mut [Operation::DelayNs(pauses.low_ns)])?;
         }
-        BusRequest::Pause { us } => bus.delay.delay_us(us),
+        BusRequest::Pause { mut us } => {
+            while us > 0 {
+                let step_us = us.min(LONGEST_DELAY_US);
+                bus.delay.delay_us(step_us);
+                us -= step_us;
+            }
+        }
     }
     slot.respond(answer);
     Ok(())
@@ -165,16 +171,16 @@ fn transact<SPI: SpiDevice<u8>, D: DelayNs>(
     operations: &mut [Operation<'_, u8>],
 ) -> Result<(), SPI::Error> {
     pause(bus);
-    bus.owed_ns = pauses.high_ns;
+    bus.pending_pause_ns = pauses.high_ns;
     let result = bus.spi.transaction(pauses.operations(operations));
     pause(bus);
     result
 }
 
-/// Waits for the pause that is owed to the part.
+/// Waits for the pause that the part still needs.
 fn pause<SPI, D: DelayNs>(bus: &mut SensorBus<SPI, D>) {
-    if bus.owed_ns > 0 {
-        bus.delay.delay_ns(bus.owed_ns);
-        bus.owed_ns = 0;
+    if bus.pending_pause_ns > 0 {
+        bus.delay.delay_ns(bus.pending_pause_ns);
+        bus.pending_pause_ns = 0;
     }
 }

@@ -33,6 +33,7 @@ impl GyroBias {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct FactoryRestore {
     /// Bias correction of the gyros, 0.0125 °/s per count.
     pub gyro: GyroBias,

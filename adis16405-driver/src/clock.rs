@@ -53,7 +53,7 @@ impl ClockMode {
 const TICKS_PER_1000_S: u32 = 1_638_400;
 
 /// Period of the internal sample clock: time base · divisor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
@@ -90,14 +90,7 @@ impl SamplePeriod {
         if !(hz.is_finite() && hz > 0.0) {
             return Err(ConfigError::Rate);
         }
-        let mut best = Self::RESET;
-        for smpl_prd in 0x01..=0xFF {
-            let candidate = Self { smpl_prd };
-            if (candidate.hz() - hz).abs() < (best.hz() - hz).abs() {
-                best = candidate;
-            }
-        }
-        Ok(best)
+        Ok(Self::least(|period| (period.hz() - hz).abs()))
     }
 
     /// As [`nearest`](Self::nearest), in `f32`, for targets with a single-precision FPU.
@@ -108,14 +101,13 @@ impl SamplePeriod {
         if !(hz.is_finite() && hz > 0.0) {
             return Err(ConfigError::Rate);
         }
-        let mut best = Self::RESET;
-        for smpl_prd in 0x01..=0xFF {
-            let candidate = Self { smpl_prd };
-            if (candidate.hz_f32() - hz).abs() < (best.hz_f32() - hz).abs() {
-                best = candidate;
-            }
-        }
-        Ok(best)
+        Ok(Self::least(|period| (period.hz_f32() - hz).abs()))
+    }
+
+    /// The period with the least `error`, the shortest of several.
+    fn least<T: PartialOrd>(error: impl Fn(Self) -> T) -> Self {
+        let periods = (0x02..=0xFF).map(|smpl_prd| Self { smpl_prd });
+        periods.fold(Self::RESET, |best, period| if error(period) < error(best) { period } else { best })
     }
 
     /// As [`nearest`](Self::nearest), for a rate in 10⁻³ samples per second and in exact integers, for targets without
@@ -181,6 +173,12 @@ impl SamplePeriod {
     /// The power mode that this period selects by the data sheet.
     pub const fn clock_mode(self) -> ClockMode {
         if self.smpl_prd <= 0x08 { ClockMode::Normal } else { ClockMode::LowPower }
+    }
+}
+
+impl fmt::Debug for SamplePeriod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "SamplePeriod({:#04x}: {} mHz)", self.smpl_prd, self.millihz())
     }
 }
 
@@ -291,6 +289,7 @@ impl PerClockMode {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct Timing {
     /// Least stall after a frame or a burst, ns. The part needs 9 µs in normal and 75 µs in low-power mode (Table 2);
     /// Analog Devices' evaluation tool keeps 16 µs. After a single frame the stall is longer where

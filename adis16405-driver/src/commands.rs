@@ -80,7 +80,7 @@ impl Protocol<'_> {
     }
 
     pub(crate) async fn init(&mut self) -> Result<Product, ProtocolError> {
-        self.state.assume_either_mode();
+        self.state.assume_low_power_until_read();
         let product = self.identity().await?;
         if self.state.stimulated {
             self.stop_stimulus().await?;
@@ -91,7 +91,7 @@ impl Protocol<'_> {
     }
 
     pub(crate) async fn start_up(&mut self) -> Result<Product, ProtocolError> {
-        self.state.forget_registers();
+        self.state.mark_registers_unknown();
         self.pause(self.state.timing.start_up_us).await;
         self.init().await
     }
@@ -148,9 +148,9 @@ impl Protocol<'_> {
     }
 
     pub(crate) async fn software_reset(&mut self) -> Result<Product, ProtocolError> {
-        self.state.assume_either_mode();
+        self.state.assume_low_power_until_read();
         self.write_low(Register::GlobCmd, SOFTWARE_RESET).await;
-        self.state.forget_registers();
+        self.state.mark_registers_unknown();
         self.pause(self.state.timing.reset_us).await;
         self.init().await
     }

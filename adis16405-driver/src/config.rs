@@ -5,7 +5,7 @@ use crate::channel::GyroRange;
 use crate::clock::{ConfigError, SampleClock, SamplePeriod};
 
 /// Gyro range, filter and sample clock: a combination that the part accepts. The default is that of the part after
-/// reset.
+/// reset: ±300 °/s, M = 2 (four samples an average), 819.2 samples per second.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

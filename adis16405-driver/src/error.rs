@@ -81,6 +81,7 @@ impl defmt::Format for Diagnosis {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct FlashUpdate {
     /// DIAG_STAT before the command: [`Diagnosis::FLASH_UPDATE`] here belongs to an earlier update.
     pub before: Diagnosis,
@@ -129,8 +130,8 @@ pub enum Error<E> {
     /// It is not known which configuration the part has, or a stimulus of the manual self-test may be on:
     /// [`init`](crate::Adis16405::init) has to succeed first. Nothing was sent.
     NotReady,
-    /// The pin of the reset line could not be driven.
-    ResetLine,
+    /// A pin of the controller failed: that of the reset line, or of data ready.
+    Pin,
     /// The part does not accept the configuration. Nothing was written.
     Config(ConfigError),
     /// The value does not fit the register. Nothing was written.
@@ -157,7 +158,7 @@ impl Error<Infallible> {
             Error::FlashUpdate(outcome) => Error::FlashUpdate(outcome),
             Error::Unusable(faults) => Error::Unusable(faults),
             Error::NotReady => Error::NotReady,
-            Error::ResetLine => Error::ResetLine,
+            Error::Pin => Error::Pin,
             Error::Config(error) => Error::Config(error),
             Error::Value { register, value } => Error::Value { register, value },
             Error::ReadOnly(register) => Error::ReadOnly(register),
@@ -196,7 +197,7 @@ impl<E: fmt::Debug> fmt::Display for Error<E> {
             }
             Error::Unusable(faults) => write!(f, "the burst is not usable: {}", faults.cause().unwrap_or_default()),
             Error::NotReady => write!(f, "init() has to succeed first"),
-            Error::ResetLine => write!(f, "the pin of the reset line could not be driven"),
+            Error::Pin => write!(f, "a pin of the controller failed"),
             Error::Config(error) => write!(f, "{error}"),
             Error::Value { register, value } => write!(f, "{value} does not fit {}", register.name()),
             Error::ReadOnly(register) => write!(f, "{} cannot be written", register.name()),

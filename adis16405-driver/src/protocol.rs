@@ -143,14 +143,14 @@ impl DriverState {
     }
 
     /// The part has loaded its registers from flash: until they are read, neither configuration nor power mode is known.
-    pub(crate) const fn forget_registers(&mut self) {
+    pub(crate) const fn mark_registers_unknown(&mut self) {
         self.configured = false;
         self.mode = ClockMode::LowPower;
     }
 
     /// Unless the driver has configured the part, its power mode is not known: the part may have it from its flash, or from
     /// before a restart of the microcontroller alone.
-    pub(crate) const fn assume_either_mode(&mut self) {
+    pub(crate) const fn assume_low_power_until_read(&mut self) {
         if !self.configured {
             self.mode = ClockMode::LowPower;
         }

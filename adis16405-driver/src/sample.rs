@@ -37,7 +37,7 @@ impl ImuSample {
 
     /// Sets the faults that the burst shows and that did not refuse it.
     #[must_use]
-    pub(crate) const fn with_warnings(mut self, warnings: Faults) -> Self {
+    pub const fn with_warnings(mut self, warnings: Faults) -> Self {
         self.warnings = warnings;
         self
     }

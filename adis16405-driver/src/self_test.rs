@@ -11,6 +11,7 @@ use crate::register::Register;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct SelfTest {
     /// DIAG_STAT before the test; the read cleared the register.
     pub before: Diagnosis,
@@ -32,6 +33,7 @@ impl SelfTest {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct FlashTest {
     /// DIAG_STAT before the test; the read cleared the register.
     pub before: Diagnosis,

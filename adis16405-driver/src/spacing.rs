@@ -16,6 +16,9 @@ pub enum SelectDuringStall {
     Low,
 }
 
+/// Longest delay that is asked for at once, µs: some HALs compute its cycles in 32 bits, which 25 s at 168 MHz overflow.
+pub(crate) const LONGEST_DELAY_US: u32 = 100_000;
+
 /// The pauses after a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FramePauses {
@@ -51,11 +54,11 @@ pub(crate) struct SensorBus<SPI, D> {
     pub(crate) delay: D,
     /// The pause that has to pass before the next transaction, ns. Not 0 if the transaction or the pause before was
     /// interrupted, by a future that was dropped.
-    pub(crate) owed_ns: u32,
+    pub(crate) pending_pause_ns: u32,
 }
 
 impl<SPI, D> SensorBus<SPI, D> {
     pub(crate) const fn new(spi: SPI, delay: D) -> Self {
-        Self { spi, delay, owed_ns: 0 }
+        Self { spi, delay, pending_pause_ns: 0 }
     }
 }

@@ -202,6 +202,7 @@ fn may_have_lost_its_sign(x: i16) -> bool {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct Validity {
     /// The faults found.
     pub faults: Faults,
@@ -221,6 +222,7 @@ impl Validity {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct FaultCounters {
     /// Bursts validated.
     pub bursts: u32,

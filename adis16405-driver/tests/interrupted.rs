@@ -232,8 +232,9 @@ fn a_shared_delay_serves_both_the_spi_device_and_the_driver() {
     }
     let bus = Bus::new(0..0);
     let delay = SharedDelay::new(Total(0));
-    let mut imu = Adis16405::new(Device(bus.clone(), &delay), &delay, Config::default())
-        .with_timing(Timing { stall_select: SelectDuringStall::Low, ..Timing::DEFAULT });
+    let mut timing = Timing::DEFAULT;
+    timing.stall_select = SelectDuringStall::Low;
+    let mut imu = Adis16405::new(Device(bus.clone(), &delay), &delay, Config::default()).with_timing(timing);
     imu.start_up().unwrap();
     let frames = bus.transactions() as u64;
     // 290 ms of start-up; the stall of low-power mode after the first four frames, that of normal mode after the others, and

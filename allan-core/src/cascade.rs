@@ -1,10 +1,5 @@
 //! The streaming estimator: integer samples in, exact sums of squared second differences out.
 
-mod block;
-pub(crate) mod checkpoint;
-mod gap;
-pub(crate) mod snapshot;
-
 use crate::interpolation::Interpolation;
 use crate::moments::{Moments, ROUNDED};
 use core::mem::replace;
@@ -12,6 +7,18 @@ use core::num::Wrapping;
 use core::ops::Sub;
 
 /// Streaming Allan variance at the averaging factors `n = 1, 2, 4 … 2^(OCTAVES−1)` samples.
+///
+/// ```
+/// let mut estimator = allan_core::Cascade::<20, 8>::new();
+/// estimator.push(-12); // a sample, in counts
+/// estimator.gap(3); // three samples are missing
+/// estimator.push(-11);
+/// # (0..100).for_each(|k| estimator.push(k * k % 7));
+/// let curve = estimator.curve(1.0 / 204.8).scaled(0.05); // sample period in s, deg/s per count
+/// for point in curve.points() {
+///     println!("{} s: {} deg/s", point.tau, point.avar.sqrt());
+/// }
+/// ```
 ///
 /// The running sum of the samples passes through a chain of delay lines. Level `j` receives every second value that
 /// leaves the level above it and delays it by `OVERLAP` strides of `2^j` samples. The sums of now, `n` samples ago and
@@ -144,12 +151,6 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
     }
 
-    /// Size of an estimator in bytes.
-    #[must_use]
-    pub const fn memory() -> usize {
-        size_of::<Self>()
-    }
-
     /// Adds the next sample, in counts.
     ///
     /// The first 2048 samples, and those after a gap until the shortest octaves have left it behind, take more time.
@@ -229,6 +230,22 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
             }
             (step, reach, middle) = (step >> 1, reach << 1, oldest);
         }
+    }
+}
+
+// The page of the documentation has the methods in this order: `new`, `push`, `gap`, `curve`, `snapshot`, the others.
+mod gap;
+
+pub(crate) mod checkpoint;
+pub(crate) mod snapshot;
+
+mod block;
+
+impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
+    /// Size of an estimator in bytes.
+    #[must_use]
+    pub const fn memory() -> usize {
+        size_of::<Self>()
     }
 
     /// Adds the sums of another estimator, which has seen a later stretch of the same channel; further samples continue

@@ -8,6 +8,7 @@ use crate::serialized::{StateWords, serde_by_words, visit_wide};
 /// Allan covariance of two channels at one averaging factor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct Covariance {
     /// Averaging factor, samples.
     pub n: u64,

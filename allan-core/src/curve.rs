@@ -12,6 +12,7 @@ use heapless::Vec;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct AllanPoint {
     /// Averaging factor, samples.
     pub n: u64,

@@ -160,6 +160,7 @@ pub(crate) fn estimate<T: TermSet>(
 /// How well a model describes the curve that it was fitted to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct Goodness {
     /// `Σ edf·(v/m − 1 − ln(v/m))` over all points.
     pub deviance: f64,

@@ -12,6 +12,7 @@ use heapless::Vec;
 /// One averaging factor of a Hadamard curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct HadamardPoint {
     /// Averaging factor, samples.
     pub n: u64,

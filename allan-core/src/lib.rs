@@ -1,5 +1,6 @@
-//! Streaming Allan variance of integer samples, its confidence, and a noise model fitted to it, in memory that is fixed
-//! at compile time.
+#![doc = include_str!("../README.md")]
+//!
+//! # Modules
 //!
 //! | step | module | items |
 //! |---|---|---|
@@ -11,21 +12,6 @@
 //! | several channels | `coupling`, [`regression`] | [`Coupling`], [`regression::CovariateRegression`] |
 //! | other statistics | `hadamard`, `fractional_octaves`, [`slope_method`], [`telegraph`] | [`Hadamard`], [`FractionalOctaves`] |
 //!
-//! ```
-//! use allan_core::{Cascade, NoiseTerm, fit::fit};
-//!
-//! let mut cascade = Cascade::<16, 8>::new(); // 16 octaves, 8-fold overlap
-//! let mut state = 1_u64;
-//! for _ in 0..100_000 {
-//!     state = state * 16_807 % 2_147_483_647;
-//!     cascade.push((state % 100) as i32); // white noise with a standard deviation of 100/√12 counts
-//! }
-//! let curve = cascade.curve(0.01); // sample period in s
-//! let model = fit(&curve, &[NoiseTerm::AngleRandomWalk]);
-//! let n = model.get(NoiseTerm::AngleRandomWalk).unwrap().value; // counts·√s
-//! assert!((n / (100.0 / 12.0_f64.sqrt() * 0.1) - 1.0).abs() < 0.02);
-//! ```
-//!
 //! Everything up to the sums is integer arithmetic without rounding. From the curve on it is floating point, computed by
 //! the same code on every platform. A microcontroller and a server therefore agree to the bit.
 //!
@@ -33,6 +19,7 @@
 //!
 //! With the feature `serde`, [`Cascade`], [`Coupling`], [`Hadamard`] and [`FractionalOctaves`] can be serialised; a
 //! deserialised estimator continues to the bit.
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
@@ -41,10 +28,6 @@
 extern crate self as allan_core;
 #[cfg(test)]
 extern crate std; // for the simulation that unit tests share with the integration tests
-
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct ReadmeExamples;
 
 mod cascade;
 pub mod confidence;

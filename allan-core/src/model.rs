@@ -16,6 +16,7 @@ pub const MAX_TERMS: usize = 8;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct FittedTerm {
     /// The term, with the estimates of its shape parameters.
     pub kind: NoiseTerm,
@@ -35,6 +36,12 @@ impl FittedTerm {
     pub fn exact(kind: NoiseTerm, value: f64) -> Self {
         let shape = kind.shape().map(|value| (value, value));
         Self { kind, value, low: value, high: value, shape }
+    }
+
+    /// The same term with other 95 % bounds of its coefficient.
+    #[must_use]
+    pub const fn with_bounds(self, low: f64, high: f64) -> Self {
+        Self { low, high, ..self }
     }
 
     /// Name, value and 95 % bounds of each shape parameter.
@@ -209,6 +216,7 @@ pub(crate) fn variance_fractions<T: TermSet>(
 /// measured and `m` the modelled Allan variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct Discrepancy {
     /// `mean edf·(ln(m/v) + v/m − 1)`: about 1 for a correct model on the data to which it was fitted.
     pub deviance_per_point: f64,

@@ -19,6 +19,7 @@ pub const WORST_ACCURACY: f64 = 25.0;
 /// A coefficient and the interval of averaging times, in s, on which its slope was found.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct SlopeEstimate {
     /// Value, in the unit of [`NoiseTerm::unit`](crate::term::NoiseTerm::unit).
     pub value: f64,

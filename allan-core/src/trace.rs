@@ -33,6 +33,7 @@ const PROMISING: f32 = 0.4;
 /// A term that was missing in the baseline model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct AddedTerm {
     /// Index of the term in the final model.
     pub term: usize,
@@ -58,6 +59,7 @@ pub struct Residual {
 /// The result of a [`trace`].
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct Trace {
     /// The fitted baseline model.
     pub before: Model,

@@ -258,10 +258,11 @@ fn degrades(
     };
     let share = CovariateRegression { covariance: &of_covariates, ..*regression };
     let worse = |(raw, added): (&AllanPoint, f64)| {
-        let (Some(subtracted), Some(share)) = (
-            regression.subtracted_at(raw, sensitivities),
-            share.subtracted_at(&AllanPoint { avar: 0.0, ..*raw }, sensitivities),
-        ) else {
+        let mut without = *raw;
+        without.avar = 0.0;
+        let (Some(subtracted), Some(share)) =
+            (regression.subtracted_at(raw, sensitivities), share.subtracted_at(&without, sensitivities))
+        else {
             return added > raw.avar * 2.0 * libm::sqrt(2.0 / raw.edf);
         };
         let halfway = ((raw.avar + subtracted) / 2.0 - share / 4.0).max(0.0);

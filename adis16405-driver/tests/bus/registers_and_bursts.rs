@@ -12,6 +12,13 @@ fn config(range: GyroRange, taps: u8, smpl_prd: u8) -> Config {
     Config::new(range, taps, SamplePeriod::from_register(smpl_prd).unwrap()).unwrap()
 }
 
+/// Other times than the default ones.
+fn timing(change: impl FnOnce(&mut Timing)) -> Timing {
+    let mut timing = Timing::DEFAULT;
+    change(&mut timing);
+    timing
+}
+
 #[test]
 fn new_sends_nothing() {
     // An empty bench refuses every step.
@@ -46,7 +53,7 @@ fn the_stall_is_that_of_low_power_mode_above_0x08() {
 /// Linux has the limit of normal mode one higher than the data sheet.
 #[test]
 fn the_limit_of_normal_mode_can_be_set() {
-    let timing = Timing { normal_mode_max_smpl_prd: 0x09, ..Timing::DEFAULT };
+    let timing = timing(|timing| timing.normal_mode_max_smpl_prd = 0x09);
     let config = config(GyroRange::Dps300, 2, 0x09);
     let value = both!(config, with [.with_timing(timing)]; [read(0x00, 7)]; NONE; |imu| imu.flash_writes());
     assert_eq!(value, Ok(7));
@@ -89,12 +96,14 @@ fn chip_select_is_high_during_the_stall_unless_it_is_set_to_be_low() {
     };
     let default = Timing::DEFAULT;
     assert_eq!((default.stall_select, default.select_high_ns), (SelectDuringStall::High, 1_000));
-    let held_low = Timing { stall_select: SelectDuringStall::Low, ..default };
+    let held_low = timing(|timing| timing.stall_select = SelectDuringStall::Low);
+    let mut pulsed = held_low;
+    pulsed.select_high_ns = 0;
     for (timing, bus) in [
         (default, high(STALL_NS)),
-        (Timing { select_high_ns: 50_000, ..default }, high(50_000)),
+        (timing(|timing| timing.select_high_ns = 50_000), high(50_000)),
         (held_low, low(STALL_NS, Some(1_000))),
-        (Timing { select_high_ns: 0, ..held_low }, low(STALL_NS, None)),
+        (pulsed, low(STALL_NS, None)),
     ] {
         let written = both!(Config::default(), with [.with_timing(timing)]; [bus.clone()]; NONE;
             |imu| imu.write_register(Register::GlobCmd, 0x80));
@@ -197,9 +206,10 @@ fn a_word_gap_splits_a_burst_into_13_transfers() {
         Step::Deselect,
         Step::Delay(1_000),
     ]);
-    let timing = Timing { word_gap_ns: 1_000, ..Timing::DEFAULT };
-    let held_low = Timing { stall_select: SelectDuringStall::Low, ..timing };
-    for (timing, bus) in [(timing, high.collect::<Frames>()), (held_low, low.collect())] {
+    let gaps = timing(|timing| timing.word_gap_ns = 1_000);
+    let mut held_low = gaps;
+    held_low.stall_select = SelectDuringStall::Low;
+    for (timing, bus) in [(gaps, high.collect::<Frames>()), (held_low, low.collect())] {
         let burst = both!(Config::default(), with [.with_timing(timing)]; [bus.clone()]; NONE; |imu| imu.burst());
         assert_eq!(burst.unwrap().words.map(|word| word.0)[..2], [0x8081, 0x8283]);
         assert_eq!(burst.unwrap().words[11].0, 0x9697);

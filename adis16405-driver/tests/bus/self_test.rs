@@ -1,7 +1,7 @@
 //! Internal self-test, flash test, manual self-test. MSC_CTRL 0x34: bit 11 flash test, 10 internal self-test, 9 and 8
 //! manual self-test, negative and positive.
 
-use adis16405_driver::{Config, Diagnosis, Error, FlashTest, Register, SelfTest, Stimulus};
+use adis16405_driver::{Config, Diagnosis, Error, Register, Stimulus};
 
 use super::harness::{Frames, NONE, read, read_all, write};
 
@@ -20,7 +20,7 @@ fn a_self_test_is_polled_until_its_bit_clears() {
     ];
     let outcome = both!(Config::default(); bus; [1_000, 1_000]; |imu| imu.self_test()).unwrap();
     let diagnosis = Diagnosis::GYRO_Z | Diagnosis::SELF_TEST;
-    assert_eq!(outcome, SelfTest { before: Diagnosis::SUPPLY_LOW, ran: true, diagnosis });
+    assert_eq!((outcome.before, outcome.ran, outcome.diagnosis), (Diagnosis::SUPPLY_LOW, true, diagnosis));
     assert!(!outcome.passed());
 }
 
@@ -83,8 +83,8 @@ fn a_flash_test_reports_a_wrong_checksum() {
         read(0x34, 6),
     ];
     let outcome = both!(Config::default(); bus; [1_000]; |imu| imu.flash_test()).unwrap();
-    let expected = FlashTest { before: Diagnosis::empty(), ran: true, diagnosis: Diagnosis::FLASH_CHECKSUM };
-    assert_eq!(outcome, expected);
+    let flash_checksum = Diagnosis::FLASH_CHECKSUM;
+    assert_eq!((outcome.before, outcome.ran, outcome.diagnosis), (Diagnosis::empty(), true, flash_checksum));
     assert!(!outcome.passed());
 }
 

@@ -30,6 +30,28 @@ impl OctaveSums {
 }
 
 impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
+    /// The Allan variance, in counts², of every octave that has at least one difference.
+    ///
+    /// `sample_period` in seconds. The confidence is that of the power law that the local slope suggests; a
+    /// [`fit`](crate::fit::fit) gives the confidence of the fitted mixture of noises.
+    ///
+    /// # Cost
+    /// | `Cascade::curve` | Cortex-M4F | Cortex-M0+ |
+    /// |---|---|---|
+    /// | instructions | 6.7 million | 20.4 million |
+    /// | stack, bytes | 1,896 | 2,100 |
+    /// | flash, bytes | 19,700 | — |
+    ///
+    /// See [`guide::costs`](crate::guide::costs) for how they are counted.
+    #[must_use]
+    pub fn curve(&self, sample_period: f64) -> Curve<OCTAVES> {
+        let mut curve = Curve::empty();
+        Self::rebuild_curve(&mut curve, sample_period, self.len(), |octave| {
+            self.octave_sums(octave).unwrap_or_default()
+        });
+        curve
+    }
+
     /// The sums of an octave; `None` beyond the last.
     #[must_use]
     pub fn octave_sums(&self, octave: usize) -> Option<OctaveSums> {
@@ -59,28 +81,6 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
             octave.moments = Moments { squares: squares.into(), fourths: fourths.into() };
             (octave.differences, octave.interpolation) = (count, interpolation);
         }
-    }
-
-    /// The Allan variance, in counts², of every octave that has at least one difference.
-    ///
-    /// `sample_period` in seconds. The confidence is that of the power law that the local slope suggests; a
-    /// [`fit`](crate::fit::fit) gives the confidence of the fitted mixture of noises.
-    ///
-    /// # Cost
-    /// | `Cascade::curve` | Cortex-M4F | Cortex-M0+ |
-    /// |---|---|---|
-    /// | instructions | 6.7 million | 20.4 million |
-    /// | stack, bytes | 1,896 | 2,100 |
-    /// | flash, bytes | 19,700 | — |
-    ///
-    /// See [`guide::costs`](crate::guide::costs) for how they are counted.
-    #[must_use]
-    pub fn curve(&self, sample_period: f64) -> Curve<OCTAVES> {
-        let mut curve = Curve::empty();
-        Self::rebuild_curve(&mut curve, sample_period, self.len(), |octave| {
-            self.octave_sums(octave).unwrap_or_default()
-        });
-        curve
     }
 
     /// The Allan variance of one octave, in counts², without what replacing missing samples has added; `None` beyond the last

@@ -76,7 +76,7 @@ const BUGS: [Bug; 35] = [
         "high_ns: stall_ns.max(least_high_ns)", "high_ns: least_high_ns",
         "the_default_keeps_chip_select_high_for_the_whole_stall"),
     bug("a stall that a dropped future cut short is forgotten", "asynch.rs",
-        "    pause(bus).await;\n    bus.owed_ns = pauses.high_ns;", "    bus.owed_ns = pauses.high_ns;",
+        "    pause(bus).await;\n    bus.pending_pause_ns = pauses.high_ns;", "    bus.pending_pause_ns = pauses.high_ns;",
         "a_stall_that_a_dropped_future_cut_short_is_kept_before_the_next_frame"),
     bug("low-power mode begins above SMPL_PRD = 0x0F", "clock.rs",
         "normal_mode_max_smpl_prd: 0x08,", "normal_mode_max_smpl_prd: 0x0F,",

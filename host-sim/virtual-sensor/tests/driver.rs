@@ -61,9 +61,9 @@ fn the_driver_keeps_the_read_rate_at_every_clock() {
                 if known {
                     imu = imu.with_sck_hz(sck_hz);
                 }
-                let stall_ns = PerClockMode { normal: 9_000, low_power: 75_000 };
-                let timing = imu.timing();
-                let mut imu = imu.with_timing(Timing { stall_ns, ..timing });
+                let mut timing = imu.timing();
+                timing.stall_ns = PerClockMode { normal: 9_000, low_power: 75_000 };
+                let mut imu = imu.with_timing(timing);
                 imu.init().unwrap();
                 let registers = [Register::ProdId, Register::SmplPrd, Register::SensAvg];
                 assert_eq!(imu.read_registers(registers), Ok([16405, u16::from(smpl_prd), 0x0402]), "{sck_hz} Hz");
@@ -271,9 +271,9 @@ fn a_supply_alarm_sets_diag_stat_which_clears_on_read() {
 #[test]
 fn violations_of_the_bus_timing_are_recorded() {
     let bus = EmulatedBus::new(VirtualAdis16405::new(NoiseModel::noiseless(), 1));
-    let read_rate_ns = PerClockMode { normal: 0, low_power: 0 };
-    let stall_ns = PerClockMode { normal: 8_999, low_power: 8_999 };
-    let timing = Timing { stall_ns, read_rate_ns, ..Timing::DEFAULT };
+    let mut timing = Timing::DEFAULT;
+    timing.read_rate_ns = PerClockMode { normal: 0, low_power: 0 };
+    timing.stall_ns = PerClockMode { normal: 8_999, low_power: 8_999 };
     let mut too_fast = Adis16405::new(bus.clone(), bus.delay(), Config::default()).with_timing(timing);
     assert_ne!(too_fast.read_register(Register::ProdId), Ok(0x4015), "garbled");
     let kind = ViolationKind::Stall { stall_ns: 8_999, least_ns: 9_000 };

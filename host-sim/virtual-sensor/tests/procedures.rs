@@ -7,8 +7,8 @@ use std::task::{Context, Poll, Waker};
 
 use adis16405_driver::{
     Adis16405, Alarm, AlarmNumber, AlarmThreshold, AlarmWatch, BurstValidator, Channel, Config, DacLevel, Diagnosis,
-    Dio, DioLine, DioSignal, Error, FactoryRestore, Faults, FlashUpdate, Gpio, GyroBias, OnChipCompensation, Polarity,
-    Product, Register, Sleep, Stimulus,
+    Dio, DioLine, DioSignal, Error, Faults, Gpio, GyroBias, OnChipCompensation, Polarity, Product, Register, Sleep,
+    Stimulus,
 };
 
 use virtual_sensor::{BusyAnswers, EmulatedBus, NoiseModel, OutputRegister, Strictness, VirtualAdis16405};
@@ -33,7 +33,7 @@ fn demanding_part(model: NoiseModel) -> VirtualAdis16405 {
 
 /// Runs a script through both shells. `$imu` has started up on the part behind `$bus`. Lines are
 /// `expect call => value;` or `take name = call;`, where the call is awaited in the asynchronous run, `given
-/// name = value;` or `then action;`.
+/// name = value;`, `then action;`, or `fails call => error => check;`.
 macro_rules! both_shells {
     ($model:expr, |$bus:ident, $imu:ident| $($script:tt)*) => {{
         {
@@ -60,6 +60,13 @@ macro_rules! both_shells {
     };
     (@run [$($wait:tt)*] given $name:ident = $value:expr; $($rest:tt)*) => {
         let $name = $value;
+        both_shells!(@run [$($wait)*] $($rest)*);
+    };
+    (@run [$($wait:tt)*] fails $call:expr => $error:pat => $check:expr; $($rest:tt)*) => {
+        match $call $($wait)* {
+            Err($error) => $check,
+            other => panic!("{other:?}"),
+        }
         both_shells!(@run [$($wait)*] $($rest)*);
     };
     (@run [$($wait:tt)*] then $action:expr; $($rest:tt)*) => {
@@ -174,17 +181,17 @@ fn the_precision_auto_null_averages_for_thirty_silent_seconds() {
 
 #[test]
 fn a_factory_restore_returns_the_calibration_it_erased() {
-    let lost =
-        FactoryRestore { gyro: GyroBias { part: [0, 1, -2], host_x: -3 }, accl: [4, -5, 6], hard_iron: [-7, 8, -9] };
-    let restored = FactoryRestore { gyro: GyroBias::default(), accl: [0; 3], hard_iron: [0; 3] };
+    let (gyro, accl, hard_iron) = (GyroBias { part: [0, 1, -2], host_x: -3 }, [4, -5, 6], [-7, 8, -9]);
     let soft_iron = [0x0801, 0x0000, 0x0FFF];
     both_shells!(NoiseModel::noiseless(), |bus, imu|
-        expect imu.set_gyro_offsets([-3, 1, -2]) => Ok(lost.gyro);
-        expect imu.set_accl_offsets(lost.accl) => Ok(());
-        expect imu.set_hard_iron(lost.hard_iron) => Ok(());
+        expect imu.set_gyro_offsets([-3, 1, -2]) => Ok(gyro);
+        expect imu.set_accl_offsets(accl) => Ok(());
+        expect imu.set_hard_iron(hard_iron) => Ok(());
         expect imu.set_soft_iron(soft_iron) => Ok(());
-        expect imu.factory_restore() => Ok(lost);
-        expect imu.factory_restore() => Ok(restored);
+        take lost = imu.factory_restore();
+        then assert_eq!((lost.gyro, lost.accl, lost.hard_iron), (gyro, accl, hard_iron));
+        take lost = imu.factory_restore();
+        then assert_eq!((lost.gyro, lost.accl, lost.hard_iron), (GyroBias::default(), [0; 3], [0; 3]));
         expect imu.soft_iron() => Ok(soft_iron);
         expect imu.flash_writes() => Ok(2);
     );
@@ -200,10 +207,10 @@ fn a_flash_update_outlives_a_reset() {
         expect imu.write_register(Register::GlobCmd, 1 << 3) => Ok(());
         then { let now = bus.part().now(); bus.advance_to(now + 100_000_000) };
         then bus.part_mut().repair_flash();
-        given none = Diagnosis::empty();
         given failed = Diagnosis::FLASH_UPDATE;
-        expect imu.flash_update()
-            => Ok(FlashUpdate { before: failed, writes_before: 0, writes: 1, diagnosis: none });
+        take update = imu.flash_update();
+        then assert_eq!((update.before, update.writes_before), (failed, 0));
+        then assert_eq!((update.writes, update.diagnosis), (1, Diagnosis::empty()));
         expect imu.set_accl_offsets([0, 0, 0]) => Ok(());
         expect imu.set_filter_taps_log2(5) => Ok(());
         expect imu.set_sample_rate(200.0) => Ok(204.8);
@@ -212,8 +219,10 @@ fn a_flash_update_outlives_a_reset() {
         expect imu.read_registers([Register::SmplPrd, Register::SensAvg]) => Ok([0x0007, 0x0405]);
 
         then bus.part_mut().damage_flash();
-        expect imu.flash_update()
-            => Err(Error::FlashUpdate(FlashUpdate { before: none, writes_before: 1, writes: 1, diagnosis: failed }));
+        fails imu.flash_update() => Error::FlashUpdate(update) => assert_eq!(
+            (update.before, update.writes_before, update.writes, update.diagnosis),
+            (Diagnosis::empty(), 1, 1, failed)
+        );
     );
 }
 

@@ -1,5 +1,6 @@
 //! Every test of this crate in one program, so that what it links is compiled and linked once.
 
+mod data_ready;
 mod deliberate_bugs;
 mod driver;
 mod faults;

@@ -5,9 +5,12 @@
 //! |---|---|---|
 //! | PA4 | CS | |
 //! | PA5, PA6, PA7 | SCLK, DOUT, DIN | SPI1, mode 3, by DMA2 streams 3 and 2 |
-//! | PB0 | DIO1, data ready | floating: the sensor may drive 5 V |
+//! | PB0 | DIO1, data ready | with a pull-down: an unplugged sensor gives no pulse |
 //! | PB1, open drain | RST | |
 //! | PB2 | | chip select of another device on the bus |
+//!
+//! The sensor runs from 5 V and drives its outputs from an internal 3.3 V: connect every signal directly, without a divider
+//! or a level shifter (data sheet Rev. B, page 5).
 #![no_std]
 #![no_main]
 
@@ -58,7 +61,7 @@ async fn main(_spawner: Spawner) {
     let bus = BUS.init(Mutex::new(spi));
 
     let imu = SpiDevice::new(bus, Output::new(p.PA4, Level::High, Speed::Medium));
-    let data_ready = ExtiInput::new(p.PB0, p.EXTI0, Pull::None, Irqs);
+    let data_ready = ExtiInput::new(p.PB0, p.EXTI0, Pull::Down, Irqs);
     let reset = OutputOpenDrain::new(p.PB1, Level::High, Speed::Low);
     interrupt::CAN1_TX.set_priority(Priority::P6);
     // A `SendSpawner`: the future of the task must be `Send`.
@@ -83,13 +86,8 @@ async fn sample(spi: Device, mut data_ready: ExtiInput<'static, ByDma>, mut rese
             defmt::error!("{}", defmt::Debug2Format(&error));
             started = imu.hardware_reset(&mut reset).await;
         }
-        // At 819.2 samples per second an edge comes every 1.2 ms, and a burst takes 0.2 ms.
-        match with_timeout(Duration::from_millis(50), async {
-            data_ready.wait_for_rising_edge().await;
-            imu.read().await
-        })
-        .await
-        {
+        // At 819.2 samples per second a pulse comes every 1.2 ms, and a burst takes 0.2 ms.
+        match with_timeout(Duration::from_millis(50), imu.read_on(&mut data_ready)).await {
             Ok(Ok(sample)) => {
                 defmt::trace!("{} °/s", sample.gyro_dps());
                 if sample.warnings().contains(Faults::ERROR_ALARM) {
@@ -98,7 +96,7 @@ async fn sample(spi: Device, mut data_ready: ExtiInput<'static, ByDma>, mut rese
             }
             Ok(Err(error)) => defmt::warn!("{}", defmt::Debug2Format(&error)),
             Err(_) => {
-                defmt::warn!("no data-ready edge for 50 ms: reset");
+                defmt::warn!("no data-ready pulse for 50 ms: reset");
                 started = imu.hardware_reset(&mut reset).await;
             }
         }

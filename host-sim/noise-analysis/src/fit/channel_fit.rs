@@ -336,11 +336,10 @@ impl ChannelFit {
         let added = self.traced.next_addition(score, residual(self.after(), octave));
         let markov = NoiseTerm::Markov(Markov { time_constant: time_constant.value });
         // The curve leaves the bounds of its deviation open; those that are known otherwise hold.
-        let as_found = |term: &FittedTerm| FittedTerm {
-            low: deviation.low.min(term.value),
-            high: deviation.high.max(term.value),
-            shape: Shape::Markov { time_constant: (time_constant.low, time_constant.high) },
-            ..*term
+        let as_found = |term: &FittedTerm| {
+            let mut term = term.with_bounds(deviation.low.min(term.value), deviation.high.max(term.value));
+            term.shape = Shape::Markov { time_constant: (time_constant.low, time_constant.high) };
+            term
         };
         let Some(with) = self.traced.added_to(curve, (markov, Some(added)), as_found) else { return false };
         self.traced = with;

@@ -108,7 +108,7 @@ pub(crate) fn with_bounds_behind_a_filter(
         // Of the squared coefficient, whose relative error is twice that of the coefficient.
         let half_width = NORMAL_975 * covariance[(position, position)].sqrt() / 2.0;
         let low = term.value * (1.0 - half_width).max(0.0);
-        FittedTerm { low: term.low.min(low), high: term.high.max(term.value * (1.0 + half_width)), ..*term }
+        term.with_bounds(term.low.min(low), term.high.max(term.value * (1.0 + half_width)))
     };
     Model::new(model.sample_period(), model.terms().iter().map(widened))
 }

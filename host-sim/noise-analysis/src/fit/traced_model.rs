@@ -192,7 +192,9 @@ impl TracedModel {
         // The spectrum knows the lines much better than the curve knows the others: their relative errors stay.
         let kept = |(new, old): (&FittedTerm, &FittedTerm)| {
             let scaled = |bound: f64, limit: f64| if old.value > 0.0 { bound * new.value / old.value } else { limit };
-            FittedTerm { low: scaled(old.low, 0.0), high: scaled(old.high, new.high), shape: old.shape, ..*new }
+            let mut term = new.with_bounds(scaled(old.low, 0.0), scaled(old.high, new.high));
+            term.shape = old.shape;
+            term
         };
         let kept = fitted.terms().iter().zip(model.terms()).map(kept);
         let model = within_measured(&Model::new(period_s, kept.chain(lines.iter().copied())), curve);
@@ -292,7 +294,7 @@ pub(crate) fn within_measured(model: &Model, curve: &Curve<OCTAVES>) -> Model {
             return *term;
         }
         let limit = if term.low > 0.0 { limit(&term.kind, &of_all) } else { least };
-        FittedTerm { high: term.high.min(limit.max(term.value)), ..*term }
+        term.with_bounds(term.low, term.high.min(limit.max(term.value)))
     };
     Model::new(model.sample_period(), model.terms().iter().map(bounded))
 }
@@ -334,8 +336,8 @@ mod tests {
             let mut cascade = Cascade::<{ crate::OCTAVES }, OVERLAP>::new();
             (0..1 << 16).for_each(|_| cascade.push((100.0 * random.sample::<f64, _>(StandardNormal)).round() as i32));
             let curve = cascade.curve(0.01);
-            let nothing = |kind| FittedTerm { low: 0.0, high: 7400.0, ..FittedTerm::exact(kind, 0.0) };
-            let known = FittedTerm { low: 9.95, high: 10.05, ..FittedTerm::exact(NoiseTerm::AngleRandomWalk, 10.0) };
+            let nothing = |kind| FittedTerm::exact(kind, 0.0).with_bounds(0.0, 7400.0);
+            let known = FittedTerm::exact(NoiseTerm::AngleRandomWalk, 10.0).with_bounds(9.95, 10.05);
             let bounded = within_measured(&Model::new(0.01, NoiseTerm::BASELINE.map(nothing)), &curve);
             let [n, b, k] = bounded.terms() else { panic!("three terms") };
             for point in curve.points().iter().filter(|point| point.tau >= 0.08) {

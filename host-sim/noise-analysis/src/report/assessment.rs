@@ -17,7 +17,7 @@ use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::{Welch, correlation_time};
 use crate::units::{Conversion, GRAVITY, conversions};
 use allan_core::model::FittedTerm;
-use allan_core::term::{MovingAverageFilter, Resonance, Shape, Sinusoid};
+use allan_core::term::{MovingAverageFilter, Resonance, Sinusoid};
 use allan_core::{Model, NoiseTerm};
 use innovations::filter_innovations;
 use navigation::{CALIBRATION_S, IntegratedError, integrated_errors};
@@ -202,13 +202,9 @@ fn sampled_every(model: &Model, period: f64) -> Model {
             kind => (kind, 1.0),
         };
         // Of a line at a multiple of the rate of the means nothing is left.
-        (gain > LEAST_GAIN).then_some(FittedTerm {
-            kind,
-            value: gain * term.value,
-            low: gain * term.low,
-            high: gain * term.high,
-            ..*term
-        })
+        let mut term = term.with_bounds(gain * term.low, gain * term.high);
+        (term.kind, term.value) = (kind, gain * term.value);
+        (gain > LEAST_GAIN).then_some(term)
     };
     Model::new(period, model.terms().iter().filter_map(term))
 }
@@ -227,7 +223,7 @@ fn terms_with_one_white_noise(model: &Model, resolution: f64) -> Vec<FittedTerm>
     let of_processes = others.iter().filter_map(|term| white_noise_of_process(model, term, resolution));
     let parts: Vec<BoundedEstimate> = of_white.chain(of_processes).collect();
     let BoundedEstimate { value, low, high } = sum_of_white_noise(&parts);
-    let one = FittedTerm { kind: NoiseTerm::AngleRandomWalk, value, low, high, shape: Shape::PowerLaw };
+    let one = FittedTerm::exact(NoiseTerm::AngleRandomWalk, value).with_bounds(low, high);
     (!parts.is_empty()).then_some(one).into_iter().chain(others).collect()
 }
 

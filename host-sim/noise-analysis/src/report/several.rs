@@ -371,24 +371,15 @@ fn f_quantile(z: f64, above: f64, below: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::{bartlett, f_quantile, upper_tail};
-    use allan_core::{AllanPoint, PowerLaw};
+    use allan_core::{AllanPoint, Cascade};
     use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
     fn point(avar: f64, edf: f64) -> AllanPoint {
-        AllanPoint {
-            n: 1,
-            tau: 1.0,
-            avar,
-            interpolation: 0.0,
-            replaced: 0.0,
-            count: 1,
-            overlap: 1,
-            edf,
-            low: 0.0,
-            high: 0.0,
-            kurtosis: None,
-            power_law: PowerLaw::White,
-        }
+        let mut cascade = Cascade::<1, 1>::new();
+        (0..3).for_each(|sample| cascade.push(sample));
+        let mut point = cascade.curve(1.0).points()[0];
+        (point.avar, point.edf) = (avar, edf);
+        point
     }
 
     #[test]

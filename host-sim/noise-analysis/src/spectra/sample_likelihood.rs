@@ -74,9 +74,11 @@ impl SampleSpectrum {
             (value, (value - (value - low).hypot(down)).max(0.0), value + (high - value).hypot(up))
         });
         let terms = model.terms().iter().map(|term| {
-            let is_kept = is_sinusoid(&term.kind);
-            let (value, low, high) = if is_kept { (term.value, term.low, term.high) } else { fitted.next()? };
-            Some(FittedTerm { value, low, high, ..*term })
+            let mut term = *term;
+            if !is_sinusoid(&term.kind) {
+                (term.value, term.low, term.high) = fitted.next()?;
+            }
+            Some(term)
         });
         Some(Model::new(model.sample_period(), terms.collect::<Option<Vec<FittedTerm>>>()?))
     }

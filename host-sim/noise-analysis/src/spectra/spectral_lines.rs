@@ -276,7 +276,9 @@ impl MergedLine {
             NoiseTerm::Resonance(_) => Shape::Resonance { frequency, bandwidth: bounds(self.width) },
             _ => Shape::Sinusoid { frequency },
         };
-        FittedTerm { low: scale * low, high: scale * high, shape, ..FittedTerm::exact(kind, value) }
+        let mut term = FittedTerm::exact(kind, value).with_bounds(scale * low, scale * high);
+        term.shape = shape;
+        term
     }
 
     /// The model's term for the line: a sinusoid, or a resonance if it is wider than the record resolves.

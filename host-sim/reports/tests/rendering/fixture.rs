@@ -188,7 +188,7 @@ fn rate_unit(unit: &str, per: &str) -> String {
 }
 
 pub(crate) fn term(kind: NoiseTerm, value: f64, unit: &str) -> TermReport {
-    TermReport::new(&FittedTerm { low: value * 0.94, high: value * 1.07, ..FittedTerm::exact(kind, value) }, unit)
+    TermReport::new(&FittedTerm::exact(kind, value).with_bounds(value * 0.94, value * 1.07), unit)
 }
 
 /// The point of one octave: about `1.5·N/n` degrees of freedom, and a bounded wobble inside the interval.

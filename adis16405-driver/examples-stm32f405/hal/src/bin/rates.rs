@@ -1,4 +1,6 @@
-//! Prints the angular rates once a second. PA4 CS, PA5 SCLK, PA6 DOUT, PA7 DIN; the sensor's supply is 5 V.
+//! Prints the angular rates once a second. PA4 CS, PA5 SCLK, PA6 DOUT, PA7 DIN.
+//! The sensor runs from 5 V and drives its outputs from an internal 3.3 V: connect every signal directly, without a divider
+//! or a level shifter (data sheet Rev. B, page 5).
 #![no_std]
 #![no_main]
 

@@ -8,7 +8,8 @@
 //! | PB0 | DIO1, data ready |
 //! | PB1, open drain | RST |
 //!
-//! The sensor's supply is 5 V, and so may its outputs be: PA6 and PB0 are 5 V tolerant while they have no pull.
+//! The sensor runs from 5 V and drives its outputs from an internal 3.3 V: connect every signal directly, without a divider
+//! or a level shifter (data sheet Rev. B, page 5).
 #![no_std]
 #![no_main]
 

@@ -1,6 +1,8 @@
 //! RTIC 2: a hardware task reads the sensor at each data-ready edge, and a software task prints the mean rates.
 //!
-//! Wiring: PA4 CS, PA5 SCLK, PA6 DOUT, PA7 DIN, PB0 DIO1 (data ready). The sensor's supply is 5 V.
+//! Wiring: PA4 CS, PA5 SCLK, PA6 DOUT, PA7 DIN, PB0 DIO1 (data ready).
+//! The sensor runs from 5 V and drives its outputs from an internal 3.3 V: connect every signal directly, without a divider
+//! or a level shifter (data sheet Rev. B, page 5).
 #![no_std]
 #![no_main]
 
@@ -45,8 +47,8 @@ mod app {
         let product = imu.start_up().unwrap();
         defmt::info!("{}", product);
 
-        // Floating: the sensor may drive 5 V, which a pin with a pull does not tolerate.
-        let mut data_ready = gpiob.pb0.into_floating_input();
+        // With a pull, so that an unplugged sensor gives no edges.
+        let mut data_ready = gpiob.pb0.into_pull_down_input();
         data_ready.make_interrupt_source(&mut context.device.SYSCFG.constrain(&mut rcc));
         data_ready.trigger_on_edge(&mut context.device.EXTI, Edge::Rising);
         data_ready.enable_interrupt(&mut context.device.EXTI);

@@ -186,8 +186,11 @@ impl<'a> ChannelDeviance<'a> {
         let direction = DVector::from_iterator(
             points.len(),
             points.iter().map(|point| {
-                let [from, to] = [1.0 - DERIVATIVE_STEP, 1.0 + DERIVATIVE_STEP]
-                    .map(|factor| share(point, &FittedTerm { kind: shorter(factor), ..**filtered }));
+                let [from, to] = [1.0 - DERIVATIVE_STEP, 1.0 + DERIVATIVE_STEP].map(|factor| {
+                    let mut term = **filtered;
+                    term.kind = shorter(factor);
+                    share(point, &term)
+                });
                 (to - from) / (2.0 * DERIVATIVE_STEP)
             }),
         );

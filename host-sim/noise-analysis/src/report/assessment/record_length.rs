@@ -77,7 +77,7 @@ mod tests {
 
     fn model(n: f64, k: f64) -> Model {
         let terms = [FittedTerm::exact(NoiseTerm::AngleRandomWalk, n), FittedTerm::exact(NoiseTerm::RateRandomWalk, k)];
-        Model::new(0.01, terms.map(|term| FittedTerm { low: 0.9 * term.value, high: 1.1 * term.value, ..term }))
+        Model::new(0.01, terms.map(|term| term.with_bounds(0.9 * term.value, 1.1 * term.value)))
     }
 
     #[test]
@@ -95,11 +95,8 @@ mod tests {
     #[test]
     fn a_model_with_a_sinusoid_has_lengths_as_well() {
         let noise = model(2e-3, 3.464e-5);
-        let line = FittedTerm {
-            low: 0.7e-3,
-            high: 1.3e-3,
-            ..FittedTerm::exact(NoiseTerm::Sinusoid(Sinusoid { frequency: 20.0 }), 1e-3)
-        };
+        let sinusoid = NoiseTerm::Sinusoid(Sinusoid { frequency: 20.0 });
+        let line = FittedTerm::exact(sinusoid, 1e-3).with_bounds(0.7e-3, 1.3e-3);
         let with_line = Model::new(0.01, noise.terms().iter().copied().chain([line]));
         for term in 0..2 {
             assert_eq!(required_length(&with_line, term, 1e4), required_length(&noise, term, 1e4));
