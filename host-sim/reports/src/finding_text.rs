@@ -7,14 +7,14 @@ mod channel_names;
 mod examples;
 mod shown_effect;
 
-use crate::formatting::{capital, moment, words};
+use crate::formatting::{capital, moment};
 use crate::rounding::{plain, quantity, quantity_digits, signed, significant, span};
 use amounts::{Amounts, Label};
 pub use channel_names::channel_list;
 pub(crate) use channel_names::{ALL_CHANNELS, channel_name};
 use noise_analysis::bounds::{BoundedEstimate, Parameter};
 use noise_analysis::effects::{Effect, Observation, Unexplained, UnexplainedPlace};
-use noise_analysis::report::{ChannelReport, Finding, Report, Validation};
+use noise_analysis::report::{Finding, Report, Validation};
 pub use shown_effect::{ShownEffect, shown_effects};
 use std::f64::consts::SQRT_2;
 
