@@ -5,7 +5,7 @@ use adis16405_driver::{GyroRange, Register};
 use heapless::Vec;
 
 /// The lines that `?` prints, each in 80 columns.
-pub const HELP: [&str; 33] = [
+pub const HELP: [&str; 34] = [
     "at the press of a key:",
     "?          this list",
     "t          report as a table",
@@ -33,6 +33,7 @@ pub const HELP: [&str; 33] = [
     "dump       all registers of the sensor by name, in hexadecimal",
     "peek REG   read one: peek smpl_prd, or by its address peek 36",
     "poke R V   write one: poke smpl_prd 0007; check undoes it",
+    "compare R  read one 10,000 times, count the answers that differ",
     "measure    SCK, stall and read rate, period and width of data ready",
     "careful 1  longer times on the bus, if the sensor answers wrongly; careful 0",
     "help       this list",
@@ -86,6 +87,8 @@ pub enum DeviceCommand {
     ReadRegister(Register),
     /// Write a register of the sensor.
     WriteRegister(Register, u16),
+    /// Read a register of the sensor many times, and count the answers that differ.
+    CompareReads(Register),
     /// Print the times of the bus and of data ready.
     Measure,
     /// Run the self-test with its deflections.
@@ -217,11 +220,12 @@ fn whole_line(line: &[u8]) -> Option<DeviceCommand> {
     }
 }
 
-/// `peek REGISTER` or `poke REGISTER VALUE`.
+/// `peek REGISTER`, `compare REGISTER` or `poke REGISTER VALUE`.
 fn register_command<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<DeviceCommand> {
     let (verb, register) = (words.next()?, register(words.next()?)?);
     let command = match verb {
         "peek" => DeviceCommand::ReadRegister(register),
+        "compare" => DeviceCommand::CompareReads(register),
         "poke" => DeviceCommand::WriteRegister(register, hexadecimal(words.next()?)?),
         _ => return None,
     };
@@ -311,10 +315,11 @@ mod tests {
             ]
         );
         assert_eq!(
-            parse("peek smpl_prd\rpeek 36\rpoke sens_avg 0x0402\rpoke 3e 80 \r"),
+            parse("peek smpl_prd\rpeek 36\rcompare 56\rpoke sens_avg 0x0402\rpoke 3e 80 \r"),
             [
                 Ok(DeviceCommand::ReadRegister(Register::SmplPrd)),
                 Ok(DeviceCommand::ReadRegister(Register::SmplPrd)),
+                Ok(DeviceCommand::CompareReads(Register::ProdId)),
                 Ok(DeviceCommand::WriteRegister(Register::SensAvg, 0x0402)),
                 Ok(DeviceCommand::WriteRegister(Register::GlobCmd, 0x0080)),
             ]
