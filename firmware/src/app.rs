@@ -281,6 +281,10 @@ impl App {
                 let line = bench_console::read_register(register, &self.state, board);
                 self.print(board, format_args!("{line}"));
             }
+            Command::CompareReads(register) => {
+                let line = bench_console::compare_reads(register, &self.state, board);
+                self.print(board, format_args!("{line}"));
+            }
             Command::WriteRegister(register, value)
                 if bench_console::writes_flash(register, value) && !self.disarm(now_us) =>
             {

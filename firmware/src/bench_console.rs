@@ -6,7 +6,9 @@ use crate::board::{Board, FrameTimes};
 use crate::device::{DeviceState, clock_limit_hz};
 use crate::number_text::Decimal;
 use crate::sensor::{LOW_POWER_LIMIT_HZ, addressed};
-use adis16405_driver::{Access, BURST_BYTES, Config, Register, Stimulus};
+use adis16405_driver::{Access, Adis16405, BURST_BYTES, Config, Error, Register, Stimulus, Timing};
+use embedded_hal::delay::DelayNs;
+use embedded_hal::spi::SpiDevice;
 use link::{TextLine, text_line};
 
 /// The register with this name, or with this address in hexadecimal: `smpl_prd`, `36`, `0x36`.
@@ -30,20 +32,47 @@ enum Request {
     Read(Register),
     Write(Register, u16),
     Deflections(Stimulus),
+    /// Many reads of a register.
+    Compare(Register),
 }
 
-/// Asks the sensor while nothing is sampled, at the clock and with the stall that it takes in either power mode. The answer is the value
-/// of a register, or six deflections; the error is one to be printed.
+/// Reads of [`Request::Compare`], so many of them overlapping. They take 0.43 s in normal mode, 1.6 s in low-power mode.
+const COMPARED_READS: usize = 10_000;
+const OVERLAPPING_READS: usize = 16;
+
+/// The first value that a register answers, the number of others, and the bits in which they differ from it.
+fn compared<SPI: SpiDevice<u8>, D: DelayNs>(
+    register: Register,
+    sensor: &mut Adis16405<SPI, D>,
+) -> Result<[i16; 6], Error<SPI::Error>> {
+    let first = sensor.read_register(register)?;
+    let (mut others, mut bits) = (0, 0);
+    for _ in 0..COMPARED_READS / OVERLAPPING_READS {
+        for value in sensor.read_registers([register; OVERLAPPING_READS])? {
+            others += i16::from(value != first);
+            bits |= value ^ first;
+        }
+    }
+    Ok([first as i16, others, bits as i16, 0, 0, 0])
+}
+
+/// Asks the sensor while nothing is sampled, at the clock and with the stall that it takes in either power mode; many reads are as fast as
+/// its configuration allows. The answer is the value of a register, six deflections, or what [`compared`] says; the error is one to be printed.
 #[allow(clippy::result_large_err, reason = "the text of an error is made where its type is known, and printed")]
 fn ask(request: Request, state: &DeviceState, board: &mut impl Board) -> Result<[i16; 6], TextLine> {
     board.set_sampling(false);
-    let sck_hz = board.set_clock_limit(LOW_POWER_LIMIT_HZ);
+    let is_fast = matches!(request, Request::Compare(_));
+    let sck_hz = board.set_clock_limit(if is_fast { clock_limit_hz(state.config) } else { LOW_POWER_LIMIT_HZ });
     let answer = {
         let mut sensor = addressed(board.sensor_bus(), state.config, sck_hz);
         let answer = match request {
             Request::Read(register) => sensor.read_register(register).map(|value| [value as i16, 0, 0, 0, 0, 0]),
             Request::Write(register, value) => sensor.write_register(register, value).map(|()| [0; 6]),
             Request::Deflections(stimulus) => sensor.stimulus_response(stimulus),
+            Request::Compare(register) => {
+                sensor = sensor.with_timing(Timing::DEFAULT).with_sck_hz(sck_hz);
+                compared(register, &mut sensor)
+            }
         };
         answer.map_err(|error| text_line(format_args!("{error}")))
     };
@@ -75,6 +104,18 @@ pub(crate) fn read_register(register: Register, state: &DeviceState, board: &mut
         return text_line(format_args!("{} cannot be read", register.name()));
     }
     line(register, state, board)
+}
+
+/// Reads a register many times.
+pub(crate) fn compare_reads(register: Register, state: &DeviceState, board: &mut impl Board) -> TextLine {
+    let (name, address) = (register.name(), register.address());
+    match ask(Request::Compare(register), state, board) {
+        Ok([first, others, bits, ..]) => text_line(format_args!(
+            "{name:<10} {address:#04x}  {:#06x}  {others} of {COMPARED_READS} differ, bits {:#06x}",
+            first as u16, bits as u16
+        )),
+        Err(error) => text_line(format_args!("{name:<10} {address:#04x}  {error}")),
+    }
 }
 
 /// The bits of GLOB_CMD by which the sensor writes its flash memory: auto-null, factory restore, flash update, precision auto-null

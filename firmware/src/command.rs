@@ -37,6 +37,8 @@ pub(crate) enum Command {
     AutoNull,
     ReadRegister(Register),
     WriteRegister(Register, u16),
+    /// Read a register many times, and count the answers that differ.
+    CompareReads(Register),
     CarefulBus(bool),
     Persist,
     Forget,
@@ -63,7 +65,7 @@ enum Form {
 }
 
 /// The commands: usage, which begins with the word, form, and help, in the order of the list that `?` prints. A line has 80 columns.
-static COMMANDS: [(&str, Form, &str); 33] = {
+static COMMANDS: [(&str, Form, &str); 34] = {
     use Command as C;
     use Form::{Key, Number, RegisterValue, Thousandths, Title, Word};
     [
@@ -94,6 +96,7 @@ static COMMANDS: [(&str, Form, &str); 33] = {
         ("dump", Word(C::Answer(Answer::Registers)), "all registers of the sensor by name, in hexadecimal"),
         ("peek REG", Form::Register(C::ReadRegister), "read one: peek smpl_prd, or by its address peek 36"),
         ("poke R V", RegisterValue(C::WriteRegister), "write one: poke smpl_prd 0007; check undoes it"),
+        ("compare R", Form::Register(C::CompareReads), "read one 10,000 times, count the answers that differ"),
         ("measure", Word(C::Answer(Answer::Measurement)), "SCK, stall and read rate, period and width of data ready"),
         (
             "careful 1",
@@ -321,10 +324,11 @@ mod tests {
             ]
         );
         assert_eq!(
-            parse("peek smpl_prd\rpeek 36\rpoke sens_avg 0x0402\rpoke 3e 80 \r"),
+            parse("peek smpl_prd\rpeek 36\rcompare 56\rpoke sens_avg 0x0402\rpoke 3e 80 \r"),
             [
                 Ok(Command::ReadRegister(Register::SmplPrd)),
                 Ok(Command::ReadRegister(Register::SmplPrd)),
+                Ok(Command::CompareReads(Register::ProdId)),
                 Ok(Command::WriteRegister(Register::SensAvg, 0x0402)),
                 Ok(Command::WriteRegister(Register::GlobCmd, 0x0080)),
             ]

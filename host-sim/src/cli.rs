@@ -4,6 +4,7 @@ use crate::tip::similar_name;
 use adis16405_driver::GyroRange;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use host_sim::bench::BenchPlan;
 use recordings::serial;
 use recordings::time_base::TimeRange;
 use reports::export::{AxisChoice, ExportFormat};
@@ -68,6 +69,15 @@ Examples:
   host-sim record cable.csv.gz --port /dev/ttyACM0 --seconds 3600
   host-sim record night.csv.gz --port COM4 --seconds 28800 --page report";
 
+/// Below the options of `bench`.
+const EXAMPLES_OF_BENCH: &str = "\
+The sensor must be still. Two minutes; the statistics are reset, the settings
+kept. docs/bench.md has what to do with an oscilloscope.
+
+Examples:
+  host-sim bench /dev/ttyACM0
+  host-sim bench /dev/ttyACM0 --second /dev/ttyUSB0";
+
 /// Length of a recording of a device if none is given, s.
 const DEFAULT_S: f64 = 60.0;
 
@@ -128,6 +138,9 @@ pub(crate) enum Command {
     /// Show a device or a recording live, while its record grows
     #[command(after_help = EXAMPLES_OF_MONITOR)]
     Monitor(MonitorArguments),
+    /// Check a device, its wires and its sensor: what passes, what fails
+    #[command(after_help = EXAMPLES_OF_BENCH)]
+    Bench(BenchArguments),
     /// Record the bursts of a device on a serial port; analyse them
     #[command(after_help = EXAMPLES_OF_RECORD)]
     Record {
@@ -476,6 +489,25 @@ impl InputArguments {
 fn time_in_recording(text: &str) -> Result<f64, String> {
     let time = text.parse().ok().filter(|time: &f64| time.is_finite() && *time >= 0.0);
     time.ok_or_else(|| "not a time of at least 0 s".to_owned())
+}
+
+/// A device to check.
+#[derive(Debug, Args)]
+pub(crate) struct BenchArguments {
+    /// Serial port of the device, such as /dev/ttyACM0.
+    pub(crate) port: String,
+    /// Baud rate of the port.
+    #[arg(long, help_heading = INPUT, default_value_t = serial::BAUD)]
+    pub(crate) baud: u32,
+    /// Its other port, which must carry the same bursts.
+    #[arg(long, help_heading = INPUT, value_name = "PORT")]
+    pub(crate) second: Option<String>,
+    /// Reads of PROD_ID.
+    #[arg(long, default_value_t = BenchPlan::default().reads)]
+    pub(crate) reads: u32,
+    /// Time for which bursts are counted, s.
+    #[arg(long, default_value_t = BenchPlan::default().bursts_s, value_parser = time_in_recording)]
+    pub(crate) seconds: f64,
 }
 
 /// What to show live.

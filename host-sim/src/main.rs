@@ -89,6 +89,7 @@ fn run(Cli { command, simulate, mut output }: Cli) -> Result<()> {
             let report = analyze::analyze_replay(&arguments)?;
             output::write_report(&report.into(), Some(&output::source_name(file)), output, &files)
         }
+        Some(Command::Bench(arguments)) => record::bench_device(&arguments),
         Some(Command::Record { out, port, baud, seconds, output }) => {
             OutputFiles::new([], output.force).check(&out)?;
             // The log is read again: nothing else is written to it.
@@ -147,7 +148,7 @@ fn monitor_device(arguments: &MonitorArguments, deadline: Option<Instant>) -> Re
         live::show(&mut DeviceSource::new(&mut cable, port.to_owned()), deadline)?;
         return output::print(|out| writeln!(out, "{}", monitor::summary(&cable.counters())));
     }
-    Ok(monitor::show(&mut cable, deadline, &mut io::stdout().lock())?)
+    Ok(monitor::show(&mut cable, deadline, monitor::LONG_SILENCE, &mut io::stdout().lock())?)
 }
 
 fn is_broken_pipe(error: &anyhow::Error) -> bool {

@@ -10,21 +10,36 @@ use recordings::Printable;
 use recordings::serial::SerialLink;
 use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-/// Writes every message to `out` until the device disconnects or `deadline`, then the [`summary`].
+/// Silence after which it is said that nothing comes: a device reports every ten seconds.
+pub const LONG_SILENCE: Duration = Duration::from_secs(15);
+
+/// What a long silence means.
+pub const SILENCE: &str = "another port or baud rate, no image on the board, or its reports are off; try `bench`";
+
+/// Writes every message to `out` until the device disconnects or `deadline`, then the [`summary`]. `silence` is the time after which it is
+/// said that nothing comes.
 ///
 /// # Errors
 /// The port fails, or `out` cannot be written.
 pub fn show<P: Read + Write>(
     cable: &mut SerialLink<P>,
     deadline: Option<Instant>,
+    silence: Duration,
     out: &mut impl Write,
 ) -> io::Result<()> {
     let mut formatter = MessageFormatter::default();
-    while let Some(received) = cable.next(deadline)? {
-        for line in formatter.lines(&received) {
-            writeln!(out, "{}", Printable(&line))?;
+    loop {
+        let silent = Instant::now() + silence;
+        match cable.next(Some(deadline.map_or(silent, |deadline| deadline.min(silent))))? {
+            Some(received) => {
+                for line in formatter.lines(&received) {
+                    writeln!(out, "{}", Printable(&line))?;
+                }
+            }
+            None if cable.is_disconnected() || deadline.is_some_and(|deadline| Instant::now() >= deadline) => break,
+            None => writeln!(out, "nothing received for {} s: {SILENCE}", silence.as_secs())?,
         }
         out.flush()?;
     }

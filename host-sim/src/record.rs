@@ -1,11 +1,13 @@
-//! `record`, and the command without a subcommand: the report of a device, of which a recording is left, or of the virtual sensor.
+//! `record`, `bench`, and the command without a subcommand: the report of a device, of which a recording is left, or of the virtual sensor.
 
 use crate::analyze::analyze_recording;
+use crate::cli::BenchArguments;
 use crate::interrupt;
-use crate::output::{note, progress_bar};
-use crate::tip::UnknownPort;
+use crate::output::{self, note, progress_bar};
+use crate::tip::{DeniedPort, UnknownPort};
 use adis16405_driver::GyroRange;
-use anyhow::{Context, Error, Result};
+use anyhow::{Context, Error, Result, ensure};
+use host_sim::bench::{self, BenchPlan, SerialConsole};
 use host_sim::monitor;
 use noise_analysis::report::Report;
 use recordings::serial::{self, SerialLink};
@@ -24,13 +26,34 @@ pub(crate) fn simulate(simulation: &Simulation) -> Result<Report> {
     analyze_recording(recording?, None).context("virtual sensor")
 }
 
-/// A link to the device on a serial port. If there is no such port, the error leads to the names of those that there are.
+/// A link to the device on a serial port. The error of a port that is not there, or may not be opened, has a tip.
 pub(crate) fn open_link(port: &str, baud: u32) -> Result<SerialLink<impl Read + Write + use<>>> {
     let port = serial::open(port, baud).map_err(|error| match error.kind() {
         ErrorKind::NotFound => UnknownPort.into(),
+        ErrorKind::PermissionDenied => DeniedPort.into(),
         _ => Error::from(error),
     })?;
     Ok(SerialLink::new(port))
+}
+
+/// Checks a device and prints what passes and what fails.
+pub(crate) fn bench_device(arguments: &BenchArguments) -> Result<()> {
+    let BenchArguments { port, baud, second, reads, seconds } = arguments;
+    let open = |port: &str| open_link(port, *baud).with_context(|| port.to_owned());
+    let mut console = SerialConsole::new(open(port)?, second.as_deref().map(open).transpose()?);
+    let plan = BenchPlan { reads: *reads, bursts_s: *seconds, ..BenchPlan::default() };
+    let bar = progress_bar(0, "{msg} {wide_bar} {pos}/{len} steps {elapsed}");
+    let transcript = bench::run(&mut console, &plan, |step, index, steps| {
+        bar.set_length(steps as u64);
+        bar.set_position(index as u64);
+        bar.set_message(step.command.clone());
+    });
+    bar.finish_and_clear();
+    let checks = bench::checks(&transcript.with_context(|| port.to_owned())?);
+    output::print(|out| bench::write_table(&checks, out))?;
+    let failed = checks.iter().filter(|check| check.cause.is_some()).count();
+    ensure!(failed == 0, "{failed} of {} checks failed", checks.len());
+    Ok(())
 }
 
 /// Writes `seconds` of the raw bursts of the device on `port` to the frame log `log` and reports on them.

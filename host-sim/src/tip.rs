@@ -26,6 +26,11 @@ pub(crate) struct UnknownSensor(pub(crate) String, pub(crate) Vec<&'static str>)
 #[error("no such serial port")]
 pub(crate) struct UnknownPort;
 
+/// A serial port that the user may not open.
+#[derive(Debug, thiserror::Error)]
+#[error("permission denied")]
+pub(crate) struct DeniedPort;
+
 /// The most similar of `names`; `None` if none is similar.
 pub(crate) fn similar_name<T: AsRef<str>>(name: &str, names: impl IntoIterator<Item = T>) -> Option<T> {
     let similarities = names.into_iter().map(|candidate| (strsim::jaro(name, candidate.as_ref()), candidate));
@@ -59,6 +64,9 @@ pub(crate) fn tip(error: &anyhow::Error) -> Option<String> {
         let ports = serial::ports();
         let ports = if ports.is_empty() { "none".to_owned() } else { ports.join(", ") };
         return Some(format!("serial ports of this machine: {ports}"));
+    }
+    if let Some(DeniedPort) = error.downcast_ref() {
+        return Some("on Linux: sudo usermod -aG dialout $USER, then log in again".to_owned());
     }
     if let Some(error) = error.downcast_ref::<ScenarioTextError>() {
         return similar_part(error);

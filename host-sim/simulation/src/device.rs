@@ -7,8 +7,9 @@ use embedded_hal::spi::SpiDevice;
 use firmware::retained::{RetainedMemory, blank_memory};
 use firmware::settings_store::StoreError;
 use firmware::{
-    App, Board, BoardMeters, BurstQueue, BusTiming, EdgeAction, Estimators, FIRST_CONFIG, FinishedEpoch, HostPort,
-    RetainedRam, Sampler, SamplingActivity, Start, Statistics, TimedBurst, TransmitBuffer, TransmitQueue, estimate,
+    App, Board, BoardMeters, BurstQueue, BusTiming, EdgeAction, Estimators, FIRST_CONFIG, FinishedEpoch, FrameTimes,
+    HostPort, RetainedRam, Sampler, SamplingActivity, Start, Statistics, TimedBurst, TransmitBuffer, TransmitQueue,
+    estimate,
 };
 use heapless::spsc::Consumer;
 use link::{Boot, BootCause};
@@ -54,8 +55,8 @@ struct SimulatedBoard {
     received: VecDeque<u8>,
     restarts: u32,
     fed_us: u64,
-    /// The serial clock cannot be changed.
-    fixed_clock: bool,
+    /// The serial clock in Hz, if it cannot be changed.
+    fixed_sck_hz: Option<u32>,
     /// The sensor's RST line is connected.
     reset_line: bool,
     /// Time for which the samples of the sensor could have been used, µs.
@@ -93,8 +94,8 @@ impl Device {
 
     /// Has a board whose serial clock cannot be changed.
     #[must_use]
-    pub fn with_fixed_clock(mut self) -> Self {
-        self.board.fixed_clock = true;
+    pub fn with_fixed_clock(mut self, sck_hz: u32) -> Self {
+        self.board.fixed_sck_hz = Some(sck_hz);
         self
     }
 
@@ -221,7 +222,7 @@ impl SimulatedBoard {
             received: VecDeque::new(),
             restarts: 0,
             fed_us: now_us,
-            fixed_clock: false,
+            fixed_sck_hz: None,
             reset_line: false,
             usable_us: 0,
             edges: 0,
@@ -236,8 +237,8 @@ impl SimulatedBoard {
         let fresh = Self::new(self.bus.clone(), self.now_us);
         let (sent, received) = (std::mem::take(&mut self.sent), std::mem::take(&mut self.received));
         let record = self.record.take();
-        let Self { restarts, fixed_clock, reset_line, usable_us, edges, audit, .. } = *self;
-        *self = Self { sent, received, restarts, fixed_clock, reset_line, usable_us, edges, audit, record, ..fresh };
+        let Self { restarts, fixed_sck_hz, reset_line, usable_us, edges, audit, .. } = *self;
+        *self = Self { sent, received, restarts, fixed_sck_hz, reset_line, usable_us, edges, audit, record, ..fresh };
         let start = Start {
             boot: Boot { cause, ..Boot::default() },
             retained: RetainedRam::open(memory),
@@ -324,7 +325,7 @@ impl Board for SimulatedBoard {
     }
 
     fn set_clock_limit(&mut self, limit_hz: u32) -> u32 {
-        let sck_hz = if self.fixed_clock { SCK_HZ } else { limit_hz.min(SCK_HZ) };
+        let sck_hz = self.fixed_sck_hz.unwrap_or(limit_hz.min(SCK_HZ));
         self.bus.bus().part_mut().set_sck_hz(Some(sck_hz));
         sck_hz
     }
@@ -353,6 +354,23 @@ impl Board for SimulatedBoard {
             faults.frames = faults.frames.filter(|(_, end)| *end != FaultEnd::CarefulBus);
         }
         true
+    }
+
+    fn frame_times(&mut self) -> Option<FrameTimes> {
+        Some(self.bus.take_frame_times())
+    }
+
+    fn data_ready_width_us(&mut self, limit_us: u32) -> Option<u32> {
+        let (now_us, next_us) = (self.now_us(), self.bus.bus().part().next_data_ready() / 1000 + 1);
+        if self.bus.faults().borrow().no_data_ready || next_us > now_us + u64::from(limit_us) {
+            self.advance_to(now_us + u64::from(limit_us));
+            return None;
+        }
+        self.advance_to(next_us);
+        while self.bus.bus().part().pin(1) {
+            self.advance_to(self.now_us + 1);
+        }
+        Some((self.now_us - next_us) as u32)
     }
 
     fn sampling_activity(&mut self) -> SamplingActivity {

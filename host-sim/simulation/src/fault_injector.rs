@@ -3,7 +3,8 @@
 use crate::line_fault::{LineFault, RandomFault};
 use adis16405_driver::BURST_BYTES;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
-use std::cell::RefCell;
+use firmware::FrameTimes;
+use std::cell::{Cell, RefCell};
 use std::convert::Infallible;
 use std::rc::Rc;
 use virtual_sensor::{DiagnosisFlag, EmulatedBus};
@@ -43,6 +44,19 @@ pub enum FrameFault {
     Stale,
     /// The supply is at 4.70 V, and DIAG_STAT says so. Nothing is damaged.
     LowSupply,
+    /// A bit of every word is stuck, for all frames.
+    StuckBit {
+        /// 0 for the last one.
+        bit: u8,
+        /// Whether it reads one.
+        high: bool,
+    },
+    /// Every bit of all frames comes one clock late, as with another SPI mode.
+    Late,
+    /// One of so many ones reads zero, as with a level that is too low, for all frames.
+    OnesLost(u32),
+    /// Bits of every word to the sensor are stuck low: those that this mask lacks.
+    Requests(u16),
 }
 
 /// When a frame fault ends.
@@ -116,12 +130,77 @@ pub struct FaultyBus {
     frozen: Rc<RefCell<Option<[u8; BURST_BYTES]>>>,
     /// The latest burst as the sensor sent it.
     sent: Rc<RefCell<[u8; BURST_BYTES]>>,
+    /// Ones sent so far.
+    ones: Rc<Cell<u32>>,
+    times: Rc<Cell<SelectTimes>>,
+}
+
+/// Times of chip select.
+#[derive(Debug, Clone, Copy)]
+struct SelectTimes {
+    fell_ns: u64,
+    rose_ns: u64,
+    frames: FrameTimes,
 }
 
 impl FaultyBus {
     /// A bus without faults.
     pub(crate) fn new(bus: EmulatedBus) -> Self {
-        Self { bus, faults: Rc::default(), latest: Rc::default(), frozen: Rc::default(), sent: Rc::default() }
+        let times = Rc::new(Cell::new(SelectTimes { fell_ns: 0, rose_ns: 0, frames: FrameTimes::NONE }));
+        let (faults, latest, frozen) = (Rc::default(), Rc::default(), Rc::default());
+        Self { bus, faults, latest, frozen, sent: Rc::default(), ones: Rc::default(), times }
+    }
+
+    /// The times of the frames since they were taken last.
+    pub(crate) fn take_frame_times(&self) -> FrameTimes {
+        let times = self.times.get();
+        self.times.set(SelectTimes { frames: FrameTimes { low_us: times.frames.low_us, ..FrameTimes::NONE }, ..times });
+        times.frames
+    }
+
+    /// Notes a frame that began at `fell_ns` and has ended now.
+    fn note_times(&self, fell_ns: u64) {
+        let SelectTimes { fell_ns: before_ns, rose_ns, frames } = self.times.get();
+        let now_ns = self.bus.part().now();
+        let us = |ns: u64| u32::try_from(ns / 1000).unwrap_or(u32::MAX);
+        let frames = FrameTimes {
+            low_us: us(now_ns - fell_ns),
+            shortest_high_us: frames.shortest_high_us.min(us(fell_ns - rose_ns)),
+            shortest_period_us: frames.shortest_period_us.min(us(fell_ns - before_ns)),
+        };
+        self.times.set(SelectTimes { fell_ns, rose_ns: now_ns, frames });
+    }
+
+    /// Damages what the sensor has sent in any frame.
+    fn damage_line(&self, answer: &mut [u8]) {
+        let Some((fault, _)) = self.faults.borrow().frames else { return };
+        match fault {
+            FrameFault::StuckBit { bit, high } => {
+                for byte in answer.iter_mut().skip(usize::from(bit < 8)).step_by(2) {
+                    let mask = 1 << (bit % 8);
+                    *byte = if high { *byte | mask } else { *byte & !mask };
+                }
+            }
+            FrameFault::Late => {
+                let mut before = 0;
+                for byte in answer {
+                    let sent = *byte;
+                    *byte = sent >> 1 | before << 7;
+                    before = sent;
+                }
+            }
+            FrameFault::OnesLost(every) => {
+                for byte in answer {
+                    for mask in (0..8).map(|bit| 1 << bit) {
+                        self.ones.set(self.ones.get().wrapping_add(u32::from(*byte & mask != 0)));
+                        if *byte & mask != 0 && self.ones.get().is_multiple_of(every) {
+                            *byte &= !mask;
+                        }
+                    }
+                }
+            }
+            _ => {}
+        }
     }
 
     /// The bus and the part on it.
@@ -196,6 +275,7 @@ impl FaultyBus {
                 answer[2..4].copy_from_slice(&LOW_SUPPLY);
                 answer[2] |= flags;
             }
+            _ => {}
         }
         if let FaultEnd::Bursts(left) = end {
             faults.frames = (left > 1).then_some((fault, FaultEnd::Bursts(left - 1)));
@@ -205,6 +285,14 @@ impl FaultyBus {
     /// The transaction on the bus, with the random fault if it meets it.
     fn transact(&mut self, operations: &mut [Operation<'_, u8>]) {
         let mut faults = self.faults.borrow_mut();
+        if let Some((FrameFault::Requests(mask), _)) = faults.frames
+            && let [Operation::Transfer(answer, request)] = operations
+        {
+            let damaged: Vec<u8> =
+                request.iter().zip(mask.to_be_bytes().into_iter().cycle()).map(|(a, b)| a & b).collect();
+            let Ok(()) = self.bus.transaction(&mut [Operation::Transfer(answer, &damaged)]);
+            return;
+        }
         let Some(random) = faults.random.as_mut() else {
             let Ok(()) = self.bus.transaction(operations);
             return;
@@ -255,9 +343,14 @@ impl SpiDevice<u8> for FaultyBus {
             Operation::Transfer(_, write) | Operation::Write(write) => Some([write[0], write[1]]),
             _ => None,
         });
+        let fell_ns = self.bus.part().now();
         self.transact(operations);
+        self.note_times(fell_ns);
         let requested = std::mem::replace(&mut *self.latest.borrow_mut(), sent.map_or(0, |[address, _]| address));
         for operation in operations.iter_mut() {
+            if let Operation::Transfer(answer, _) = operation {
+                self.damage_line(answer);
+            }
             match operation {
                 Operation::Transfer(answer, [READ_BURST, ..]) if answer.len() == BURST_BYTES => {
                     self.damage_burst(answer)

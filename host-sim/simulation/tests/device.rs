@@ -105,7 +105,7 @@ fn a_report_has_product_id_and_measured_rate() {
 
 #[test]
 fn rate_range_and_filter_are_set_or_refused_with_the_reason() {
-    let mut device = device().with_fixed_clock();
+    let mut device = device().with_fixed_clock(1_000_000);
     after(&mut device, "", SECOND);
     after(&mut device, "f 819.2\rn 5\rg 75\r", 2 * SECOND);
     let heard = after(&mut device, "r", 3 * SECOND);

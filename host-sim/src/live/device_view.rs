@@ -26,7 +26,7 @@ use reports::rounding::{plain, span};
 use reports::summary::{ChannelCoefficients, tables_of_channels};
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Two lines of different channels whose frequencies differ by less than this share are one finding, as in the device's table.
 const SAME_FREQUENCY: f64 = 0.02;
@@ -35,12 +35,14 @@ const SAME_FREQUENCY: f64 = 0.02;
 pub(crate) struct DeviceSource<'a, P> {
     cable: &'a mut SerialLink<P>,
     messages: LatestMessages,
+    /// When something was received last.
+    received: Instant,
 }
 
 impl<'a, P: Read + Write> DeviceSource<'a, P> {
     /// The device at the other end of `cable`, which is called `name`.
     pub(crate) fn new(cable: &'a mut SerialLink<P>, name: String) -> Self {
-        Self { cable, messages: LatestMessages { name, ..LatestMessages::default() } }
+        Self { cable, messages: LatestMessages { name, ..LatestMessages::default() }, received: Instant::now() }
     }
 }
 
@@ -48,12 +50,13 @@ impl<P: Read + Write> LiveSource for DeviceSource<'_, P> {
     fn advance(&mut self, deadline: Instant) -> Result<bool> {
         while let Some(received) = self.cable.next(Some(deadline))? {
             self.messages.take(received);
+            self.received = Instant::now();
         }
         Ok(!self.cable.is_disconnected())
     }
 
     fn view(&self) -> LiveView {
-        let mut view = self.messages.view();
+        let mut view = self.messages.view(self.received.elapsed());
         view.health += &format!(" Link: {}.", monitor::summary(&self.cable.counters()));
         view
     }
@@ -70,15 +73,14 @@ struct LatestMessages {
     validations: BTreeMap<u8, ValidationMessage>,
     /// The last line of text.
     text: String,
+    /// What the device says of a sensor that it does not sample.
+    trouble: Option<String>,
 }
 
 impl LatestMessages {
     fn take(&mut self, received: Received) {
         let message = match received {
-            Received::Text(line) => {
-                self.text = Printable(line.as_str()).to_string();
-                return;
-            }
+            Received::Text(line) => return self.take_text(&line),
             Received::Message { message, .. } => message,
         };
         match message {
@@ -93,12 +95,34 @@ impl LatestMessages {
             Message::Health(health) => self.health = Some(health),
             Message::Validation(report) => drop(self.validations.insert(report.channel, report)),
             Message::Learned(report) => drop(self.learned.insert(report.channel, report)),
-            Message::Log(line) => self.text = Printable(line.as_str()).to_string(),
+            Message::Log(line) => self.take_text(&line),
             Message::Raw(_) => {}
         }
     }
 
-    fn view(&self) -> LiveView {
+    fn take_text(&mut self, line: &str) {
+        self.text = Printable(line).to_string();
+        if let Some(said) = self.text.strip_prefix("sensor: ") {
+            let is_found = said.starts_with("ADIS") || said.starts_with("DIAG_STAT");
+            self.trouble = (!is_found).then(|| said.to_owned());
+        }
+    }
+
+    /// What is shown after a time without a message.
+    fn view(&self, silence: Duration) -> LiveView {
+        let (mut view, name) = (self.report(), &self.name);
+        if silence >= monitor::LONG_SILENCE {
+            view.headline = format!("{name}   Nothing received for {} s", silence.as_secs());
+            view.sentences = format!("Probably {}.", monitor::SILENCE);
+        } else if let Some(trouble) = &self.trouble {
+            view.headline = format!("{name}   The sensor is not sampled: {trouble}");
+            view.sentences = format!("Its wires or its supply; host-sim bench {name} says which.");
+        }
+        view
+    }
+
+    /// The latest report.
+    fn report(&self) -> LiveView {
         let Some(hello) = &self.hello else {
             return LiveView {
                 headline: self.name.clone(),
@@ -310,6 +334,25 @@ mod tests {
     use ratatui::backend::TestBackend;
     use reports::live::CurveGroup;
 
+    /// Nothing for a quarter of a minute, and what the device says of its sensor, are the headline; a sensor that is found ends that.
+    #[test]
+    fn silence_and_a_lost_sensor_are_the_headline() {
+        let mut messages = LatestMessages { name: "/dev/ttyACM0".to_owned(), ..LatestMessages::default() };
+        let shown = |messages: &LatestMessages, seconds| {
+            let view = messages.view(Duration::from_secs(seconds));
+            format!("{}. {}", view.headline, view.sentences)
+        };
+        assert!(shown(&messages, 14).contains("has not reported yet"));
+        let silent = shown(&messages, 15);
+        assert!(silent.contains("Nothing received for 15 s") && silent.contains("`bench`"), "{silent}");
+        let log = |text: &str| Received::Text(link::text_line(format_args!("{text}")));
+        messages.take(log("sensor: PROD_ID answered 0 (0x0000), not 16405 or 16400; reading again"));
+        let lost = shown(&messages, 1);
+        assert!(lost.contains("not sampled: PROD_ID answered 0") && lost.contains("bench /dev/ttyACM0"), "{lost}");
+        messages.take(log("sensor: ADIS16405, self-test passed"));
+        assert!(shown(&messages, 1).contains("has not reported yet"));
+    }
+
     /// One message of each kind, with all its fields.
     const KEPT: &[u8] = include_bytes!("../../../firmware/link/tests/kept_stream/version-4-mixed-alarm.bin");
     const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
@@ -355,7 +398,7 @@ mod tests {
                     for message in of_kind.flatten().flatten().chain([hostile]) {
                         messages.take(message);
                     }
-                    let view = messages.view();
+                    let view = messages.view(Duration::ZERO);
                     taken += 1;
                     // Drawing costs a hundred times as much.
                     if taken % 16 == 0 {

@@ -2,6 +2,7 @@
 //! each verb once. What is read of a file is tested in `recordings`, what a report says in `reports`.
 
 mod analyze_and_replay;
+mod bench;
 mod convert_and_simulate;
 mod documented_options;
 mod exit_codes;

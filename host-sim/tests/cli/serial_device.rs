@@ -118,7 +118,7 @@ fn the_monitor_shows_reports_and_counts_damaged_messages() {
     let mut link = SerialLink::new(Port { device: NoisyDevice::new(), sent: VecDeque::new() });
     link.send_command("i 2").and_then(|()| link.send_command("?")).expect("a port");
     let mut text = Vec::new();
-    monitor::show(&mut link, None, &mut text).expect("memory");
+    monitor::show(&mut link, None, monitor::LONG_SILENCE, &mut text).expect("memory");
     let text = String::from_utf8(text).expect("text");
     for words in expected {
         assert!(text.contains(words), "{words}: {text}");

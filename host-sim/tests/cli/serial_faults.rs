@@ -172,7 +172,7 @@ fn escape_sequences_of_a_device_do_not_reach_the_terminal() {
         encoder.encode(message.into(), &mut |sent| bytes.extend(sent));
     }
     let mut text = Vec::new();
-    monitor::show(&mut SerialLink::new(Port(bytes)), None, &mut text).expect("memory");
+    monitor::show(&mut SerialLink::new(Port(bytes)), None, monitor::LONG_SILENCE, &mut text).expect("memory");
     let text = String::from_utf8(text).expect("text");
     for expected in ["crash record: ", "panic at app.rs:7", "title"] {
         assert!(text.contains(expected), "{expected}: {text:?}");
