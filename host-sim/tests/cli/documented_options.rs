@@ -33,7 +33,8 @@ fn options_of_the_documentation_are_those_of_the_program() {
     for page in &pages {
         let text = std::fs::read_to_string(page).expect("a page");
         for line in text.lines() {
-            let command = ["cargo run --release -- ", "$ host-sim "].iter().find_map(|program| line.split_once(program));
+            let command =
+                ["cargo run --release -- ", "$ host-sim "].iter().find_map(|program| line.split_once(program));
             let Some((_, command)) = command else { continue };
             let command = command.split(['#', '|', '`']).next().unwrap_or_default();
             let Some(name) = command.split_whitespace().next().filter(|name| !name.starts_with('-')) else { continue };
