@@ -1,15 +1,26 @@
-//! Shared by the tests of several crates: the measured recordings, the program, generated documentation, and the report of a
-//! skipped test.
+//! Shared by the tests of several crates: the measured recordings, the program, generated documentation, pseudo-terminals, and the report
+//! of a skipped test.
 //!
 //! The tests of the noise observatory as a whole live in `tests/`.
 
 mod generated;
 
 pub use generated::{generated, generated_within, writes_docs};
+use serial2::SerialPort;
 use std::fs::{File, OpenOptions};
 use std::io::Write;
+use std::os::fd::AsRawFd;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Duration;
+
+/// Two connected pseudo-terminals, of which reading and writing give up after `timeout`, and the name of the second one.
+pub fn pseudo_terminals(timeout: Duration) -> (SerialPort, SerialPort, String) {
+    let (mut near, far) = SerialPort::pair().expect("a pseudo-terminal");
+    near.set_read_timeout(timeout).and_then(|()| near.set_write_timeout(timeout)).expect("a timeout");
+    let name = std::fs::read_link(format!("/proc/self/fd/{}", far.as_raw_fd())).expect("a name");
+    (near, far, name.display().to_string())
+}
 
 /// The path of a measured recording in the folder that `ADIS_RECORDINGS` names. If it is absent, the test is reported as
 /// skipped, and should return. Nothing else reads the variable, which a test of the architecture checks.

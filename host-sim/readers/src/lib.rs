@@ -23,6 +23,6 @@ pub use input::stream_error::StreamError;
 pub use rows::any_sensor::ReadOptions;
 pub use rows::batch::{Batch, RegisterField, RowBefore, ValueColumn};
 pub use rows::padding::{PaddingFinder, Unpadded};
-pub use rows::quantizer::Quantizer;
+pub use rows::quantizer::ColumnQuantizer;
 pub use rows::row_source::{BATCH, FileRows, PartFilter, RowsRead, WantedRows};
 pub use rows::whole_table::MAX_SAMPLES;

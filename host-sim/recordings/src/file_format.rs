@@ -10,6 +10,7 @@ use readers::{
     Reason, is_output_register,
 };
 use std::io::{self, BufReader};
+use std::ops::Deref;
 use std::path::Path;
 use std::sync::Arc;
 use tempfile::NamedTempFile;
@@ -47,7 +48,7 @@ impl RecordedFormat {
     }
 }
 
-/// A recording that can be read more than once.
+/// A recording that can be read more than once: a file, of which this knows more than the format.
 #[derive(Debug)]
 pub struct RecordedInput {
     file: InputFile,
@@ -123,24 +124,6 @@ impl RecordedInput {
         }
     }
 
-    /// As the user named it.
-    #[must_use]
-    pub fn name(&self) -> &Path {
-        self.file.name()
-    }
-
-    /// Who watches the reading.
-    #[must_use]
-    pub fn monitor(&self) -> &ReadMonitor {
-        self.file.monitor()
-    }
-
-    /// The bytes as they are read; of a bag that was split, those of its first file.
-    #[must_use]
-    pub fn bytes(&self) -> &FileBytes {
-        self.file.bytes()
-    }
-
     /// The rows of any sensor, or of register counts of an ADIS16405.
     ///
     /// # Errors
@@ -196,21 +179,13 @@ impl RecordedInput {
         }
         Ok(tables)
     }
+}
 
-    /// Names of the sensors of one kind that the file has, as [`InputFile::sensors`].
-    ///
-    /// # Errors
-    /// The file is damaged.
-    pub fn sensors(&self) -> Result<Vec<String>, InputError> {
-        self.file.sensors()
-    }
+impl Deref for RecordedInput {
+    type Target = InputFile;
 
-    /// What is in the file, as [`InputFile::contents`].
-    ///
-    /// # Errors
-    /// The file is damaged.
-    pub fn contents(&self) -> Result<Vec<TopicDescription>, InputError> {
-        self.file.contents()
+    fn deref(&self) -> &InputFile {
+        &self.file
     }
 }
 

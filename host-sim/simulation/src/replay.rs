@@ -9,7 +9,7 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{Error, ErrorKind, ErrorType, Operation, SpiDevice};
 use recordings::count_table;
 use recordings::frame_log::{Frame, FrameLogReader};
-use recordings::recorded_file::{FrameReader, RecordedFile};
+use recordings::recorded_file::FrameReader;
 use recordings::recording::{MAX_SAMPLES, Recorder, Recording, TimeStamp};
 use recordings::{FileBytes, InputError, Reason, SelectionError};
 use std::cell::RefCell;
@@ -32,9 +32,9 @@ pub struct Replay {
 /// The file cannot be read, or a transaction differs from the one that the driver requests.
 pub fn replay(file: impl Into<FileBytes>, range: GyroRange) -> Result<Replay, InputError> {
     let file = &file.into();
-    match RecordedFile::open(file)? {
-        RecordedFile::Frames(frames) => replay_frames(file, frames, range),
-        RecordedFile::Table => replay_table(file, range),
+    match FrameReader::open(file)? {
+        Some(frames) => replay_frames(file, frames, range),
+        None => replay_table(file, range),
     }
 }
 

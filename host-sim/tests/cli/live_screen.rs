@@ -1,11 +1,12 @@
 //! `monitor` on a pseudo-terminal: the live screen of a replayed recording, how it ends, and that the terminal is restored.
 
 use crate::program::{host_sim, write};
-use serialport::{SerialPort, TTYPort};
+use serial2::SerialPort;
 use std::fs::OpenOptions;
-use std::io::{ErrorKind, Read, Write};
+use std::io::ErrorKind;
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
+use system_tests::pseudo_terminals;
 
 /// The sequences by which a terminal enters and leaves its alternate screen.
 const ENTER: &str = "\u{1b}[?1049h";
@@ -41,8 +42,10 @@ fn without_control(text: &str) -> String {
 
 /// A session of the program on a pseudo-terminal of 80 columns and 24 rows.
 struct Session {
-    near: TTYPort,
-    far: TTYPort,
+    near: SerialPort,
+    /// Keeps the terminal open.
+    _far: SerialPort,
+    name: String,
     program: std::process::Child,
     seen: String,
     before: String,
@@ -50,9 +53,7 @@ struct Session {
 
 impl Session {
     fn start(arguments: &[&str], environment: &[(&str, &str)]) -> Self {
-        let (mut near, far) = TTYPort::pair().expect("a pseudo-terminal");
-        near.set_timeout(Duration::from_millis(20)).expect("a timeout");
-        let name = far.name().expect("a name");
+        let (near, far, name) = pseudo_terminals(Duration::from_millis(20));
         let sized =
             Command::new("stty").args(["-F", &name, "sane", "rows", "24", "cols", "80"]).status().expect("stty");
         assert!(sized.success());
@@ -68,7 +69,7 @@ impl Session {
             .stderr(terminal())
             .spawn()
             .expect("the program starts");
-        Self { near, far, program, seen: String::new(), before }
+        Self { near, _far: far, name, program, seen: String::new(), before }
     }
 
     /// Reads what there is; whether anything was.
@@ -109,7 +110,7 @@ impl Session {
         };
         // A program that has ended sends nothing more.
         while self.read() {}
-        let restored = settings(&self.far.name().expect("a name")) == self.before && self.seen.contains(LEAVE);
+        let restored = settings(&self.name) == self.before && self.seen.contains(LEAVE);
         (status, restored, std::mem::take(&mut self.seen))
     }
 }
@@ -156,7 +157,7 @@ fn a_terminal_that_changes_its_size_is_drawn_anew() {
         Session::start(&["monitor", file.to_str().expect("a name"), "--rate", "100", "--speed", "max"], &[]);
     session.wait_for("What was found");
     session.seen.clear();
-    let name = session.far.name().expect("a name");
+    let name = session.name.clone();
     assert!(Command::new("stty").args(["-F", &name, "rows", "40", "cols", "120"]).status().expect("stty").success());
     // Row 40 is written only on the larger screen.
     session.wait_for("\u{1b}[40;");

@@ -3,7 +3,6 @@
 use crate::program::{host_sim, send};
 use ::host_sim::monitor;
 use recordings::serial::SerialLink;
-use serialport::{SerialPort, TTYPort};
 use simulation::Device;
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind, Read, Write};
@@ -12,6 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::thread;
 use std::time::Duration;
+use system_tests::pseudo_terminals;
 use virtual_sensor::{NoiseModel, VirtualAdis16405};
 
 /// A simulated device, which runs faster than real time and sends bytes that are no message once a second of its time.
@@ -40,9 +40,7 @@ impl NoisyDevice {
 /// Runs `host-sim` with these arguments, `PORT` replaced by the port of a simulated device, until it has printed all of `expected`, or to
 /// its end where that is empty.
 fn with_device(arguments: &[&str], expected: &[&str]) -> Output {
-    let (mut near, far) = TTYPort::pair().expect("a pseudo-terminal");
-    let port = far.name().expect("a name");
-    near.set_timeout(Duration::from_millis(1)).expect("a timeout");
+    let (mut near, far, port) = pseudo_terminals(Duration::from_millis(1));
     let over = Arc::new(AtomicBool::new(false));
     let done = Arc::clone(&over);
     let mut program = Command::new(env!("CARGO_BIN_EXE_host-sim"))

@@ -3,13 +3,13 @@
 use crate::program::{host_sim, send, signal, with_default_signals};
 use ::host_sim::monitor;
 use recordings::serial::SerialLink;
-use serialport::{SerialPort, TTYPort};
 use simulation::Device;
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::path::Path;
 use std::process::{Output, Stdio};
 use std::time::Duration;
+use system_tests::pseudo_terminals;
 use tempfile::tempdir;
 use virtual_sensor::{NoiseModel, VirtualAdis16405};
 
@@ -26,9 +26,7 @@ const FAULT_AFTER_US: u64 = 5_000_000;
 /// Records 20 s of a simulated device, which runs faster than real time, into `log`. Returns the output of the program and the
 /// commands that the device received.
 fn record(log: &Path, fault: Fault) -> (Output, String) {
-    let (mut near, far) = TTYPort::pair().expect("a pseudo-terminal");
-    let port = far.name().expect("a name");
-    near.set_timeout(Duration::from_millis(1)).expect("a timeout");
+    let (mut near, far, port) = pseudo_terminals(Duration::from_millis(1));
     let mut program = with_default_signals()
         .args(["record", log.to_str().expect("UTF-8"), "--force", "--port", &port, "--seconds", "20"])
         .stdout(Stdio::null())
@@ -106,8 +104,7 @@ fn a_file_is_kept_where_the_device_is_silent() {
 
 #[test]
 fn impossible_durations_are_refused() {
-    let (_near, far) = TTYPort::pair().expect("a pseudo-terminal");
-    let port = far.name().expect("a name");
+    let (_near, _far, port) = pseudo_terminals(Duration::from_millis(1));
     for seconds in ["nan", "inf", "0"] {
         let output = host_sim(&["record", "/nonexistent/x.csv", "--port", &port, "--seconds", seconds]);
         assert!(!output.status.success(), "{seconds}");
@@ -183,7 +180,7 @@ fn escape_sequences_of_a_device_do_not_reach_the_terminal() {
 /// A device that says nothing: the monitor ends after its time, with its summary.
 #[test]
 fn the_monitor_ends_after_its_time() {
-    let (_near, far) = TTYPort::pair().expect("a pseudo-terminal");
-    let output = host_sim(&["monitor", &far.name().expect("a name"), "--seconds", "0.1"]);
+    let (_near, _far, port) = pseudo_terminals(Duration::from_millis(1));
+    let output = host_sim(&["monitor", &port, "--seconds", "0.1"]);
     assert!(output.status.success() && String::from_utf8_lossy(&output.stdout).starts_with("0 messages, "));
 }

@@ -29,11 +29,10 @@ const LEAST_TICK: f64 = 0.05;
 
 /// Stamps that a loop wrote which asks for a sample when it has time, s: a sample is missing where an interval is long, and nowhere else.
 pub(crate) fn of_loop(times: &[f64], tick_s: Option<f64>) -> Option<AlignedStamps> {
-    let mut intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let in_order = intervals.clone();
-    let usual_s = quantile(&mut intervals, 1, 2);
+    let intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let usual_s = quantile(&mut intervals.clone(), 1, 2);
     let surplus = |from: usize| {
-        let next = &in_order[from..in_order.len().min(from + CATCHES_UP)];
+        let next = &intervals[from..intervals.len().min(from + CATCHES_UP)];
         next.iter().sum::<f64>() / usual_s - next.len() as f64
     };
     let mut periods = Vec::with_capacity(times.len());
@@ -41,7 +40,7 @@ pub(crate) fn of_loop(times: &[f64], tick_s: Option<f64>) -> Option<AlignedStamp
     let (mut shortest_s, mut longest_s) = (f64::INFINITY, 0.0_f64);
     let (mut window_s, mut in_window) = (0.0, 0);
     for at in 0..times.len() {
-        if let Some(&interval) = at.checked_sub(1).and_then(|before| in_order.get(before)) {
+        if let Some(&interval) = at.checked_sub(1).and_then(|before| intervals.get(before)) {
             let excess = (interval / usual_s).round() - 1.0;
             if interval >= LONG * usual_s && excess >= 1.0 && surplus(at - 1) >= LONG - 1.0 {
                 // A float beyond the range of u64 saturates.

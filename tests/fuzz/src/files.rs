@@ -4,7 +4,7 @@ use clap::ValueEnum;
 use measurement::SensorProfile;
 use recordings::ReadOptions;
 use recordings::file_format::{RecordedFormat, RecordedInput};
-use recordings::recorded_file::RecordedFile;
+use recordings::recorded_file::FrameReader;
 use recordings::sample_stream::{KeptInMemory, Reading, SampleStream};
 use recordings::{ColumnSelection, count_table};
 use reports::export::{AxisChoice, ExportFormat, export};
@@ -23,7 +23,7 @@ pub(crate) fn recording(bytes: &[u8]) {
     let range = adis16405_driver::GyroRange::Dps300;
     match input.format() {
         RecordedFormat::FrameLog | RecordedFormat::SpiExport => {
-            let Ok(RecordedFile::Frames(mut frames)) = RecordedFile::open(input.bytes()) else { return };
+            let Ok(Some(mut frames)) = FrameReader::open(input.bytes()) else { return };
             while let Ok(Some(_)) = frames.next() {}
         }
         RecordedFormat::CountTable => {

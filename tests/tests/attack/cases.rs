@@ -10,14 +10,14 @@ use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
-use serialport::{SerialPort, TTYPort};
 use std::collections::BTreeMap;
 use std::fmt;
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::Path;
 use std::process::Command;
 use std::thread;
 use std::time::Duration;
+use system_tests::pseudo_terminals;
 use tempfile::TempDir;
 
 /// A kind of attack: its name, and how it is run.
@@ -717,9 +717,7 @@ fn interrupted(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
 
 /// A port on which anything comes: garbage, halves of messages, floods, silence.
 fn terminal(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
-    let (mut near, far) = TTYPort::pair().expect("a pseudo-terminal");
-    let port = far.name().expect("a name");
-    near.set_timeout(Duration::from_millis(5)).expect("a timeout");
+    let (near, far, port) = pseudo_terminals(Duration::from_millis(5));
     let folder = campaign.folder().to_owned();
     let words: Vec<&str> = if rng.random() {
         vec!["monitor", &port, "--seconds", "1"]

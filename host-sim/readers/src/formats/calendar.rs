@@ -196,22 +196,47 @@ pub(crate) enum CalendarColumns {
     Parts(Vec<(usize, i64)>),
 }
 
-/// Endings of names of parts of a time, in small letters, the nanoseconds of their units, and the numbers below which they are.
-const PARTS: [(&[&str], i64, i64); 7] = [
-    (&["hour", "hours", "hh"], 3600 * SECOND_NS, 24),
-    (&["minute", "minutes", "min", "mins", "mm"], 60 * SECOND_NS, 60),
-    (&["second", "seconds", "sec", "secs", "tv_sec", "ss", "s"], SECOND_NS, i64::MAX),
-    (&["ms", "msec", "msecs", "millis", "millisecond", "milliseconds"], 1_000_000, 1000),
-    (&["us", "usec", "usecs", "tv_usec", "micros", "microsecond", "microseconds"], 1000, 1_000_000),
-    (
-        &["ns", "nsec", "nsecs", "nanosec", "nanosecs", "tv_nsec", "nanos", "nanosecond", "nanoseconds"],
-        1,
-        1_000_000_000,
-    ),
-    (&["centisecond", "centiseconds"], 10_000_000, 100),
+/// A part of a time that may have a column of its own.
+struct TimePart {
+    /// Endings of the name of the column, in small letters.
+    names: &'static [&'static str],
+    unit_ns: i64,
+    /// Its numbers are below this.
+    below: i64,
+}
+
+const PARTS: [TimePart; 7] = [
+    TimePart { names: &["hour", "hours", "hh"], unit_ns: 3600 * SECOND_NS, below: 24 },
+    TimePart { names: &["minute", "minutes", "min", "mins", "mm"], unit_ns: 60 * SECOND_NS, below: 60 },
+    TimePart { names: &["second", "seconds", "sec", "secs", "tv_sec", "ss", "s"], unit_ns: SECOND_NS, below: i64::MAX },
+    TimePart {
+        names: &["ms", "msec", "msecs", "millis", "millisecond", "milliseconds"],
+        unit_ns: 1_000_000,
+        below: 1000,
+    },
+    TimePart {
+        names: &["us", "usec", "usecs", "tv_usec", "micros", "microsecond", "microseconds"],
+        unit_ns: 1000,
+        below: 1_000_000,
+    },
+    TimePart {
+        names: &["ns", "nsec", "nsecs", "nanosec", "nanosecs", "tv_nsec", "nanos", "nanosecond", "nanoseconds"],
+        unit_ns: 1,
+        below: SECOND_NS,
+    },
+    TimePart { names: &["centisecond", "centiseconds"], unit_ns: 10_000_000, below: 100 },
 ];
 /// The place of the seconds among them.
 const SECONDS: usize = 2;
+
+/// A column whose name is that of a part of a time.
+struct NamedPart {
+    /// What comes before it in the name.
+    prefix: String,
+    /// Its place among the [`PARTS`].
+    part: usize,
+    position: usize,
+}
 
 impl CalendarColumns {
     /// The first of `fields` with a calendar time.
@@ -231,8 +256,7 @@ impl CalendarColumns {
     /// The columns whose names are those of the parts of a time, as `secs` and `nsecs`, with whole numbers in `rows` that fit them. The seconds
     /// are one of them.
     pub(crate) fn parts(available: &[AvailableColumn], rows: &[Vec<&str>]) -> Option<Self> {
-        // Beginning of the name, place among the parts, position.
-        let mut named: Vec<(String, usize, usize)> = Vec::new();
+        let mut named: Vec<NamedPart> = Vec::new();
         for (position, column) in available.iter().enumerate() {
             let plain: String = column.name.to_lowercase().replace([' ', '-'], "_");
             let start = plain.rfind(['.', '_', '/']).map_or(0, |at| at + 1);
@@ -240,24 +264,23 @@ impl CalendarColumns {
                 Some(prefix) => (prefix, &plain[prefix.len()..]),
                 None => (&plain[..start], &plain[start..]),
             };
-            if let Some(part) = PARTS.iter().position(|(endings, ..)| endings.contains(&ending)) {
-                let is_new = !named.iter().any(|(known, other, _)| known == prefix && *other == part);
+            if let Some(part) = PARTS.iter().position(|part| part.names.contains(&ending)) {
+                let is_new = !named.iter().any(|known| known.prefix == prefix && known.part == part);
                 let fits = rows.iter().all(|row| {
                     let value = row.get(position).and_then(|field| number(field));
-                    matches!(value, Some(Number::Integer(value)) if (0..PARTS[part].2).contains(&value))
+                    matches!(value, Some(Number::Integer(value)) if (0..PARTS[part].below).contains(&value))
                 });
                 if is_new && fits {
-                    named.push((prefix.to_owned(), part, position));
+                    named.push(NamedPart { prefix: prefix.to_owned(), part, position });
                 }
             }
         }
-        let prefix = named.iter().find(|(_, part, _)| *part == SECONDS).map(|(prefix, ..)| prefix.clone())?;
-        named.retain(|(own, ..)| *own == prefix);
-        let has = |part: usize| named.iter().any(|(_, own, _)| *own == part);
+        let prefix = named.iter().find(|of| of.part == SECONDS).map(|of| of.prefix.clone())?;
+        named.retain(|of| of.prefix == prefix);
+        let has = |part: usize| named.iter().any(|of| of.part == part);
         // Hours without minutes are no time of day; of several fractions one is a part.
         let is_time = named.len() > 1 && has(0) <= has(1) && !rows.is_empty();
-        let of_part = |(_, part, position): &(String, usize, usize)| (*position, PARTS[*part].1);
-        let mut parts: Vec<(usize, i64)> = named.iter().map(of_part).collect();
+        let mut parts: Vec<(usize, i64)> = named.iter().map(|of| (of.position, PARTS[of.part].unit_ns)).collect();
         parts.sort_unstable();
         is_time.then_some(Self::Parts(parts))
     }
@@ -315,7 +338,7 @@ impl CalendarClock {
     /// The time that the sum of the parts of a row is, ns, after as many midnights, or full hours without hours, as were passed.
     pub(crate) fn sum_ns(&mut self, sum: i64) -> Option<i64> {
         let CalendarColumns::Parts(parts) = &self.columns else { return None };
-        let has = |part: usize| parts.iter().any(|(_, unit)| *unit == PARTS[part].1);
+        let has = |part: usize| parts.iter().any(|(_, unit)| *unit == PARTS[part].unit_ns);
         let modulus = if has(0) { DAY_NS } else { 3600 * SECOND_NS };
         if has(1) {
             self.midnights += i64::from(self.before_ns.is_some_and(|before| sum < before - modulus / 2));

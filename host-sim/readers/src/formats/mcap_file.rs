@@ -153,6 +153,9 @@ pub(crate) fn for_each_record(
     }
 }
 
+/// Bytes of a chunk that are decompressed at once.
+const PIECE_BYTES: usize = 1 << 16;
+
 /// Takes the operation code and the content of a record.
 type EachRecord<'a> = dyn FnMut(u8, &[u8]) -> Result<(), Stop> + 'a;
 
@@ -200,7 +203,8 @@ fn chunk(data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
         "zstd" => Box::new(ZstdFrames::new(packed)),
         other => return Err(damaged(&format!("a chunk is compressed by {other}, which is not known")).into()),
     };
-    let mut input = Summed { input: unpacked, crc: Crc::new() };
+    // The checksum and the decoders are slow in pieces of a record.
+    let mut input = BufReader::with_capacity(PIECE_BYTES, Summed { input: unpacked, crc: Crc::new() });
     let failed = |error: io::Error| Stop::Damage(damaged(&format!("a chunk is damaged: {error}")));
     let mut record = Vec::new();
     loop {
@@ -216,7 +220,7 @@ fn chunk(data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
         each(opcode, &record)?;
     }
     // Less than a header may be left of a chunk that is cut off.
-    let is_right = record.is_empty() && (crc == 0 || crc == input.crc.sum());
+    let is_right = record.is_empty() && (crc == 0 || crc == input.get_ref().crc.sum());
     if is_right { Ok(()) } else { Err(damaged("the checksum of a chunk is wrong").into()) }
 }
 

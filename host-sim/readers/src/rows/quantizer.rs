@@ -25,7 +25,7 @@ pub(crate) const MEDIAN_OF_NORMAL: f64 = 0.674_5;
 
 /// How the numbers of a column become counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Quantizer {
+pub struct ColumnQuantizer {
     /// Size of a count, in the unit of the file.
     pub lsb: f64,
     /// Number whose count is 0; less than one LSB from 0.
@@ -35,7 +35,7 @@ pub struct Quantizer {
     pub cost: Option<f64>,
 }
 
-impl Quantizer {
+impl ColumnQuantizer {
     /// Numbers that are counts.
     pub const COUNTS: Self = Self { lsb: 1.0, offset: 0.0, cost: None };
 
@@ -194,7 +194,7 @@ pub(crate) fn noise_at_lag(values: &[f64], lag: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{MAX_COST, Quantizer, step};
+    use super::{ColumnQuantizer, MAX_COST, step};
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -225,7 +225,7 @@ mod tests {
                 if single { f64::from(value as f32) } else { value }
             };
             let values: Vec<f64> = counts.iter().map(written).collect();
-            let quantizer = Quantizer::new(&values);
+            let quantizer = ColumnQuantizer::new(&values);
             assert_eq!(quantizer.cost, None, "{step} {single}");
             assert!((quantizer.lsb / step - 1.0).abs() < 1e-6, "{} for {step}", quantizer.lsb);
             let found: Vec<i32> = values.iter().map(|&value| quantizer.count(value).expect("in range")).collect();
@@ -237,7 +237,7 @@ mod tests {
     fn a_bias_that_was_taken_off_is_no_hindrance() {
         let counts: Vec<i32> = noise(2, 20_000).iter().map(|x| (5.0 * x).round() as i32).collect();
         let values: Vec<f64> = counts.iter().map(|&count| f64::from(count) * 0.125 - 1.2345).collect();
-        let quantizer = Quantizer::new(&values);
+        let quantizer = ColumnQuantizer::new(&values);
         assert_eq!(quantizer.cost, None);
         let found: Vec<i32> = values.iter().map(|&value| quantizer.count(value).expect("in range")).collect();
         let shift = found[0] - counts[0];
@@ -249,7 +249,7 @@ mod tests {
     #[test]
     fn other_numbers_cost_at_most_what_is_stated() {
         let values: Vec<f64> = noise(3, 100_000).iter().map(|x| 9.81 + 1.7e-3 * x).collect();
-        let quantizer = Quantizer::new(&values);
+        let quantizer = ColumnQuantizer::new(&values);
         let cost = quantizer.cost.expect("no step");
         assert!(cost > MAX_COST / 5.0 && cost <= 1.05 * MAX_COST, "{cost}");
         let rounded: Vec<f64> =
@@ -272,7 +272,7 @@ mod tests {
             let counts: Vec<i32> =
                 noise.iter().enumerate().map(|(at, x)| (deviation * x + vibration(at)).round() as i32).collect();
             let values: Vec<f64> = counts.iter().map(|&count| f64::from(count) * 1e-6).collect();
-            let quantizer = Quantizer::new(&values);
+            let quantizer = ColumnQuantizer::new(&values);
             assert_eq!(quantizer.cost, None, "{deviation}: {quantizer:?}");
             let found: Vec<i32> = values.iter().map(|&value| quantizer.count(value).expect("in range")).collect();
             assert_eq!(found, counts, "{deviation}");
@@ -293,7 +293,7 @@ mod tests {
         let values: Vec<f64> = noise(5, 20_000).iter().map(|x| (9e7 * x).round() * 1e-9).collect();
         let (step, _) = step(&values).expect("nine decimals");
         assert!((step / 1e-9 - 1.0).abs() < 1e-6, "{step}");
-        let quantizer = Quantizer::new(&values);
+        let quantizer = ColumnQuantizer::new(&values);
         assert!(quantizer.lsb > 1e-3 && quantizer.cost.is_some(), "{quantizer:?}");
     }
 
@@ -309,14 +309,14 @@ mod tests {
         for values in
             [vec![], vec![f64::NAN; 4], vec![0.0; 4], vec![3.7; 9], vec![1e308, -1e308, 1e308], vec![1e-320, 0.0]]
         {
-            let quantizer = Quantizer::new(&values);
+            let quantizer = ColumnQuantizer::new(&values);
             assert!(quantizer.lsb > 0.0 && quantizer.lsb.is_finite(), "{values:?}: {quantizer:?}");
             assert!(values.iter().all(|&value| value.is_nan() || quantizer.count(value).is_some()), "{values:?}");
         }
         // One spike does not take the resolution from the others.
         let mut values = noise(4, 20_000);
         values[777] = 1e30;
-        let quantizer = Quantizer::new(&values);
+        let quantizer = ColumnQuantizer::new(&values);
         assert!(quantizer.cost.is_some_and(|cost| cost <= 1.05 * MAX_COST));
         assert_eq!(quantizer.count(1e30), None);
         assert_eq!(quantizer.count(f64::INFINITY), None);

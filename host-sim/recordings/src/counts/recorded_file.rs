@@ -1,17 +1,9 @@
-//! A table of register counts, or what was on the SPI bus, opened once: it may be a pipe.
+//! What was on the SPI bus, by this program or by a logic analyzer.
 
 use crate::counts::frame_log::{FrameLogReader, HEADER};
 use crate::counts::spi_export::{self, CapturedFrame, SpiExportReader};
 use readers::delimited_text::Lines;
 use readers::{FileBytes, InputError};
-
-/// An open recording, told apart by its header.
-pub enum RecordedFile {
-    /// A table.
-    Table,
-    /// Transactions of the SPI bus.
-    Frames(FrameReader),
-}
 
 /// Transactions of the SPI bus, by this program or by a logic analyzer.
 pub enum FrameReader {
@@ -21,25 +13,22 @@ pub enum FrameReader {
     Export(Box<SpiExportReader>),
 }
 
-impl RecordedFile {
-    /// Opens `file`, plain or gzip.
+impl FrameReader {
+    /// Opens `file`, plain or gzip; `None` where its first line is that of a table.
     ///
     /// # Errors
     /// The file cannot be read, or its header is that of none of the formats.
-    pub fn open(file: &FileBytes) -> Result<Self, InputError> {
+    pub fn open(file: &FileBytes) -> Result<Option<Self>, InputError> {
         let mut lines = Lines::open(file)?;
-        let header = lines.header()?;
-        if header == Some(HEADER) {
-            FrameLogReader::new(file.name(), lines).map(|log| Self::Frames(FrameReader::Log(log)))
-        } else if header.is_some_and(spi_export::is_header) {
-            SpiExportReader::new(file.name(), lines).map(|export| Self::Frames(FrameReader::Export(Box::new(export))))
-        } else {
-            Ok(Self::Table)
-        }
+        Ok(match lines.header()? {
+            Some(HEADER) => Some(Self::Log(FrameLogReader::new(file.name(), lines)?)),
+            Some(header) if spi_export::is_header(header) => {
+                Some(Self::Export(Box::new(SpiExportReader::new(file.name(), lines)?)))
+            }
+            _ => None,
+        })
     }
-}
 
-impl FrameReader {
     /// The next transaction; `None` at the end.
     ///
     /// # Errors

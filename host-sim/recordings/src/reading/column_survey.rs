@@ -4,7 +4,7 @@ use crate::batch_source::channel;
 use crate::recording::Verdict;
 use adis16405_driver::{Channel, Faults};
 use measurement::ChannelProfile;
-use readers::{Quantizer, ValueColumn};
+use readers::{ColumnQuantizer, ValueColumn};
 use std::collections::BTreeMap;
 
 /// How often a range of the data sheet a value may be before it is no measurement.
@@ -132,21 +132,24 @@ impl ColumnSurvey {
     }
 
     /// How the numbers become counts; `None` where none can be used.
-    pub(crate) fn quantizer(&self, column: &ValueColumn) -> Option<Quantizer> {
-        let of_values = || if column.register.is_some() { Quantizer::COUNTS } else { Quantizer::new(&self.values()) };
+    pub(crate) fn quantizer(&self, column: &ValueColumn) -> Option<ColumnQuantizer> {
+        let of_values =
+            || if column.register.is_some() { ColumnQuantizer::COUNTS } else { ColumnQuantizer::new(&self.values()) };
         self.is_usable.then(of_values)
     }
 
     /// The same for numbers that are no multiples of the step of those that were kept.
-    pub(crate) fn quantizer_without_step(&self) -> Quantizer {
-        Quantizer::without_step(&self.values())
+    pub(crate) fn quantizer_without_step(&self) -> ColumnQuantizer {
+        ColumnQuantizer::without_step(&self.values())
     }
 }
 
 /// What the user should know of the counts that stand for the numbers of some channels; `None` where rounding to them costs nothing that
 /// counts.
-pub(crate) fn rounding_note<'a>(channels: impl Iterator<Item = (&'a ChannelProfile, &'a Quantizer)>) -> Option<String> {
-    let cost = |(profile, quantizer): (&ChannelProfile, &Quantizer)| {
+pub(crate) fn rounding_note<'a>(
+    channels: impl Iterator<Item = (&'a ChannelProfile, &'a ColumnQuantizer)>,
+) -> Option<String> {
+    let cost = |(profile, quantizer): (&ChannelProfile, &ColumnQuantizer)| {
         let cost = quantizer.cost.filter(|cost| *cost > NOTED_COST)?;
         Some(format!("{} {cost:.1e}", profile.name))
     };

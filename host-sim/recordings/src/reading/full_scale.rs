@@ -3,7 +3,7 @@
 //! The full scale is that of the data sheet, else that of 16 bits if the counts reach it and do not exceed it. How large a count is, is known
 //! at the end: until then a row is a candidate while it has the largest or the smallest number of its column.
 
-use readers::{Quantizer, ValueColumn};
+use readers::{ColumnQuantizer, ValueColumn};
 use std::collections::BTreeMap;
 
 /// Largest and smallest count of 16 bits.
@@ -90,7 +90,7 @@ impl FullScale {
     }
 
     /// Rows at full scale, and of each channel a sentence on its samples there.
-    pub(crate) fn finish(&self, columns: &[ValueColumn], quantizers: &[Option<Quantizer>]) -> (u64, Vec<String>) {
+    pub(crate) fn finish(&self, columns: &[ValueColumn], quantizers: &[Option<ColumnQuantizer>]) -> (u64, Vec<String>) {
         let (mut mask, mut notes) = (0u128, Vec::new());
         for (at, (extremes, column)) in self.extremes.iter().zip(columns).enumerate() {
             let Some(quantizer) = &quantizers[at] else { continue };
@@ -138,7 +138,7 @@ fn forget(rows: &mut BTreeMap<u128, u64>, bit: u128) {
 mod tests {
     use super::FullScale;
     use measurement::{ChannelProfile, Quantity};
-    use readers::{Quantizer, ValueColumn};
+    use readers::{ColumnQuantizer, ValueColumn};
 
     /// Rows at full scale, and those of the first channel by its note, of counts in two channels.
     fn found(range: Option<f64>, rows: &[[f64; 2]]) -> (u64, Vec<String>) {
@@ -149,7 +149,7 @@ mod tests {
         for (row, numbers) in rows.iter().enumerate() {
             scale.add(&columns, row as u64, numbers.iter().copied());
         }
-        scale.finish(&columns, &[Some(Quantizer::COUNTS); 2])
+        scale.finish(&columns, &[Some(ColumnQuantizer::COUNTS); 2])
     }
 
     /// Counts from 0 to 49.

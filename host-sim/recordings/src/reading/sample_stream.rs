@@ -15,8 +15,8 @@ use measurement::{
     lost_part,
 };
 use readers::{
-    ACCELEROMETER, BATCH, GYROSCOPE, InputError, MAGNETOMETER, PaddingFinder, Quantizer, ReadMonitor, ReadOptions,
-    ReadPass, RowBefore, Unpadded, ValueColumn, WantedRows,
+    ACCELEROMETER, BATCH, ColumnQuantizer, GYROSCOPE, InputError, MAGNETOMETER, PaddingFinder, ReadMonitor,
+    ReadOptions, ReadPass, RowBefore, Unpadded, ValueColumn, WantedRows,
 };
 use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
@@ -420,7 +420,7 @@ struct StreamedColumn {
     column: ValueColumn,
     survey: ColumnSurvey,
     /// `None` where no number can be used.
-    quantizer: Option<Quantizer>,
+    quantizer: Option<ColumnQuantizer>,
 }
 
 /// What the first reading of a recording has found.
@@ -499,7 +499,8 @@ impl Survey {
         let quantizer = |(at, (survey, column)): (usize, (&ColumnSurvey, &ValueColumn))| {
             survey.quantizer(column).filter(|_| !unfilled.contains(&at))
         };
-        let quantizers: Vec<Option<Quantizer>> = surveys.iter().zip(&columns).enumerate().map(quantizer).collect();
+        let quantizers: Vec<Option<ColumnQuantizer>> =
+            surveys.iter().zip(&columns).enumerate().map(quantizer).collect();
         let (full_scale, full_scale_notes) = full_scale.finish(&columns, &quantizers);
         let mut dropped = totals.dropped(has_index);
         if quantizers.iter().all(Option::is_none) {

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use recordings::ReadOptions;
 use recordings::file_format::{RecordedFormat, RecordedInput};
 use recordings::inspection::InspectedTable;
-use recordings::recorded_file::RecordedFile;
+use recordings::recorded_file::FrameReader;
 use recordings::recording::{Recorder, Recording, TimeStamp};
 use recordings::row_writer::{SensorRows, WriteError};
 use recordings::sample_stream::{KeptInMemory, Reading as WayOfReading, SampleStream, StreamError};
@@ -163,7 +163,7 @@ pub(crate) fn read_file<T: AsRef<str>>(file: &Path, options: &[T]) -> Result<Rea
 
 /// The bursts of a log of the SPI bus in its default range, without the driver.
 fn bursts(input: &RecordedInput) -> Result<Recording, InputError> {
-    let RecordedFile::Frames(mut frames) = RecordedFile::open(input.bytes())? else { panic!("a log of the bus") };
+    let Some(mut frames) = FrameReader::open(input.bytes())? else { panic!("a log of the bus") };
     let mut recorder = Recorder::new(Channel::ALL.to_vec(), GyroRange::default());
     while let Some(captured) = frames.next()? {
         let frame = captured.frame;
