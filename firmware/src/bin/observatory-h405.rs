@@ -7,7 +7,8 @@
 //! | PB0 | data ready, rising edge | DIO1 |
 //! | PA2, PA3 | USART2 TX, RX, 460 800 Bd 8N1 | to the host |
 //!
-//! The sensor runs from 5 V; its outputs are connected to 5 V tolerant pins without a pull, and its inputs accept 3.3 V.
+//! The sensor runs from 5 V and drives its outputs from an internal 3.3 V: connect every signal directly, without a divider
+//! or a level shifter (data sheet Rev. B, page 5).
 #![no_std]
 #![no_main]
 

@@ -8,8 +8,8 @@
 //! | GP0, GP1 | UART0 TX, RX, 460 800 Bd 8N1 | to the host |
 //! | USB | serial port (CDC-ACM), the same messages | to the host |
 //!
-//! The sensor runs from 5 V, which VBUS gives; its inputs accept 3.3 V, and its outputs are driven from an internal supply of
-//! 3.3 V (ADIS16400/ADIS16405 data sheet Rev. B, page 5), as the RP2040's pins need it. GP16 and GP20 have no pull.
+//! The sensor runs from 5 V and drives its outputs from an internal 3.3 V: connect every signal directly, without a divider
+//! or a level shifter (data sheet Rev. B, page 5).
 #![no_std]
 #![no_main]
 

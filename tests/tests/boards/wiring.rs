@@ -29,7 +29,7 @@ fn each_board_samples_with_its_crystal_and_pins() {
         assert_eq!((health.used, health.lost_edges), (health.bursts, 0), "{name}: {health:?}");
         assert!((9..=11).contains(&led_changes), "{name}: {led_changes} changes of the LED in 5 s");
 
-        // MISO (PA6) and data ready: 5 V tolerant without a pull (STM32F405 data sheet, table 7).
+        // MISO (PA6) and data ready have no pull.
         for (port, pin) in [(0, 6), wiring.data_ready] {
             assert_eq!(registers[&gpio(port, PUPDR)] >> (2 * pin) & 3, 0, "{name}: port {port}, pin {pin}");
         }
