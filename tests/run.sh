@@ -20,7 +20,7 @@ BROWSER=wasm32-unknown-unknown
 mkdir -p "${CARGO_TARGET_DIR:-target}"
 TARGET=$(realpath "${CARGO_TARGET_DIR:-target}")
 WITHOUT_RECORDINGS=$TARGET/tests-without-recordings # names of tests, one a line
-WORKSPACES=(. tests/tools adis16405-driver/examples-stm32f405 allan-core/examples-cortex-m)
+WORKSPACES=(. tests/tools adis16405-driver/examples-stm32f405 adis16405-driver/examples-rp2040 allan-core/examples-cortex-m)
 STEPS=(
     "tools:install what is missing"
     "format:formatting"
@@ -125,13 +125,15 @@ build() {
     (cd tests/tools && run cargo programs --target-dir "$TARGET/programs") # the tests start them
     export HOST_SIM=$TARGET/debug/host-sim # the program as just built
 }
-examples() { # two workspaces with the same frameworks, which are compiled once
-    local workspace
-    for workspace in adis16405-driver/examples-stm32f405 allan-core/examples-cortex-m; do
+examples() { # workspaces with the same frameworks, which are compiled once for each core
+    local workspace core
+    for workspace in adis16405-driver/examples-stm32f405 allan-core/examples-cortex-m adis16405-driver/examples-rp2040; do
+        core=$MCU
+        [ "$workspace" != adis16405-driver/examples-rp2040 ] || core=$SMALL
         (
             unset RUSTC_WORKSPACE_WRAPPER
             cd "$workspace"
-            run cargo clippy --locked --target "$MCU" --target-dir "$TARGET/examples" -- -D warnings
+            run cargo clippy --locked --target "$core" --target-dir "$TARGET/examples" -- -D warnings
         )
     done
 }

@@ -5,6 +5,11 @@
 
 mod generated;
 
+/// Compiles the example with both libraries.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/libraries.md")]
+struct Libraries;
+
 pub use generated::{generated, generated_within, writes_docs};
 use serial2::SerialPort;
 use std::fs::{File, OpenOptions};

@@ -12,3 +12,4 @@ mod links;
 mod recorded_words;
 mod recordings;
 mod reproducible_image;
+mod wires;

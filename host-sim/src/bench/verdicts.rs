@@ -1,6 +1,6 @@
 //! What the answers say: a check for each figure, and the probable cause of each that fails.
 
-use super::{Topic, Transcript, raw_messages};
+use super::transcript::{PATTERNS, Topic, Transcript, raw_messages};
 use adis16405_driver::{Channel, GyroRange, OutputWord, Product};
 use link::{BootCause, ClockSource, Health, RawMessage, Received};
 use std::collections::BTreeMap;
@@ -356,7 +356,7 @@ fn identification(transcript: &Transcript) -> Vec<Check> {
         checks.push(Check::not_run("PROD_ID again and again", "none differs"));
     }
     let (mut written, mut bits) = (0, 0);
-    for pattern in super::PATTERNS {
+    for pattern in PATTERNS {
         let line = transcript.lines(Topic::Pattern(pattern)).find(|line| line.starts_with("ALM_MAG1"));
         if let Some(value) = line.and_then(register_value) {
             written += 1;
