@@ -132,7 +132,7 @@ const BUGS: [Bug; 35] = [
         "an_external_clock_triggers_the_samples"),
     bug("the filter has a phase of N − 1 samples", "config.rs",
         "if age <= n { age } else { (2 * n).saturating_sub(age) }", "if age < n { age + 1 } else { (2 * n - 1).saturating_sub(age) }",
-        "a_step_passes_the_filter_with_the_weights_of_the_driver"),
+        "a_step_passes_the_filter_with_a_triangle_of_weights"),
     bug("a supply outside its window refuses a sample", "validity.rs",
         "Faults::REPEATED.union(Faults::SUPPLY).union(Faults::ERROR_ALARM)", "Faults::REPEATED.union(Faults::ERROR_ALARM)",
         "a_supply_outside_its_window_refuses_a_sample_only_if_that_is_asked_for"),
