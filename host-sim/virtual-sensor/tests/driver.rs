@@ -111,7 +111,7 @@ fn a_step_passes_the_filter_with_a_triangle_of_weights() {
     imu.write_register(Register::MscCtrl, 0x0106).unwrap();
     let mut expected = 0.0;
     for age in 0_i32..20 {
-        expected += 800.0 * f64::from((age + 1).min(15 - age).max(0)) / 64.0;
+        expected += 800.0 * f64::from(age.min(16 - age).max(0)) / 64.0;
         bus.wait_for_data();
         let x = imu.burst().unwrap().counts().gyro()[0];
         assert!((f64::from(x) - expected).abs() <= 0.5 + 1e-9, "sample {age}: {x}, expected {expected}");
