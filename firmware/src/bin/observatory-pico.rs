@@ -20,7 +20,7 @@ impl BoardSupport for Pico {
     type Device = pac::Peripherals;
     type Microcontroller = Rp2040;
     type DataReady = wires::DataReady;
-    type Bus = wires::SensorBus;
+    type Bus = wires::Spi0Bus;
     type Uart = wires::Uart;
     type Usb = wires::Usb;
     type Led = wires::Led;

@@ -35,7 +35,7 @@ const BAUD: u32 = 460_800;
 type Pin<I, F, P = PullDown> = gpio::Pin<I, F, P>;
 type SpiPins = (Pin<Gpio19, FunctionSpi>, Pin<Gpio16, FunctionSpi>, Pin<Gpio18, FunctionSpi>);
 /// The sensor's bus.
-pub type SensorBus = SensorSpi<Spi0<SpiPins>, Pin<Gpio17, FunctionSioOutput>>;
+pub type Spi0Bus = SensorSpi<Spi0<SpiPins>, Pin<Gpio17, FunctionSioOutput>>;
 /// The data-ready input.
 pub type DataReady = Pin<Gpio20, FunctionSioInput>;
 /// The serial port on pins.
@@ -57,14 +57,7 @@ pub fn start<B>(
     reset_line: impl FnOnce(ResetPin) -> Option<B::ResetLine>,
 ) -> BoardParts<B>
 where
-    B: BoardSupport<
-            Microcontroller = Rp2040,
-            DataReady = DataReady,
-            Bus = SensorBus,
-            Uart = Uart,
-            Usb = Usb,
-            Led = Led,
-        >,
+    B: BoardSupport<Microcontroller = Rp2040, DataReady = DataReady, Bus = Spi0Bus, Uart = Uart, Usb = Usb, Led = Led>,
 {
     let cause = boot_cause(&device.VREG_AND_CHIP_RESET, &device.WATCHDOG);
     let mut resets = device.RESETS;
