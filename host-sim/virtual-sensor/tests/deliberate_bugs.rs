@@ -32,7 +32,7 @@ const fn bug(
 }
 
 #[rustfmt::skip]
-const BUGS: [Bug; 35] = [
+const BUGS: [Bug; 34] = [
     bug("a burst is requested with 0x3C00", "burst.rs",
         "request[0] = 0x3E;", "request[0] = 0x3C;",
         "the_driver_reads_what_the_part_sampled"),
