@@ -68,8 +68,9 @@ fn assert_recovers_from_every_fault(rate_hz: f64, seed: u64) {
     // After its reset the sensor gives no edge for at least 100 ms, and is configured before its samples are used.
     assert_eq!(reset.recoveries, 1);
     assert!(f64::from(reset.lost_edges) >= 0.1 * rate_hz, "{reset:?}");
-    // A burst that the reset cuts short is refused: its bits are shifted.
+    // A burst that the reset cuts short is refused: its bits are shifted. The sensor reports a frame with a wrong number of clocks then.
     assert!(reset.shifted <= 1 && reset.used + reset.shifted == reset.bursts, "{reset:?}");
+    assert_eq!(reset.shifted, reset.diag_spi, "{reset:?}");
 
     // After 16 bursts of a stuck line sampling stops, and the sensor is probed until it answers.
     assert_eq!((low.stuck_low, low.recoveries), (16, 2), "{low:?}");
