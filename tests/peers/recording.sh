@@ -80,7 +80,7 @@ if [ -f "$run" ]; then
 fi
 echo "virtual hour"
 hour=$((3600 * 2048 / 10))
-measure "host-sim" "$hour" "$target/release/host-sim" --page "$folder/page" --force --quiet
+measure "host-sim" "$hour" "$target/release/host-sim" demo --page "$folder/page" --force --quiet
 # 166 recordings of a minute at 100 Hz.
 rows=996000 minute=6000
 table=$(table_of "$rows")
@@ -95,6 +95,6 @@ fi
 echo "$((rows / minute)) recordings of a minute, and one of their length"
 for option in --quick ""; do
     measure "host-sim analyze $option, one" "$rows" "$target/release/host-sim" analyze "$table" --rate 100 --quiet $option
-    measure "host-sim analyze $option, minutes" "$rows" "$target/release/host-sim" analyze "$minutes"/*.csv --rate 100 \
-        --reports "$folder/reports" --force --quiet $option
+    measure "host-sim batch $option, minutes" "$rows" "$target/release/host-sim" batch "$minutes"/*.csv --rate 100 \
+        -o "$folder/reports" --force --quiet $option
 done

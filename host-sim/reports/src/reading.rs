@@ -2,11 +2,11 @@
 
 use crate::formatting::count;
 use crate::formatting::words;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// What was read of a recording.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ReadingRecord {
     /// Name of the file, without its folder.
     pub file: String,

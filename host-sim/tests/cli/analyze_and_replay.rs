@@ -76,7 +76,7 @@ fn a_file_that_is_cut_is_told_everywhere() {
     assert!(html.contains("Not read to its end: truncated") && html.contains("What was read"));
     // Of many.
     let intact = write(&dir, "whole.ulg", &whole);
-    let output = host_sim(&["analyze", file, intact.to_str().expect("UTF-8"), "--reports", &reports]);
+    let output = host_sim(&["batch", file, intact.to_str().expect("UTF-8"), "-o", &reports]);
     assert_eq!(output.status.code(), Some(3), "{}", String::from_utf8_lossy(&output.stderr));
     for (name, complete) in [("cut", false), ("whole", true)] {
         let report = std::fs::read(format!("{reports}/{name}.ulg.json")).expect("a report");

@@ -48,20 +48,8 @@ fn options_of_the_documentation_are_those_of_the_program() {
     assert!(commands > 30, "{commands} commands");
     // What says how a recording is read is described.
     let page = std::fs::read_to_string(root.join("docs/recordings.md")).expect("a page");
-    for option in [
-        "columns",
-        "units",
-        "topic",
-        "rate",
-        "sensor",
-        "range",
-        "from",
-        "to",
-        "yes",
-        "each-sensor",
-        "reports",
-        "format",
-    ] {
+    for option in ["columns", "units", "topic", "rate", "sensor", "range", "from", "to", "yes", "each-sensor", "format"]
+    {
         assert!(page.contains(&format!("--{option}")), "docs/recordings.md does not have --{option}");
     }
     assert!(options("convert").is_superset(&["from", "to", "format", "rate"].map(str::to_owned).into()));
