@@ -441,5 +441,5 @@ fn the_table_of_rivals_is_in_the_docs() {
     };
     let rows: String = RIVALRIES.iter().map(line).collect();
     let table = format!("| stands | in the place of | where | because |\n|---|---|---|---|\n{rows}");
-    system_tests::generated("docs/analysis.md", "rivals", &table);
+    system_tests::generated("docs/rivals.md", "rivals", &table);
 }
