@@ -61,7 +61,6 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
         ("--page", output.page.is_some()),
         ("--pictures", output.pictures.is_some()),
         ("--full", output.full),
-        ("--explain", output.explain),
     ];
     let refused: Vec<&str> = refused.into_iter().filter(|(_, is_given)| *is_given).map(|(option, _)| option).collect();
     if !refused.is_empty() {

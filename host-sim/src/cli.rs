@@ -726,12 +726,9 @@ impl SimulationArguments {
 #[derive(Debug, Args)]
 #[command(next_help_heading = OUTPUT)]
 pub(crate) struct OutputArguments {
-    /// Print every table of every channel.
-    #[arg(long, conflicts_with_all = ["quiet", "explain"])]
-    pub(crate) full: bool,
-    /// Print sentences: what was found, what it changes.
+    /// Print every sentence and table of every channel.
     #[arg(long, conflicts_with = "quiet")]
-    pub(crate) explain: bool,
+    pub(crate) full: bool,
     /// Print nothing.
     #[arg(long)]
     pub(crate) quiet: bool,

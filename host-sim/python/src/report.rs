@@ -1,5 +1,6 @@
 //! The report of an analysis, and its rows as a table of Arrow.
 
+use anstream::StripStream;
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::{ArrayRef, Float64Array, Int64Array, RecordBatch, RecordBatchIterator, StringArray};
 use arrow_schema::ffi::FFI_ArrowSchema;
@@ -14,8 +15,12 @@ use reports::export::{self, AxisChoice, ExportFormat};
 use reports::json::ReportJson;
 use reports::rows::{ReportRow, rows};
 use reports::saved_report::SavedReport;
-use reports::{explanation, figure, page};
+use reports::terminal::Screen;
+use reports::{figure, page};
 use std::sync::Arc;
+
+/// Columns of a report as text.
+const COLUMNS: usize = 80;
 
 /// The report behind `imunoise.Report`.
 #[pyclass(frozen, name = "Report", module = "imunoise._native")]
@@ -51,12 +56,13 @@ impl NativeReport {
             .map_err(failed)
     }
 
-    /// The report in sentences.
+    /// The screen of the command, without colours.
     fn text(&self, py: Python) -> PyResult<String> {
         py.detach(|| {
-            let mut text = Vec::new();
-            explanation::write(&self.analysed.report, Some(&self.name), &mut text).map_err(failed)?;
-            String::from_utf8(text).map_err(failed)
+            let mut text = StripStream::new(Vec::new());
+            let screen = Screen { report: &self.analysed.report, source: Some(&self.name), columns: COLUMNS };
+            screen.write(&mut text).map_err(failed)?;
+            String::from_utf8(text.into_inner()).map_err(failed)
         })
     }
 
