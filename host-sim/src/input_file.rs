@@ -14,7 +14,7 @@ const HEAD: u64 = 64;
 pub(crate) fn is_report(file: &Path) -> bool {
     let mut head = Vec::new();
     let is_file = file.is_file();
-    let read = || File::open(file)?.take(HEAD).read_to_end(&mut head);
+    let mut read = || File::open(file)?.take(HEAD).read_to_end(&mut head);
     is_file && read().is_ok() && head.trim_ascii_start().starts_with(b"{")
 }
 
