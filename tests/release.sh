@@ -33,7 +33,7 @@ PATH=$python:$PATH run "$python/maturin" build --quiet --release --locked --mani
 
 # The program, optimised over all crates, which the everyday build is not.
 run cargo build --locked --release --package host-sim --target-dir "$target"
-cp "$target/release/host-sim" "$out"
+cp "$target/release/imunoise" "$out"
 
 # The images
 image() { # BOARD TARGET ENDING

@@ -124,7 +124,7 @@ format() {
 build() {
     nextest --no-run
     (cd tests/tools && run cargo programs --target-dir "$TARGET/programs") # the tests start them
-    export HOST_SIM=$TARGET/debug/host-sim # the program as just built
+    export IMUNOISE=$TARGET/debug/imunoise # the program as just built
 }
 examples() { # workspaces with the same frameworks, which are compiled once for each core
     local workspace core

@@ -1,7 +1,7 @@
 """Processor time on this machine, medians of runs in turn: the estimator beside other programs on the same arrays, and the analysis of an
 array beside the command on the same numbers in a file.
 
-    python speed.py [COMMAND]     # COMMAND, such as target/release/host-sim: the time of `analyze` too
+    python speed.py [COMMAND]     # COMMAND, such as target/release/imunoise: the time of `analyze` too
 
 The other programs are those of tests/requirements.txt and tests/peers/accuracy/requirements.txt.
 """

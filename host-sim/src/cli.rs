@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 /// Name of the program.
-pub(crate) const PROGRAM: &str = "host-sim";
+pub(crate) const PROGRAM: &str = "imunoise";
 
 /// Heading of the options that say how a recording is read.
 const INPUT: &str = "Input";
@@ -30,67 +30,67 @@ const OUTPUT: &str = "Output";
 /// Below the options of the program; each line is a command.
 const EXAMPLES: &str = "\
 Examples:
-  host-sim imu.bag --page report             a recording of any inertial sensor
-  host-sim demo                              an hour of the virtual sensor
-  host-sim monitor /dev/ttyACM0              a device that runs the firmware";
+  imunoise imu.bag --page report             a recording of any inertial sensor
+  imunoise demo                              an hour of the virtual sensor
+  imunoise monitor /dev/ttyACM0              a device that runs the firmware";
 
 /// Below the options of `analyze`.
 const EXAMPLES_OF_ANALYZE: &str = "\
 Examples:
-  host-sim analyze flight.ulg --page report --export kalibr=imu.yaml
-  host-sim analyze imu.csv --columns gyro_x=wx,time=t --units deg/s,ms
-  host-sim analyze run1.csv.gz --rate 100 --json report.json";
+  imunoise analyze flight.ulg --page report --export kalibr=imu.yaml
+  imunoise analyze imu.csv --columns gyro_x=wx,time=t --units deg/s,ms
+  imunoise analyze run1.csv.gz --rate 100 --json report.json";
 
 /// Below the options of `batch`.
 const EXAMPLES_OF_BATCH: &str = "\
 Examples:
-  host-sim batch recordings -o reports --rows rows.ndjson
-  host-sim batch a.csv.gz b.csv.gz -o reports --rate 100 -j 4 --resume";
+  imunoise batch recordings -o reports --rows rows.ndjson
+  imunoise batch a.csv.gz b.csv.gz -o reports --rate 100 -j 4 --resume";
 
 /// Below the options of `demo`.
 const EXAMPLES_OF_DEMO: &str = "\
 The page is report/index.html, unless --page names another folder.
 
 Examples:
-  host-sim demo
-  host-sim demo --seconds 600 --plain --page hour";
+  imunoise demo
+  imunoise demo --seconds 600 --plain --page hour";
 
 /// Below the options of `inspect`.
 const EXAMPLES_OF_INSPECT: &str = "\
 Examples:
-  host-sim inspect imu.bag
-  host-sim inspect flight.ulg --topic sensor_gyro:1";
+  imunoise inspect imu.bag
+  imunoise inspect flight.ulg --topic sensor_gyro:1";
 
 /// Below the options of `compare`.
 const EXAMPLES_OF_COMPARE: &str = "\
 Examples:
-  host-sim compare run1.csv.gz run2.csv.gz --rate 100
-  host-sim compare still.csv.gz --running hover.csv.gz
-  host-sim compare before.json after.json
-  host-sim compare report.json --data-sheet";
+  imunoise compare run1.csv.gz run2.csv.gz --rate 100
+  imunoise compare still.csv.gz --running hover.csv.gz
+  imunoise compare before.json after.json
+  imunoise compare report.json --data-sheet";
 
 /// Below the options of `export`.
 const EXAMPLES_OF_EXPORT: &str = "\
 Examples:
-  host-sim export report.json imu.yaml --format kalibr";
+  imunoise export report.json imu.yaml --format kalibr";
 
 /// Below the options of `convert`.
 const EXAMPLES_OF_CONVERT: &str = "\
 Examples:
-  host-sim convert flight.ulg still.csv.gz --from 8.2 --to 60
-  host-sim convert imu.bag imu.npy";
+  imunoise convert flight.ulg still.csv.gz --from 8.2 --to 60
+  imunoise convert imu.bag imu.npy";
 
 /// Below the options of `monitor`.
 const EXAMPLES_OF_MONITOR: &str = "\
 Examples:
-  host-sim monitor /dev/ttyACM0
-  host-sim monitor run1.csv.gz --rate 100 --speed 60";
+  imunoise monitor /dev/ttyACM0
+  imunoise monitor run1.csv.gz --rate 100 --speed 60";
 
 /// Below the options of `record`.
 const EXAMPLES_OF_RECORD: &str = "\
 Examples:
-  host-sim record cable.csv.gz --port /dev/ttyACM0 --seconds 3600
-  host-sim record night.csv.gz --port COM4 --seconds 28800 --page report";
+  imunoise record cable.csv.gz --port /dev/ttyACM0 --seconds 3600
+  imunoise record night.csv.gz --port COM4 --seconds 28800 --page report";
 
 /// Below the options of `bench`.
 const EXAMPLES_OF_BENCH: &str = "\
@@ -98,8 +98,8 @@ The sensor must be still. Two minutes; the statistics are reset, the settings
 kept. docs/bench.md has what to do with an oscilloscope.
 
 Examples:
-  host-sim bench /dev/ttyACM0
-  host-sim bench /dev/ttyACM0 --second /dev/ttyUSB0";
+  imunoise bench /dev/ttyACM0
+  imunoise bench /dev/ttyACM0 --second /dev/ttyUSB0";
 
 /// Length of a recording of a device if none is given, s.
 const DEFAULT_S: f64 = 60.0;
@@ -107,8 +107,8 @@ const DEFAULT_S: f64 = 60.0;
 /// Below the options of `replay`.
 const EXAMPLES_OF_REPLAY: &str = "\
 Examples:
-  host-sim replay counts.csv.gz --rate 100
-  host-sim replay bus.csv.gz --json report.json";
+  imunoise replay counts.csv.gz --rate 100
+  imunoise replay bus.csv.gz --json report.json";
 
 /// Below the options of `simulate`.
 const EXAMPLES_OF_SIMULATE: &str = "\
@@ -116,13 +116,13 @@ Without --gyro and --accl the noise is that of a published part.
 --effect, --environment and --fault may be given several times.
 
 Examples:
-  host-sim simulate hour.csv.gz --gyro 0.037,0.009,0.0013
-  host-sim simulate fan.csv --effect sinusoid:gyro_z:frequency=20,amplitude=0.1";
+  imunoise simulate hour.csv.gz --gyro 0.037,0.009,0.0013
+  imunoise simulate fan.csv --effect sinusoid:gyro_z:frequency=20,amplitude=0.1";
 
 /// Below the options of `completions`.
 const EXAMPLES_OF_COMPLETIONS: &str = "\
 Examples:
-  host-sim completions bash";
+  imunoise completions bash";
 
 /// Noise analysis of inertial sensors, with a virtual ADIS16405.
 #[derive(Debug, Parser)]
@@ -804,7 +804,7 @@ mod tests {
         let program = Cli::command();
         for command in std::iter::once(&program).chain(program.get_subcommands()) {
             let text = command.get_after_help().map(ToString::to_string).unwrap_or_default();
-            let lines = text.lines().filter(|line| line.starts_with("  host-sim"));
+            let lines = text.lines().filter(|line| line.starts_with("  imunoise"));
             let examples: Vec<&str> = lines.filter_map(|line| line.trim_start().split("   ").next()).collect();
             assert!(!examples.is_empty(), "{}", command.get_name());
             for example in examples {

@@ -156,7 +156,7 @@ impl Contents {
         let file = self.given.input.file.display().to_string();
         let rate = ["--rate", "HZ"].into_iter().filter(|_| proposal.lacks_rate).map(str::to_owned);
         let words = [file].into_iter().chain(arguments.options(false)).chain(rate).chain(cli::other_options());
-        format!("host-sim analyze {}", words.map(|word| quoted(&word)).collect::<Vec<_>>().join(" "))
+        format!("imunoise analyze {}", words.map(|word| quoted(&word)).collect::<Vec<_>>().join(" "))
     }
 }
 
@@ -199,7 +199,7 @@ impl Display for Contents {
         if self.proposals().count() > 1 && self.proposals().all(is_taken) {
             let rest = if self.proposals().all(Proposal::is_complete) { "" } else { " --yes" };
             let file = quoted(&self.given.input.file.display().to_string());
-            writeln!(f, "all of them, as several recordings:\n  host-sim analyze {file} --each-sensor{rest}")?;
+            writeln!(f, "all of them, as several recordings:\n  imunoise analyze {file} --each-sensor{rest}")?;
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! The command `host-sim`, and its analysis of one recording as a function of other programs.
+//! The command `imunoise`, and its analysis of one recording as a function of other programs.
 
 mod analyze;
 mod batch;

@@ -1,4 +1,4 @@
-//! The command `host-sim`.
+//! The command `imunoise`.
 
 #[cfg(feature = "mimalloc")]
 mod allocator;

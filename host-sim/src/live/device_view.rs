@@ -116,7 +116,7 @@ impl LatestMessages {
             view.sentences = format!("Probably {}.", monitor::SILENCE);
         } else if let Some(trouble) = &self.trouble {
             view.headline = format!("{name}   The sensor is not sampled: {trouble}");
-            view.sentences = format!("Its wires or its supply; host-sim bench {name} says which.");
+            view.sentences = format!("Its wires or its supply; imunoise bench {name} says which.");
         }
         view
     }

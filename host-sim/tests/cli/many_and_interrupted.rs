@@ -1,6 +1,6 @@
 //! `batch` of many files and folders, and the interruption of the reading.
 
-use crate::program::{host_sim, json_of, signal, wait_until, write};
+use crate::program::{imunoise, json_of, signal, wait_until, write};
 use serde_json::Value;
 use std::fs::{self, File, OpenOptions};
 use std::io::{Read, Write};
@@ -32,7 +32,7 @@ fn each_report_of_many_is_that_of_the_file_alone() {
     for quick in [&[][..], &["--quick"]] {
         let reports = dir.path().join("reports");
         let arguments = ["batch", a, text(&damaged), b, c, "--rate", "100", "-o", text(&reports)];
-        let output = host_sim(&[&arguments[..], quick].concat());
+        let output = imunoise(&[&arguments[..], quick].concat());
         let (printed, errors) =
             (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr).into_owned());
         assert_eq!(output.status.code(), Some(1), "{errors}");
@@ -57,7 +57,7 @@ fn reports_of_one_name_are_refused_before_any_work() {
     let other = write(&dir, "other/imu.csv", table(2, 100).as_bytes());
     let reports = dir.path().join("reports");
     let arguments = ["batch", text(&one), text(&other), "--rate", "100", "-o", text(&reports)];
-    let output = host_sim(&arguments);
+    let output = imunoise(&arguments);
     let error = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(!output.status.success() && error.contains("would both have the report"), "{error}");
     assert!(!reports.exists());
@@ -76,7 +76,7 @@ fn the_reports_of_a_folder_mirror_it_and_are_resumed() {
     let [fleet, reports, rows] = ["fleet", "reports", "rows.ndjson"].map(|name| dir.path().join(name));
     let arguments = ["batch", text(&fleet), "-o", text(&reports), "--rows", text(&rows), "--rate", "100", "-j", "1"];
     let run = |more: &[&str]| {
-        let output = host_sim(&[&arguments[..], more].concat());
+        let output = imunoise(&[&arguments[..], more].concat());
         let printed = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
         (output.status.code(), printed)
     };
@@ -112,7 +112,7 @@ fn the_reports_of_a_folder_mirror_it_and_are_resumed() {
 /// The program with a named pipe as its recording, which it copies into the folder `copies`, and the open end of the pipe to write to.
 fn reading(pipe: &Path, copies: &Path, arguments: &[&str]) -> (Child, File) {
     assert!(Command::new("mkfifo").arg(pipe).status().expect("mkfifo starts").success());
-    let program = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+    let program = Command::new(env!("CARGO_BIN_EXE_imunoise"))
         .args(["analyze", text(pipe), "--rate", "100"])
         .args(arguments)
         .env("TMPDIR", copies)
@@ -169,7 +169,7 @@ fn a_terminal_shows_how_far_the_reading_is() {
     let dir = tempdir().expect("a folder");
     let pipe = dir.path().join("pipe");
     assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo starts").success());
-    let command = format!("{} analyze {} --rate 100 --quick --quiet", env!("CARGO_BIN_EXE_host-sim"), pipe.display());
+    let command = format!("{} analyze {} --rate 100 --quick --quiet", env!("CARGO_BIN_EXE_imunoise"), pipe.display());
     let mut program = Command::new("script")
         .args(["--quiet", "--return", "--command", &command, "/dev/null"])
         .stdin(Stdio::null())

@@ -1,11 +1,11 @@
 //! `compare` of recordings and of reports, and `analyze --each-sensor`.
 
-use crate::program::{host_sim, json_of};
+use crate::program::{imunoise, json_of};
 use serde_json::Value;
 use tempfile::tempdir;
 
 fn text(arguments: &[&str]) -> String {
-    let output = host_sim(arguments);
+    let output = imunoise(arguments);
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
@@ -74,7 +74,7 @@ fn wrong_sets_of_recordings_and_reports_are_refused() {
         (&["compare", &one, "--data-sheet"], "--data-sheet compares a report"),
         (&["compare", &one, &two, "--json", &two], "it would be overwritten"),
     ] {
-        let output = host_sim(arguments);
+        let output = imunoise(arguments);
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(!output.status.success() && errors.contains(expected), "{arguments:?}: {errors}");
     }
@@ -96,7 +96,7 @@ fn each_sensor_of_a_file_is_a_recording() {
     assert_eq!(several["agreement"]["samples"], Value::from(vec![2000, 2000]));
     let reports = dir.path().join("reports");
     let batch = [&["batch"], &analyze[1..], &["-o", reports.to_str().expect("UTF-8")]].concat();
-    assert!(host_sim(&batch).status.success());
+    assert!(imunoise(&batch).status.success());
     assert_eq!(std::fs::read_dir(&reports).expect("a folder").count(), 2);
     let inspected = text(&["inspect", file.to_str().expect("UTF-8")]);
     assert!(inspected.contains("--topic left") && inspected.contains("--topic right"), "{inspected}");

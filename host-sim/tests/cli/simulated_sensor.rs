@@ -1,6 +1,6 @@
 //! Reports of the virtual sensor, whose noise and hidden effects are known.
 
-use crate::program::{host_sim, json_of};
+use crate::program::{imunoise, json_of};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -55,7 +55,7 @@ fn the_file_for_kalibr_has_the_noise_of_the_virtual_sensor() {
     let page = dir.path().to_str().expect("UTF-8");
     let file_name = file.to_str().expect("UTF-8");
     let output =
-        host_sim(&["demo", "--plain", "--seconds", "600", "--page", page, "--export", &format!("kalibr={file_name}")]);
+        imunoise(&["demo", "--plain", "--seconds", "600", "--page", page, "--export", &format!("kalibr={file_name}")]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let yaml = std::fs::read_to_string(&file).expect("the file");
     // The converter's steps of 3.33 mg add white noise of a twelfth of their square.
