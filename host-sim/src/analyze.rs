@@ -8,8 +8,9 @@ use crate::inspect::{self, read_or_ask};
 use crate::output::{self, Analysed, Incomplete, note};
 use crate::output_files::OutputFiles;
 use crate::progress::{self, Progress};
+use crate::several_recordings::write_several;
+use crate::streaming;
 use crate::tip::UnknownSensor;
-use crate::{compare, streaming};
 use adis16405_driver::GyroRange;
 use anyhow::{Context, Result, bail};
 use measurement::{Measurement, SensorProfile, adis16405, profile_file};
@@ -73,7 +74,7 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
     if are_parts(&still) {
         write_parts(still, &names, output, &outputs)?;
     } else if output.exports.is_empty() {
-        compare::write_several(&still, None, output.json.as_deref(), output.quiet, &outputs)?;
+        write_several(&still, None, output.json.as_deref(), output.quiet, &outputs)?;
     } else {
         bail!("--export: these sensors have the same channels; export one of them, with --topic or --columns");
     }

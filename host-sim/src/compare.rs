@@ -3,14 +3,13 @@
 use crate::analyze::SeveralReadings;
 use crate::cli::{CompareArguments, InputArguments, RecordingArguments};
 use crate::input_file::{is_report, read_report};
-use crate::output::{self, Incomplete, check_result, print, write_result};
-use crate::output_files::{OutputFiles, is_standard_stream};
+use crate::output::{Incomplete, check_result, print, write_result};
+use crate::output_files::OutputFiles;
+use crate::several_recordings::write_several;
 use anyhow::{Context, Result, bail};
 use measurement::Measurement;
-use noise_analysis::report::several::{self, NoiseAgreement, NoiseInflation};
 use recordings::Printable;
 use reports::comparison;
-use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Compares the recordings or the reports of the arguments, and prints what differs.
@@ -39,39 +38,6 @@ pub(crate) fn run(arguments: &CompareArguments) -> Result<()> {
     let running = running.as_deref().map(|file| reading.read(&of_file(file))).transpose()?;
     write_several(&still, running.as_ref(), output.json.as_deref(), false, &outputs)?;
     Incomplete::check(reading.are_complete())
-}
-
-/// The JSON of several recordings.
-#[derive(Serialize)]
-struct SeveralRecordings<'a> {
-    agreement: Option<&'a NoiseAgreement>,
-    inflation: Option<&'a NoiseInflation>,
-}
-
-/// Prints whether recordings agree, and how much noisier they are than one of motors that run; or writes it as JSON.
-///
-/// # Errors
-/// They cannot be compared, or the file cannot be written.
-pub(crate) fn write_several(
-    still: &[Measurement],
-    running: Option<&Measurement>,
-    json: Option<&Path>,
-    is_quiet: bool,
-    outputs: &OutputFiles,
-) -> Result<()> {
-    let agreement = (still.len() > 1).then(|| several::compare(still)).transpose()?;
-    let inflation = running.map(|running| several::inflation(still, running)).transpose()?;
-    if let Some(file) = json {
-        let several = SeveralRecordings { agreement: agreement.as_ref(), inflation: inflation.as_ref() };
-        output::write_json(&several, file, outputs)?;
-    }
-    if is_quiet || json.is_some_and(is_standard_stream) {
-        return Ok(());
-    }
-    print(|out| {
-        agreement.as_ref().map_or(Ok(()), |agreement| reports::several::write_agreement(agreement, out))?;
-        inflation.as_ref().map_or(Ok(()), |inflation| reports::several::write_inflation(inflation, out))
-    })
 }
 
 /// Compares the last report with the first, or with the data sheet, and prints the table.

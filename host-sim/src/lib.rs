@@ -19,6 +19,7 @@ mod progress;
 mod record;
 pub mod recording_analysis;
 mod recording_file;
+mod several_recordings;
 mod simulate;
 mod streaming;
 mod tip;
