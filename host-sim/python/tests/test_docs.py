@@ -31,7 +31,7 @@ def test_the_readme_runs(capsys: pytest.CaptureFixture[str]) -> None:
     readme = (ROOT / "host-sim" / "python" / "README.md").read_text(encoding="utf-8")
     [code] = re.findall(r"```python\n(.*?)```", readme, re.DOTALL)
     exec(code, {})
-    assert "20,000 samples at 200.0 Hz" in capsys.readouterr().out
+    assert "20,000 samples" in capsys.readouterr().out
 
 
 def test_the_docstrings_run() -> None:
