@@ -270,7 +270,7 @@ pub(crate) struct CompareArguments {
     #[command(flatten)]
     pub(crate) recording: RecordingArguments,
     /// More recordings, or the second report.
-    #[arg(value_name = "FILE")]
+    #[arg(value_name = "FILE", required_unless_present_any = ["running", "data_sheet"])]
     pub(crate) more: Vec<PathBuf>,
     /// Recording with motors on: how much noisier?
     #[arg(long, help_heading = INPUT, value_name = "FILE", conflicts_with = "data_sheet")]

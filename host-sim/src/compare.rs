@@ -20,14 +20,8 @@ pub(crate) fn run(arguments: &CompareArguments) -> Result<()> {
     let inputs = files.iter().copied().chain(running.as_deref()).chain(sensor);
     let outputs = OutputFiles::new(inputs, output.force);
     check_result(output, &outputs)?;
-    if files.iter().any(|file| is_report(file)) {
-        return compare_reports(&files, *data_sheet, arguments, &outputs);
-    }
-    if *data_sheet {
-        bail!("--data-sheet compares a report, which `analyze --json` writes");
-    }
-    if files.len() == 1 && running.is_none() {
-        bail!("one recording: name another, or --running FILE");
+    if *data_sheet || files.iter().any(|file| is_report(file)) {
+        return compare_reports(&files, arguments, &outputs);
     }
     let of_file = |file: &Path| RecordingArguments {
         input: InputArguments { file: file.to_owned(), ..recording.input.clone() },
@@ -41,12 +35,7 @@ pub(crate) fn run(arguments: &CompareArguments) -> Result<()> {
 }
 
 /// Compares the last report with the first, or with the data sheet, and prints the table.
-fn compare_reports(
-    files: &[&Path],
-    data_sheet: bool,
-    arguments: &CompareArguments,
-    outputs: &OutputFiles,
-) -> Result<()> {
+fn compare_reports(files: &[&Path], arguments: &CompareArguments, outputs: &OutputFiles) -> Result<()> {
     let CompareArguments { running, output, .. } = arguments;
     if running.is_some() {
         bail!("--running compares recordings, and not reports");
@@ -56,12 +45,11 @@ fn compare_reports(
             let comparison = comparison::of_reports(&read_report(first)?, &read_report(second)?)?;
             (comparison, name(first), name(second))
         }
-        [first] if data_sheet => {
+        [first] => {
             let comparison =
                 comparison::with_data_sheet(&read_report(first)?).with_context(|| first.display().to_string())?;
             (comparison, "data sheet".to_owned(), name(first))
         }
-        [_] => bail!("one report: name another, or --data-sheet"),
         _ => bail!("{} reports: two are compared", files.len()),
     };
     write_result(&comparison, output, outputs)?;

@@ -36,8 +36,8 @@ pub(crate) fn check(output: &OutputArguments, files: &OutputFiles) -> Result<()>
             files.check_folder(folder, endings)?;
         }
     }
-    // A figure that every report has stands for all of them.
-    let [page, picture] = [(&output.page, page::FILE), (&output.pictures, "overview.svg")]
+    // A figure that a report with gyros has stands for all of them.
+    let [page, picture] = [(&output.page, page::FILE), (&output.pictures, "overview-gyros.svg")]
         .map(|(folder, file)| Some(folder.as_ref()?.join(file)));
     let exports = output.exports.iter().map(|ExportTarget { file, .. }| file.as_path());
     let written: Vec<&Path> =

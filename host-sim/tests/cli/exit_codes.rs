@@ -20,7 +20,7 @@ const ERRORS: &[Case] = &[
     (&["analyze", "DIR/rows.csv", "--sensor", "/dev/zero"], &["/dev/zero", "not longer than 1048576 bytes"]),
     (&["analyze", "DIR/rows.csv", "--sensor", "nowhere.toml"], &["nowhere.toml", "bmi088"]),
     (&["replay", "DIR/array.npy"], &["neither register counts nor an SPI log"]),
-    (&["compare", "DIR/rows.csv", "DIR/rows.csv"], &["no JSON report"]),
+    (&["compare", "DIR/rows.csv", "--data-sheet"], &["no JSON report"]),
     // A text of 100 kB where the report has a number.
     (&["compare", "DIR/long.json", "--data-sheet"], &["long.json", " … "]),
     (&["record", "DIR/missing/log.csv", "--port", "/dev/null"], &["log.csv", "No such file"]),

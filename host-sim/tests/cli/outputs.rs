@@ -177,7 +177,7 @@ fn outputs_are_checked_before_the_work_and_never_overwrite_the_input() {
     std::os::unix::fs::symlink(&file, &link).expect("a link");
     let nowhere = dir.path().join("missing").join("out");
     // Folders whose files cannot be written: a file is in the way, or a folder of the name of the page or of the figure.
-    for inside in ["index.html", "overview.svg"] {
+    for inside in ["index.html", "overview-gyros.svg"] {
         fs::create_dir_all(blocked.join(inside)).expect("a folder");
     }
     for (option, prefix) in [("--json", ""), ("--export", "kalibr=")] {
@@ -231,7 +231,7 @@ fn a_file_that_exists_is_overwritten_with_force_alone() {
     let report = dir.path().join("report.json");
     assert!(imunoise(&["analyze", name(&rows), "--quiet", "--json", name(&report)]).status.success());
     let [rows, report] = [name(&rows), name(&report)];
-    let [old, page, picture] = ["old", "page/index.html", "pictures/overview.svg"].map(|file| dir.path().join(file));
+    let [old, page, picture] = ["old", "page/index.html", "pictures/overview-gyros.svg"].map(|file| dir.path().join(file));
     let reports = dir.path().join("reports");
     let one_report = reports.join("rows.json");
     let [of_page, of_pictures] = [&page, &picture].map(|file| file.parent().expect("a folder"));

@@ -70,8 +70,7 @@ fn wrong_sets_of_recordings_and_reports_are_refused() {
     }
     for (arguments, expected) in [
         (&["compare", &one, &two][..], "recordings are compared at one rate"),
-        (&["compare", &one], "name another, or --running"),
-        (&["compare", &one, "--data-sheet"], "--data-sheet compares a report"),
+        (&["compare", &one, "--data-sheet"], "no JSON report"),
         (&["compare", &one, &two, "--json", &two], "it would be overwritten"),
     ] {
         let output = imunoise(arguments);
