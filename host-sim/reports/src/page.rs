@@ -4,7 +4,7 @@
 mod tables;
 
 use crate::coefficient_notes::coefficient_notes;
-use crate::evidence::{EvidenceText, NumberStyle};
+use crate::evidence::EvidenceText;
 use crate::explanation;
 use crate::figure::{self, Plot};
 use crate::finding_text::{self, ShownEffect, channel_list, channel_name};
@@ -249,7 +249,7 @@ fn finding_card(report: &Report, index: usize, number: usize) -> Markup {
             details {
                 summary { "Parameters and evidence" }
                 (parameters(report, index))
-                p { (capital(&EvidenceText::of_finding(finding, NumberStyle::Prefixed).sentence())) "." }
+                p { (capital(&EvidenceText::of_finding(finding).sentence())) "." }
             }
         }
     }
