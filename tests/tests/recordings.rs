@@ -19,7 +19,7 @@ fn report(arguments: &[&str], recording: &PathBuf) -> Value {
         .arg("--page")
         .arg(folder.path())
         .output()
-        .expect("host-sim runs");
+        .expect("imunoise runs");
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     but_reading(&serde_json::from_slice(&std::fs::read(json).expect("the report")).expect("JSON"))
 }

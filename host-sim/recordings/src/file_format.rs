@@ -6,8 +6,8 @@ use adis16405_driver::{Channel, GyroRange};
 use measurement::{SensorProfile, adis16405};
 use readers::inspection::InspectedTable;
 use readers::{
-    ColumnSelection, FileBytes, FileHash, FileRows, HEAD_BYTES, InputError, InputFile, ReadMonitor, ReadOptions,
-    Reason, is_output_register,
+    ColumnSelection, FileBytes, FileHash, FileRows, HEAD_BYTES, InputError, InputFile, MemoryTable, ReadMonitor,
+    ReadOptions, Reason, is_output_register,
 };
 use std::io::{self, BufReader};
 use std::ops::Deref;
@@ -81,7 +81,26 @@ impl RecordedInput {
     /// # Errors
     /// They have none of the formats, or are too many once they are decompressed.
     pub fn in_memory(name: &Path, bytes: impl Into<Arc<[u8]>>) -> Result<Self, InputError> {
-        Self::recognised(name, vec![FileBytes::in_memory(name, bytes)], &ReadMonitor::default())
+        Self::in_memory_monitored(name, bytes, &ReadMonitor::default())
+    }
+
+    /// As [`in_memory`](Self::in_memory), with `monitor` as [`open_monitored`](Self::open_monitored).
+    ///
+    /// # Errors
+    /// As [`in_memory`](Self::in_memory).
+    pub fn in_memory_monitored(
+        name: &Path,
+        bytes: impl Into<Arc<[u8]>>,
+        monitor: &ReadMonitor,
+    ) -> Result<Self, InputError> {
+        Self::recognised(name, vec![FileBytes::in_memory(name, bytes)], monitor)
+    }
+
+    /// Arrays in memory that are called `name`.
+    #[must_use]
+    pub fn of_arrays(name: &Path, arrays: Arc<MemoryTable>, monitor: &ReadMonitor) -> Self {
+        let file = InputFile::of_arrays(name, arrays, monitor);
+        Self { file, format: RecordedFormat::File(FileFormat::Arrays), capture: None }
     }
 
     fn recognised(name: &Path, mut files: Vec<FileBytes>, monitor: &ReadMonitor) -> Result<Self, InputError> {

@@ -9,10 +9,10 @@ fn run(dir: &TempDir, arguments: &[&str]) -> String {
     let log = dir.path().join("bus.csv");
     let file = log.to_str().expect("UTF-8");
     if !log.exists() {
-        let simulated = host_sim(&["simulate", file, "--format", "frames", "--seconds", "30"]);
+        let simulated = imunoise(&["simulate", file, "--format", "frames", "--seconds", "30"]);
         assert!(simulated.status.success(), "{}", String::from_utf8_lossy(&simulated.stderr));
     }
-    let output = host_sim(&[&["analyze", file], arguments].concat());
+    let output = imunoise(&[&["analyze", file], arguments].concat());
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).expect("text")
 }

@@ -108,13 +108,9 @@ pub(crate) trait ArrayReader: Send {
         add: &mut dyn FnMut(u64) -> Result<(), Reason>,
     ) -> Result<Vec<Vec<Number>>, Reason>;
 
-    /// Gives the rows of these columns, or the reason why there are no more, without holding them; `None` where the format has to hold them.
-    fn for_each_row(
-        &mut self,
-        _array: usize,
-        _columns: &[usize],
-        _each: &mut EachArrayRow,
-    ) -> Option<Result<(), InputError>> {
+    /// Gives the rows of these columns, each by its array and its number, or the reason why there are no more, without holding them;
+    /// `None` where the format has to hold them.
+    fn for_each_row(&mut self, _places: &[(usize, usize)], _each: &mut EachArrayRow) -> Option<Result<(), InputError>> {
         None
     }
 }
@@ -293,24 +289,23 @@ impl<R: ArrayReader> Source for ArraySource<'_, R> {
         let first = places.first().map_or(0, |(array, _)| *array);
         let note = |(hz, by): &(f64, String)| format!("the file states a rate of {hz} Hz ({by})");
         let notes = self.stated_rate(topic, columns).map(note).into_iter().collect();
-        if places.iter().all(|(array, _)| *array == first) {
-            let of_array: Vec<usize> = places.iter().map(|(_, column)| *column).collect();
-            let mut each_row = |row: Result<&[Number], Reason>| each(row.map_err(fail)?);
-            if let Some(streamed) = self.reader.for_each_row(first, &of_array, &mut each_row) {
-                return streamed.map(|()| Ending { damage: None, notes });
-            }
+        if let Some(array) =
+            places.iter().map(|(array, _)| &self.arrays[*array]).find(|of| of.rows != self.arrays[first].rows)
+        {
+            let [one, other] =
+                [&self.arrays[first], array].map(|array| format!("array {:?} has {} rows", array.path(), array.rows));
+            return Err(fail(Reason::UnequalRows(format!("{one}, {other}"))));
+        }
+        let mut each_row = |row: Result<&[Number], Reason>| each(row.map_err(fail)?);
+        if let Some(streamed) = self.reader.for_each_row(&places, &mut each_row) {
+            return streamed.map(|()| Ending { damage: None, notes });
         }
         let mut values: Vec<Vec<Number>> = vec![Vec::new(); places.len()];
         let mut meter = self.budget.meter();
-        for (number, array) in self.arrays.iter().enumerate() {
+        for number in 0..self.arrays.len() {
             let own: Vec<usize> = (0..places.len()).filter(|&at| places[at].0 == number).collect();
             if own.is_empty() {
                 continue;
-            }
-            if array.rows != self.arrays[first].rows {
-                let [one, other] = [&self.arrays[first], array]
-                    .map(|array| format!("array {:?} has {} rows", array.path(), array.rows));
-                return Err(fail(Reason::UnequalRows(format!("{one}, {other}"))));
             }
             let columns: Vec<usize> = own.iter().map(|&at| places[at].1).collect();
             let read = self.reader.read(number, &columns, &mut |values| meter.add_values(values)).map_err(fail)?;
