@@ -2,6 +2,7 @@
 //! `tests/tools`, that for the Raspberry Pi Pico in rp2040js.
 
 mod bench;
+mod checklist;
 mod compensation;
 mod costs;
 mod decoded;

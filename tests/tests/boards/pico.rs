@@ -15,6 +15,12 @@ fn sensor(seed: u64) -> VirtualAdis16405 {
     VirtualAdis16405::new(NoiseModel::paper(), seed)
 }
 
+/// What the UART of a sound board has sent, and the part.
+pub(crate) fn run_sound(seed: u64, seconds: f64, keys: &[&str]) -> (Vec<(u64, u8)>, VirtualAdis16405) {
+    let Outcome { received, part, .. } = run(SOUND, sensor(seed), seconds, keys, &[]);
+    (received, part)
+}
+
 #[test]
 #[ignore = "long: 20 emulated seconds with software floating point take half a minute; run with --long"]
 fn the_pico_reports_what_the_host_computes_from_the_same_counts() {
