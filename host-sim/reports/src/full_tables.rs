@@ -3,7 +3,7 @@
 use crate::coefficient_notes::coefficient_notes;
 use crate::coefficients::{self, CoefficientRow};
 use crate::curve_numbers::curve_numbers;
-use crate::evidence::{EvidenceText, NumberStyle};
+use crate::evidence::EvidenceText;
 use crate::explanation;
 use crate::finding_text::FindingText;
 use crate::formatting::{
@@ -40,6 +40,13 @@ pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io:
     verdict(report, out)?;
     for channel in &report.channels {
         section(channel, out)?;
+    }
+    let together = explanation::all_channels(report);
+    if !together.is_empty() {
+        writeln!(out, "\nAll channels")?;
+    }
+    for text in together {
+        writeln!(out, "{}", wrap(&format!("• {text}"), WIDTH.into()))?;
     }
     writeln!(out)?;
     writeln!(out, "Intervals are of 95 %. The models are fitted to the first half of the samples; the second")?;
@@ -127,11 +134,14 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "{}", term_table(&channel.after.terms))?;
     }
     writeln!(out, "{}", error_table(channel))?;
+    if channel.after.unseen.rms_percent.is_some() {
+        writeln!(out, "{}", wrap(&explanation::model(channel), WIDTH.into()))?;
+    }
     for text in worst_deviations(channel) {
         writeln!(out, "{}", wrap(&format!("! {text}."), WIDTH.into()))?;
     }
     for ChannelEffect { effect, .. } in &channel.effects {
-        let evidence = EvidenceText::of_effect(effect, NumberStyle::Prefixed).sentence();
+        let evidence = EvidenceText::of_effect(effect).sentence();
         writeln!(out, "{}", wrap(&format!("• {}: {evidence}", words(effect.name())), WIDTH.into()))?;
     }
     for text in explanation::course(channel) {
