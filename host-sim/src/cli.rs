@@ -272,7 +272,7 @@ pub(crate) struct CompareArguments {
     /// More recordings, or the second report.
     #[arg(value_name = "FILE")]
     pub(crate) more: Vec<PathBuf>,
-    /// Recording with motors on: how much noisier is it?
+    /// Recording with motors on: how much noisier?
     #[arg(long, help_heading = INPUT, value_name = "FILE", conflicts_with = "data_sheet")]
     pub(crate) running: Option<PathBuf>,
     /// Compare a report with its sensor's data sheet.
@@ -795,8 +795,9 @@ pub(crate) struct JsonArgument {
 
 #[cfg(test)]
 mod tests {
-    use super::Cli;
+    use super::{Cli, with_subcommand};
     use clap::{CommandFactory, Parser};
+    use std::ffi::OsString;
 
     #[test]
     fn every_command_has_examples_that_the_program_takes() {
@@ -808,7 +809,8 @@ mod tests {
             let examples: Vec<&str> = lines.filter_map(|line| line.trim_start().split("   ").next()).collect();
             assert!(!examples.is_empty(), "{}", command.get_name());
             for example in examples {
-                assert!(Cli::try_parse_from(example.split_whitespace()).is_ok(), "{example}");
+                let words = with_subcommand(example.split_whitespace().map(OsString::from).collect());
+                assert!(Cli::try_parse_from(words).is_ok(), "{example}");
             }
         }
     }

@@ -1,6 +1,6 @@
 //! The screens of measured recordings: what is said changes with the analysis, how it is said does not.
 
-use crate::program::host_sim;
+use crate::program::imunoise;
 use noise_analysis::effects::Effect;
 use noise_analysis::report::Report;
 use reports::terminal::{MOST_LINES, Screen};

@@ -1,6 +1,6 @@
 //! Where a report goes: one screen, every table, nothing, JSON on standard output, pictures.
 
-use crate::program::host_sim;
+use crate::program::imunoise;
 use serde_json::Value;
 use tempfile::TempDir;
 

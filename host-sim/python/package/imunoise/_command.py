@@ -12,4 +12,4 @@ def main() -> None:
     """Runs the command with the words of this process, and exits with its code."""
     # The command takes signals itself.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    sys.exit(_native.command(sys.argv))
+    sys.exit(_native.command(["imunoise", *sys.argv[1:]]))

@@ -36,14 +36,14 @@ class Finding:
         kind: such as `sinusoid`.
         channels: those that show it.
         parameters: by channel and name, such as `parameters["gyro_z"]["frequency"]`.
-        evidence: a sentence.
+        evidence: what it rests on, as the JSON of a report has it.
         validated: `yes`, `no` or `untestable` on the second half of the record.
     """
 
     kind: str
     channels: tuple[str, ...]
     parameters: Mapping[str, Mapping[str, Estimate]]
-    evidence: str
+    evidence: Any
     validated: str
 
 
