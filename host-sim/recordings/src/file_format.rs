@@ -81,7 +81,19 @@ impl RecordedInput {
     /// # Errors
     /// They have none of the formats, or are too many once they are decompressed.
     pub fn in_memory(name: &Path, bytes: impl Into<Arc<[u8]>>) -> Result<Self, InputError> {
-        Self::recognised(name, vec![FileBytes::in_memory(name, bytes)], &ReadMonitor::default())
+        Self::in_memory_monitored(name, bytes, &ReadMonitor::default())
+    }
+
+    /// As [`in_memory`](Self::in_memory); `monitor` counts the bytes that are read of the recording.
+    ///
+    /// # Errors
+    /// As [`in_memory`](Self::in_memory).
+    pub fn in_memory_monitored(
+        name: &Path,
+        bytes: impl Into<Arc<[u8]>>,
+        monitor: &ReadMonitor,
+    ) -> Result<Self, InputError> {
+        Self::recognised(name, vec![FileBytes::in_memory(name, bytes)], monitor)
     }
 
     fn recognised(name: &Path, mut files: Vec<FileBytes>, monitor: &ReadMonitor) -> Result<Self, InputError> {

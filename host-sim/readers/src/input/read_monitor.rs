@@ -27,9 +27,16 @@ struct State {
     stop: AtomicBool,
     is_interrupted: AtomicBool,
     is_cut: AtomicBool,
+    watch: Option<fn(u64)>,
 }
 
 impl ReadMonitor {
+    /// Calls `watch` with [`bytes`](Self::bytes) whenever it grows, on the thread that reads.
+    #[must_use]
+    pub fn watched(watch: fn(u64)) -> Self {
+        Self(Arc::new(State { watch: Some(watch), ..State::default() }))
+    }
+
     /// Bytes that were read from the file since it was opened last; compressed ones, where the file is compressed.
     #[must_use]
     pub fn bytes(&self) -> u64 {
@@ -97,7 +104,10 @@ impl ReadMonitor {
 
     /// Counts bytes that were read.
     pub(crate) fn count(&self, bytes: usize) {
-        self.0.bytes.fetch_add(bytes as u64, Relaxed);
+        let before = self.0.bytes.fetch_add(bytes as u64, Relaxed);
+        if let Some(watch) = self.0.watch {
+            watch(before + bytes as u64);
+        }
     }
 }
 
