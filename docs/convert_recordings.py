@@ -9,7 +9,7 @@
 
 Only `imudata` needs a package besides Python 3.9: `pip install rdata`. A name that ends in .gz is written with gzip.
 
-Where the files are (docs/recordings.md has the licences):
+Where the files are (docs/measured.md has the licences):
     imudata   github.com/SMAC-Group/imudata     data/adis_16405_imu1.rda, ..._imu2.rda, ..._imu3.rda
     launch10  github.com/psas/Launch-10         data/raw/fc/logfile-1009847896.log (fc/fc/ in later revisions)
     stm32     github.com/psas/stm32             projects/flight-imu/host_fc/adis16405_log.txt-example
@@ -21,7 +21,7 @@ The first lines of the public stm32 file were compared too. The public .rda and 
     printed, and the conversion stops if the values of a column are not multiples of it.
   * `launch10` follows fc/fc/logfile_to_csv.py of the same repository. It looks for ADIS messages and does not need to know
     the others; the byte order of the words is found by the supply, which is the first word. Which part of the log the
-    figures of docs/recordings.md come from could not be checked: they are of 49,425 rows over 60.6 s with the part at rest;
+    figures of docs/measured.md come from could not be checked: they are of 49,425 rows over 60.6 s with the part at rest;
     `--from` and `--to` cut the converted log.
 """
 

@@ -5,7 +5,7 @@
 #
 #   docs/report.svg       gyro x of the simulated hour that the program makes without a command
 #                         (seed 1); no recording
-#   docs/run1-gyro_z.svg  gyro z of adis16405-static/run1.csv.gz in the folder that ADIS_RECORDINGS names (docs/recordings.md); left
+#   docs/run1-gyro_z.svg  gyro z of adis16405-static/run1.csv.gz in the folder that ADIS_RECORDINGS names (docs/measured.md); left
 #                         as it is without
 set -eu
 cd "$(dirname "$0")/.."

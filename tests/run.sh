@@ -7,7 +7,7 @@
 #
 # Without an option: what a pull request needs. --quick: formatting, lints, and the unit tests of the libraries and of the host.
 # --long: also the tests that are marked `#[ignore = "long: …"]`, and the search for bytes that break a reader. Tests on measured
-# recordings are skipped where ADIS_RECORDINGS does not name their folder (docs/recordings.md); --recordings runs those alone that the
+# recordings are skipped where ADIS_RECORDINGS does not name their folder (docs/measured.md); --recordings runs those alone that the
 # last run skipped for that reason, and none may be skipped again.
 # The last lines have the seconds of each step, of the clock and of the processor, and how many tests passed, failed and were skipped.
 set -euo pipefail

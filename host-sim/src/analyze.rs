@@ -76,7 +76,6 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
         ("--page", output.page.is_some()),
         ("--pictures", output.pictures.is_some()),
         ("--full", output.full),
-        ("--explain", output.explain),
         ("--export", !*each_sensor && !output.exports.is_empty()),
     ];
     let refused: Vec<&str> = refused.into_iter().filter(|(_, is_given)| *is_given).map(|(option, _)| option).collect();

@@ -192,7 +192,7 @@ pub(crate) struct AnalyzeArguments {
     #[arg(long, help_heading = OUTPUT)]
     pub(crate) quick: bool,
     /// Write the report of each recording as DIR/NAME.json.
-    #[arg(long, help_heading = OUTPUT, value_name = "DIR", conflicts_with_all = ["full", "explain", "pictures", "json", "page", "exports", "axis"])]
+    #[arg(long, help_heading = OUTPUT, value_name = "DIR", conflicts_with_all = ["full", "pictures", "json", "page", "exports", "axis"])]
     pub(crate) reports: Option<PathBuf>,
     /// Where the report goes besides the terminal.
     #[command(flatten)]
@@ -605,12 +605,9 @@ impl SimulationArguments {
 #[derive(Debug, Args)]
 #[command(next_help_heading = OUTPUT)]
 pub(crate) struct OutputArguments {
-    /// Print every table of every channel.
-    #[arg(long, conflicts_with_all = ["quiet", "explain"])]
-    pub(crate) full: bool,
-    /// Print sentences: what was found, what it changes.
+    /// Print every sentence and table of every channel.
     #[arg(long, conflicts_with = "quiet")]
-    pub(crate) explain: bool,
+    pub(crate) full: bool,
     /// Print nothing.
     #[arg(long)]
     pub(crate) quiet: bool,

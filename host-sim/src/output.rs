@@ -12,7 +12,7 @@ use reports::json::ReportJson;
 use reports::reading::ReadingRecord;
 use reports::saved_report::SavedReport;
 use reports::terminal::Screen;
-use reports::{explanation, full_tables, page};
+use reports::{full_tables, page};
 use serde::Serialize;
 use std::borrow::Cow;
 use std::fmt;
@@ -126,8 +126,6 @@ fn show(analysed: &Analysed, source: Option<&str>, output: &OutputArguments, pag
     }
     if output.full {
         print(|out| full_tables::write(report, source, out))?;
-    } else if output.explain {
-        print(|out| explanation::write(report, source, out))?;
     } else {
         show_screen(report, source)?;
     }

@@ -14,7 +14,7 @@ const SIMILAR: f64 = 0.7;
 /// What other programs call an option, and the one of this program.
 const OPTIONS: [(&str, &str); 2] = [("html", "--page"), ("svg", "--pictures")];
 /// What is no command, and how it is asked for.
-const COMMANDS: [(&str, &str); 1] = [("explain", "analyze FILE --explain")];
+const COMMANDS: [(&str, &str); 1] = [("explain", "analyze FILE --full")];
 
 /// A name of a sensor that is neither included nor a file: as given, and those that are included.
 #[derive(Debug, thiserror::Error)]

@@ -1,70 +1,23 @@
-//! The long form of a report: in sentences, what was found, what changes in the course of the record, and what a model of the
-//! first half leaves on the second.
+//! How the noise of a channel changes in the course of the record, what the channels have in common, and what a model of the first half
+//! leaves on the second, in sentences.
 
-use crate::finding_text::{FindingText, channel_list};
-use crate::formatting::{capital, count, duration, words, wrap};
-use crate::rounding::{NONE, quantity_digits, signed, significant, span};
-use crate::summary::{self, off_percent};
+use crate::finding_text::channel_list;
+use crate::formatting::{capital, count, words};
+use crate::rounding::{NONE, signed, significant, span};
+use crate::summary::off_percent;
 use noise_analysis::nonstationarity::{FittedPart, RelatedLine, TrackedSet};
 use noise_analysis::report::{ChannelReport, CommonModeRegression, ModelErrorReport, Nonstationarity, Report};
-use std::io::{self, Write};
 
-/// Columns of a line.
-const WIDTH: usize = 100;
 /// Averaging times at which the common mode is told, s: the octave nearest to each.
 const COMMON_MODE_TAU_S: [f64; 3] = [0.01, 40.0, 160.0];
 
-/// Writes the explanation of `report`, under the name of the recording if it has one.
-///
-/// # Errors
-/// `out` cannot be written.
-pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io::Result<()> {
-    if let Some(source) = source {
-        writeln!(out, "{source}\n{}", "═".repeat(source.chars().count()))?;
-    }
-    let length = duration(report.samples as f64 / report.sample_rate_hz);
-    writeln!(
-        out,
-        "{} samples at {}, {length}.",
-        count(report.samples),
-        quantity_digits(report.sample_rate_hz, "Hz", 4)
-    )?;
-    writeln!(out, "\nWhat was found")?;
-    let (named, unexplained) = summary::findings(report);
-    if named.is_empty() && unexplained.is_empty() {
-        writeln!(out, "{}", item("Nothing beyond N, B and K."))?;
-    }
-    for finding in named.iter().chain(&unexplained) {
-        writeln!(out, "{}", item(&found(finding)))?;
-    }
-    for note in summary::part_notes(report) {
-        writeln!(out, "{}", item(&note))?;
-    }
-    let followed = || report.channels.iter().filter_map(|channel| Some((channel, channel.nonstationarity.as_ref()?)));
-    for (channel, _) in followed() {
-        writeln!(out, "\n{}", channel_list(std::slice::from_ref(&channel.name)))?;
-        for text in paragraphs(channel) {
-            writeln!(out, "{}", item(&text))?;
-        }
-    }
-    let Some(first) = followed().next() else {
-        return writeln!(
-            out,
-            "\n{}",
-            wrap("No gyro or accelerometer changes and has enough samples to be cut into epochs (24,576).", WIDTH)
-        );
-    };
-    writeln!(out, "\nAll channels")?;
-    writeln!(out, "{}", item(&coverage(followed().map(|(_, changes)| changes), first.1.epoch_s)))?;
-    for text in report.common_mode.iter().flat_map(common_mode) {
-        writeln!(out, "{}", item(&text))?;
-    }
-    Ok(())
-}
-
-/// A paragraph of a list.
-fn item(text: &str) -> String {
-    wrap(&format!("• {text}"), WIDTH)
+/// What the channels say together: how often the predictions held, and what they have in common. Nothing of a record in which none is
+/// followed.
+pub(crate) fn all_channels(report: &Report) -> Vec<String> {
+    let followed = || report.channels.iter().filter_map(|channel| channel.nonstationarity.as_ref());
+    let Some(first) = followed().next() else { return Vec::new() };
+    let common = report.common_mode.iter().flat_map(common_mode);
+    [coverage(followed(), first.epoch_s)].into_iter().chain(common).collect()
 }
 
 /// `text` with a capital and a full stop.
@@ -73,11 +26,7 @@ fn sentence(text: &str) -> String {
     format!("{}{stop}", capital(text))
 }
 
-fn found(FindingText { channels, physics, advice, weight, .. }: &FindingText) -> String {
-    let weight = if weight.is_empty() { String::new() } else { format!(" {}", sentence(weight)) };
-    format!("{channels}: {physics}{weight} {advice}")
-}
-
+/// Two significant digits of a deviance per point.
 fn per_point(deviance: f64) -> String {
     significant(deviance, 2)
 }
@@ -89,11 +38,6 @@ fn chance(p_value: f64) -> String {
         odds if odds >= 2.0 => format!("chance explains it once in {} times", significant(odds, 2)),
         _ => "chance explains it".to_owned(),
     }
-}
-
-/// What is said of one channel.
-fn paragraphs(channel: &ChannelReport) -> Vec<String> {
-    [model(channel)].into_iter().chain(course(channel)).collect()
 }
 
 /// How the noise of a channel changes in the course of the record; nothing where the record is too short for it.
@@ -108,7 +52,7 @@ pub(crate) fn course(channel: &ChannelReport) -> Vec<String> {
 }
 
 /// The terms, and the errors on the second half.
-fn model(channel: &ChannelReport) -> String {
+pub(crate) fn model(channel: &ChannelReport) -> String {
     let off = |error: &ModelErrorReport| {
         error.rms_percent.map_or_else(|| NONE.to_owned(), |of| format!("{} %", off_percent(of)))
     };

@@ -48,10 +48,7 @@ pub(crate) fn style() -> [String; 2] {
     let colours = |ground: usize| {
         let of = |(class, light, dark): &(&str, &str, &str)| {
             let colour = [light, dark][ground];
-            format!(
-                ".{class} line,.{class} polyline{{stroke:{colour}}}.{class} circle{{fill:{colour}}}\
-                 polygon.{class}{{fill:{colour}}}"
-            )
+            format!(".{class} line,.{class} path{{stroke:{colour}}}.{class} circle,path.{class}{{fill:{colour}}}")
         };
         let lines: String = COLOURS.iter().map(of).collect();
         format!(
@@ -68,22 +65,22 @@ pub(crate) fn style() -> [String; 2] {
     };
     const SHAPES: &str = "svg text{font-size:13px;font-family:system-ui,'Segoe UI',Roboto,'DejaVu Sans',sans-serif}\
         svg .axis{font-size:14px}.grid,.fine,.frame{stroke-width:1;fill:none}\
-        svg polyline{fill:none;stroke-width:1.6;stroke-linejoin:round}svg .legend line{stroke-width:2}\
-        .model polyline{stroke-width:2.4}polygon.band{opacity:.2}.cursor{stroke-width:1;stroke-dasharray:3 3}\
-        .before polyline,.before line{stroke-dasharray:7 4}.term polyline,.term line{stroke-width:1.1;stroke-dasharray:2 3}\
-        .reference polyline,.reference line{stroke-dasharray:10 3 2 3}line.place{stroke-width:1.4;stroke-dasharray:4 3}";
+        svg g>path{fill:none;stroke-width:1.6;stroke-linejoin:round}svg .legend line{stroke-width:2}.bar line{stroke-width:1.4}\
+        .model path{stroke-width:2.4}svg path.band{stroke:none;opacity:.2}.cursor{stroke-width:1;stroke-dasharray:3 3}\
+        .before path,.before line{stroke-dasharray:7 4}.term path,.term line{stroke-width:1.1;stroke-dasharray:2 3}\
+        .reference path,.reference line{stroke-dasharray:10 3 2 3}line.place{stroke-width:1.4;stroke-dasharray:4 3}";
     [format!("{SHAPES}{}", colours(0)), colours(1)]
 }
 
 fn standalone(plot: &Plot) -> Picture {
     let [light, _] = style();
-    Picture { name: plot.id.clone(), svg: plot.svg(Some(&light)).into_string() }
+    Picture { name: plot.id.clone(), svg: plot.file(&light).into_string() }
 }
 
 /// Every figure of a report, in the order of the page.
 #[must_use]
 pub fn pictures(report: &Report) -> Vec<Picture> {
-    let overview = story(report).into_iter().chain(overview(report));
+    let overview = story(report).into_iter().chain(overviews(report));
     let channels = report.channels.iter().flat_map(|channel| channel_plots(report, channel));
     let findings =
         (1..).zip(summary::finding_order(report)).filter_map(|(number, index)| evidence(report, index, number));
@@ -96,6 +93,11 @@ pub(crate) fn channel_plots(report: &Report, channel: &ChannelReport) -> Vec<Plo
         .into_iter()
         .flatten()
         .collect()
+}
+
+/// The bias of a channel over time; `None` of one without means.
+pub(crate) fn course(channel: &ChannelReport) -> Option<Plot> {
+    bias_plot(channel)
 }
 
 /// The Allan deviation of `channel` as an SVG document.
@@ -117,36 +119,43 @@ pub(crate) fn story(report: &Report) -> Option<Plot> {
     let shown = gains
         .max_by(|(_, a), (_, b)| (a[0] / a[1]).total_cmp(&(b[0] / b[1])))
         .or_else(|| errors.iter().max_by(|(_, a), (_, b)| a[0].total_cmp(&b[0])));
-    shown.map(|&(channel, errors)| channel::story_plot(channel, errors))
+    shown.map(|&(channel, errors)| channel::story_plot(report, channel, errors))
 }
 
-/// The gyros' curves, or the accelerometers' where there is no gyro, beside the data sheet's. `None` without either.
-pub(crate) fn overview(report: &Report) -> Option<Plot> {
-    let of = |prefix: &str| -> Vec<&ChannelReport> {
-        report
-            .channels
-            .iter()
-            .filter(|channel| channel.name.starts_with(prefix))
-            .filter(|channel| channel.curve.iter().any(|point| has_logarithm(point.adev)))
-            .collect()
-    };
-    let (channels, name) = match of("gyro_") {
-        gyros if !gyros.is_empty() => (gyros, "gyros"),
-        _ => (of("accl_"), "accelerometers"),
-    };
+/// The picture of the finding that is told first; without one, that of the curves beside the data sheet.
+pub(crate) fn strongest(report: &Report) -> Option<Plot> {
+    let first = summary::finding_order(report).first().and_then(|&index| evidence(report, index, 1));
+    let plot = first.or_else(|| overviews(report).into_iter().next())?;
+    Some(Plot { id: "strongest".to_owned(), ..plot })
+}
+
+/// The curves of the gyros and those of the accelerometers, each with its model, beside the data sheet's.
+pub(crate) fn overviews(report: &Report) -> Vec<Plot> {
+    [("gyro_", "gyros"), ("accl_", "accelerometers")]
+        .into_iter()
+        .filter_map(|(prefix, name)| overview(report, prefix, name))
+        .collect()
+}
+
+/// Of the channels whose names begin with `prefix`; `None` without any.
+fn overview(report: &Report, prefix: &str, name: &str) -> Option<Plot> {
+    let has_curve = |channel: &&ChannelReport| channel.curve.iter().any(|point| has_logarithm(point.adev));
+    let of_prefix = report.channels.iter().filter(|channel| channel.name.starts_with(prefix));
+    let channels: Vec<&ChannelReport> = of_prefix.filter(has_curve).collect();
     let first = channels.first()?;
     let looks = [Look::Measured, Look::SecondAxis, Look::ThirdAxis];
-    let mut lines: Vec<Line> = channels
-        .iter()
-        .zip(looks.into_iter().cycle())
-        .map(|(channel, look)| measured(channel, look, &channel_name(channel)))
-        .collect();
+    let of_channel = |(channel, look): (&&ChannelReport, Look)| {
+        let name = channel_name(channel);
+        let model = channel::model_line(channel, &channel.refitted, &format!("model of {name}"), look).unlisted();
+        [model, measured(channel, look, &name)]
+    };
+    let mut lines: Vec<Line> = channels.iter().zip(looks.into_iter().cycle()).flat_map(of_channel).collect();
     let sheet = first.figure_data.data_sheet.as_ref();
     if let Some(sheet) = sheet {
         let taus: Vec<f64> = first.curve.iter().map(|point| point.tau_s).filter(|tau| has_logarithm(*tau)).collect();
         lines.push(data_sheet_line(sheet, &taus));
     }
-    let [frame] = frames([380.0]);
+    let [frame] = frames([300.0]);
     let across = Axis::logarithmic("averaging time τ, s", lines.iter().flat_map(places), [LEFT, RIGHT]);
     let label = format!("Allan deviation σ(τ), {}", crate::rounding::unit(&first.unit));
     let up = Axis::logarithmic(&label, lines.iter().flat_map(heights), frame);
@@ -161,9 +170,9 @@ pub(crate) fn overview(report: &Report) -> Option<Plot> {
         })
         .collect();
     Some(Plot {
-        id: "overview".to_owned(),
+        id: format!("overview-{name}"),
         title: format!("Allan deviation of the {name}{}", if sheet.is_some() { ", beside the data sheet" } else { "" }),
-        description: format!("Measured with 95 % bounds: {}.", each.join("; ")),
+        description: format!("Points with 95 % bounds: measured. Lines: models. {}.", each.join("; ")),
         panels: vec![Panel::new(across, up, lines)],
     })
 }

@@ -302,14 +302,25 @@ fn sentences(finding: &Finding, amounts: &Amounts) -> (String, Advice) {
             format!("A slow drift in common|, which nothing recorded explains|: {}| (1 σ)|.", each("deviation")),
             Advice::new(RECORD_CONDITIONS, "; look for a slow change in the room or the mount."),
         ),
-        Effect::SharedDrift(of) => (
-            format!(
-                "A slow drift in common with {}|, which nothing recorded explains|: {}| of it|.",
-                channel_list(&[of.with.to_owned()]),
-                each("ratio")
-            ),
-            Advice::new(RECORD_CONDITIONS, "; look for a slow change in the room or the mount."),
-        ),
+        Effect::SharedDrift(of) => {
+            let mut others = vec![of.with.to_owned()];
+            for shown in amounts.shown {
+                match shown.effect {
+                    Effect::SharedDrift(of) if !others.iter().any(|other| other == of.with) => {
+                        others.push(of.with.to_owned())
+                    }
+                    _ => {}
+                }
+            }
+            (
+                format!(
+                    "A slow drift in common with {}|, which nothing recorded explains|: {}| of it|.",
+                    channel_list(&others),
+                    each("ratio")
+                ),
+                Advice::new(RECORD_CONDITIONS, "; look for a slow change in the room or the mount."),
+            )
+        }
         Effect::LinearDrift(_) => (
             format!("The bias drifts in a straight line: {}.", each("slope")),
             Advice::new(

@@ -41,6 +41,13 @@ pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io:
     for channel in &report.channels {
         section(channel, out)?;
     }
+    let together = explanation::all_channels(report);
+    if !together.is_empty() {
+        writeln!(out, "\nAll channels")?;
+    }
+    for text in together {
+        writeln!(out, "{}", wrap(&format!("• {text}"), WIDTH.into()))?;
+    }
     writeln!(out)?;
     writeln!(out, "Intervals are of 95 %. The models are fitted to the first half of the samples; the second")?;
     writeln!(out, "half is unseen. deviance: mean edf·(ln(m/v) + v/m − 1), about 1 for a true model;")?;
@@ -127,6 +134,9 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "{}", term_table(&channel.after.terms))?;
     }
     writeln!(out, "{}", error_table(channel))?;
+    if channel.after.unseen.rms_percent.is_some() {
+        writeln!(out, "{}", wrap(&explanation::model(channel), WIDTH.into()))?;
+    }
     for text in worst_deviations(channel) {
         writeln!(out, "{}", wrap(&format!("! {text}."), WIDTH.into()))?;
     }

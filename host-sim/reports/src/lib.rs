@@ -1,12 +1,11 @@
-//! Reports of a noise analysis: the text of the terminal, the HTML page with its figures, exports for other programs,
-//! and the text that explains a recording.
+//! Reports of a noise analysis: the text of the terminal, the HTML page with its figures, exports for other programs.
 
 pub mod coefficient_notes;
 pub mod coefficients;
 pub mod comparison;
 mod curve_numbers;
 mod evidence;
-pub mod explanation;
+mod explanation;
 pub mod export;
 pub mod figure;
 pub mod finding_text;

@@ -7,7 +7,7 @@ use crate::coefficient_notes::coefficient_notes;
 use crate::evidence::{EvidenceText, NumberStyle};
 use crate::explanation;
 use crate::figure::{self, Plot};
-use crate::finding_text::{self, FindingText, ShownEffect, channel_list, channel_name};
+use crate::finding_text::{self, ShownEffect, channel_list, channel_name};
 use crate::formatting::{
     capital, count, filter_consistency, interval, missing_samples, number, parameter_name, recording_advice, words,
     worst_deviations,
@@ -87,21 +87,23 @@ fn render(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>
             body {
                 a.skip href="#findings" { "To the findings" }
                 header {
-                    h1 { (title) }
-                    p.headline { (headline) }
+                    div { h1 { (title) } p.headline { (headline) } }
+                    div id="save" {}
                 }
                 (contents(report))
                 main {
                     @if let Some(sentence) = reading.and_then(ReadingRecord::incomplete) { p { strong { (sentence) } } }
                     div.first {
                         (verdict(report))
-                        section.steps aria-label="Curves and what to do" {
-                            @if let Some(plot) = figure::overview(report) { (drawing(&plot)) }
-                            (next_steps(report))
+                        section.pictures aria-label="The two pictures that carry the answer" {
+                            @if let Some(plot) = figure::story(report) { (drawing(&plot)) }
+                            @if let Some(plot) = figure::strongest(report) { (drawing(&plot)) }
                         }
                     }
                     (findings(report))
-                    @for channel in in_reading_order(report) { (channel_section(report, channel)) }
+                    (curves(report))
+                    (channels(report))
+                    (disagreements(report))
                     @if let Some(reading) = reading { (what_was_read(reading)) }
                     (definitions())
                 }
@@ -136,26 +138,34 @@ fn in_reading_order(report: &Report) -> impl Iterator<Item = &ChannelReport> {
 fn contents(report: &Report) -> Markup {
     html! {
         nav aria-label="Sections" {
+            a href="#answer" { "Answer" }
             a href="#findings" { "Findings" }
+            a href="#curves" { "Curves" }
             @for channel in in_reading_order(report) { a href={ "#" (channel.name) } { (channel_name(channel)) } }
+            @if !summary::contradictions(report).is_empty() { a href="#disagreements" { "Model is off" } }
             a href="#reading" { "How to read this" }
         }
     }
 }
 
-/// What the analysis gained, the record in sentences, and the coefficients.
+/// Whether the recording can be trusted, N, B and K, and what to do.
 fn verdict(report: &Report) -> Markup {
+    let answer = summary::answer(report);
     html! {
-        section.verdict aria-label="Verdict" {
-            @if let Some(plot) = figure::story(report) { (drawing(&plot)) }
-            @for sentence in summary::record_sentences(report) { p { (unparted(&sentence)) } }
-            @let conditions = summary::conditions(report);
-            @if !conditions.is_empty() { p.faint { "Conditions: " (conditions.join("; ")) "." } }
+        section.verdict id="answer" aria-label="Answer" {
+            @if let Some((first, others)) = answer.split_first() {
+                p { strong { (unparted(first)) } " " (unparted(&others.join(" "))) }
+            }
             (tables::coefficients_of_all(report))
-            @for text in coefficient_notes(report) { p.faint { (text) } }
-            @let notes = summary::part_notes(report);
-            @if !notes.is_empty() {
-                details { summary { "Clock and filter of the part" } p.faint { (notes.join(" ")) } }
+            (what_to_do(report))
+            @let notes = [coefficient_notes(report), summary::record_in_detail(report), summary::part_notes(report)].concat();
+            @let conditions = summary::conditions(report);
+            @if !notes.is_empty() || !conditions.is_empty() {
+                details {
+                    summary { "More about the record" }
+                    @for text in notes { p { (unparted(&text)) } }
+                    @if !conditions.is_empty() { p { "Conditions: " (conditions.join("; ")) "." } }
+                }
             }
         }
     }
@@ -166,17 +176,37 @@ fn unparted(text: &str) -> String {
     text.replace(" %", "\u{a0}%")
 }
 
-/// Where data and model disagree, and what to do.
-fn next_steps(report: &Report) -> Markup {
-    let (contradictions, steps) = (summary::contradictions(report), summary::next_steps(report));
+/// Advice with links to its findings, and how many places have no explanation.
+fn what_to_do(report: &Report) -> Markup {
+    html! {
+        @let advice = summary::advice(report);
+        @if !advice.is_empty() {
+            h3 { "What to do" }
+            ul { @for (step, numbers) in advice { li {
+                (step.trim_end_matches('.')) " ("
+                @for (at, number) in numbers.iter().enumerate() {
+                    @if at > 0 { ", " }
+                    a href={ "#evidence-" (number) } { (number) }
+                }
+                ")."
+            } } }
+        }
+        @if let Some(text) = summary::unexplained_in_short(report) { p.warning { "Not explained: " (unparted(&text)) "." } }
+        @if let Some(text) = summary::contradictions_in_short(report) {
+            p.warning { a href="#disagreements" { "Model is off" } ": " (unparted(&text)) "." }
+        }
+    }
+}
+
+/// Where data and model disagree.
+fn disagreements(report: &Report) -> Markup {
+    let contradictions = summary::contradictions(report);
     html! {
         @if !contradictions.is_empty() {
-            h3 { "Where data and model disagree" }
-            ul { @for text in &contradictions { li.warning { (text) "." } } }
-        }
-        @if !steps.is_empty() {
-            h3 { "What to do" }
-            ul { @for step in &steps { li { (step) } } }
+            section id="disagreements" {
+                h2 { "Where data and model disagree" }
+                ul { @for text in &contradictions { li { (unparted(text)) "." } } }
+            }
         }
     }
 }
@@ -186,47 +216,43 @@ fn drawing(plot: &Plot) -> Markup {
     html! {
         figure id=(plot.id) tabindex="0" aria-label={ (plot.title) ". Arrow keys read the values." } {
             figcaption { (plot.title) }
-            div.drawing { (plot.svg(None)) }
+            (plot.key())
+            div.drawing { (plot.drawing()) }
             output aria-live="polite" { (plot.description) }
             script.values type="application/json" { (PreEscaped(plot.values())) }
         }
     }
 }
 
-/// Every finding with its words, its parameters, the analysis' evidence and a picture.
+/// Every finding as a card.
 fn findings(report: &Report) -> Markup {
-    let order = summary::finding_order(report);
-    let texts: Vec<FindingText> = order.iter().map(|&index| summary::finding_text(report, index)).collect();
     html! {
         section id="findings" {
             h2 { "What was found" }
-            @if report.findings.is_empty() {
-                p { (summary::nothing_found(report)) }
-            } @else {
-                ol.list {
-                    @for (number, text) in (1..).zip(&texts) {
-                        li { a href={ "#evidence-" (number) } { (text.channels) } ": " (text.physics) }
-                    }
-                }
+            @if report.findings.is_empty() { p { (summary::nothing_found(report)) } }
+            div.cards {
+                @for (number, index) in (1..).zip(summary::finding_order(report)) { (finding_card(report, index, number)) }
             }
         }
-        @for (number, (&index, text)) in (1..).zip(order.iter().zip(&texts)) { (finding_section(report, index, number, text)) }
     }
 }
 
-/// The finding at `index`, which is told as `number`.
-fn finding_section(report: &Report, index: usize, number: usize, text: &FindingText) -> Markup {
+/// The finding at `index`, which is told as `number`: its words, its picture, its parameters and the analysis' evidence.
+fn finding_card(report: &Report, index: usize, number: usize) -> Markup {
     let finding = &report.findings[index];
+    let text = summary::finding_text(report, index);
     html! {
-        section.finding id={ "evidence-" (number) } {
-            h3 { (number) ". " (words(finding.effect.name())) " " small { (text.channels) } }
-            p { (text.physics) " " (text.advice) }
-            p.faint {
-                @if !text.weight.is_empty() { "In the record: " (text.weight) ". " }
-                (capital(&EvidenceText::of_finding(finding, NumberStyle::Prefixed).sentence())) "."
-            }
-            (parameters(report, index))
+        article.finding id={ "evidence-" (number) } {
+            h3 { (number) ". " (text.channels) ": " (words(finding.effect.name())) }
+            p { (text.physics) }
+            @if !text.weight.is_empty() { p { (capital(&text.weight)) "." } }
+            p { (text.advice) }
             @if let Some(plot) = figure::evidence(report, index, number) { (drawing(&plot)) }
+            details {
+                summary { "Parameters and evidence" }
+                (parameters(report, index))
+                p { (capital(&EvidenceText::of_finding(finding, NumberStyle::Prefixed).sentence())) "." }
+            }
         }
     }
 }
@@ -246,15 +272,57 @@ fn parameters(report: &Report, index: usize) -> Markup {
     }
 }
 
-/// One channel with its figures and tables.
-fn channel_section(report: &Report, channel: &ChannelReport) -> Markup {
+/// All gyros and all accelerometers beside the data sheet.
+fn curves(report: &Report) -> Markup {
+    let plots = figure::overviews(report);
     html! {
-        section.channel id=(channel.name) {
-            h2 { (channel_name(channel)) " " small { (unit(&channel.unit)) " · " (count(channel.samples)) " samples" } }
-            @let missing = missing_samples(&channel.missing);
-            @if !missing.is_empty() { p.faint { "Missing: " (missing) "." } }
+        section id="curves" {
+            h2 { "Curves" }
+            @if plots.is_empty() { p { "No gyro or accelerometer has a point of the curve." } }
+            div.cards { @for plot in &plots { (drawing(plot)) } }
+        }
+    }
+}
+
+/// Every channel, folded.
+fn channels(report: &Report) -> Markup {
+    html! {
+        section.channels aria-label="Channels" {
+            h2 { "Channels" }
+            @for channel in in_reading_order(report) {
+                details.channel {
+                    summary {
+                        strong { (channel_name(channel)) } " "
+                        span.faint {
+                            @if is_sensed(channel) {
+                                (summary::coefficients_in_short(report, &channel.name).into_iter()
+                                    .filter(|text| text.contains(' ')).collect::<Vec<_>>().join(" · "))
+                            } @else { (count(channel.samples)) " samples" }
+                        }
+                    }
+                    div id=(channel.name) { (channel_section(report, channel)) }
+                }
+            }
+        }
+    }
+}
+
+/// Whether a channel has a noise model that anybody uses: temperature and supply are conditions.
+fn is_sensed(channel: &ChannelReport) -> bool {
+    ["gyro_", "accl_", "magn_"].iter().any(|prefix| channel.name.starts_with(prefix))
+}
+
+/// One channel with its figures and tables; of a condition its course alone.
+fn channel_section(report: &Report, channel: &ChannelReport) -> Markup {
+    let missing = missing_samples(&channel.missing);
+    html! {
+        p.faint { (unit(&channel.unit)) " · " (count(channel.samples)) " samples"
+            @if !missing.is_empty() { " · missing: " (missing) } }
+        @if !is_sensed(channel) {
+            @if let Some(plot) = figure::course(channel) { (drawing(&plot)) }
+        } @else {
             @if channel.curve.is_empty() { p { "The record is too short for a point of the curve." } }
-            @for plot in figure::channel_plots(report, channel) { (drawing(&plot)) }
+            div.cards { @for plot in figure::channel_plots(report, channel) { (drawing(&plot)) } }
             div.tables {
                 div {
                     h3 { "Model, fitted to the whole record" }
@@ -278,19 +346,13 @@ fn channel_section(report: &Report, channel: &ChannelReport) -> Markup {
             }
             @let course = explanation::course(channel);
             @if !course.is_empty() {
-                details {
-                    summary { "How the noise changes in the course of the record" }
-                    ul { @for text in &course { li { (text) } } }
-                }
+                h3 { "How the noise changes in the course of the record" }
+                ul { @for text in &course { li { (text) } } }
             }
-            details {
-                summary { "What the model is good for: other units, drift, a filter's innovations, longer records" }
-                (assessment(&channel.assessment))
-            }
-            details {
-                summary { "The curve in numbers (" (count(channel.curve.len() as u64)) " points)" }
-                (tables::curve(channel))
-            }
+            h3 { "What the model is good for" }
+            (assessment(&channel.assessment))
+            h3 { "The curve in numbers" }
+            (tables::curve(channel))
         }
     }
 }

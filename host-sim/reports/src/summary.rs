@@ -124,6 +124,23 @@ pub fn coefficient_tables(report: &Report) -> Vec<CoefficientTable> {
     tables_of(&channels, report.sample_rate_hz, sheet)
 }
 
+/// N, B and K of a gyro or an accelerometer with their letters and units, without intervals, such as `N 2.424 °/√h`; the letter alone of what
+/// has no number in the table.
+pub(crate) fn coefficients_in_short(report: &Report, channel: &str) -> [String; 3] {
+    let tables = coefficient_tables(report);
+    let row = tables.iter().find_map(|table| Some((table, table.rows.iter().find(|row| row.channel == channel)?)));
+    std::array::from_fn(|index| {
+        let letter = LETTERS[index].1;
+        let number = row.and_then(|(table, row)| {
+            let number = row.coefficients[index].split(' ').next()?;
+            number
+                .starts_with(|first: char| first.is_ascii_digit())
+                .then(|| format!("{letter} {number} {}", table.units[index]))
+        });
+        number.unwrap_or_else(|| letter.to_owned())
+    })
+}
+
 /// The same tables of channels sampled at `sample_rate_hz`, without a row for the data sheet.
 #[must_use]
 pub fn tables_of_channels(channels: &[ChannelCoefficients], sample_rate_hz: f64) -> Vec<CoefficientTable> {
@@ -328,21 +345,23 @@ pub fn nothing_found(report: &Report) -> String {
 /// length is good for, and the errors without spikes and knocks.
 #[must_use]
 pub fn record_sentences(report: &Report) -> Vec<String> {
-    let length = length_advice(report);
-    let length = length.known.into_iter().chain(length.except).chain(length.longer).chain(length.limits);
-    sentences(report, length, Vec::new()).into_iter().chain(without_events(report)).collect()
+    answer(report).into_iter().chain(record_in_detail(report)).collect()
 }
 
-/// The record in sentences, with those of its length and of the part's `notes`, the most important first.
-fn sentences(report: &Report, length: impl Iterator<Item = String>, notes: Vec<String>) -> Vec<String> {
+/// The first of these sentences: the answer, rest and losses, and how good the model is on the unseen half.
+pub(crate) fn answer(report: &Report) -> Vec<String> {
     let mut sentences = vec![trust(report), rest(report), losses(report)];
     sentences.extend(report.quick.then(|| QUICK.to_owned()));
     sentences.extend(unseen_half(report));
-    sentences.extend(length);
-    sentences.extend(notes);
-    sentences.extend(recent_fit(report));
     sentences.retain(|sentence| !sentence.is_empty());
     sentences
+}
+
+/// The others: what the length is good for, to which part the models were fitted, and the errors without spikes and knocks.
+pub(crate) fn record_in_detail(report: &Report) -> Vec<String> {
+    let LengthAdvice { known, except, longer, limits } = length_advice(report);
+    let length = known.into_iter().chain(except).chain(longer).chain(limits);
+    length.chain(recent_fit(report)).chain(without_events(report)).collect()
 }
 
 /// Part of the samples that may be missing before that is held against a record.
@@ -414,8 +433,9 @@ pub fn part_notes(report: &Report) -> Vec<String> {
 /// The record in sentences for the screen: with the part's notes that it has room for, without what its table shows.
 #[must_use]
 pub fn record_sentences_in_short(report: &Report) -> Vec<String> {
-    let length = length_advice(report);
-    sentences(report, length.known.into_iter().chain(length.longer), part_note::in_short(&told_notes(report)))
+    let LengthAdvice { known, longer, .. } = length_advice(report);
+    let notes = part_note::in_short(&told_notes(report));
+    answer(report).into_iter().chain(known).chain(longer).chain(notes).chain(recent_fit(report)).collect()
 }
 
 /// A departure of the data from every model.
@@ -925,7 +945,7 @@ pub fn contradictions(report: &Report) -> Vec<String> {
 }
 
 /// The advice of the findings in their order, each with the numbers of its findings. Of a part that moved the part at rest is the first.
-fn advice(report: &Report) -> Vec<(String, Vec<usize>)> {
+pub(crate) fn advice(report: &Report) -> Vec<(String, Vec<usize>)> {
     let is_motion = |index: usize| matches!(report.findings[index].effect, Effect::MotionInterval(_));
     let at_rest = longest_at_rest(report);
     let mut steps: Vec<(String, Vec<usize>)> = Vec::new();
@@ -958,8 +978,7 @@ pub fn next_steps(report: &Report) -> Vec<String> {
 
 /// The advice of the findings with the numbers of these: `Look for a fan, a motor or the mains (2, 5).`
 pub(crate) fn numbered_steps(report: &Report) -> Vec<String> {
-    let numbered = |(step, mut numbers): (String, Vec<usize>)| {
-        numbers.sort_unstable();
+    let numbered = |(step, numbers): (String, Vec<usize>)| {
         let numbers: Vec<String> = numbers.iter().map(usize::to_string).collect();
         format!("{} ({}).", step.trim_end_matches('.'), numbers.join(", "))
     };

@@ -75,7 +75,7 @@ fn a_misspelt_command_option_or_file_gets_a_suggestion() {
         // Other names of what the program has.
         (vec!["analyze", "--html", "d", "x.csv"], 2, "'--page'".to_owned()),
         (vec!["--htlm", "d"], 2, "'--page'".to_owned()),
-        (vec!["explain", "report.json"], 2, "'analyze FILE --explain'".to_owned()),
+        (vec!["explain", "report.json"], 2, "'analyze FILE --full'".to_owned()),
         (vec!["analyze", &path, "--export", "kalib=x.yaml"], 2, "did you mean kalibr?".to_owned()),
         (vec!["analyze", &path, "--sensor", "bmi08"], 1, "tip: a similar sensor exists: bmi088\n".to_owned()),
         (vec!["simulate", "x.csv", "--effect", "sinusiod:gyro_x:a=1"], 1, "tip: did you mean sinusoid?\n".to_owned()),

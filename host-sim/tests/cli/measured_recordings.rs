@@ -1,7 +1,7 @@
 //! Effects in the measured recordings, and the errors of the models on the half of each record that was not fitted.
 //!
 //! Expected values are of three kinds: the targets of the project ([`target`]), figures of an independent analysis of the same
-//! files in Python (periodograms, autocorrelations, regressions on averages), and the figures that `docs/recordings.md` quotes.
+//! files in Python (periodograms, autocorrelations, regressions on averages), and the figures that `docs/measured.md` quotes.
 //! The last are bounded from above by their scatter ([`largest`]); a better model fails no test.
 
 use crate::recorded_screens;
@@ -80,7 +80,7 @@ struct Run {
     /// Quoted deviances per point on the unseen half: of the model of the first half, beyond the expected drift, and of the
     /// mean of the predictions epoch by epoch.
     quoted: [[f64; 6]; 3],
-    /// Channels whose quoted figure misses the target; `docs/recordings.md` says why.
+    /// Channels whose quoted figure misses the target; `docs/measured.md` says why.
     missed: &'static [&'static str],
     /// The same of gyro Z with its line at the frequency of its related line on accelerometer X.
     related_quoted: f64,

@@ -1,5 +1,5 @@
 //! Which explanation stands where two claim the same variance and the likelihood does not decide: one table, in the order in which
-//! its rows are applied. A row sees what the rows before it have left. `docs/analysis.md` has the same table.
+//! its rows are applied. A row sees what the rows before it have left.
 
 use crate::bounds::BoundedEstimate;
 use crate::detectors::random_telegraph::explains_spikes;

@@ -279,7 +279,7 @@ mod tests {
             };
             (0..100).filter(|&seed| of_seed(seed).expect("complete").find_markov(&[], 0.0).is_some()).count()
         };
-        // docs/analysis.md tells of 37 and 99 of 100; as few have a probability of one in a thousand.
+        // docs/derivations.md tells of 37 and 99 of 100; as few have a probability of one in a thousand.
         let (thirty, sixty) = (found(30.0), found(60.0));
         assert!(thirty >= 22 && sixty >= 94, "{thirty} {sixty}");
     }

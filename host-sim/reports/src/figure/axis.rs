@@ -1,6 +1,6 @@
 //! An axis of a figure: linear or logarithmic, with its ticks at round values.
 
-use crate::rounding::significant;
+use crate::rounding::{column_prefix, significant};
 
 /// Values from `from` to `to` along pixels from `start` to `end`.
 #[derive(Debug, Clone, PartialEq)]
@@ -90,6 +90,23 @@ impl Axis {
         part.is_finite().then_some(self.start + part * (self.end - self.start))
     }
 
+    /// What stands at the axis: its name, and the unit with the prefix of the numbers at the ticks.
+    pub(super) fn title(&self) -> String {
+        match self.label.rsplit_once(", ") {
+            Some((name, unit)) => format!("{name}, {}{unit}", self.prefix().0),
+            None => self.label.clone(),
+        }
+    }
+
+    /// Prefix of the unit, and its factor: of units of time, frequency and temperature none.
+    fn prefix(&self) -> (&'static str, f64) {
+        const WITHOUT: [&str; 7] = ["s", "min", "h", "d", "Hz", "°C", "σ"];
+        match self.label.rsplit_once(", ") {
+            Some((_, unit)) if !WITHOUT.contains(&unit) => column_prefix([self.from.abs(), self.to.abs()].into_iter()),
+            _ => ("", 1.0),
+        }
+    }
+
     pub(super) fn ticks(&self) -> Vec<Tick> {
         if self.is_logarithmic { self.decades() } else { self.steps() }
     }
@@ -105,25 +122,28 @@ impl Axis {
             2 | 5 => shown < 3,
             _ => shown == 0,
         };
-        let is_plain = self.from >= 1e-4 * (1.0 - 1e-9) && self.to < 1e5;
+        let factor = self.prefix().1;
+        let shift = factor.log10().round() as i32;
+        let is_plain = self.from >= factor * 1e-4 * (1.0 - 1e-9) && self.to < factor * 1e5;
         let grid = (first..=last).flat_map(|decade| (1..=9_u8).map(move |digit| (decade, digit)));
         grid.map(|(decade, digit)| (decade, digit, f64::from(digit) * 10f64.powi(decade)))
             .filter(|(_, digit, value)| inside(*value) && (every == 1 || *digit == 1))
             .map(|(decade, digit, value)| Tick {
                 value,
-                label: is_labelled(decade, digit).then(|| decade_label(digit, decade, is_plain)),
+                label: is_labelled(decade, digit).then(|| decade_label(digit, decade - shift, is_plain)),
             })
             .collect()
     }
 
     /// Lines at multiples of 1, 2 or 5 times a power of ten, about five.
     fn steps(&self) -> Vec<Tick> {
-        let rough = (self.to - self.from) / 5.0;
+        let factor = self.prefix().1;
+        let rough = (self.to - self.from) / factor / 5.0;
         let power = 10f64.powf(rough.log10().floor());
         let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|digit| digit * power).find(|step| *step >= rough);
         let step = step.unwrap_or(rough);
         let decimals = (-step.log10().floor()).clamp(0.0, 12.0) as usize;
-        let (first, last) = ((self.from / step).ceil(), (self.to / step).floor());
+        let (first, last) = ((self.from / factor / step).ceil(), (self.to / factor / step).floor());
         let count = (last - first).clamp(-1.0, 50.0) as i64 + 1;
         (0..count)
             .map(|index| {
@@ -131,7 +151,7 @@ impl Axis {
                 let text = format!("{value:.decimals$}");
                 let is_zero = text.trim_start_matches('-').bytes().all(|digit| matches!(digit, b'0' | b'.'));
                 let label = if is_zero { "0".to_owned() } else { text.replace('-', "−") };
-                Tick { value, label: Some(label) }
+                Tick { value: factor * value, label: Some(label) }
             })
             .collect()
     }
@@ -174,6 +194,22 @@ mod tests {
     fn steps_are_round() {
         let axis = Axis::linear("", [-0.3, 0.41].into_iter(), [100.0, 0.0]);
         assert_eq!(labels(&axis), ["−0.2", "0", "0.2", "0.4"]);
+    }
+
+    #[test]
+    fn small_values_have_a_prefix() {
+        let bias = Axis::linear("bias, g", [-0.003, 0.0041].into_iter(), [100.0, 0.0]);
+        assert_eq!(
+            (bias.title().as_str(), labels(&bias)),
+            ("bias, mg", ["−2", "0", "2", "4"].map(str::to_owned).to_vec())
+        );
+        let curve = Axis::logarithmic("σ(τ), g", [2e-4, 3e-2].into_iter(), [0.0, 100.0]);
+        assert_eq!(
+            (curve.title().as_str(), labels(&curve)),
+            ("σ(τ), mg", ["0.2", "0.5", "1", "2", "5", "10", "20"].map(str::to_owned).to_vec())
+        );
+        let time = Axis::logarithmic("τ, s", [0.01, 0.09].into_iter(), [0.0, 100.0]);
+        assert_eq!(time.title(), "τ, s");
     }
 
     #[test]

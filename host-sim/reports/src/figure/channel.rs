@@ -5,7 +5,7 @@ use super::plot::{LEFT, Line, Look, Panel, Place, Plot, RIGHT, below_legend, fra
 use crate::finding_text::channel_name;
 use crate::formatting::{capital, words};
 use crate::rounding::{NONE, quantity, quantity_digits, span, unit};
-use crate::summary::off_percent;
+use crate::summary::{self, off_percent};
 use allan_core::model::{FittedTerm, cube_root_deviation};
 use allan_core::{Model, NoiseTerm};
 use noise_analysis::report::{ChannelReport, Finding, ModelReport, Report, SlopeMethodReport, SlopeMethodValue};
@@ -20,16 +20,16 @@ const PER_OCTAVE: u32 = 2;
 pub(super) fn allan_deviation_plot(report: &Report, channel: &ChannelReport) -> Plot {
     let data = measured(channel, Look::Measured, "measured, 95 % bounds");
     let has_terms = channel.refitted.adev != channel.before.adev;
-    let mut lines: Vec<Line> = terms(channel, &channel.refitted, report.sample_rate_hz);
+    let mut lines: Vec<Line> = terms(report, channel);
     if has_terms {
         lines.push(model_line(channel, &channel.before, "before: N, B, K of the first half", Look::Before));
     }
-    lines.push(model_line(channel, &channel.refitted, "model", Look::Model));
+    lines.push(model_line(channel, &channel.refitted, "model of the whole record", Look::Model));
     lines.push(data);
     let [curve, residual] = frames([330.0, 120.0]);
     let across = Axis::logarithmic("averaging time τ, s", lines.iter().flat_map(places), [LEFT, RIGHT]);
     // The terms may lead out of the panel, but for the flat line of B.
-    let shown = lines.iter().filter(|line| line.look != Look::Term || line.mark == "B").flat_map(heights);
+    let shown = lines.iter().filter(|line| line.look != Look::Term || is_flat(line)).flat_map(heights);
     let up = Axis::logarithmic(&format!("Allan deviation σ(τ), {}", unit(&channel.unit)), shown, curve);
     lines.extend(slopes(channel).into_iter().flatten());
     let lower = residual_panel(channel, has_terms, across.clone(), residual);
@@ -44,7 +44,7 @@ pub(super) fn allan_deviation_plot(report: &Report, channel: &ChannelReport) -> 
 
 /// What was measured, the baseline model and the model with its effects, both fitted to the first half, and the error of each on the
 /// second; the baseline model alone where the effects do not lower its error.
-pub(super) fn story_plot(channel: &ChannelReport, [before, after]: [f64; 2]) -> Plot {
+pub(super) fn story_plot(report: &Report, channel: &ChannelReport, [before, after]: [f64; 2]) -> Plot {
     let is_lowered = after < before;
     let mut lines = vec![
         model_line(
@@ -69,33 +69,28 @@ pub(super) fn story_plot(channel: &ChannelReport, [before, after]: [f64; 2]) -> 
         let name = "second half, not seen by the fit";
         lines.push(Line::new(name, Look::Reference, unseen).with_dots().unjoined());
     }
-    let [frame] = frames([330.0]).map(|frame| below_legend(frame, &lines));
+    let [frame] = frames([270.0]).map(|frame| below_legend(frame, &lines));
     let across = Axis::logarithmic("averaging time τ, s", lines.iter().flat_map(places), [LEFT, RIGHT]);
     let label = format!("Allan deviation σ(τ), {}", unit(&channel.unit));
-    let up = Axis::logarithmic(&label, lines.iter().flat_map(heights), frame);
-    lines.extend(slopes(channel).into_iter().flatten());
+    let terms = terms(report, channel);
+    let level = terms.iter().filter(|line| is_flat(line)).flat_map(heights);
+    let up = Axis::logarithmic(&label, lines.iter().flat_map(heights).chain(level), frame);
+    lines.splice(0..0, terms);
     let name = capital(&channel_name(channel));
     let [before, after] = [&channel.before, &channel.after]
         .map(|model| model.unseen.rms_percent.map_or_else(|| NONE.to_owned(), off_percent));
-    const MEASURED: &str =
-        "The curve is that of the whole record with its 95 % bounds, the points are those of the second half.";
     let (title, description) = if is_lowered {
         (
-            format!("{name}: what was measured, and the model before and after"),
-            format!(
-                "Both models are fitted to the first half. On the second half, which they had not seen, σ is off by {before} % before and \
-                 by {after} % after the effects were added. {MEASURED}"
-            ),
+            format!("{name}: σ is off by {before} % without what was found, by {after} % with it"),
+            "Both models are fitted to the first half; the errors are those on the second, which they had not seen.",
         )
     } else {
         (
-            format!("{name}: what was measured, and the model of N, B and K"),
-            format!(
-                "The model is fitted to the first half. On the second half, which it had not seen, σ is off by {before} %. No effect was \
-                 found that lowers this. {MEASURED}"
-            ),
+            format!("{name}: σ is off by {before} %"),
+            "The model is fitted to the first half; the error is that on the second, which it had not seen. No effect lowers it.",
         )
     };
+    let description = description.to_owned();
     Plot { id: "story".to_owned(), title, description, panels: vec![Panel::new(across, up, lines)] }
 }
 
@@ -104,7 +99,7 @@ pub(super) fn story_plot(channel: &ChannelReport, [before, after]: [f64; 2]) -> 
 /// occurs.
 fn slopes(channel: &ChannelReport) -> [Option<Line>; 3] {
     let SlopeMethodReport { angle_random_walk, bias_instability, rate_random_walk } = &channel.read_off;
-    let line = |mark, found: &SlopeMethodValue, at_s: f64, deviation: &dyn Fn(f64) -> f64| {
+    let line = |slope: &str, found: &SlopeMethodValue, at_s: f64, deviation: &dyn Fn(f64) -> f64| {
         let (mut from, mut to) = (0.25 * at_s, 4.0 * at_s);
         if found.to_s < from {
             from = found.from_s;
@@ -114,7 +109,7 @@ fn slopes(channel: &ChannelReport) -> [Option<Line>; 3] {
         let octaves = (to / from).log2().ceil().clamp(1.0, 64.0) as i32;
         let points = (0..=octaves).map(|step| from * (to / from).powf(f64::from(step) / f64::from(octaves)));
         let points: Vec<(f64, f64)> = points.map(|tau| (tau, deviation(tau))).collect();
-        let line = Line { mark, ..Line::new(format!("slope {mark}"), Look::Reference, points).unlisted() };
+        let line = Line::new(format!("slope {slope}"), Look::Reference, points).unlisted().marked(slope);
         line.points.iter().all(|&(tau, of)| has_logarithm(tau) && has_logarithm(of)).then_some(line)
     };
     [
@@ -160,13 +155,15 @@ fn describe(channel: &ChannelReport) -> String {
 }
 
 /// A model at the octaves, without what cannot be shown.
-fn model_line(channel: &ChannelReport, model: &ModelReport, name: &str, look: Look) -> Line {
+pub(super) fn model_line(channel: &ChannelReport, model: &ModelReport, name: &str, look: Look) -> Line {
     let pairs = channel.curve.iter().map(|point| point.tau_s).zip(model.adev.iter().copied());
     Line::new(name, look, pairs.filter(|&(tau, adev)| has_logarithm(tau) && has_logarithm(adev)).collect())
 }
 
-/// Each term of a model on its own, the first of them in the legend.
-fn terms(channel: &ChannelReport, model: &ModelReport, rate_hz: f64) -> Vec<Line> {
+/// Each term of the model to use on its own; N, B and K with their numbers.
+fn terms(report: &Report, channel: &ChannelReport) -> Vec<Line> {
+    let (model, rate_hz) = (&channel.refitted, report.sample_rate_hz);
+    let [n, b, k] = &summary::coefficients_in_short(report, &channel.name);
     let Some(last) = channel.curve.last().map(|point| point.n) else { return Vec::new() };
     let factors: Vec<u64> = (0..=last.max(1).ilog2() * PER_OCTAVE)
         .map(|step| 2f64.powf(f64::from(step) / f64::from(PER_OCTAVE)).round() as u64)
@@ -176,18 +173,27 @@ fn terms(channel: &ChannelReport, model: &ModelReport, rate_hz: f64) -> Vec<Line
         let kind = term.kind;
         let deviation = |n: u64| (n as f64 / rate_hz, whole.part(term, n).sqrt());
         let points = factors.iter().map(|&n| deviation(n)).filter(|&(_, of)| has_logarithm(of)).collect();
-        let mark = match kind {
-            NoiseTerm::AngleRandomWalk | NoiseTerm::Filtered(_) | NoiseTerm::LowPass(_) => "N",
-            NoiseTerm::BiasInstability => "B",
-            NoiseTerm::RateRandomWalk => "K",
-            NoiseTerm::Quantization => "Q",
-            NoiseTerm::RateRamp => "R",
-            _ => "",
-        };
-        Line { mark, in_legend: false, ..Line::new(words(kind.name()), Look::Term, points) }
+        let line = Line::new(words(kind.name()), Look::Term, points).unlisted();
+        match kind {
+            NoiseTerm::AngleRandomWalk | NoiseTerm::Filtered(_) | NoiseTerm::LowPass(_) => line.marked(n),
+            NoiseTerm::BiasInstability => line.marked(b),
+            NoiseTerm::RateRandomWalk => line.marked_right(k),
+            NoiseTerm::Quantization => line.marked("Q"),
+            NoiseTerm::RateRamp => line.marked_right("R"),
+            _ => line,
+        }
     };
     let known = whole.terms().iter().filter(|term| term.value > 0.0);
-    known.map(line).filter(|line| !line.points.is_empty()).collect()
+    let mut lines: Vec<Line> = known.map(line).filter(|line| !line.points.is_empty()).collect();
+    if let Some(first) = lines.first_mut() {
+        (first.name, first.in_legend) = ("terms of the whole record".to_owned(), true);
+    }
+    lines
+}
+
+/// Whether a line is level, as that of B is.
+fn is_flat(line: &Line) -> bool {
+    line.points.first().map(|of| of.1) == line.points.last().map(|of| of.1)
 }
 
 /// What the models leave, in standard deviations of each point.
@@ -319,5 +325,5 @@ pub(super) fn measured(channel: &ChannelReport, look: Look, name: &str) -> Line 
     let shown = || channel.curve.iter().filter(|point| has_logarithm(point.tau_s) && has_logarithm(point.adev));
     let points = shown().map(|point| (point.tau_s, point.adev)).collect();
     let bounds = shown().map(|point| (point.low, point.high)).collect();
-    Line::new(name, look, points).with_bounds(bounds).with_dots()
+    Line::new(name, look, points).with_bounds(bounds).with_dots().unjoined()
 }

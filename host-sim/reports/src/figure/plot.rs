@@ -1,6 +1,6 @@
 //! A figure: panels with axes, lines, bands and markers, as SVG, with its values for the page's script.
 
-use super::axis::{Axis, has_logarithm};
+use super::axis::{Axis, Tick, has_logarithm};
 use crate::rounding::significant;
 use maud::{Markup, html};
 use std::fmt::Write;
@@ -15,6 +15,8 @@ pub(super) const TOP: f64 = 34.0;
 /// Distance of two panels, and what is below the last: labels of the axis.
 const BETWEEN: f64 = 22.0;
 const BELOW: f64 = 48.0;
+/// Above the first panel, for the upper half of the highest tick's label.
+const ABOVE: f64 = 10.0;
 
 /// How the style sheet draws a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,15 +68,28 @@ pub(super) struct Line {
     pub is_joined: bool,
     /// Whether it is in the legend.
     pub in_legend: bool,
-    /// Letter beside the last visible value; empty without.
-    pub mark: &'static str,
+    /// Text beside an end of the line; empty without.
+    pub mark: String,
+    /// Whether that is the right end.
+    pub mark_is_right: bool,
 }
 
 impl Line {
     /// A line in the legend, without bounds and dots.
     pub(super) fn new(name: impl Into<String>, look: Look, points: Vec<(f64, f64)>) -> Self {
         let name = name.into();
-        Self { name, look, points, bounds: Vec::new(), has_dots: false, is_joined: true, in_legend: true, mark: "" }
+        let (bounds, mark) = (Vec::new(), String::new());
+        Self {
+            name,
+            look,
+            points,
+            bounds,
+            has_dots: false,
+            is_joined: true,
+            in_legend: true,
+            mark,
+            mark_is_right: false,
+        }
     }
 
     pub(super) fn with_bounds(mut self, bounds: Vec<(f64, f64)>) -> Self {
@@ -95,6 +110,18 @@ impl Line {
     pub(super) fn unlisted(mut self) -> Self {
         self.in_legend = false;
         self
+    }
+
+    /// With a text beside its left end.
+    pub(super) fn marked(mut self, mark: impl Into<String>) -> Self {
+        self.mark = mark.into();
+        self
+    }
+
+    /// With a text beside its right end.
+    pub(super) fn marked_right(mut self, mark: impl Into<String>) -> Self {
+        self.mark_is_right = true;
+        self.marked(mark)
     }
 }
 
@@ -174,21 +201,57 @@ impl Plot {
         self.panels.last().map_or(TOP, |panel| panel.up.start) + BELOW
     }
 
-    /// The drawing.
-    pub(crate) fn svg(&self, style: Option<&str>) -> Markup {
-        let view = format!("0 0 {WIDTH} {}", self.height());
+    /// The drawing as a file of its own has it: with its style, its ground and its legend.
+    pub(crate) fn file(&self, style: &str) -> Markup {
+        let ground = html! {
+            style { (maud::PreEscaped(style)) }
+            rect class="paper" width=(WIDTH) height=(self.height()) {}
+        };
+        self.svg(0.0, &ground)
+    }
+
+    /// The drawing as the page has it, whose legend stands beside it.
+    pub(crate) fn drawing(&self) -> Markup {
+        self.svg(self.top() - ABOVE, &html! {})
+    }
+
+    fn svg(&self, top: f64, ground: &Markup) -> Markup {
+        let view = format!("0 {} {WIDTH} {}", pixel(top), pixel(self.height() - top));
         html! {
             svg xmlns="http://www.w3.org/2000/svg" viewBox=(view) role="img" aria-label={ (self.title) ". " (self.description) } {
                 title { (self.title) }
-                @if let Some(style) = style {
-                    style { (maud::PreEscaped(style)) }
-                    rect class="paper" width=(WIDTH) height=(self.height()) {}
-                }
+                (ground)
                 (self.legend())
                 @for (index, panel) in self.panels.iter().enumerate() {
                     (panel.svg(&format!("{}-{index}", self.id), index + 1 == self.panels.len()))
                 }
                 line class="cursor" x1="0" x2="0" y1=(self.top()) y2=(self.height() - BELOW) visibility="hidden" {}
+            }
+        }
+    }
+
+    /// Label of the upward axis, swatches and names, for the page.
+    pub(crate) fn key(&self) -> Markup {
+        let mut lines: Vec<&Line> = Vec::new();
+        for line in self.panels.iter().flat_map(|panel| &panel.lines).filter(|line| line.in_legend) {
+            if lines.iter().all(|known| known.name != line.name) {
+                lines.push(line);
+            }
+        }
+        html! {
+            ul.key {
+                @if let Some(first) = self.panels.first() { li.up { (first.up.title()) } }
+                @for line in lines {
+                    li {
+                        svg viewBox="0 0 22 10" aria-hidden="true" {
+                            g class=(line.look.class()) {
+                                @if line.is_joined { line x1="0" x2="22" y1="5" y2="5" {} }
+                                @if line.has_dots { circle cx="11" cy="5" r="3.2" {} }
+                            }
+                        }
+                        (line.name)
+                    }
+                }
             }
         }
     }
@@ -230,35 +293,29 @@ impl Panel {
                 clipPath id=(clip) {
                     rect x=(pixel(x.start)) y=(pixel(y.end)) width=(pixel(x.end - x.start)) height=(pixel(y.start - y.end)) {}
                 }
+                path class="fine" d=(self.grid(|tick| tick.label.is_none())) {}
+                path class="grid" d=(self.grid(|tick| tick.label.is_some())) {}
                 @for tick in x.ticks() {
-                    @if let Some(at) = x.at(tick.value) {
-                        line class=(if tick.label.is_some() { "grid" } else { "fine" })
-                            x1=(pixel(at)) x2=(pixel(at)) y1=(pixel(y.start)) y2=(pixel(y.end)) {}
-                        @if let (true, Some(label)) = (is_last, &tick.label) {
-                            text x=(pixel(at)) y=(pixel(y.start + 17.0)) text-anchor="middle" { (label) }
-                        }
+                    @if let (true, Some(at), Some(label)) = (is_last, x.at(tick.value), &tick.label) {
+                        text x=(pixel(at)) y=(pixel(y.start + 17.0)) text-anchor="middle" { (label) }
                     }
                 }
                 @for tick in y.ticks() {
-                    @if let Some(at) = y.at(tick.value) {
-                        line class=(if tick.label.is_some() { "grid" } else { "fine" })
-                            x1=(pixel(x.start)) x2=(pixel(x.end)) y1=(pixel(at)) y2=(pixel(at)) {}
-                        @if let Some(label) = &tick.label {
-                            text x=(pixel(x.start - 7.0)) y=(pixel(at + 4.5)) text-anchor="end" { (label) }
-                        }
+                    @if let (Some(at), Some(label)) = (y.at(tick.value), &tick.label) {
+                        text x=(pixel(x.start - 7.0)) y=(pixel(at + 4.5)) text-anchor="end" { (label) }
                     }
                 }
                 rect class="frame" x=(pixel(x.start)) y=(pixel(y.end))
                     width=(pixel(x.end - x.start)) height=(pixel(y.start - y.end)) {}
                 @let middle = (y.start + y.end) / 2.0;
-                text class="axis" x="15" y=(pixel(middle)) text-anchor="middle"
-                    transform={ "rotate(-90 15 " (pixel(middle)) ")" } { (y.label) }
+                text class="axis up" x="15" y=(pixel(middle)) text-anchor="middle"
+                    transform={ "rotate(-90 15 " (pixel(middle)) ")" } { (y.title()) }
                 @if is_last {
-                    text class="axis" x=(pixel((x.start + x.end) / 2.0)) y=(pixel(y.start + 38.0)) text-anchor="middle" { (x.label) }
+                    text class="axis" x=(pixel((x.start + x.end) / 2.0)) y=(pixel(y.start + 38.0)) text-anchor="middle" { (x.title()) }
                 }
                 g clip-path={ "url(#" (clip) ")" } {
                     @for place in &self.places { (self.place(place)) }
-                    @for line in &self.lines { (self.band(line)) }
+                    @for line in &self.lines { (self.bounds(line)) }
                     @for line in &self.lines { (self.line(line)) }
                 }
                 @for (place, row) in self.places.iter().zip((0..3).cycle()) {
@@ -272,6 +329,17 @@ impl Panel {
                 @for line in self.lines.iter().filter(|line| !line.mark.is_empty()) { (self.mark(line)) }
             }
         }
+    }
+
+    /// The lines of the ticks that are chosen.
+    fn grid(&self, is_chosen: impl Fn(&Tick) -> bool) -> String {
+        let (x, y) = (&self.across, &self.up);
+        let at = |axis: &Axis| -> Vec<f64> {
+            axis.ticks().iter().filter(|tick| is_chosen(tick)).filter_map(|tick| axis.at(tick.value)).collect()
+        };
+        let upright = at(x).into_iter().map(|at| format!("M{} {}V{}", pixel(at), pixel(y.start), pixel(y.end)));
+        let level = at(y).into_iter().map(|at| format!("M{} {}H{}", pixel(x.start), pixel(at), pixel(x.end)));
+        upright.chain(level).collect()
     }
 
     fn place(&self, place: &Place) -> Markup {
@@ -288,8 +356,11 @@ impl Panel {
         }
     }
 
-    /// The area between the bounds.
-    fn band(&self, line: &Line) -> Markup {
+    /// The bounds: the area between those of a line, a bar for each point that stands alone.
+    fn bounds(&self, line: &Line) -> Markup {
+        if !line.is_joined {
+            return self.error_bars(line);
+        }
         let edge = |of: fn(&(f64, f64)) -> f64| -> Vec<(f64, f64)> {
             let pairs = line.points.iter().zip(&line.bounds);
             pairs.filter_map(|((x, _), bounds)| Some((self.across.at(*x)?, self.up.clamped(of(bounds))?))).collect()
@@ -297,7 +368,21 @@ impl Panel {
         let (low, high) = (edge(|bounds| bounds.0), edge(|bounds| bounds.1));
         html! {
             @if low.len() > 1 && low.len() == high.len() {
-                polygon class={ "band " (line.look.class()) } points=(path(low.into_iter().chain(high.into_iter().rev()))) {}
+                path class={ "band " (line.look.class()) } d={ (path(low.into_iter().chain(high.into_iter().rev()))) "z" } {}
+            }
+        }
+    }
+
+    fn error_bars(&self, line: &Line) -> Markup {
+        let bar = |(&(x, _), &(low, high)): (&(f64, f64), &(f64, f64))| {
+            Some((self.across.at(x)?, self.up.clamped(low)?, self.up.clamped(high)?))
+        };
+        let bars = line.points.iter().zip(&line.bounds).filter_map(bar);
+        html! {
+            g class={ "bar " (line.look.class()) } {
+                @for (x, low, high) in bars {
+                    line x1=(pixel(x)) x2=(pixel(x)) y1=(pixel(low)) y2=(pixel(high)) {}
+                }
             }
         }
     }
@@ -309,7 +394,7 @@ impl Panel {
         let inside = |(_, y): &&(f64, f64)| (self.up.end - 0.5..=self.up.start + 0.5).contains(y);
         html! {
             g class=(line.look.class()) data-line=(line.name) {
-                @if line.is_joined && visible.len() > 1 { polyline points=(path(visible.iter().copied())) {} }
+                @if line.is_joined && visible.len() > 1 { path d=(path(visible.iter().copied())) {} }
                 @if line.has_dots {
                     @for (x, y) in visible.iter().filter(inside) { circle cx=(pixel(*x)) cy=(pixel(*y)) r="3.2" {} }
                 }
@@ -317,10 +402,10 @@ impl Panel {
         }
     }
 
-    /// The letter of a line at its end.
+    /// The text of a line at its end.
     fn mark(&self, line: &Line) -> Markup {
         let visible = |&(x, y): &(f64, f64)| Some((self.across.at(x)?, self.up.at(y)?));
-        let ends = if line.mark == "K" {
+        let ends = if line.mark_is_right {
             line.points.iter().filter_map(visible).next_back()
         } else {
             line.points.iter().find_map(visible)
@@ -405,15 +490,22 @@ fn pixel(value: f64) -> String {
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
+/// A path through the points, rounded to tenths of a pixel: the first place, then the way from each to the next.
 fn path(points: impl Iterator<Item = (f64, f64)>) -> String {
-    points.fold(String::new(), |mut path, (x, y)| {
-        if !path.is_empty() {
-            path.push(' ');
+    let (mut path, mut last) = ("m".to_owned(), [0.0; 2]);
+    for (x, y) in points {
+        let here = [x, y].map(|at| (10.0 * at).round());
+        for (here, last) in here.into_iter().zip(last) {
+            let way = pixel((here - last) / 10.0);
+            let way = way.replacen("0.", ".", usize::from(way.trim_start_matches('-').starts_with("0.")));
+            if path.len() > 1 && !way.starts_with('-') {
+                path.push(' ');
+            }
+            path.push_str(&way);
         }
-        // Writing to a string does not fail.
-        let _ = write!(path, "{},{}", pixel(x), pixel(y));
-        path
-    })
+        last = here;
+    }
+    path
 }
 
 /// A list of numbers in JSON with four significant digits.

@@ -111,34 +111,52 @@ impl Amounts<'_> {
     }
 
     /// Numbers of one unit share a prefix; the unit stands behind the last of them, and the kind of sensor before the first unless all
-    /// are of one kind.
+    /// are of one kind. One number that all channels have is told once.
     fn list(&self, each: &[OfChannel]) -> String {
         let is_alike = |one: &OfChannel, other: &OfChannel| {
             sensor(one.channel) == sensor(other.channel) && one.parameter.unit == other.parameter.unit
         };
-        let group = |group: &[OfChannel]| {
-            let magnitudes = group.iter().map(|of| parameter_magnitude(&of.parameter));
-            let scale = Scale::new(magnitudes, &group[0].parameter.unit);
-            let number = |(position, of): (usize, &OfChannel)| {
-                let axis = of.channel.trim_start_matches(sensor(of.channel));
-                let name = if (position > 0 || self.label == Label::Axis) && !axis.is_empty() {
-                    axis.to_owned()
-                } else {
-                    channel_list(&[of.channel.to_owned()])
-                };
-                let is_rounded = self.is_brief && !is_upper_bound(of.parameter.value, of.parameter.low);
-                let number = if is_rounded {
-                    scale.number(of.parameter.value, BRIEF_DIGITS)
-                } else {
-                    scale.estimate(&of.parameter)
-                };
-                format!("{name} {number}")
-            };
-            let numbers: Vec<String> = group.iter().enumerate().map(number).collect();
-            format!("{} {}", numbers.join(", "), scale.unit).trim_end().to_owned()
+        let groups: Vec<&[OfChannel]> = each.chunk_by(is_alike).collect();
+        let written: Vec<Group> = groups.iter().map(|group| self.group(group)).collect();
+        if let Some(same) = same_for_all(&written).filter(|_| each.len() > 1) {
+            return format!("{same} each");
+        }
+        let name = |position: usize, channel: &str| match channel.trim_start_matches(sensor(channel)) {
+            axis if (position > 0 || self.label == Label::Axis) && !axis.is_empty() => axis.to_owned(),
+            _ => channel_list(&[channel.to_owned()]),
         };
-        each.chunk_by(is_alike).map(group).collect::<Vec<_>>().join(", ")
+        let text = |(group, Group { numbers, unit }): (&&[OfChannel], &Group)| {
+            let named = group.iter().zip(numbers).enumerate();
+            let named: Vec<String> =
+                named.map(|(at, (of, number))| format!("{} {number}", name(at, of.channel))).collect();
+            format!("{} {unit}", named.join(", ")).trim_end().to_owned()
+        };
+        groups.iter().zip(&written).map(text).collect::<Vec<_>>().join(", ")
     }
+
+    fn group(&self, group: &[OfChannel]) -> Group {
+        let magnitudes = group.iter().map(|of| parameter_magnitude(&of.parameter));
+        let scale = Scale::new(magnitudes, &group[0].parameter.unit);
+        let number = |of: &OfChannel| match &of.parameter {
+            of if self.is_brief && !is_upper_bound(of.value, of.low) => scale.number(of.value, BRIEF_DIGITS),
+            of => scale.estimate(of),
+        };
+        Group { numbers: group.iter().map(number).collect(), unit: scale.unit.clone() }
+    }
+}
+
+/// The numbers of channels of one kind, and their unit.
+struct Group {
+    numbers: Vec<String>,
+    unit: String,
+}
+
+/// The number with its unit, if it is that of all channels.
+fn same_for_all(groups: &[Group]) -> Option<String> {
+    let first = groups.first()?;
+    let number = first.numbers.first()?;
+    let is_same = |group: &Group| group.unit == first.unit && group.numbers.iter().all(|other| other == number);
+    groups.iter().all(is_same).then(|| format!("{number} {}", first.unit).trim_end().to_owned())
 }
 
 fn scaled(Parameter { value, low, high, unit }: Parameter, factor: f64) -> Parameter {

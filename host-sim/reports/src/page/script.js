@@ -30,7 +30,7 @@
   };
   for (const figure of document.querySelectorAll("figure")) {
     const panels = JSON.parse(figure.querySelector(".values").textContent);
-    const svg = figure.querySelector("svg");
+    const svg = figure.querySelector(".drawing svg");
     const cursor = svg.querySelector(".cursor");
     const output = figure.querySelector("output");
     const described = output.textContent;
@@ -70,7 +70,7 @@
     svg.addEventListener("pointermove", (event) => {
       const box = svg.getBoundingClientRect();
       const scale = svg.viewBox.baseVal.width / box.width;
-      const [px, py] = [(event.clientX - box.left) * scale, (event.clientY - box.top) * scale];
+      const [px, py] = [(event.clientX - box.left) * scale, (event.clientY - box.top) * scale + svg.viewBox.baseVal.y];
       const hit = panels.findIndex((of) => py <= of.y.start + 10);
       panel = hit < 0 ? panels.length - 1 : hit;
       const xs = places(panels[panel]);
@@ -102,23 +102,15 @@
     for (const folded of opened) folded.open = true;
   });
   addEventListener("afterprint", () => { for (const folded of opened) folded.open = false; });
-  const button = (text, done, act) => {
-    const made = document.createElement("button");
-    made.type = "button";
-    made.textContent = text;
-    made.addEventListener("click", async () => {
-      await act(made);
-      made.textContent = done;
-      setTimeout(() => { made.textContent = text; }, 1500);
-    });
-    return made;
-  };
   // On light ground, with twice the pixels of the figure: sharp on paper at 15 cm.
   const png = async (svg) => {
-    const { width, height } = svg.viewBox.baseVal;
+    // With the legend, which the page has beside the drawing.
+    const { width, y, height: below } = svg.viewBox.baseVal;
+    const height = y + below;
     const alone = svg.cloneNode(true);
     alone.setAttribute("width", 2 * width);
     alone.setAttribute("height", 2 * height);
+    alone.setAttribute("viewBox", `0 0 ${width} ${height}`);
     alone.querySelector(".cursor").remove();
     const style = document.createElementNS("http://www.w3.org/2000/svg", "style");
     style.textContent = document.getElementById("figures").textContent;
@@ -134,31 +126,55 @@
     drawn.drawImage(image, 0, 0);
     return canvas.toDataURL("image/png");
   };
-  for (const figure of document.querySelectorAll("figure")) {
-    figure.after(button("Save as PNG", "Saved", async (made) => {
-      const link = document.createElement("a");
-      link.href = made.dataset.png = await png(figure.querySelector("svg"));
-      link.download = `${figure.id}.png`;
-      link.click();
-    }));
-  }
   const cell = (text) => /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
-  for (const table of document.querySelectorAll("table")) {
-    table.parentElement.after(button("Copy as CSV", "Copied", async (made) => {
-      const rows = [...table.rows].map((row) => [...row.cells].map((of) => cell(of.innerText.trim().replace(/\s+/g, " "))).join(","));
-      const text = rows.join("\n") + "\n";
-      made.dataset.csv = text;
-      try {
-        await navigator.clipboard.writeText(text);
-      } catch {
-        // A page from a file has no clipboard in every browser.
-        const area = document.createElement("textarea");
-        area.value = text;
-        document.body.append(area);
-        area.select();
-        document.execCommand("copy");
-        area.remove();
-      }
-    }));
+  const csv = (table) => {
+    const rows = [...table.rows].map((row) => [...row.cells].map((of) => cell(of.textContent.trim().replace(/\s+/g, " "))).join(","));
+    return `data:text/csv;charset=utf-8,${encodeURIComponent(rows.join("\n") + "\n")}`;
+  };
+  // Everything that can be saved is in one list at the top.
+  const save = document.getElementById("save");
+  const list = document.createElement("select");
+  list.setAttribute("aria-label", "What to save");
+  const sources = new Map();
+  const offer = (name, file, make) => {
+    sources.set(file, make);
+    list.append(new Option(name, file));
+  };
+  for (const figure of document.querySelectorAll("figure")) {
+    const name = figure.querySelector("figcaption").textContent;
+    offer(`${name} (PNG)`, `${figure.id}.png`, () => png(figure.querySelector(".drawing svg")));
   }
+  document.querySelectorAll("table").forEach((table, position) => {
+    const before = table.closest("div.scroll").previousElementSibling;
+    const channel = table.closest("details.channel")?.querySelector("strong").textContent ?? "All channels";
+    const name = before?.tagName === "H3" ? before.textContent : table.closest(".verdict") ? "N, B and K" : "numbers";
+    offer(`${channel}: ${name} (CSV)`, `table-${position + 1}.csv`, () => csv(table));
+  });
+  const button = document.createElement("button");
+  button.type = "button";
+  button.textContent = "Save";
+  button.addEventListener("click", async () => {
+    const link = document.createElement("a");
+    link.download = list.value;
+    link.href = button.dataset.saved = await sources.get(list.value)();
+    link.click();
+  });
+  save.append(list, button);
+  // A link into a channel unfolds it; the contents mark the section that is read.
+  const unfold = () => {
+    const target = document.getElementById(location.hash.slice(1));
+    const folded = target?.closest("details");
+    if (folded && !folded.open) { folded.open = true; target.scrollIntoView(); }
+  };
+  addEventListener("hashchange", unfold);
+  unfold();
+  const links = new Map([...document.querySelectorAll("nav a")].map((link) => [link.hash.slice(1), link]));
+  const seen = new IntersectionObserver((entries) => {
+    for (const { isIntersecting, target } of entries) {
+      if (!isIntersecting) continue;
+      for (const link of links.values()) link.removeAttribute("aria-current");
+      links.get(target.id).setAttribute("aria-current", "true");
+    }
+  }, { rootMargin: "-10% 0px -80% 0px" });
+  for (const id of links.keys()) seen.observe(document.getElementById(id));
 })();

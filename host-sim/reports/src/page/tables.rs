@@ -45,9 +45,9 @@ pub(super) fn coefficients_of_all(report: &Report) -> Markup {
     let headings = |group: &CoefficientTable| {
         let columns = group.names.iter().zip(["N", "B", "K"]).zip(&group.units);
         let columns = columns.map(|((name, letter), unit)| {
-            (html! { (name) "\u{a0}" span.letter { (letter) } span.under { (unit) } }, true)
+            (html! { span.letter { (letter) } ", " (unit) " " span.under { (name) } }, true)
         });
-        let error = (html! { "σ off by" span.under { "on the unseen half" } }, true);
+        let error = (html! { "σ off by " span.under { "unseen half" } }, true);
         [text(group.title)].into_iter().chain(columns).chain([error]).collect::<Vec<Heading>>()
     };
     let rows = html! {
@@ -56,15 +56,22 @@ pub(super) fn coefficients_of_all(report: &Report) -> Markup {
             @for row in &group.rows {
                 tr class=[row.channel.is_empty().then_some("sheet")] {
                     th scope="row" {
-                        @if row.channel.is_empty() { "data sheet" } @else { a href={ "#" (row.channel) } { (row.label) } }
+                        @if row.channel.is_empty() { "sheet" } @else { a href={ "#" (row.channel) } { (row.label) } }
                     }
-                    @for value in &row.coefficients { td.number { (value) } }
-                    td class={ "number" @if row.is_high { " warning" } } { (row.error) @if row.is_high { " !" } }
+                    @for value in &row.coefficients { td.number { (broken_before_interval(value)) } }
+                    td class={ "number" @if row.is_high { " warning" } } {
+                        (row.error.replace(' ', "\u{a0}")) @if row.is_high { "\u{a0}!" }
+                    }
                 }
             }
         }
     };
     html! { @if let Some(first) = groups.first() { (table("", &headings(first), &rows)) } }
+}
+
+/// `2.424 ± 0.005`, which a narrow column breaks before the interval and nowhere else.
+fn broken_before_interval(value: &str) -> String {
+    value.replacen(' ', "\n", 1).replace(' ', "\u{a0}")
 }
 
 /// The terms of a model with all their parameters.

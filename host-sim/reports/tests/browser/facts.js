@@ -1,5 +1,11 @@
 "use strict";
 // What a browser shows of a page: run in the parent of an iframe that holds it. The facts become the text of an element.
+// The places of a path that begins with "m" and goes on in steps.
+const vertices = (path) => {
+  const steps = (path.match(/-?(\d+\.?\d*|\.\d+)/g) ?? []).map(Number);
+  let [x, y] = [0, 0];
+  return steps.flatMap((step, at) => at % 2 ? [] : [[x += step, y += steps[at + 1]]]);
+};
 async function facts(frame) {
   const view = frame.contentWindow;
   const page = frame.contentDocument;
@@ -25,11 +31,11 @@ async function facts(frame) {
     contrasts.push([(Math.max(one, other) + 0.05) / (Math.min(one, other) + 0.05), element.textContent.trim().slice(0, 40)]);
   }
   contrasts.sort((a, b) => a[0] - b[0]);
+  for (const folded of page.querySelectorAll("details")) folded.open = true;
   const figures = [...page.querySelectorAll("figure")].map((figure) => {
     const drawn = [...figure.querySelectorAll("g[data-line]")].map((group) => ({
       name: group.dataset.line,
-      points: (group.querySelector("polyline")?.getAttribute("points") ?? "").split(" ").filter(Boolean)
-        .map((pair) => pair.split(",").map(Number)),
+      points: vertices(group.querySelector("path")?.getAttribute("d") ?? ""),
       dots: [...group.querySelectorAll("circle")].map((dot) => [Number(dot.getAttribute("cx")), Number(dot.getAttribute("cy"))]),
       visible: [...group.children].every((shape) => {
         const style = view.getComputedStyle(shape);
@@ -43,9 +49,9 @@ async function facts(frame) {
     const press = (key) => figure.dispatchEvent(new view.KeyboardEvent("keydown", { key, bubbles: true, cancelable: true }));
     press("ArrowRight");
     const read = output.textContent;
-    const box = figure.querySelector("svg").getBoundingClientRect();
+    const svg = figure.querySelector(".drawing svg");
+    const box = svg.getBoundingClientRect();
     figure.blur();
-    const svg = figure.querySelector("svg");
     svg.dispatchEvent(new view.PointerEvent("pointermove", { clientX: box.left + box.width / 2, clientY: box.top + box.height / 3 }));
     const pointed = output.textContent;
     svg.dispatchEvent(new view.PointerEvent("pointerleave"));
@@ -57,13 +63,18 @@ async function facts(frame) {
       }), drawn,
     };
   });
-  const button = (text) => [...page.querySelectorAll("button")].find((of) => of.textContent === text);
-  const copy = button("Copy as CSV");
-  copy?.click();
-  const save = button("Save as PNG");
-  save?.click();
-  // Decoding an image takes no time of the page: the caller gives it as much as it needs.
-  while (save && !save.dataset.png) await new Promise((done) => setTimeout(done, 20));
+  // What is chosen in the list is saved: first of its tables, first of its figures.
+  const save = async (ending) => {
+    const [list, button] = ["select", "button"].map((name) => page.querySelector(`#save ${name}`));
+    list.value = [...list.options].find((of) => of.value.endsWith(ending))?.value;
+    delete button.dataset.saved;
+    button.click();
+    // Decoding an image takes no time of the page: the caller gives it as much as it needs.
+    while (!button.dataset.saved) await new Promise((done) => setTimeout(done, 20));
+    return button.dataset.saved;
+  };
+  const csv = decodeURIComponent((await save(".csv")).split(",").slice(1).join(","));
+  const png = await save(".png");
   return {
     width: page.documentElement.clientWidth,
     overflow: page.documentElement.scrollWidth - page.documentElement.clientWidth,
@@ -75,8 +86,8 @@ async function facts(frame) {
     dark: view.matchMedia("(prefers-color-scheme: dark)").matches,
     requests: view.performance.getEntriesByType("resource").map((entry) => entry.name),
     links: [...page.querySelectorAll("a[href^='#']")].filter((link) => !page.getElementById(link.getAttribute("href").slice(1))).map((link) => link.href),
-    csv: copy?.dataset.csv ?? null,
-    png: save?.dataset.png ? await pixels(save.dataset.png) : null,
+    csv,
+    png: await pixels(png),
     figures,
   };
 }

@@ -149,6 +149,13 @@ fn channels_of_two_units_have_their_numbers_by_unit() {
     );
 }
 
+#[test]
+fn one_number_that_all_channels_have_is_told_once() {
+    let report = report(signed_kinds()[0], [21.2; 3], Validation::Yes);
+    let text = &reports::summary::findings(&report).0[0];
+    assert_eq!(text.physics, "The bias follows the temperature: 21.2 ± 0.4 m°/s/°C each.");
+}
+
 /// Half of the record contradicts the number: subtracting it makes that half worse.
 #[test]
 fn what_the_second_half_contradicts_is_not_to_be_subtracted() {

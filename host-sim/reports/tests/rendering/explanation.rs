@@ -1,4 +1,4 @@
-//! The long form of a report whose numbers are known.
+//! How the noise changes, in the long form and on the page of a report whose numbers are known.
 
 use crate::fixture::report;
 use noise_analysis::bounds::BoundedEstimate;
@@ -9,12 +9,12 @@ use noise_analysis::nonstationarity::{
 use noise_analysis::report::{
     CommonModeRegression, EventsReport, Finding, Nonstationarity, Parameter, Report, Validation,
 };
-use reports::{explanation, summary};
+use reports::{full_tables, summary};
 
 /// The text, with single spaces in the place of line breaks.
 fn text(report: &Report) -> String {
     let mut out = Vec::new();
-    explanation::write(report, None, &mut out).expect("a vector can be written");
+    full_tables::write(report, None, &mut out).expect("a vector can be written");
     let text = String::from_utf8(out).expect("text");
     assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
     text.split_whitespace().collect::<Vec<_>>().join(" ")
@@ -53,7 +53,7 @@ fn changes() -> Nonstationarity {
     }
 }
 
-/// A report with everything that the explanation tells.
+/// A report with everything that is told of the course of a record.
 fn followed() -> Report {
     let mut report = report();
     report.channels[2].nonstationarity = Some(changes());
@@ -72,7 +72,7 @@ fn followed() -> Report {
 }
 
 #[test]
-fn the_explanation_tells_every_figure_of_the_report() {
+fn the_long_form_tells_every_figure_of_the_course() {
     let report = followed();
     let text = text(&report);
     // 100·(exp(0.04112) − 1).
@@ -147,13 +147,7 @@ fn spikes_and_knocks_are_told_with_their_rate_and_the_errors_without_them() {
     }
 }
 
-#[test]
-fn a_record_too_short_for_epochs_is_said_to_be() {
-    let text = text(&report());
-    assert!(text.contains("has enough samples to be cut into epochs"), "{text}");
-}
-
-/// What the analysis knows of the course of a record is in every form of the report, and not only in the explanation.
+/// What the analysis knows of the course of a record is in every form of the report.
 #[test]
 fn every_report_tells_how_the_noise_changes() {
     let mut report = report();

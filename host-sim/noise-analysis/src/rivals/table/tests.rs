@@ -432,14 +432,3 @@ fn rows_do_not_reach_beyond_their_conditions() {
         assert_eq!(claim.standing(&all), ["telegraph"]);
     }
 }
-
-#[test]
-fn the_table_of_rivals_is_in_the_docs() {
-    let line = |row: &Rivalry| {
-        let Rivalry { stands, instead_of, condition, reason, .. } = row;
-        format!("| {stands} | {instead_of} | {condition} | {reason} |\n")
-    };
-    let rows: String = RIVALRIES.iter().map(line).collect();
-    let table = format!("| stands | in the place of | where | because |\n|---|---|---|---|\n{rows}");
-    system_tests::generated("docs/analysis.md", "rivals", &table);
-}
