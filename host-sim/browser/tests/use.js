@@ -63,8 +63,8 @@ const fromDisk = (page) => (async () => {
   assert.equal(await page.value("document.activeElement.id"), "result");
   const inFrame = 'document.getElementById("frame").contentDocument';
   await page.until(`${inFrame}.querySelectorAll("figure svg").length > 3`);
-  // The script of the report runs: it makes the buttons.
-  await page.until(`[...${inFrame}.querySelectorAll("button")].some((button) => button.textContent === "Copy as CSV")`);
+  // The script of the report runs: it makes the button that saves figures and tables.
+  await page.until(`[...${inFrame}.querySelectorAll("button")].some((button) => button.textContent === "Save")`);
   await page.until(`document.getElementById("frame").clientHeight >= ${inFrame}.body.scrollHeight`);
   await looks(page, "report");
 
