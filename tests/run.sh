@@ -146,7 +146,7 @@ systems() { # what needs no compiler of C
     )
 }
 page() { # the tests open it
-    RUSTFLAGS="-D warnings" run "$TARGET/debug/build-page" "$TARGET/browser"
+    run "$TARGET/debug/build-page" "$TARGET/browser"
     export BROWSER_PAGE=$TARGET/browser
 }
 documentation() {

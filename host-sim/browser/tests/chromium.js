@@ -5,7 +5,7 @@ const fs = require("node:fs");
 const path = require("node:path");
 
 /** Longest time for what a page does, ms: a fault ends a test by it, and nothing else depends on it. */
-const PATIENCE_MS = 20_000;
+const PATIENCE_MS = 300_000;
 
 /** Opens the page at `url`, lets `act` use it, and closes it; downloads go into `folder`. */
 exports.withPage = async (program, url, folder, act) => {

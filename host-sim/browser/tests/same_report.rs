@@ -71,7 +71,6 @@ fn the_page_makes_the_report_of_the_command() {
     let mut files: Vec<(PathBuf, Vec<String>)> = names.into_iter().map(known).collect();
     // A line and a temperature effect, in the program's own format, compressed.
     let counts = folder.path().join("effects.csv.gz");
-    let simulate = ["--seconds", "900", "--effect", "sinusoid:gyro_z:frequency=20,amplitude=0.1", "--environment"];
     let effects = [
         "--effect",
         "sinusoid:gyro_z:frequency=20,amplitude=0.1",
