@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Converts the public recordings of the ADIS16405 to the CSV of register counts that host-sim reads.
+"""Converts the public recordings of the ADIS16405 to the CSV of register counts that imunoise reads.
 
     python3 docs/convert_recordings.py imudata  adis_16405_imu1.rda                    adis16405-static/run1.csv.gz
     python3 docs/convert_recordings.py launch10 logfile-1009847896.log                 adis16405-burst/launch10.csv.gz
@@ -180,7 +180,7 @@ WORDS = [*CHANNELS[4:7], *CHANNELS[1:4], *CHANNELS[7:10]]  # order of the line
 
 
 def stm32(source, target, table=False):
-    """The words as they are, for decoders; or, with `table`, sign-extended counts that `host-sim analyze` reads."""
+    """The words as they are, for decoders; or, with `table`, sign-extended counts that `imunoise analyze` reads."""
 
     def lines():
         with open(source, encoding="ascii") as file:
@@ -272,7 +272,7 @@ def main():
             command.add_argument("--from", dest="start", type=float, help="leave out what is before, s")
             command.add_argument("--to", dest="end", type=float, help="leave out what is after, s")
         if name == "stm32":
-            command.add_argument("--table", action="store_true", help="sign-extended counts that host-sim reads")
+            command.add_argument("--table", action="store_true", help="sign-extended counts that imunoise reads")
     arguments = vars(parser.parse_args())
     if arguments.pop("self_test"):
         return self_test()

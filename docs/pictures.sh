@@ -3,8 +3,7 @@
 #
 #     docs/pictures.sh
 #
-#   docs/report.svg       gyro x of the simulated hour that the program makes without a command
-#                         (seed 1); no recording
+#   docs/report.svg       gyro x of the simulated hour of `demo` (seed 1); no recording
 #   docs/run1-gyro_z.svg  gyro z of adis16405-static/run1.csv.gz in the folder that ADIS_RECORDINGS names (docs/measured.md); left
 #                         as it is without
 set -eu
@@ -12,7 +11,7 @@ cd "$(dirname "$0")/.."
 drawn=$(mktemp -d)
 trap 'rm -rf "$drawn"' EXIT
 
-cargo run --release -- --quiet --page "$drawn/page" --pictures "$drawn/simulated"
+cargo run --release -- demo --quiet --page "$drawn/page" --pictures "$drawn/simulated"
 cp "$drawn/simulated/gyro_x-allan.svg" docs/report.svg
 
 if [ -n "${ADIS_RECORDINGS:-}" ]; then

@@ -2,7 +2,7 @@
 # Cargo calls this in the place of rustc for the crates of the workspace (RUSTC_WORKSPACE_WRAPPER): clippy reads the crate first, and only what
 # it has nothing to say about is compiled. So the dependencies are compiled once for lints and tests, and clippy, which switches off
 # optimisations of its own process, does not make the program.
-# In bash: dash drops variables such as CARGO_BIN_EXE_host-sim.
+# In bash: dash drops variables such as CARGO_BIN_EXE_imunoise.
 set -eu
 rustc=$1
 shift

@@ -24,15 +24,16 @@ for package in adis16405-driver allan-core; do
     cp "$target/publish/package/$package-$version.crate" "$out"
 done
 
-# Python
+# Python: the module and the command in one wheel.
 python=$target/python/bin
 [ -x "$python/pip" ] || { echo "no $python: run ./tests/run.sh once, which installs it" >&2; exit 1; }
-PATH=$python:$PATH run "$python/pip" wheel --quiet --disable-pip-version-check --no-build-isolation --no-deps \
-    --wheel-dir "$out" ./allan-core/python
+# For every Linux with a C library as old as that of the build, or older than what the wheel needs (manylinux).
+PATH=$python:$PATH run "$python/maturin" build --quiet --release --locked --manifest-path host-sim/python/Cargo.toml \
+    --target-dir "$target" --out "$out"
 
 # The program, optimised over all crates, which the everyday build is not.
 run cargo build --locked --release --package host-sim --target-dir "$target"
-cp "$target/release/host-sim" "$out"
+cp "$target/release/imunoise" "$out"
 
 # The images
 image() { # BOARD TARGET ENDING

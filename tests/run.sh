@@ -6,7 +6,8 @@
 # tests/requirements.txt, and Node.js with npm, for the emulator of the Pico.
 #
 # Without an option: what a pull request needs. --quick: formatting, lints, and the unit tests of the libraries and of the host.
-# --long: also the tests that are marked `#[ignore = "long: …"]`, and the search for bytes that break a reader. Tests on measured
+# --long: also the tests that are marked `#[ignore = "long: …"]`, those on local clusters of Ray and Spark, for which it installs both
+# and Java, and the search for bytes that break a reader. Tests on measured
 # recordings are skipped where ADIS_RECORDINGS does not name their folder (docs/measured.md); --recordings runs those alone that the
 # last run skipped for that reason, and none may be skipped again.
 # The last lines have the seconds of each step, of the clock and of the processor, and how many tests passed, failed and were skipped.
@@ -124,7 +125,7 @@ format() {
 build() {
     nextest --no-run
     (cd tests/tools && run cargo programs --target-dir "$TARGET/programs") # the tests start them
-    export HOST_SIM=$TARGET/debug/host-sim # the program as just built
+    export IMUNOISE=$TARGET/debug/imunoise # the program as just built
 }
 examples() { # workspaces with the same frameworks, which are compiled once for each core
     local workspace core
@@ -160,11 +161,22 @@ dependencies() {
             check licenses bans sources
     done
 }
-python() { # with the packages of tests/requirements.txt; compiled as the tests are, so that dependencies are compiled once
-    local python=$TARGET/python/bin
-    PATH=$python:$PATH CARGO_TARGET_DIR=$TARGET run "$python/pip" install --quiet --disable-pip-version-check \
-        --config-settings build-args="--profile dev" --no-build-isolation --no-deps --force-reinstall ./allan-core/python
-    (cd allan-core/python && run "$python/pytest" --quiet -p no:cacheprovider) 2>&1 | tee -a "$log"
+python() { # with the packages of tests/requirements.txt; one wheel, compiled as the tests are, so that dependencies are compiled once
+    local python=$TARGET/python/bin pip
+    pip=("$python/pip" --quiet --disable-pip-version-check)
+    rm -f "$TARGET"/wheels/*.whl
+    PATH=$python:$PATH CARGO_TARGET_DIR=$TARGET run "${pip[@]}" wheel --config-settings build-args="--profile dev" \
+        --no-build-isolation --no-deps --wheel-dir "$TARGET/wheels" ./host-sim/python
+    run "${pip[@]}" install --no-deps --force-reinstall "$TARGET"/wheels/imunoise-*.whl
+    local marks=(-m "not cluster")
+    if [ ${#chosen[@]} != 0 ]; then # --long
+        command -v java >/dev/null || debian default-jre-headless
+        run "${pip[@]}" install --requirement tests/requirements-cluster.txt
+        marks=()
+    fi
+    local wheel
+    wheel=$(realpath "$TARGET"/wheels/imunoise-*.whl)
+    (cd host-sim/python && IMUNOISE_WHEEL=$wheel run "$python/pytest" --quiet -p no:cacheprovider "${marks[@]}") 2>&1 | tee -a "$log"
 }
 tests() {
     nextest "${chosen[@]}" 2>&1 | tee -a "$log"

@@ -1,22 +1,22 @@
-//! `analyze` and `replay`: the report of a recording in a file, and the summary of several.
+//! `analyze` and `replay`: the report of a recording in a file, or of each of its sensors.
 
 use crate::cli::{
-    AnalyzeArguments, ExportTarget, GyroRangeArgument, InputArguments, OutputArguments, RecordingArguments,
+    AnalyzeArguments, ExportTarget, GyroRangeArgument, InputArguments, OutputArguments, PROGRAM, RecordingArguments,
     ReplayArguments,
 };
 use crate::inspect::{self, read_or_ask};
 use crate::output::{self, Analysed, Incomplete, note};
-use crate::output_files::{OutputFiles, is_standard_stream};
+use crate::output_files::OutputFiles;
 use crate::progress::{self, Progress};
+use crate::several_recordings::write_several;
+use crate::streaming;
 use crate::tip::UnknownSensor;
-use crate::{many, streaming};
 use adis16405_driver::GyroRange;
 use anyhow::{Context, Result, bail};
 use measurement::{Measurement, SensorProfile, adis16405, profile_file};
 use noise_analysis::analysis::{analyze_and_release, analyze_condensed};
 use noise_analysis::effects::Effect;
 use noise_analysis::record::long_record::{MOST_LOST, MOST_SAMPLES, MOST_SAMPLES_WITH_LOSSES};
-use noise_analysis::report::several::{self, NoiseAgreement, NoiseInflation};
 use noise_analysis::report::{Report, Stretch};
 use recordings::ReadOptions;
 use recordings::file_format::{FileFormat, RecordedFormat, RecordedInput};
@@ -27,12 +27,11 @@ use recordings::{ColumnSelection, FileHash, Printable, ReadMonitor, count_table}
 use reports::reading::ReadingRecord;
 use reports::saved_report::SavedReport;
 use reports::summary::longest_at_rest;
-use serde::Serialize;
 use simulation::Replay;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{ErrorKind, Read};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Name of the sensor whose register counts need no profile.
 const ADIS16405: &str = "adis16405";
@@ -46,77 +45,60 @@ const PROFILE_BYTES: u64 = 1 << 20;
 /// Name of a sensor without a data sheet.
 const GENERIC: &str = "generic";
 
-/// Analyses the recordings of the arguments and writes the report, or the summary of several.
+/// Analyses the recording of the arguments and writes its report, or what each of its sensors has.
 pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
-    let AnalyzeArguments { recording, more, each_sensor, against, quick, reports, output } = arguments;
-    let files: Vec<&Path> = [&recording.input.file].into_iter().chain(more).map(PathBuf::as_path).collect();
+    let AnalyzeArguments { recording, each_sensor, quick, output } = arguments;
     let sensor = recording.input.sensor.as_deref().map(Path::new);
-    let outputs = OutputFiles::new(files.iter().copied().chain(against.as_deref()).chain(sensor), output.force);
-    let mut recordings: Vec<RecordingArguments> = Vec::new();
-    for &file in &files {
-        let of_file = of_file(recording, file);
-        recordings.extend(if *each_sensor { inspect::each_sensor(&of_file)? } else { vec![of_file] });
-    }
-    if let Some(folder) = reports {
-        let analyze = |recording: &RecordingArguments| {
-            read_or_ask(recording, |recording| report(recording, *quick, &ReadMonitor::default(), &mut |_| {}))
-        };
-        return many::write_reports(&recordings, folder, output.quiet, &outputs, analyze);
-    }
+    let outputs = OutputFiles::new([recording.input.file.as_path()].into_iter().chain(sensor), output.force);
     output::check(output, &outputs)?;
-    if let ([recording], None) = (recordings.as_slice(), against) {
+    let sensors = if *each_sensor { inspect::each_sensor(recording)? } else { vec![recording.clone()] };
+    if let [recording] = sensors.as_slice() {
         let source = output::source_name(&recording.input.file);
         let report = read_or_ask(recording, |recording| watched_report(recording, *quick))?;
         return output::write_report(&report, Some(&source), output, &outputs);
     }
-    if *quick {
-        bail!("several recordings have a summary and no report: leave out --quick, or give --reports DIR");
-    }
     let refused = [
+        ("--quick", *quick),
         ("--page", output.page.is_some()),
         ("--pictures", output.pictures.is_some()),
         ("--full", output.full),
-        ("--export", !*each_sensor && !output.exports.is_empty()),
     ];
     let refused: Vec<&str> = refused.into_iter().filter(|(_, is_given)| *is_given).map(|(option, _)| option).collect();
     if !refused.is_empty() {
-        bail!("several recordings have a summary and no report: leave out {}", refused.join(", "));
+        bail!("several sensors have a summary and no report: leave out {}, or use `batch`", refused.join(", "));
     }
-    let names: Vec<String> = recordings.iter().map(sensor_name).collect();
-    let mut is_complete = true;
-    let mut read = |recording: &RecordingArguments| -> Result<Measurement> {
+    let names: Vec<String> = sensors.iter().map(sensor_name).collect();
+    let mut reading = SeveralReadings::default();
+    let still: Vec<Measurement> = sensors.iter().map(|sensor| reading.read(sensor)).collect::<Result<_>>()?;
+    note(format_args!("recordings: {}", Printable(&names.join(", "))));
+    if are_parts(&still) {
+        write_parts(still, &names, output, &outputs)?;
+    } else if output.exports.is_empty() {
+        write_several(&still, None, output.json.as_deref(), output.quiet, &outputs)?;
+    } else {
+        bail!("--export: these sensors have the same channels; export one of them, with --topic or --columns");
+    }
+    Incomplete::check(reading.are_complete())
+}
+
+/// Recordings that are read one after the other.
+#[derive(Debug, Default)]
+pub(crate) struct SeveralReadings {
+    incomplete: usize,
+}
+
+impl SeveralReadings {
+    /// All samples of a recording in memory.
+    pub(crate) fn read(&mut self, recording: &RecordingArguments) -> Result<Measurement> {
         let read = read_or_ask(recording, open_measured)?;
-        is_complete &= read.rows_read().is_complete();
+        self.incomplete += usize::from(!read.rows_read().is_complete());
         Ok(read.into_beginning())
-    };
-    let still: Vec<Measurement> = recordings.iter().map(&mut read).collect::<Result<_>>()?;
-    if *each_sensor {
-        note(format_args!("recordings: {}", Printable(&names.join(", "))));
-        if are_parts(&still) {
-            write_parts(still, &names, output, &outputs)?;
-            return Incomplete::check(is_complete);
-        }
-        if !output.exports.is_empty() {
-            bail!("--export: these sensors have the same channels; export one of them, with --topic or --columns");
-        }
     }
-    let agreement = (still.len() > 1).then(|| several::compare(&still)).transpose()?;
-    let inflation = match against {
-        Some(file) => Some(several::inflation(&still, &read(&of_file(recording, file))?)?),
-        None => None,
-    };
-    if let Some(file) = &output.json {
-        let several = SeveralRecordings { agreement: agreement.as_ref(), inflation: inflation.as_ref() };
-        output::write_json(&several, file, &outputs)?;
+
+    /// Whether all of them were read to their end.
+    pub(crate) fn are_complete(&self) -> bool {
+        self.incomplete == 0
     }
-    if output.quiet || output.json.as_deref().is_some_and(is_standard_stream) {
-        return Incomplete::check(is_complete);
-    }
-    output::print(|out| {
-        agreement.as_ref().map_or(Ok(()), |agreement| reports::several::write_agreement(agreement, out))?;
-        inflation.as_ref().map_or(Ok(()), |inflation| reports::several::write_inflation(inflation, out))
-    })?;
-    Incomplete::check(is_complete)
 }
 
 /// Whether recordings of one file are parts of one sensor: no two have a channel in common.
@@ -135,7 +117,7 @@ fn write_parts(
     outputs: &OutputFiles,
 ) -> Result<()> {
     if output.json.is_some() {
-        bail!("--json: the parts of a sensor have a report each; --reports DIR writes them");
+        bail!("--json: the parts of a sensor have a report each; `batch --each-sensor` writes them");
     }
     let mut saved = Vec::new();
     for (part, name) in parts.into_iter().zip(names) {
@@ -156,35 +138,32 @@ fn sensor_name(recording: &RecordingArguments) -> String {
     topic.clone().unwrap_or_else(|| columns.join(" "))
 }
 
-/// The same arguments for another file.
-fn of_file(recording: &RecordingArguments, file: &Path) -> RecordingArguments {
-    let input = InputArguments { file: file.to_owned(), ..recording.input.clone() };
-    RecordingArguments { input, ..recording.clone() }
-}
+/// Is called with a recording that was read, and with what the user should know of it, before it is analysed.
+type EndReading<'a> = dyn FnMut(&SampleStream, &[String]) + 'a;
 
 /// The report of a recording. Shows how far the reading is, and makes the report of what was read if that is interrupted.
 fn watched_report(recording: &RecordingArguments, is_quick: bool) -> Result<Analysed> {
     let mut progress = Progress::reading(&recording.input.file);
     let monitor = progress.monitor().clone();
-    let mut end_reading = |stream: &SampleStream| {
+    let mut end_reading = |stream: &SampleStream, notes: &[String]| {
         if progress.end_reading() {
             note(format_args!(
                 "interrupted: this is the report of the first {} samples, which were read until then",
                 stream.description().samples
             ));
         }
-        note_all(stream.notes());
+        note_all(notes);
     };
     report(recording, is_quick, &monitor, &mut end_reading)
 }
 
 /// The report of a recording, with the longest part at rest of its file where the platform moved; `end_reading` is called when it was
 /// read, before it is analysed.
-fn report(
+pub(crate) fn report(
     recording: &RecordingArguments,
     is_quick: bool,
     monitor: &ReadMonitor,
-    end_reading: &mut dyn FnMut(&SampleStream),
+    end_reading: &mut EndReading,
 ) -> Result<Analysed> {
     let mut analysed = report_of_samples(recording, is_quick, monitor, end_reading)?;
     let report = &mut analysed.report;
@@ -205,29 +184,26 @@ fn report_of_samples(
     recording: &RecordingArguments,
     is_quick: bool,
     monitor: &ReadMonitor,
-    end_reading: &mut dyn FnMut(&SampleStream),
+    end_reading: &mut EndReading,
 ) -> Result<Analysed> {
     let quick = KeptInMemory { rows: QUICK_ROWS, rows_with_losses: QUICK_ROWS, most_lost: 1.0 };
-    let OpenStream { mut stream, hash } = open_stream(recording, monitor, if is_quick { quick } else { KEPT })?;
+    let OpenStream { mut stream, hash, notes } = open_stream(recording, monitor, if is_quick { quick } else { KEPT })?;
     if is_quick {
         let estimators = streaming::curves(&mut stream)?;
-        end_reading(&stream);
-        let reading = reading_record(recording, true, &stream, hash);
+        end_reading(&stream, &notes);
+        let reading = reading_record(recording, true, &stream, notes);
         let bar = progress::fitting(stream.description().channels.len());
         let report = estimators.report(&|| bar.inc(1));
         bar.finish_and_clear();
-        return Ok(Analysed { report, reading: Some(reading) });
+        return Ok(Analysed { report, reading: Some(ReadingRecord { sha256: finished(hash), ..reading }) });
     }
-    let mut reading = None;
+    let mut reading = ReadingRecord::default();
     let report = analyze_stream(stream, &mut |stream| {
-        end_reading(stream);
-        reading = Some(reading_record(recording, false, stream, None));
+        end_reading(stream, &notes);
+        reading = reading_record(recording, false, stream, notes.clone());
     })?;
     // The hash is made while the samples are analysed.
-    if let Some(reading) = &mut reading {
-        reading.sha256 = finished(hash);
-    }
-    Ok(Analysed { report, reading })
+    Ok(Analysed { report, reading: Some(ReadingRecord { sha256: finished(hash), ..reading }) })
 }
 
 /// What was read of a recording.
@@ -235,7 +211,7 @@ fn reading_record(
     recording: &RecordingArguments,
     is_quick: bool,
     stream: &SampleStream,
-    hash: Option<FileHash>,
+    notes: Vec<String>,
 ) -> ReadingRecord {
     let read = stream.rows_read();
     let mut left_out: BTreeMap<String, u64> = stream
@@ -250,15 +226,15 @@ fn reading_record(
     left_out.retain(|_, rows| *rows > 0);
     ReadingRecord {
         file: output::source_name(&recording.input.file),
-        sha256: finished(hash),
-        program: env!("CARGO_PKG_NAME").to_owned(),
+        sha256: None,
+        program: PROGRAM.to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         options: recording.options(is_quick),
         rows: read.rows,
         left_out,
         complete: read.is_complete(),
         damage: read.damage.clone(),
-        notes: stream.notes().to_vec(),
+        notes,
     }
 }
 
@@ -282,10 +258,10 @@ fn note_all(notes: &[String]) {
     notes.iter().for_each(|sentence| note(format_args!("{sentence}")));
 }
 
-/// Opens a recording of any format, or the part of it that the arguments say. What the user should know of an SPI log is noted.
+/// Opens a recording of any format, or the part of it that the arguments say.
 fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor, kept: KeptInMemory) -> Result<OpenStream> {
     let reading = Reading::new(recording.rate, kept).of_part(recording.time_range());
-    let mut hash = None;
+    let (mut hash, mut notes) = (None, Vec::new());
     let opened = match open(&recording.input, monitor)? {
         Opened::Counts(input) => {
             hash = input.begin_hash().ok();
@@ -295,22 +271,27 @@ fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor, kept: Kept
             hash = input.begin_hash().ok();
             SampleStream::any_sensor(input, *options, reading)
         }
-        Opened::Replayed(replayed) => SampleStream::recorded(replayed, reading).map_err(StreamError::from),
+        Opened::Replayed(replayed, of_log) => {
+            notes = of_log;
+            SampleStream::recorded(replayed, reading).map_err(StreamError::from)
+        }
     };
     let stream = opened.map_err(|error| named(error, &recording.input.file))?;
-    Ok(OpenStream { stream, hash })
+    notes.extend_from_slice(stream.notes());
+    Ok(OpenStream { stream, hash, notes })
 }
 
-/// An open recording, and the hash of its file.
+/// An open recording, the hash of its file, and what the user should know of it.
 struct OpenStream {
     stream: SampleStream,
     hash: Option<FileHash>,
+    notes: Vec<String>,
 }
 
 /// All samples of a recording in memory. What the user should know is noted.
 fn open_measured(recording: &RecordingArguments) -> Result<SampleStream> {
-    let OpenStream { stream, .. } = open_stream(recording, &ReadMonitor::default(), KeptInMemory::ALL)?;
-    note_all(stream.notes());
+    let OpenStream { stream, notes, .. } = open_stream(recording, &ReadMonitor::default(), KeptInMemory::ALL)?;
+    note_all(&notes);
     note_all(stream.rows_read().damage.as_slice());
     Ok(stream)
 }
@@ -324,13 +305,6 @@ pub(crate) fn named(error: StreamError, file: &Path) -> anyhow::Error {
     }
 }
 
-/// The JSON of several recordings.
-#[derive(Serialize)]
-struct SeveralRecordings<'a> {
-    agreement: Option<&'a NoiseAgreement>,
-    inflation: Option<&'a NoiseInflation>,
-}
-
 /// Analyses what the driver reads of a table of register counts or a frame log over the emulated bus.
 pub(crate) fn analyze_replay(arguments: &ReplayArguments) -> Result<Report> {
     let ReplayArguments { file, rate, range, output: _ } = arguments;
@@ -341,7 +315,8 @@ pub(crate) fn analyze_replay(arguments: &ReplayArguments) -> Result<Report> {
             Printable(&file.display().to_string())
         );
     }
-    let recording = replayed(&input, *range)?;
+    let (recording, notes) = replayed(&input, *range)?;
+    note_all(&notes);
     analyze_recording(recording, *rate).with_context(|| file.display().to_string())
 }
 
@@ -357,16 +332,16 @@ enum Opened {
     Counts(RecordedInput),
     /// Numbers of any sensor.
     AnySensor(RecordedInput, Box<ReadOptions>),
-    /// A log of the bus of an ADIS16405, which was read.
-    Replayed(Recording),
+    /// A log of the bus of an ADIS16405, which was read, and what the user should know of it.
+    Replayed(Recording, Vec<String>),
 }
 
-/// Opens a file of any format. What the user should know of an SPI log is noted.
+/// Opens a file of any format.
 fn open(arguments: &InputArguments, monitor: &ReadMonitor) -> Result<Opened> {
     let InputArguments { file, range, sensor, columns, units, topic, .. } = arguments;
     let sensor = sensor.as_deref().map(|name| sensor_profile(name, (*range).into())).transpose()?;
     let selection = ColumnSelection::parse(columns, units)?;
-    let input = RecordedInput::open_monitored(file, monitor)?;
+    let input = arguments.open(monitor)?;
     if let Some(topic) = topic
         .as_ref()
         .filter(|_| input.format().is_text() && input.format() != RecordedFormat::File(FileFormat::TextTable))
@@ -376,7 +351,10 @@ fn open(arguments: &InputArguments, monitor: &ReadMonitor) -> Result<Opened> {
     }
     let is_adis16405 = sensor.as_ref().is_none_or(|sensor| sensor.name == adis16405::NAME);
     match input.format() {
-        RecordedFormat::FrameLog | RecordedFormat::SpiExport => replayed(&input, *range).map(Opened::Replayed),
+        RecordedFormat::FrameLog | RecordedFormat::SpiExport => {
+            let (recording, notes) = replayed(&input, *range)?;
+            Ok(Opened::Replayed(recording, notes))
+        }
         RecordedFormat::CountTable if is_adis16405 && selection.is_empty() => Ok(Opened::Counts(input)),
         _ => {
             let sensor = sensor.unwrap_or_else(SensorProfile::generic);
@@ -403,12 +381,15 @@ pub(crate) fn open_rows(arguments: &RecordingArguments) -> Result<Recorded> {
             let recording = count_table::read_part(&input, (*range).into(), part, *rate);
             Recorded::Counts(recording.map_err(|error| named(error, &arguments.input.file))?)
         }
-        Opened::Replayed(recording) => Recorded::Counts(match part {
-            Some(part) => {
-                part_of(recording, part, *rate).map_err(|error| named(error.into(), &arguments.input.file))?
-            }
-            None => recording,
-        }),
+        Opened::Replayed(recording, notes) => {
+            note_all(&notes);
+            Recorded::Counts(match part {
+                Some(part) => {
+                    part_of(recording, part, *rate).map_err(|error| named(error.into(), &arguments.input.file))?
+                }
+                None => recording,
+            })
+        }
         Opened::AnySensor(input, options) => Recorded::AnySensor(input, options),
     })
 }
@@ -418,14 +399,14 @@ pub(crate) fn read_measurement(arguments: &RecordingArguments) -> Result<Measure
     Ok(open_measured(arguments)?.into_beginning())
 }
 
-/// What the driver reads of a log or of counts.
-fn replayed(input: &RecordedInput, range: GyroRangeArgument) -> Result<Recording> {
+/// What the driver reads of a log or of counts, and what the user should know of it.
+fn replayed(input: &RecordedInput, range: GyroRangeArgument) -> Result<(Recording, Vec<String>)> {
     let Replay { recording, other_transactions, timing } = simulation::replay(input.bytes(), range.into())?;
-    note_all(&timing.notes());
+    let mut notes = timing.notes();
     if other_transactions > 0 {
-        note(format_args!("{other_transactions} transactions that are no bursts"));
+        notes.push(format!("{other_transactions} transactions that are no bursts"));
     }
-    Ok(recording)
+    Ok((recording, notes))
 }
 
 /// The profile of a known sensor, or of a profile file; `range` is that of an ADIS16405's gyros.

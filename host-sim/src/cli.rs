@@ -1,15 +1,22 @@
 //! The arguments of the command line.
 
+use crate::bench::BenchPlan;
 use crate::tip::similar_name;
 use adis16405_driver::GyroRange;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use host_sim::bench::BenchPlan;
-use recordings::serial;
+use recordings::file_format::RecordedInput;
 use recordings::time_base::TimeRange;
+use recordings::{InputError, MemoryTable, ReadMonitor, serial};
 use reports::export::{AxisChoice, ExportFormat};
 use simulation::Simulation;
+use std::ffi::OsString;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
+
+/// Name of the program.
+pub(crate) const PROGRAM: &str = "imunoise";
 
 /// Heading of the options that say how a recording is read.
 const INPUT: &str = "Input";
@@ -23,51 +30,67 @@ const OUTPUT: &str = "Output";
 /// Below the options of the program; each line is a command.
 const EXAMPLES: &str = "\
 Examples:
-  host-sim                                   an hour of the virtual sensor
-  host-sim analyze imu.bag --page report     a recording of any inertial sensor
-  host-sim monitor /dev/ttyACM0              a device that runs the firmware";
+  imunoise imu.bag --page report             a recording of any inertial sensor
+  imunoise demo                              an hour of the virtual sensor
+  imunoise monitor /dev/ttyACM0              a device that runs the firmware";
 
 /// Below the options of `analyze`.
 const EXAMPLES_OF_ANALYZE: &str = "\
 Examples:
-  host-sim analyze flight.ulg --page report --export kalibr=imu.yaml
-  host-sim analyze imu.csv --columns gyro_x=wx,time=t --units deg/s,ms
-  host-sim analyze run1.csv.gz run2.csv.gz --rate 100";
+  imunoise analyze flight.ulg --page report --export kalibr=imu.yaml
+  imunoise analyze imu.csv --columns gyro_x=wx,time=t --units deg/s,ms
+  imunoise analyze run1.csv.gz --rate 100 --json report.json";
+
+/// Below the options of `batch`.
+const EXAMPLES_OF_BATCH: &str = "\
+Examples:
+  imunoise batch recordings -o reports --rows rows.ndjson
+  imunoise batch a.csv.gz b.csv.gz -o reports --rate 100 -j 4 --resume";
+
+/// Below the options of `demo`.
+const EXAMPLES_OF_DEMO: &str = "\
+The page is report/index.html, unless --page names another folder.
+
+Examples:
+  imunoise demo
+  imunoise demo --seconds 600 --plain --page hour";
 
 /// Below the options of `inspect`.
 const EXAMPLES_OF_INSPECT: &str = "\
 Examples:
-  host-sim inspect imu.bag
-  host-sim inspect flight.ulg --topic sensor_gyro:1";
+  imunoise inspect imu.bag
+  imunoise inspect flight.ulg --topic sensor_gyro:1";
 
 /// Below the options of `compare`.
 const EXAMPLES_OF_COMPARE: &str = "\
 Examples:
-  host-sim compare before.json after.json
-  host-sim compare report.json --data-sheet";
+  imunoise compare run1.csv.gz run2.csv.gz --rate 100
+  imunoise compare still.csv.gz --running hover.csv.gz
+  imunoise compare before.json after.json
+  imunoise compare report.json --data-sheet";
 
 /// Below the options of `export`.
 const EXAMPLES_OF_EXPORT: &str = "\
 Examples:
-  host-sim export report.json imu.yaml --format kalibr";
+  imunoise export report.json imu.yaml --format kalibr";
 
 /// Below the options of `convert`.
 const EXAMPLES_OF_CONVERT: &str = "\
 Examples:
-  host-sim convert flight.ulg still.csv.gz --from 8.2 --to 60
-  host-sim convert imu.bag imu.npy";
+  imunoise convert flight.ulg still.csv.gz --from 8.2 --to 60
+  imunoise convert imu.bag imu.npy";
 
 /// Below the options of `monitor`.
 const EXAMPLES_OF_MONITOR: &str = "\
 Examples:
-  host-sim monitor /dev/ttyACM0
-  host-sim monitor run1.csv.gz --rate 100 --speed 60";
+  imunoise monitor /dev/ttyACM0
+  imunoise monitor run1.csv.gz --rate 100 --speed 60";
 
 /// Below the options of `record`.
 const EXAMPLES_OF_RECORD: &str = "\
 Examples:
-  host-sim record cable.csv.gz --port /dev/ttyACM0 --seconds 3600
-  host-sim record night.csv.gz --port COM4 --seconds 28800 --page report";
+  imunoise record cable.csv.gz --port /dev/ttyACM0 --seconds 3600
+  imunoise record night.csv.gz --port COM4 --seconds 28800 --page report";
 
 /// Below the options of `bench`.
 const EXAMPLES_OF_BENCH: &str = "\
@@ -75,8 +98,8 @@ The sensor must be still. Two minutes; the statistics are reset, the settings
 kept. docs/bench.md has what to do with an oscilloscope.
 
 Examples:
-  host-sim bench /dev/ttyACM0
-  host-sim bench /dev/ttyACM0 --second /dev/ttyUSB0";
+  imunoise bench /dev/ttyACM0
+  imunoise bench /dev/ttyACM0 --second /dev/ttyUSB0";
 
 /// Length of a recording of a device if none is given, s.
 const DEFAULT_S: f64 = 60.0;
@@ -84,8 +107,8 @@ const DEFAULT_S: f64 = 60.0;
 /// Below the options of `replay`.
 const EXAMPLES_OF_REPLAY: &str = "\
 Examples:
-  host-sim replay counts.csv.gz --rate 100
-  host-sim replay bus.csv.gz --json report.json";
+  imunoise replay counts.csv.gz --rate 100
+  imunoise replay bus.csv.gz --json report.json";
 
 /// Below the options of `simulate`.
 const EXAMPLES_OF_SIMULATE: &str = "\
@@ -93,42 +116,65 @@ Without --gyro and --accl the noise is that of a published part.
 --effect, --environment and --fault may be given several times.
 
 Examples:
-  host-sim simulate hour.csv.gz --gyro 0.037,0.009,0.0013
-  host-sim simulate fan.csv --effect sinusoid:gyro_z:frequency=20,amplitude=0.1";
+  imunoise simulate hour.csv.gz --gyro 0.037,0.009,0.0013
+  imunoise simulate fan.csv --effect sinusoid:gyro_z:frequency=20,amplitude=0.1";
 
 /// Below the options of `completions`.
 const EXAMPLES_OF_COMPLETIONS: &str = "\
 Examples:
-  host-sim completions bash";
+  imunoise completions bash";
 
 /// Noise analysis of inertial sensors, with a virtual ADIS16405.
 #[derive(Debug, Parser)]
-#[command(name = "host-sim", version, args_conflicts_with_subcommands = true)]
+#[command(name = PROGRAM, version, arg_required_else_help = true)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Cli {
     /// The subcommand.
     #[command(subcommand)]
-    pub(crate) command: Option<Command>,
-    /// What to simulate without a subcommand.
-    #[command(flatten)]
-    pub(crate) simulate: SimulationArguments,
-    /// Where the report goes besides the terminal.
-    #[command(flatten)]
-    pub(crate) output: OutputArguments,
+    pub(crate) command: Command,
+}
+
+/// The words with `analyze` before the recording, where that comes first.
+pub(crate) fn with_subcommand(mut words: Vec<OsString>) -> Vec<OsString> {
+    let program = Cli::command();
+    let is_recording = words.get(1).is_some_and(|word| {
+        let name = word.to_string_lossy();
+        let is_known = program.get_subcommands().any(|known| known.get_name() == name) || name == "help";
+        // A misspelt subcommand is none.
+        let is_path = name == "-" || name.contains(['.', '/', '\\']) || Path::new(word).exists();
+        !is_known && is_path && (name == "-" || !name.starts_with('-'))
+    });
+    if is_recording {
+        words.insert(1, "analyze".into());
+    }
+    words
 }
 
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Analyse a recording, or compare the noise of several
+    /// Analyse a recording: what its noise is, what it hides
     #[command(after_help = EXAMPLES_OF_ANALYZE)]
     Analyze(AnalyzeArguments),
+    /// Simulate an hour of the virtual sensor and analyse it
+    #[command(after_help = EXAMPLES_OF_DEMO)]
+    Demo {
+        /// What is simulated.
+        #[command(flatten)]
+        simulate: SimulationArguments,
+        /// Where the report goes besides the terminal.
+        #[command(flatten)]
+        output: OutputArguments,
+    },
     /// Show what is in a file: topics, columns, units, rate, gaps
     #[command(after_help = EXAMPLES_OF_INSPECT)]
     Inspect(InspectArguments),
-    /// Compare the coefficients of two reports, or with the data sheet
+    /// Analyse many recordings or folders: a report each, and rows
+    #[command(after_help = EXAMPLES_OF_BATCH)]
+    Batch(Box<BatchArguments>),
+    /// Compare recordings, or reports, or one with the data sheet
     #[command(after_help = EXAMPLES_OF_COMPARE)]
-    Compare(CompareArguments),
+    Compare(Box<CompareArguments>),
     /// Write the noise of a report in the format of another program
     #[command(after_help = EXAMPLES_OF_EXPORT)]
     Export(ExportArguments),
@@ -173,27 +219,18 @@ pub(crate) enum Command {
     },
 }
 
-/// Recordings to analyse, and where the report goes.
+/// A recording to analyse, and where the report goes.
 #[derive(Debug, Args)]
 pub(crate) struct AnalyzeArguments {
-    /// The first recording, and how to read it and the others.
+    /// The recording, and how to read it.
     #[command(flatten)]
     pub(crate) recording: RecordingArguments,
-    /// More recordings: is their noise the same?
-    #[arg(value_name = "FILE")]
-    pub(crate) more: Vec<PathBuf>,
     /// Each sensor of the file as its own recording.
     #[arg(long, help_heading = INPUT, conflicts_with = "topic")]
     pub(crate) each_sensor: bool,
-    /// Recording with motors on: noise ratio to FILE.
-    #[arg(long, help_heading = INPUT, value_name = "RUNNING", conflicts_with = "reports")]
-    pub(crate) against: Option<PathBuf>,
     /// Curves and models only, for records of any length.
     #[arg(long, help_heading = OUTPUT)]
     pub(crate) quick: bool,
-    /// Write the report of each recording as DIR/NAME.json.
-    #[arg(long, help_heading = OUTPUT, value_name = "DIR", conflicts_with_all = ["full", "pictures", "json", "page", "exports", "axis"])]
-    pub(crate) reports: Option<PathBuf>,
     /// Where the report goes besides the terminal.
     #[command(flatten)]
     pub(crate) output: OutputArguments,
@@ -226,21 +263,70 @@ pub(crate) struct ReplayArguments {
     pub(crate) output: OutputArguments,
 }
 
-/// Reports to compare.
+/// Recordings or reports to compare.
 #[derive(Debug, Args)]
 pub(crate) struct CompareArguments {
-    /// A report that `analyze --json` wrote.
-    #[arg(value_name = "REPORT")]
-    pub(crate) first: PathBuf,
-    /// Another, which is called better or worse than the first.
-    #[arg(value_name = "REPORT", required_unless_present = "data_sheet")]
-    pub(crate) second: Option<PathBuf>,
-    /// Compare with the typical values of the sensor's data sheet.
-    #[arg(long, conflicts_with = "second")]
+    /// The first one, and how to read it and the others.
+    #[command(flatten)]
+    pub(crate) recording: RecordingArguments,
+    /// More recordings, or the second report.
+    #[arg(value_name = "FILE")]
+    pub(crate) more: Vec<PathBuf>,
+    /// Recording with motors on: how much noisier is it?
+    #[arg(long, help_heading = INPUT, value_name = "FILE", conflicts_with = "data_sheet")]
+    pub(crate) running: Option<PathBuf>,
+    /// Compare a report with its sensor's data sheet.
+    #[arg(long, conflicts_with = "more")]
     pub(crate) data_sheet: bool,
     /// Where the result goes besides the terminal.
     #[command(flatten)]
     pub(crate) output: JsonArgument,
+}
+
+/// Recordings that have a report each.
+#[derive(Debug, Args)]
+pub(crate) struct BatchArguments {
+    /// The first one, and how to read it and the others; of a folder all files below it.
+    #[command(flatten)]
+    pub(crate) recording: RecordingArguments,
+    /// More recordings, or folders of them.
+    #[arg(value_name = "FILE|DIR")]
+    pub(crate) more: Vec<PathBuf>,
+    /// Each sensor of each file as its own recording.
+    #[arg(long, help_heading = INPUT, conflicts_with = "topic")]
+    pub(crate) each_sensor: bool,
+    /// Curves and models only, for records of any length.
+    #[arg(long, help_heading = OUTPUT)]
+    pub(crate) quick: bool,
+    /// Folder of the reports, which mirrors those given.
+    #[arg(short, long, help_heading = OUTPUT, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// One JSON object a row: status, values, findings.
+    #[arg(long, help_heading = OUTPUT, value_name = "OUT")]
+    pub(crate) rows: Option<PathBuf>,
+    /// Leave out what has a report of the same bytes.
+    #[arg(long, help_heading = OUTPUT)]
+    pub(crate) resume: bool,
+    /// Recordings at a time [default: one a core].
+    #[arg(short, long, value_name = "N")]
+    pub(crate) jobs: Option<NonZeroUsize>,
+    /// Print nothing.
+    #[arg(long, help_heading = OUTPUT)]
+    pub(crate) quiet: bool,
+    /// Overwrite files that exist.
+    #[arg(long, help_heading = OUTPUT)]
+    pub(crate) force: bool,
+}
+
+impl BatchArguments {
+    /// The recordings and folders, each with how it is read.
+    pub(crate) fn each(&self) -> impl Iterator<Item = RecordingArguments> + '_ {
+        let files = [&self.recording.input.file].into_iter().chain(&self.more);
+        files.map(|file| RecordingArguments {
+            input: InputArguments { file: file.clone(), ..self.recording.input.clone() },
+            ..self.recording.clone()
+        })
+    }
 }
 
 /// How a recording is written.
@@ -366,12 +452,22 @@ pub(crate) struct ExportArguments {
 }
 
 /// Options of `analyze` that a proposed command states itself, or does not need.
-const PROPOSED: [&str; 11] =
-    ["topic", "columns", "units", "rate", "sensor", "range", "from", "to", "against", "yes", "each-sensor"];
+const PROPOSED: [&str; 10] =
+    ["topic", "columns", "units", "rate", "sensor", "range", "from", "to", "yes", "each-sensor"];
+
+/// The words that were typed, the name of the program first.
+static TYPED: OnceLock<Vec<String>> = OnceLock::new();
+
+/// Keeps the words that were typed, for commands that are proposed.
+pub(crate) fn set_typed(words: &[OsString]) {
+    // A process runs one command.
+    let _ = TYPED.set(words.iter().map(|word| word.to_string_lossy().into_owned()).collect());
+}
 
 /// The options that were typed for `analyze`, without those that a proposed command states itself.
 pub(crate) fn other_options() -> Vec<String> {
-    let mut words = std::env::args().skip(1).skip_while(|word| word.starts_with("--"));
+    let typed = TYPED.get().into_iter().flatten().cloned();
+    let mut words = typed.skip(1).skip_while(|word| word.starts_with("--"));
     if words.next().as_deref() != Some("analyze") {
         return Vec::new();
     }
@@ -468,6 +564,18 @@ pub(crate) struct InputArguments {
     /// adis16405, adis16470, bmi088, mpu6050 or a TOML file.
     #[arg(long, help_heading = SENSOR, value_name = "NAME|FILE")]
     pub(crate) sensor: Option<String>,
+    /// What is in memory, in the place of the file.
+    #[arg(skip)]
+    pub(crate) memory: Option<RecordingInMemory>,
+}
+
+/// A recording that is in no file.
+#[derive(Debug, Clone)]
+pub(crate) enum RecordingInMemory {
+    /// The bytes of one.
+    Bytes(Arc<[u8]>),
+    /// Arrays.
+    Arrays(Arc<MemoryTable>),
 }
 
 impl InputArguments {
@@ -481,6 +589,19 @@ impl InputArguments {
             units: Vec::new(),
             topic: None,
             yes: false,
+            memory: None,
+        }
+    }
+
+    /// Opens the recording; `monitor` as in [`RecordedInput::open_monitored`].
+    ///
+    /// # Errors
+    /// It cannot be read, or has no known format.
+    pub(crate) fn open(&self, monitor: &ReadMonitor) -> Result<RecordedInput, InputError> {
+        match self.memory.clone() {
+            None => RecordedInput::open_monitored(&self.file, monitor),
+            Some(RecordingInMemory::Bytes(bytes)) => RecordedInput::in_memory_monitored(&self.file, bytes, monitor),
+            Some(RecordingInMemory::Arrays(arrays)) => Ok(RecordedInput::of_arrays(&self.file, arrays, monitor)),
         }
     }
 }
@@ -683,7 +804,7 @@ mod tests {
         let program = Cli::command();
         for command in std::iter::once(&program).chain(program.get_subcommands()) {
             let text = command.get_after_help().map(ToString::to_string).unwrap_or_default();
-            let lines = text.lines().filter(|line| line.starts_with("  host-sim"));
+            let lines = text.lines().filter(|line| line.starts_with("  imunoise"));
             let examples: Vec<&str> = lines.filter_map(|line| line.trim_start().split("   ").next()).collect();
             assert!(!examples.is_empty(), "{}", command.get_name());
             for example in examples {

@@ -3,8 +3,20 @@
 use anyhow::{Error, Result};
 use recordings::{InputError, Reason};
 use reports::saved_report::SavedReport;
-use std::fs;
+use std::fs::{self, File};
+use std::io::Read;
 use std::path::Path;
+
+/// Bytes that tell a report.
+const HEAD: u64 = 64;
+
+/// Whether a file begins as the JSON of a report; a pipe is not looked at.
+pub(crate) fn is_report(file: &Path) -> bool {
+    let mut head = Vec::new();
+    let is_file = file.is_file();
+    let mut read = || File::open(file)?.take(HEAD).read_to_end(&mut head);
+    is_file && read().is_ok() && head.trim_ascii_start().starts_with(b"{")
+}
 
 /// Reads the JSON that `analyze --json` wrote.
 ///

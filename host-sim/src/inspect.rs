@@ -9,7 +9,7 @@ use recordings::file_format::{RecordedFormat, RecordedInput, TopicDescription};
 use recordings::inspection::{ColumnGuess, InspectedColumn, InspectedTable, Proposal};
 use recordings::sample_stream::StreamError;
 use recordings::time_base::{TimeBaseError, TimeRange};
-use recordings::{ColumnSelection, InputError, Printable, Reason};
+use recordings::{ColumnSelection, InputError, Printable, ReadMonitor, Reason};
 use reports::rounding::plain;
 use reports::summary::time_options;
 use std::fmt::{self, Display, Write as _};
@@ -69,7 +69,7 @@ fn describe_bus_log(file: &Path, read: ReadMeasurement) -> Result<String> {
 /// # Errors
 /// The file is damaged, or has one sensor, or something is missing that is not guessed.
 pub(crate) fn each_sensor(recording: &RecordingArguments) -> Result<Vec<RecordingArguments>> {
-    let opened = RecordedInput::open(&recording.input.file)?;
+    let opened = recording.input.open(&ReadMonitor::default())?;
     let contents = Contents::read(&opened, recording.clone())?;
     let is_offered = |proposal: &&Proposal| {
         contents.several.is_empty() || proposal.topic.as_ref().is_some_and(|topic| contents.several.contains(topic))
@@ -81,7 +81,7 @@ pub(crate) fn each_sensor(recording: &RecordingArguments) -> Result<Vec<Recordin
             "{}: what each sensor is, the file does not say",
             Printable(&recording.input.file.display().to_string())
         );
-        return Err(Question { error, text: contents.to_string() }.into());
+        return Err(Question { error, text: contents.to_string(), hint: "" }.into());
     }
     Ok(proposals.into_iter().map(|proposal| contents.arguments(proposal)).collect())
 }
@@ -89,7 +89,8 @@ pub(crate) fn each_sensor(recording: &RecordingArguments) -> Result<Vec<Recordin
 /// The longest part at rest of the file of `recording`, as `inspect` shows it; `None` where that shows none, or more than one table.
 pub(crate) fn part_at_rest(recording: &RecordingArguments) -> Option<TimeRange> {
     let file = &recording.input.file;
-    let input = RecordedInput::open(file).ok().filter(|_| !is_standard_stream(file))?;
+    let is_read_again = !is_standard_stream(file);
+    let input = is_read_again.then(|| recording.input.open(&ReadMonitor::default()).ok())??;
     match Contents::read(&input, recording.clone()).ok()?.tables.as_slice() {
         [table] => table.part_at_rest(),
         _ => None,
@@ -155,7 +156,7 @@ impl Contents {
         let file = self.given.input.file.display().to_string();
         let rate = ["--rate", "HZ"].into_iter().filter(|_| proposal.lacks_rate).map(str::to_owned);
         let words = [file].into_iter().chain(arguments.options(false)).chain(rate).chain(cli::other_options());
-        format!("host-sim analyze {}", words.map(|word| quoted(&word)).collect::<Vec<_>>().join(" "))
+        format!("imunoise analyze {}", words.map(|word| quoted(&word)).collect::<Vec<_>>().join(" "))
     }
 }
 
@@ -198,7 +199,7 @@ impl Display for Contents {
         if self.proposals().count() > 1 && self.proposals().all(is_taken) {
             let rest = if self.proposals().all(Proposal::is_complete) { "" } else { " --yes" };
             let file = quoted(&self.given.input.file.display().to_string());
-            writeln!(f, "all of them, as several recordings:\n  host-sim analyze {file} --each-sensor{rest}")?;
+            writeln!(f, "all of them, as several recordings:\n  imunoise analyze {file} --each-sensor{rest}")?;
         }
         Ok(())
     }
@@ -323,6 +324,8 @@ pub(crate) struct Question {
     error: anyhow::Error,
     /// The table and the command, in lines.
     pub(crate) text: String,
+    /// What the option `--yes` does, in a line; empty where that says nothing.
+    pub(crate) hint: &'static str,
 }
 
 impl Display for Question {
@@ -347,7 +350,7 @@ pub(crate) fn read_or_ask<R>(
     if !is_answered_by_columns(&error) || is_standard_stream(file) {
         return Err(error);
     }
-    let opened = RecordedInput::open(file).map_err(anyhow::Error::from);
+    let opened = recording.input.open(&ReadMonitor::default()).map_err(anyhow::Error::from);
     let Ok(contents) = opened.and_then(|opened| Contents::read(&opened, recording.clone())) else { return Err(error) };
     let proposals: Vec<&Proposal> = contents.proposals().collect();
     let hint = match proposals.as_slice() {
@@ -359,8 +362,7 @@ pub(crate) fn read_or_ask<R>(
         _ if *yes => "--yes takes no guess in doubt, no rate, and none of several\n",
         _ => "",
     };
-    let text = format!("{contents}{hint}");
-    Err(Question { error, text }.into())
+    Err(Question { error, text: contents.to_string(), hint }.into())
 }
 
 /// Whether a column, a unit, a topic or a rate is missing.

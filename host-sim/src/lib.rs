@@ -1,4 +1,25 @@
-//! Parts of the command `host-sim` that tests of the whole system use as well.
+//! The command `imunoise`, and its analysis of one recording as a function of other programs.
 
+mod analyze;
+mod batch;
 pub mod bench;
+mod cli;
+pub mod command;
+mod compare;
+mod convert;
+mod export;
+mod input_file;
+mod inspect;
+mod interrupt;
+mod live;
 pub mod monitor;
+mod output;
+mod output_files;
+mod progress;
+mod record;
+pub mod recording_analysis;
+mod recording_file;
+mod several_recordings;
+mod simulate;
+mod streaming;
+mod tip;

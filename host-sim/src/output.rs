@@ -19,6 +19,7 @@ use std::fmt;
 use std::fs;
 use std::io::{self, BufWriter, StdoutLock, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// Columns where standard output is no terminal, or does not say how wide it is.
 const USUAL_COLUMNS: usize = 80;
@@ -46,10 +47,11 @@ pub(crate) fn check(output: &OutputArguments, files: &OutputFiles) -> Result<()>
 
 /// A report, and what was read for it.
 #[derive(Debug)]
-pub(crate) struct Analysed {
-    pub(crate) report: Report,
-    /// `None` where it is of no file, or of one that the driver has read.
-    pub(crate) reading: Option<ReadingRecord>,
+pub struct Analysed {
+    /// The report.
+    pub report: Report,
+    /// `None` where it is of no recording.
+    pub reading: Option<ReadingRecord>,
 }
 
 impl From<Report> for Analysed {
@@ -60,7 +62,8 @@ impl From<Report> for Analysed {
 
 impl Analysed {
     /// Whether the recording was read to its end.
-    pub(crate) fn is_complete(&self) -> bool {
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
         self.reading.as_ref().is_none_or(|reading| reading.complete)
     }
 }
@@ -212,8 +215,19 @@ pub(crate) fn print(write: impl FnOnce(&mut BufWriter<StdoutLock>) -> io::Result
     Ok(out.flush()?)
 }
 
-/// A progress bar on standard error, shown on a terminal only.
+/// Whether this process is the command, and not a program that calls its functions.
+static IS_COMMAND: AtomicBool = AtomicBool::new(false);
+
+/// Lets this process show progress.
+pub(crate) fn show_progress() {
+    IS_COMMAND.store(true, Relaxed);
+}
+
+/// A progress bar on standard error, shown by the command on a terminal only.
 pub(crate) fn progress_bar(length: u64, template: &str) -> ProgressBar {
+    if !IS_COMMAND.load(Relaxed) {
+        return ProgressBar::hidden();
+    }
     let bar = ProgressBar::new(length);
     match ProgressStyle::with_template(template) {
         Ok(style) => bar.with_style(style),

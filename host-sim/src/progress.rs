@@ -98,17 +98,22 @@ fn purpose(pass: ReadPass) -> &'static str {
     }
 }
 
+/// The bar, with a thread that draws it where it is shown.
+fn ticking(bar: ProgressBar) -> ProgressBar {
+    if !bar.is_hidden() {
+        bar.enable_steady_tick(INTERVAL);
+    }
+    bar
+}
+
 /// The bar of the fits of so many channels, one after the other.
 pub(crate) fn fitting(channels: usize) -> ProgressBar {
-    let bar = progress_bar(channels as u64, FITTING);
-    bar.enable_steady_tick(INTERVAL);
-    bar
+    ticking(progress_bar(channels as u64, FITTING))
 }
 
 /// Runs `analyze` beside the bar of its stages.
 pub(crate) fn analysing<R>(analyze: impl FnOnce(&dyn Fn(Stage)) -> R) -> R {
-    let bar = progress_bar(Stage::COUNT as u64, ANALYSING);
-    bar.enable_steady_tick(INTERVAL);
+    let bar = ticking(progress_bar(Stage::COUNT as u64, ANALYSING));
     let result = analyze(&|stage| {
         bar.set_position(stage as u64);
         bar.set_message(stage.to_string());

@@ -1,14 +1,14 @@
-//! `record`, `bench`, and the command without a subcommand: the report of a device, of which a recording is left, or of the virtual sensor.
+//! `record`, `bench` and `demo`: the report of a device, of which a recording is left, or of the virtual sensor.
 
 use crate::analyze::analyze_recording;
+use crate::bench::{self, BenchPlan, SerialConsole};
 use crate::cli::BenchArguments;
 use crate::interrupt;
+use crate::monitor;
 use crate::output::{self, note, progress_bar};
 use crate::tip::{DeniedPort, UnknownPort};
 use adis16405_driver::GyroRange;
 use anyhow::{Context, Error, Result, ensure};
-use host_sim::bench::{self, BenchPlan, SerialConsole};
-use host_sim::monitor;
 use noise_analysis::report::Report;
 use recordings::serial::{self, SerialLink};
 use simulation::Simulation;

@@ -60,9 +60,9 @@ for rows in "${@:-1000000}"; do
         if ! $only_quick; then
             measure "pandas and allantools.oadev" "$rows" "$python" tests/peers/recording/curves.py "$file" 100
         fi
-        measure "host-sim analyze --quick" "$rows" "$target/release/host-sim" analyze "$file" --rate 100 --quick --quiet
+        measure "imunoise analyze --quick" "$rows" "$target/release/imunoise" analyze "$file" --rate 100 --quick --quiet
         if ! $only_quick; then
-            measure "host-sim analyze" "$rows" "$target/release/host-sim" analyze "$file" --rate 100 --quiet
+            measure "imunoise analyze" "$rows" "$target/release/imunoise" analyze "$file" --rate 100 --quiet
         fi
     done
 done
@@ -75,12 +75,12 @@ if [ -f "$run" ]; then
     echo "a measured run of a million rows with a dozen findings, thrice in turn"
     for _ in 1 2 3; do
         measure "pandas and allantools.oadev" 1000000 "$python" tests/peers/recording/curves.py "$run" 100
-        measure "host-sim analyze" 1000000 "$target/release/host-sim" analyze "$run" --rate 100 --quiet
+        measure "imunoise analyze" 1000000 "$target/release/imunoise" analyze "$run" --rate 100 --quiet
     done
 fi
 echo "virtual hour"
 hour=$((3600 * 2048 / 10))
-measure "host-sim" "$hour" "$target/release/host-sim" --page "$folder/page" --force --quiet
+measure "imunoise" "$hour" "$target/release/imunoise" demo --page "$folder/page" --force --quiet
 # 166 recordings of a minute at 100 Hz.
 rows=996000 minute=6000
 table=$(table_of "$rows")
@@ -94,7 +94,7 @@ if [ ! -d "$minutes" ]; then
 fi
 echo "$((rows / minute)) recordings of a minute, and one of their length"
 for option in --quick ""; do
-    measure "host-sim analyze $option, one" "$rows" "$target/release/host-sim" analyze "$table" --rate 100 --quiet $option
-    measure "host-sim analyze $option, minutes" "$rows" "$target/release/host-sim" analyze "$minutes"/*.csv --rate 100 \
-        --reports "$folder/reports" --force --quiet $option
+    measure "imunoise analyze $option, one" "$rows" "$target/release/imunoise" analyze "$table" --rate 100 --quiet $option
+    measure "imunoise batch $option, minutes" "$rows" "$target/release/imunoise" batch "$minutes"/*.csv --rate 100 \
+        -o "$folder/reports" --force --quiet $option
 done

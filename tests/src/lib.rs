@@ -50,15 +50,15 @@ pub fn note_skipped(test: &str, reason: &str) {
     }
 }
 
-/// The path of the program: that which `HOST_SIM` names, or built by cargo in the profile of the tests.
+/// The path of the program: that which `IMUNOISE` names, or built by cargo in the profile of the tests.
 pub fn host_sim() -> PathBuf {
-    if let Some(program) = std::env::var_os("HOST_SIM") {
+    if let Some(program) = std::env::var_os("IMUNOISE") {
         return program.into();
     }
-    let arguments = ["build", "--quiet", "--locked", "--package", "host-sim", "--bin", "host-sim"];
-    assert!(cargo().args(arguments).status().expect("cargo runs").success(), "host-sim does not build");
+    let arguments = ["build", "--quiet", "--locked", "--package", "host-sim", "--bin", "imunoise"];
+    assert!(cargo().args(arguments).status().expect("cargo runs").success(), "imunoise does not build");
     let test = std::env::current_exe().expect("the path of this test");
-    test.ancestors().nth(2).expect("target/debug").join("host-sim")
+    test.ancestors().nth(2).expect("target/debug").join("imunoise")
 }
 
 /// The path of a program of the workspace `tests/tools`, which is built if it is not there.

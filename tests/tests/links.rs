@@ -10,7 +10,7 @@ fn root() -> PathBuf {
 /// The pages: Markdown of the root and of the folders that hold documentation.
 fn pages() -> Vec<PathBuf> {
     let folders =
-        ["", "docs", "adis16405-driver", "allan-core", "allan-core/guide", "allan-core/python", "allan-core/ffi"];
+        ["", "docs", "adis16405-driver", "allan-core", "allan-core/guide", "allan-core/ffi", "host-sim/python"];
     let markdown = folders.iter().flat_map(|folder| std::fs::read_dir(root().join(folder)).expect("a folder"));
     let mut pages: Vec<PathBuf> = markdown.map(|entry| entry.expect("an entry").path()).collect();
     pages.retain(|path| path.extension().is_some_and(|ending| ending == "md"));

@@ -7,7 +7,6 @@ mod attack;
 #[path = "boards/main.rs"]
 mod boards;
 mod estimator;
-mod fleet;
 mod links;
 mod recorded_words;
 mod recordings;

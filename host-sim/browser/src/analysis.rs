@@ -1,4 +1,4 @@
-//! From the bytes of a recording to its report, as the command `host-sim analyze` makes it.
+//! From the bytes of a recording to its report, as the command `imunoise` makes it.
 
 use crate::host::{self, Task};
 use crate::recording_options::RecordingOptions;
@@ -27,7 +27,7 @@ use std::sync::Arc;
 const KEPT: KeptInMemory =
     KeptInMemory { rows: MOST_SAMPLES, rows_with_losses: MOST_SAMPLES_WITH_LOSSES, most_lost: MOST_LOST };
 /// The command of which the report is the same, and which reads it again with the options that the report states.
-const COMMAND: &str = "host-sim";
+const COMMAND: &str = "imunoise";
 
 /// A recording in memory, and how it is read.
 pub(crate) struct Recorded<'a> {

@@ -1,4 +1,4 @@
-//! What is in a recording, as HTML: the table of `host-sim inspect`, and a form with what it proposes, for each sensor.
+//! What is in a recording, as HTML: the table of `imunoise inspect`, and a form with what it proposes, for each sensor.
 
 use crate::analysis::Recorded;
 use crate::recording_options::RecordingOptions;

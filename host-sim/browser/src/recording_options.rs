@@ -1,4 +1,4 @@
-//! How a recording is read: the options of the command `host-sim analyze`, as the page sends them.
+//! How a recording is read: the options of the command `imunoise`, as the page sends them.
 
 use adis16405_driver::GyroRange;
 use anyhow::{Context, Result, bail};

@@ -39,7 +39,7 @@ fn differences(path: &str, one: &Value, other: &Value, tolerance: f64, found: &m
 
 fn analysed(arguments: &[String], report: &Path) {
     let output = Command::new(host_sim()).args(arguments).arg("--quiet").arg("--json").arg(report).output();
-    let output = output.expect("host-sim starts");
+    let output = output.expect("imunoise starts");
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
 }
 
@@ -79,7 +79,7 @@ fn the_page_makes_the_report_of_the_command() {
     ];
     let simulated =
         Command::new(host_sim()).arg("simulate").arg(&counts).args(["--seconds", "900"]).args(effects).status();
-    assert!(simulated.expect("host-sim starts").success());
+    assert!(simulated.expect("imunoise starts").success());
     files.push((counts, Vec::new()));
     assert_eq!(files.len(), 10);
 
@@ -96,7 +96,7 @@ fn the_page_makes_the_report_of_the_command() {
     if !drive(TEST, "reports.js", "observatory.html", folder.path(), &Value::from(jobs).to_string()) {
         return;
     }
-    let simulation = ["--seconds", "600", "--seed", "1", "--page"].map(str::to_owned);
+    let simulation = ["demo", "--seconds", "600", "--seed", "1", "--page"].map(str::to_owned);
     let page = folder.path().join("page").display().to_string();
     let mut failed = String::new();
     for at in 0..=10 {

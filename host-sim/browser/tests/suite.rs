@@ -1,4 +1,4 @@
-//! The page in headless Chromium, with the files of other programs and the command `host-sim`. Where there is no Chromium or no Node.js the
+//! The page in headless Chromium, with the files of other programs and the command `imunoise`. Where there is no Chromium or no Node.js the
 //! tests are reported as skipped.
 
 mod harness;

@@ -16,7 +16,7 @@ fn a_user_finds_the_way_and_nothing_is_requested() {
     bytes[8..64].fill(0xFF);
     std::fs::write(&damaged, bytes).expect("room");
     let run = |arguments: &[&str]| {
-        let output = Command::new(host_sim()).args(arguments).output().expect("host-sim starts");
+        let output = Command::new(host_sim()).args(arguments).output().expect("imunoise starts");
         assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
         output.stdout
     };
@@ -37,7 +37,7 @@ fn a_user_finds_the_way_and_nothing_is_requested() {
         return;
     }
     let of_page = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("written");
-    let agreement = run(&["analyze", &compared[0], &compared[1]]);
+    let agreement = run(&["compare", &compared[0], &compared[1]]);
     assert_eq!(of_page("agreement.txt"), String::from_utf8(agreement).expect("text"));
     let kalibr = folder.path().join("kalibr.yaml").display().to_string();
     run(&["analyze", &csv, "--quiet", "--export", &format!("kalibr={kalibr}")]);

@@ -12,6 +12,7 @@ mod labelled_row;
 pub(crate) mod matlab;
 mod mcap_bag;
 mod mcap_file;
+pub(crate) mod memory_table;
 mod message_layout;
 mod nmea;
 pub(crate) mod numpy;

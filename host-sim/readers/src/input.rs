@@ -9,4 +9,5 @@ pub(crate) mod input_error;
 pub(crate) mod read_ahead;
 pub(crate) mod read_monitor;
 pub(crate) mod stream_error;
+pub(crate) mod threads;
 pub(crate) mod zstd_frames;

@@ -3,7 +3,10 @@
 use crate::recording::{NOT_RECORDED, RecordedSample, Recorder, Recording, TimeStamp, Verdict};
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
 use measurement::adis16405;
-use readers::{Batch, FileRows, PartFilter, RegisterField, RowsRead, StreamError, ValueColumn, WantedRows};
+use readers::{
+    Batch, FileRows, PartFilter, ReadMonitor, RegisterField, RowsRead, StreamError, ValueColumn, WantedRows,
+    may_begin_threads,
+};
 use std::panic::resume_unwind;
 use std::sync::mpsc::sync_channel;
 use std::thread;
@@ -58,8 +61,12 @@ impl<'a> BatchSource<'a> {
     pub(crate) fn for_each_batch(
         &mut self,
         wanted: WantedRows,
-        take: impl FnMut(Batch<Verdict>) -> Result<(), StreamError>,
+        mut take: impl FnMut(Batch<Verdict>) -> Result<(), StreamError>,
     ) -> Result<RowsRead, StreamError> {
+        let monitor = match self {
+            Self::File(rows, _) => rows.monitor().clone(),
+            Self::Recording(_) => ReadMonitor::default(),
+        };
         let read = |give: &mut dyn FnMut(Batch<Verdict>) -> bool| match self {
             Self::File(rows, validator) => rows.read(wanted, &mut |batch| {
                 let verdicts = validator.as_mut().map(|validator| verdicts(validator, &batch));
@@ -67,11 +74,14 @@ impl<'a> BatchSource<'a> {
             }),
             Self::Recording(recording) => recording.read(wanted, give),
         };
-        for_each_batch(read, take)
+        for_each_batch(read, |batch| {
+            monitor.ask();
+            take(batch)
+        })
     }
 }
 
-/// Calls `take` with each batch that `read` gives, which reads on another thread where there are threads.
+/// Calls `take` with each batch that `read` gives, which reads on another thread where there may be one.
 ///
 /// # Errors
 /// The file is damaged, the part has no row, or `take` fails.
@@ -79,7 +89,7 @@ pub(crate) fn for_each_batch<B: Send>(
     read: impl FnOnce(&mut dyn FnMut(B) -> bool) -> Result<RowsRead, StreamError> + Send,
     mut take: impl FnMut(B) -> Result<(), StreamError>,
 ) -> Result<RowsRead, StreamError> {
-    if cfg!(target_family = "wasm") {
+    if !may_begin_threads() {
         let mut taken = Ok(());
         let read = read(&mut |batch| {
             taken = take(batch);
@@ -98,16 +108,16 @@ pub(crate) fn for_each_batch<B: Send>(
 
 /// What the burst validator says of register counts, which fit their fields; one that is missing is as if it had not been recorded.
 fn verdicts(validator: &mut Recorder, batch: &Batch) -> Vec<Verdict> {
-    for row in 0..batch.rows {
+    let verdict = |row: usize| {
         let mut counts = NOT_RECORDED;
         for (channel, column) in validator.channels().iter().zip(&batch.values) {
             if !column[row].is_nan() {
                 counts[*channel as usize] = column[row] as i16;
             }
         }
-        validator.push(TimeStamp::default(), &Burst::from_counts(&Counts::new(counts)));
-    }
-    validator.take_samples().iter().map(RecordedSample::verdict).collect()
+        validator.judge(&Burst::from_counts(&Counts::new(counts)))
+    };
+    (0..batch.rows).map(verdict).collect()
 }
 
 /// Samples in memory.

@@ -6,8 +6,8 @@ use adis16405_driver::{Channel, GyroRange};
 use measurement::{SensorProfile, adis16405};
 use readers::inspection::InspectedTable;
 use readers::{
-    ColumnSelection, FileBytes, FileHash, FileRows, HEAD_BYTES, InputError, InputFile, ReadMonitor, ReadOptions,
-    Reason, is_output_register,
+    ColumnSelection, FileBytes, FileHash, FileRows, HEAD_BYTES, InputError, InputFile, MemoryTable, ReadMonitor,
+    ReadOptions, Reason, is_output_register,
 };
 use std::io::{self, BufReader};
 use std::ops::Deref;
@@ -84,7 +84,7 @@ impl RecordedInput {
         Self::in_memory_monitored(name, bytes, &ReadMonitor::default())
     }
 
-    /// As [`in_memory`](Self::in_memory); `monitor` counts the bytes that are read of the recording.
+    /// As [`in_memory`](Self::in_memory), with `monitor` as [`open_monitored`](Self::open_monitored).
     ///
     /// # Errors
     /// As [`in_memory`](Self::in_memory).
@@ -94,6 +94,13 @@ impl RecordedInput {
         monitor: &ReadMonitor,
     ) -> Result<Self, InputError> {
         Self::recognised(name, vec![FileBytes::in_memory(name, bytes)], monitor)
+    }
+
+    /// Arrays in memory that are called `name`.
+    #[must_use]
+    pub fn of_arrays(name: &Path, arrays: Arc<MemoryTable>, monitor: &ReadMonitor) -> Self {
+        let file = InputFile::of_arrays(name, arrays, monitor);
+        Self { file, format: RecordedFormat::File(FileFormat::Arrays), capture: None }
     }
 
     fn recognised(name: &Path, mut files: Vec<FileBytes>, monitor: &ReadMonitor) -> Result<Self, InputError> {

@@ -14,7 +14,7 @@ pub mod time_base;
 
 pub use counts::{count_table_writer, frame_log, numpy_matrix, recorded_file, serial, spi_export};
 pub use readers::{
-    ColumnSelection, FileBytes, FileHash, InputError, Printable, ReadMonitor, ReadOptions, ReadPass, Reason,
-    SelectionError, inspection,
+    ColumnSelection, FileBytes, FileHash, InputError, MemoryArray, MemoryColumn, MemoryTable, Number, Printable,
+    ReadMonitor, ReadOptions, ReadPass, Reason, SelectionError, inspection, read_on_one_thread,
 };
 pub use reading::{count_table, row_writer, sample_stream};

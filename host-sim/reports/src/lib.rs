@@ -18,6 +18,7 @@ pub mod page;
 mod part_note;
 pub mod reading;
 pub mod rounding;
+pub mod rows;
 pub mod saved_report;
 pub mod several;
 pub mod summary;

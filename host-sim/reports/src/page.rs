@@ -4,7 +4,7 @@
 mod tables;
 
 use crate::coefficient_notes::coefficient_notes;
-use crate::evidence::{EvidenceText, NumberStyle};
+use crate::evidence::EvidenceText;
 use crate::explanation;
 use crate::figure::{self, Plot};
 use crate::finding_text::{self, ShownEffect, channel_list, channel_name};
@@ -33,13 +33,26 @@ pub const FILE: &str = "index.html";
 /// The report on the recording `source` as a page.
 #[must_use]
 pub fn html(report: &Report, source: Option<&str>) -> String {
-    render(report, source, None).into_string()
+    render(report, source, None, Extent::Whole).into_string()
 }
 
 /// The same with what was read for it.
 #[must_use]
 pub fn html_with_reading(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>) -> String {
-    render(report, source, reading).into_string()
+    render(report, source, reading, Extent::Whole).into_string()
+}
+
+/// The first screen of that page alone: what was found, the curves, and what to do.
+#[must_use]
+pub fn first_screen(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>) -> String {
+    render(report, source, reading, Extent::FirstScreen).into_string()
+}
+
+/// How much of the page is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Extent {
+    Whole,
+    FirstScreen,
 }
 
 /// The page could not be written.
@@ -65,7 +78,8 @@ pub fn write(report: &Report, source: Option<&str>, dir: &Path) -> Result<PathBu
     Ok(path)
 }
 
-fn render(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>) -> Markup {
+fn render(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>, extent: Extent) -> Markup {
+    let is_whole = extent == Extent::Whole;
     let [light, dark] = figure::style();
     let (title, headline) = {
         let headline = summary::headline(report, source);
@@ -85,12 +99,12 @@ fn render(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>
                 style { "@media screen and (prefers-color-scheme: dark){" (PreEscaped(dark)) "}" }
             }
             body {
-                a.skip href="#findings" { "To the findings" }
+                @if is_whole { a.skip href="#findings" { "To the findings" } }
                 header {
                     div { h1 { (title) } p.headline { (headline) } }
                     div id="save" {}
                 }
-                (contents(report))
+                @if is_whole { (contents(report)) }
                 main {
                     @if let Some(sentence) = reading.and_then(ReadingRecord::incomplete) { p { strong { (sentence) } } }
                     div.first {
@@ -100,12 +114,14 @@ fn render(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>
                             @if let Some(plot) = figure::strongest(report) { (drawing(&plot)) }
                         }
                     }
-                    (findings(report))
-                    (curves(report))
-                    (channels(report))
-                    (disagreements(report))
-                    @if let Some(reading) = reading { (what_was_read(reading)) }
-                    (definitions())
+                    @if is_whole {
+                        (findings(report))
+                        (curves(report))
+                        (channels(report))
+                        (disagreements(report))
+                        @if let Some(reading) = reading { (what_was_read(reading)) }
+                        (definitions())
+                    }
                 }
                 script { (PreEscaped(SCRIPT)) }
             }
@@ -251,7 +267,7 @@ fn finding_card(report: &Report, index: usize, number: usize) -> Markup {
             details {
                 summary { "Parameters and evidence" }
                 (parameters(report, index))
-                p { (capital(&EvidenceText::of_finding(finding, NumberStyle::Prefixed).sentence())) "." }
+                p { (capital(&EvidenceText::of_finding(finding).sentence())) "." }
             }
         }
     }

@@ -2,11 +2,11 @@
 
 use crate::formatting::count;
 use crate::formatting::words;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// What was read of a recording.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ReadingRecord {
     /// Name of the file, without its folder.
     pub file: String,
@@ -70,7 +70,7 @@ mod tests {
     fn a_reading_says_what_is_missing_and_why() {
         let record = ReadingRecord {
             file: "cut.ulg".to_owned(),
-            program: "host-sim".to_owned(),
+            program: "imunoise".to_owned(),
             version: "1.2".to_owned(),
             options: vec!["--rate".to_owned(), "100".to_owned()],
             rows: 9189,
@@ -79,7 +79,7 @@ mod tests {
             ..ReadingRecord::default()
         };
         assert_eq!(record.incomplete().as_deref(), Some("Not read to its end: truncated ULog: the data end early."));
-        assert_eq!(record.lines()[0], "9,189 rows of cut.ulg were read by host-sim 1.2, with --rate 100.");
+        assert_eq!(record.lines()[0], "9,189 rows of cut.ulg were read by imunoise 1.2, with --rate 100.");
         assert_eq!(record.lines()[1], "Rows that are no samples: 3 time backwards.");
         let whole = ReadingRecord { complete: true, damage: None, ..record };
         assert_eq!(whole.incomplete(), None);

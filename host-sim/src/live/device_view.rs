@@ -1,9 +1,9 @@
 //! A device on a serial port: its reports as the live view, in the words of the host's reports.
 
 use super::LiveSource;
+use crate::monitor;
 use adis16405_driver::{Channel, GyroRange};
 use anyhow::Result;
-use host_sim::monitor;
 use link::{
     ChannelMessage, Health, Hello, LearnedMessage, Message, Received, ReportedAddedTerm, ReportedParameter,
     ReportedRegressor, ReportedTerm, ValidationMessage,
@@ -116,7 +116,7 @@ impl LatestMessages {
             view.sentences = format!("Probably {}.", monitor::SILENCE);
         } else if let Some(trouble) = &self.trouble {
             view.headline = format!("{name}   The sensor is not sampled: {trouble}");
-            view.sentences = format!("Its wires or its supply; host-sim bench {name} says which.");
+            view.sentences = format!("Its wires or its supply; imunoise bench {name} says which.");
         }
         view
     }

@@ -1,6 +1,6 @@
 //! A recording gives the same report whether its counts are read or its bursts are replayed over the emulated bus.
 
-use crate::program::{analysis_of, counts, host_sim, json_of, write};
+use crate::program::{analysis_of, counts, imunoise, json_of, write};
 use serde_json::Value;
 use tempfile::tempdir;
 
@@ -10,7 +10,7 @@ fn a_table_has_one_report_analyzed_and_replayed() {
     let table = counts(&dir);
     let table = table.to_str().expect("UTF-8");
     assert!(analysis_of(&dir, &["analyze", table]) == analysis_of(&dir, &["replay", table]), "the reports differ");
-    let [analyzed, replayed] = ["analyze", "replay"].map(|command| host_sim(&[command, table]).stdout);
+    let [analyzed, replayed] = ["analyze", "replay"].map(|command| imunoise(&[command, table]).stdout);
     assert!(!analyzed.is_empty() && analyzed == replayed, "the screens differ");
 }
 
@@ -20,7 +20,7 @@ fn a_recorded_simulation_replays_to_the_same_report() {
     for name in ["log.csv", "log.csv.gz"] {
         let log = dir.path().join(name);
         let log = log.to_str().expect("UTF-8");
-        let simulated = host_sim(&["simulate", log, "--format", "frames", "--seconds", "5", "--seed", "7"]);
+        let simulated = imunoise(&["simulate", log, "--format", "frames", "--seconds", "5", "--seed", "7"]);
         assert!(simulated.status.success(), "{}", String::from_utf8_lossy(&simulated.stderr));
         let report = analysis_of(&dir, &["analyze", log]);
         assert!(report == analysis_of(&dir, &["replay", log]), "{name}");
@@ -58,7 +58,7 @@ fn a_file_that_is_cut_is_told_everywhere() {
     let file = cut.to_str().expect("UTF-8");
     let [json, page, reports] =
         [dir.path().join("cut.json"), page, reports].map(|path| path.to_str().expect("UTF-8").to_owned());
-    let output = host_sim(&["analyze", file, "--json", &json, "--page", &page]);
+    let output = imunoise(&["analyze", file, "--json", &json, "--page", &page]);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(3), "{errors}");
     assert!(errors.contains("not read to its end"), "{errors}");
@@ -76,7 +76,7 @@ fn a_file_that_is_cut_is_told_everywhere() {
     assert!(html.contains("Not read to its end: truncated") && html.contains("What was read"));
     // Of many.
     let intact = write(&dir, "whole.ulg", &whole);
-    let output = host_sim(&["analyze", file, intact.to_str().expect("UTF-8"), "--reports", &reports]);
+    let output = imunoise(&["batch", file, intact.to_str().expect("UTF-8"), "-o", &reports]);
     assert_eq!(output.status.code(), Some(3), "{}", String::from_utf8_lossy(&output.stderr));
     for (name, complete) in [("cut", false), ("whole", true)] {
         let report = std::fs::read(format!("{reports}/{name}.ulg.json")).expect("a report");

@@ -1,6 +1,6 @@
 //! `simulate`, `convert` and `export`: what is described is in the file, and another format has the same samples.
 
-use crate::program::{analysis_of, host_sim, json_of};
+use crate::program::{analysis_of, imunoise, json_of};
 use serde_json::Value;
 use std::path::Path;
 use tempfile::{TempDir, tempdir};
@@ -10,7 +10,7 @@ fn path(dir: &TempDir, name: &str) -> String {
 }
 
 fn run(arguments: &[&str]) -> String {
-    let output = host_sim(arguments);
+    let output = imunoise(arguments);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{arguments:?}: {errors}");
     errors
@@ -127,7 +127,7 @@ fn a_report_is_exported() {
     assert!(notes.contains(lacks), "{notes}");
     let [first, second] = [first, second].map(|file| std::fs::read_to_string(file).expect("a file"));
     assert_eq!(first, second);
-    let output = host_sim(&["export", "--format", "gtsam", &report, &never]);
+    let output = imunoise(&["export", "--format", "gtsam", &report, &never]);
     let error = crate::program::error_line(&output);
     assert!(error.contains("gyro_y is not in the report") && !Path::new(&never).exists(), "{error}");
 }
@@ -135,7 +135,7 @@ fn a_report_is_exported() {
 #[test]
 fn completions_know_the_subcommands() {
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
-        let output = host_sim(&["completions", shell]);
+        let output = imunoise(&["completions", shell]);
         assert!(output.status.success() && String::from_utf8_lossy(&output.stdout).contains("simulate"), "{shell}");
     }
 }

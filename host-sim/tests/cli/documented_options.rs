@@ -1,12 +1,12 @@
 //! The options that the documentation uses are those that the program has, and those of a recording are all in the documentation.
 
-use crate::program::{host_sim, write};
+use crate::program::{imunoise, write};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// The options of a command by its own help.
 fn options(command: &str) -> BTreeSet<String> {
-    let output = host_sim(&[command, "--help"]);
+    let output = imunoise(&[command, "--help"]);
     assert!(output.status.success(), "{command}");
     let help = String::from_utf8(output.stdout).expect("UTF-8");
     // An option begins its line; others are named within sentences.
@@ -34,7 +34,7 @@ fn options_of_the_documentation_are_those_of_the_program() {
         let text = std::fs::read_to_string(page).expect("a page");
         for line in text.lines() {
             let command =
-                ["cargo run --release -- ", "$ host-sim "].iter().find_map(|program| line.split_once(program));
+                ["cargo run --release -- ", "$ imunoise "].iter().find_map(|program| line.split_once(program));
             let Some((_, command)) = command else { continue };
             let command = command.split(['#', '|', '`']).next().unwrap_or_default();
             let Some(name) = command.split_whitespace().next().filter(|name| !name.starts_with('-')) else { continue };
@@ -48,20 +48,8 @@ fn options_of_the_documentation_are_those_of_the_program() {
     assert!(commands > 30, "{commands} commands");
     // What says how a recording is read is described.
     let page = std::fs::read_to_string(root.join("docs/recordings.md")).expect("a page");
-    for option in [
-        "columns",
-        "units",
-        "topic",
-        "rate",
-        "sensor",
-        "range",
-        "from",
-        "to",
-        "yes",
-        "each-sensor",
-        "reports",
-        "format",
-    ] {
+    for option in ["columns", "units", "topic", "rate", "sensor", "range", "from", "to", "yes", "each-sensor", "format"]
+    {
         assert!(page.contains(&format!("--{option}")), "docs/recordings.md does not have --{option}");
     }
     assert!(options("convert").is_superset(&["from", "to", "format", "rate"].map(str::to_owned).into()));
@@ -75,7 +63,7 @@ fn the_table_of_the_page_for_a_logger_is_read_as_register_counts() {
     let table = page.split("```\n").find(|block| block.starts_with("time_s,")).expect("a table");
     let dir = tempfile::tempdir().expect("a folder");
     let file = write(&dir, "log.csv", table.as_bytes());
-    let output = host_sim(&["inspect", file.to_str().expect("UTF-8")]);
+    let output = imunoise(&["inspect", file.to_str().expect("UTF-8")]);
     let text = String::from_utf8(output.stdout).expect("UTF-8");
     assert!(output.status.success() && text.contains("register counts of an ADIS16405"), "{text}");
 }

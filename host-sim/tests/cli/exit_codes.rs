@@ -1,6 +1,6 @@
 //! Errors: exit code 1 and one line on standard error, 2 for wrong usage; nothing is written.
 
-use crate::program::{counts, error_line, host_sim, write};
+use crate::program::{counts, error_line, imunoise, write};
 use std::path::Path;
 use tempfile::tempdir;
 
@@ -51,7 +51,7 @@ fn an_error_is_one_line_and_exit_code_1() {
     let folder = dir.path().to_str().expect("UTF-8");
     for (arguments, words) in ERRORS {
         let arguments: Vec<String> = arguments.iter().map(|argument| argument.replace("DIR", folder)).collect();
-        let output = host_sim(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+        let output = imunoise(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
         let line = error_line(&output);
         assert!(line.len() < 4000, "{arguments:?}: {} bytes", line.len());
         for word in words.iter().map(|word| word.replace("DIR", folder)) {
@@ -83,7 +83,7 @@ fn wrong_usage_has_exit_code_2() {
         (&["monitor", "still.csv", "--speed=inf"], "neither a positive number nor max"),
         (&["monitor", "still.csv", "--speed=fast"], "neither a positive number nor max"),
     ] {
-        let output = host_sim(arguments);
+        let output = imunoise(arguments);
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.code() == Some(2) && errors.contains(words), "{arguments:?}: {errors}");
         assert!(output.stdout.is_empty());
@@ -102,7 +102,7 @@ fn names_with_control_characters_are_escaped() {
         ["analyze", hidden.to_str().expect("UTF-8")],
         ["simulate", "--effect=\u{1b}[31m:gyro_x:amplitude=1"],
     ] {
-        let output = host_sim(&arguments);
+        let output = imunoise(&arguments);
         let error = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(!output.status.success() && error.starts_with("error: "), "{error:?}");
         assert!(!error.contains(['\u{1b}', '\u{202e}']), "{error:?}");

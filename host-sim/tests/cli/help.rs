@@ -1,6 +1,6 @@
 //! `--help` of every command, and suggestions for what is misspelt.
 
-use crate::program::{host_sim, write};
+use crate::program::{imunoise, write};
 use std::process::Output;
 
 /// Lines and columns of a terminal window in which a help is read without scrolling.
@@ -12,7 +12,7 @@ fn text(bytes: Vec<u8>) -> String {
 
 /// The help of a command; of the program if `command` is empty.
 fn help(command: &[&str]) -> String {
-    let Output { status, stdout, .. } = host_sim(&[command, &["--help"]].concat());
+    let Output { status, stdout, .. } = imunoise(&[command, &["--help"]].concat());
     assert!(status.success(), "{command:?}");
     text(stdout)
 }
@@ -42,7 +42,7 @@ fn options_are_grouped_and_examples_follow() {
     let commands = section(&help(&[]), "Commands:");
     for command in commands.iter().map(String::as_str).filter(|command| *command != "help") {
         let examples = section(&help(&[command]), "Examples:");
-        assert!(!examples.is_empty() && examples.iter().all(|word| word == "host-sim"), "{command}: {examples:?}");
+        assert!(!examples.is_empty() && examples.iter().all(|word| word == "imunoise"), "{command}: {examples:?}");
     }
     let help = help(&["analyze"]);
     for (heading, option) in [("Input:", "--rate"), ("Sensor:", "--sensor"), ("Output:", "--page")] {
@@ -91,12 +91,12 @@ fn a_misspelt_command_option_or_file_gets_a_suggestion() {
         (vec!["analyze", &misspelt_folder], 1, format!("tip: a similar file exists: {in_folder}\n")),
         (vec!["compare", &misspelt, "--data-sheet"], 1, format!("tip: a similar file exists: {path}\n")),
     ] {
-        let output = host_sim(&arguments);
+        let output = imunoise(&arguments);
         let errors = text(output.stderr);
         assert!(output.status.code() == Some(status) && errors.contains(&suggestion), "{arguments:?}: {errors}");
     }
     for unlike in ["/nowhere/hover.csv", "/"] {
-        let errors = text(host_sim(&["analyze", unlike]).stderr);
+        let errors = text(imunoise(&["analyze", unlike]).stderr);
         assert!(!errors.contains("tip"), "{errors}");
     }
 }
@@ -104,12 +104,12 @@ fn a_misspelt_command_option_or_file_gets_a_suggestion() {
 #[test]
 fn a_port_that_is_not_there_is_answered_with_those_that_are() {
     for arguments in [&["monitor", "/dev/ttyNONE"][..], &["record", "x.csv", "--port", "/dev/ttyNONE"]] {
-        let errors = text(host_sim(arguments).stderr);
+        let errors = text(imunoise(arguments).stderr);
         assert!(errors.contains("/dev/ttyNONE") && errors.contains("tip: serial ports of this machine: "), "{errors}");
     }
 }
 
 #[test]
 fn help_is_a_command_too() {
-    assert!(text(host_sim(&["help", "analyze"]).stdout).contains("--rate"));
+    assert!(text(imunoise(&["help", "analyze"]).stdout).contains("--rate"));
 }

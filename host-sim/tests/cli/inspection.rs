@@ -1,6 +1,6 @@
 //! `inspect`, and the command that `analyze` proposes where a file does not say enough. What is found in a file is tested in `recordings`.
 
-use crate::program::{host_sim, json_of, write};
+use crate::program::{imunoise, json_of, write};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::Output;
 use tempfile::tempdir;
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_host-sim");
+const PROGRAM: &str = env!("CARGO_BIN_EXE_imunoise");
 const ROWS: u32 = 6000;
 
 fn name(file: &Path) -> &str {
@@ -28,14 +28,14 @@ fn refusal(output: &Output) -> String {
 }
 
 fn inspected(file: &Path) -> String {
-    let output = host_sim(&["inspect", name(file)]);
+    let output = imunoise(&["inspect", name(file)]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
 /// The arguments of the first command that is proposed.
 fn command(text: &str) -> Vec<&str> {
-    let line = text.lines().find_map(|line| line.trim().strip_prefix("host-sim ")).unwrap_or_else(|| panic!("{text}"));
+    let line = text.lines().find_map(|line| line.trim().strip_prefix("imunoise ")).unwrap_or_else(|| panic!("{text}"));
     line.split_whitespace().map(|word| word.trim_matches('\'')).collect()
 }
 
@@ -52,7 +52,7 @@ fn columns_without_names_are_shown_with_the_command_that_reads_them() {
         format!("{:.2} {force} {rate}\n", f64::from(row) / 100.0)
     };
     let file = write(&dir, "rows.txt", (0..ROWS).map(row).collect::<String>().as_bytes());
-    let text = refusal(&host_sim(&["analyze", name(&file)]));
+    let text = refusal(&imunoise(&["analyze", name(&file)]));
     let columns = "time=0,gyro_x=4,gyro_y=5,gyro_z=6,accl_x=1,accl_y=2,accl_z=3";
     let expected = ["analyze", name(&file), "--columns", columns, "--units", "rad/s,m/s^2"];
     assert_eq!(command(&text), expected, "{text}");
@@ -62,8 +62,8 @@ fn columns_without_names_are_shown_with_the_command_that_reads_them() {
     assert_eq!(by_command, json_of(&dir, &["analyze", name(&file), "--yes"]));
     let report: Value = serde_json::from_slice(&by_command).expect("JSON");
     assert_eq!((&report["samples"], &report["dropped"]["gap"]), (&Value::from(ROWS), &Value::from(0)));
-    let taken = host_sim(&["analyze", name(&file), "--yes", "--quiet"]);
-    assert!(String::from_utf8_lossy(&taken.stderr).contains("guessed: host-sim analyze"), "a guess is told");
+    let taken = imunoise(&["analyze", name(&file), "--yes", "--quiet"]);
+    assert!(String::from_utf8_lossy(&taken.stderr).contains("guessed: imunoise analyze"), "a guess is told");
     // The same without an error.
     let shown = inspected(&file);
     for words in ["6000 rows at 100.0000 Hz", "no sample missing", "at rest all the time"] {
@@ -88,7 +88,7 @@ fn a_guess_in_doubt_is_shown_and_not_taken() {
         ("n,gyro_x_deg_s", 1.0, &["--rate HZ"]),
     ] {
         let file = table(heading, noise);
-        let text = refusal(&host_sim(&["analyze", name(&file), "--yes"]));
+        let text = refusal(&imunoise(&["analyze", name(&file), "--yes"]));
         assert!(words.iter().all(|word| text.contains(word)), "{heading}: {text}");
     }
 }
@@ -111,7 +111,7 @@ fn the_part_at_rest_is_the_same_in_inspect_and_analyze() {
     let shown = inspected(&file);
     assert!(shown.contains(&format!("longest part at rest: {offered}, in s")), "{shown}");
     for part in [&[][..], &["--from", "1"]] {
-        let output = host_sim(&[&["analyze", name(&file)], part].concat());
+        let output = imunoise(&[&["analyze", name(&file)], part].concat());
         let text = String::from_utf8(output.stdout).expect("UTF-8");
         let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(text.contains(&format!("for the longest part at rest, add {offered}.")), "{part:?}: {text}");
@@ -201,7 +201,7 @@ fn every_printed_command_runs() {
     for (file, content) in files {
         let file = write(&dir, file, content.as_bytes());
         let shown = inspected(&file);
-        let commands: Vec<&str> = shown.lines().filter_map(|line| line.trim().strip_prefix("host-sim ")).collect();
+        let commands: Vec<&str> = shown.lines().filter_map(|line| line.trim().strip_prefix("imunoise ")).collect();
         assert!(!commands.is_empty(), "{shown}");
         for command in commands {
             let words = format!("{PROGRAM} {} --quiet", command.replace("--rate HZ", "--rate 100"));
@@ -215,7 +215,7 @@ fn every_printed_command_runs() {
         if file.ends_with("moved.csv") {
             assert!(
                 shown.contains("analyze")
-                    && shown.lines().any(|line| line.contains("host-sim") && line.contains("--from 2")),
+                    && shown.lines().any(|line| line.contains("imunoise") && line.contains("--from 2")),
                 "{shown}"
             );
         }

@@ -1,6 +1,6 @@
 //! `monitor` on a pseudo-terminal: the live screen of a replayed recording, how it ends, and that the terminal is restored.
 
-use crate::program::{host_sim, write};
+use crate::program::{imunoise, write};
 use serial2::SerialPort;
 use std::fs::OpenOptions;
 use std::io::ErrorKind;
@@ -59,7 +59,7 @@ impl Session {
         assert!(sized.success());
         let before = settings(&name);
         let terminal = || Stdio::from(OpenOptions::new().read(true).write(true).open(&name).expect("the terminal"));
-        let program = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+        let program = Command::new(env!("CARGO_BIN_EXE_imunoise"))
             .args(arguments)
             .env_remove("NO_COLOR")
             .envs(environment.iter().copied())
@@ -193,7 +193,7 @@ fn no_color_is_respected() {
 fn over_a_pipe_a_replay_prints_lines() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = write(&folder, "still.csv", &table());
-    let output = host_sim(&["monitor", file.to_str().expect("a name"), "--rate", "100", "--speed", "max"]);
+    let output = imunoise(&["monitor", file.to_str().expect("a name"), "--rate", "100", "--speed", "max"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).expect("text");
     assert!(!text.contains('\u{1b}'), "{text}");

@@ -1,4 +1,4 @@
-//! The command `host-sim`: its help, exit codes, streams and signals, the files that it writes, the live screen, and a device on a serial port;
+//! The command `imunoise`: its help, exit codes, streams and signals, the files that it writes, the live screen, and a device on a serial port;
 //! each verb once. What is read of a file is tested in `recordings`, what a report says in `reports`.
 
 mod analyze_and_replay;

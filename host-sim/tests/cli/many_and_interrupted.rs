@@ -1,6 +1,6 @@
-//! `analyze --reports` of many files, and the interruption of the reading.
+//! `batch` of many files and folders, and the interruption of the reading.
 
-use crate::program::{host_sim, json_of, signal, wait_until, write};
+use crate::program::{imunoise, json_of, signal, wait_until, write};
 use serde_json::Value;
 use std::fs::{self, File, OpenOptions};
 use std::io::{Read, Write};
@@ -31,8 +31,8 @@ fn each_report_of_many_is_that_of_the_file_alone() {
     let damaged = write(&dir, "damaged.csv", b"gyro_x_counts\n1\nx\n");
     for quick in [&[][..], &["--quick"]] {
         let reports = dir.path().join("reports");
-        let arguments = ["analyze", a, text(&damaged), b, c, "--rate", "100", "--reports", text(&reports)];
-        let output = host_sim(&[&arguments[..], quick].concat());
+        let arguments = ["batch", a, text(&damaged), b, c, "--rate", "100", "-o", text(&reports)];
+        let output = imunoise(&[&arguments[..], quick].concat());
         let (printed, errors) =
             (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr).into_owned());
         assert_eq!(output.status.code(), Some(1), "{errors}");
@@ -56,20 +56,63 @@ fn reports_of_one_name_are_refused_before_any_work() {
     std::fs::create_dir(dir.path().join("other")).expect("a folder");
     let other = write(&dir, "other/imu.csv", table(2, 100).as_bytes());
     let reports = dir.path().join("reports");
-    let arguments = ["analyze", text(&one), text(&other), "--rate", "100", "--reports", text(&reports)];
-    let output = host_sim(&arguments);
+    let arguments = ["batch", text(&one), text(&other), "--rate", "100", "-o", text(&reports)];
+    let output = imunoise(&arguments);
     let error = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(!output.status.success() && error.contains("would both have the report"), "{error}");
     assert!(!reports.exists());
-    // Several recordings without it are compared, which is not done quickly.
-    let output = host_sim(&["analyze", text(&one), text(&other), "--rate", "100", "--quick"]);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("--reports"));
+}
+
+/// A folder has its reports in the same folders, and a row a coefficient; a second run leaves out what is there.
+#[test]
+fn the_reports_of_a_folder_mirror_it_and_are_resumed() {
+    let dir = tempdir().expect("a folder");
+    fs::create_dir_all(dir.path().join("fleet/one/deep")).expect("folders");
+    for (seed, name) in (1..).zip(["fleet/imu.csv", "fleet/one/imu.csv", "fleet/one/deep/imu.csv", "fleet/.hidden.csv"])
+    {
+        write(&dir, name, table(seed, 2000).as_bytes());
+    }
+    let damaged = write(&dir, "fleet/damaged.csv", b"gyro_x_counts\n1\nx\n");
+    let [fleet, reports, rows] = ["fleet", "reports", "rows.ndjson"].map(|name| dir.path().join(name));
+    let arguments = ["batch", text(&fleet), "-o", text(&reports), "--rows", text(&rows), "--rate", "100", "-j", "1"];
+    let run = |more: &[&str]| {
+        let output = imunoise(&[&arguments[..], more].concat());
+        let printed = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+        (output.status.code(), printed)
+    };
+    let read = || -> Vec<Value> {
+        let text = fs::read_to_string(&rows).expect("rows");
+        text.lines().map(|line| serde_json::from_str(line).expect("a row")).collect()
+    };
+    let of_recordings = || -> Vec<(Value, Value)> {
+        let rows = read().into_iter().filter(|row| row["row"] == "recording");
+        rows.map(|row| (row["recording"].clone(), row["status"].clone())).collect()
+    };
+    let (code, [printed, errors]) = run(&[]);
+    assert_eq!((code, printed.contains("3 of 4 reports")), (Some(1), true), "{printed}{errors}");
+    for report in ["imu.json", "one/imu.json", "one/deep/imu.json"] {
+        assert!(reports.join(report).is_file(), "{report}");
+    }
+    let status = of_recordings();
+    assert_eq!(status.len(), 4, "{status:?}");
+    assert!(status.contains(&(text(&damaged).into(), "failed".into())), "{status:?}");
+    let walks = read().into_iter().filter(|row| row["kind"] == "angle_random_walk" && row["channel"] == "gyro_x");
+    assert_eq!(walks.count(), 3);
+    // Existing reports are no accident where the work is resumed; one of other bytes is made anew.
+    let (code, [_, errors]) = run(&[]);
+    assert!(code == Some(1) && errors.contains("exists already"), "{errors}");
+    write(&dir, "fleet/damaged.csv", table(9, 2000).as_bytes());
+    write(&dir, "fleet/imu.csv", table(8, 2000).as_bytes());
+    let (code, [printed, errors]) = run(&["--resume"]);
+    let is_resumed = printed.contains("4 of 4 reports") && printed.contains("2 of them from before");
+    assert_eq!((code, is_resumed), (Some(0), true), "{printed}{errors}");
+    assert_eq!(of_recordings().len(), 6, "two rows more");
 }
 
 /// The program with a named pipe as its recording, which it copies into the folder `copies`, and the open end of the pipe to write to.
 fn reading(pipe: &Path, copies: &Path, arguments: &[&str]) -> (Child, File) {
     assert!(Command::new("mkfifo").arg(pipe).status().expect("mkfifo starts").success());
-    let program = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+    let program = Command::new(env!("CARGO_BIN_EXE_imunoise"))
         .args(["analyze", text(pipe), "--rate", "100"])
         .args(arguments)
         .env("TMPDIR", copies)
@@ -126,7 +169,7 @@ fn a_terminal_shows_how_far_the_reading_is() {
     let dir = tempdir().expect("a folder");
     let pipe = dir.path().join("pipe");
     assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo starts").success());
-    let command = format!("{} analyze {} --rate 100 --quick --quiet", env!("CARGO_BIN_EXE_host-sim"), pipe.display());
+    let command = format!("{} analyze {} --rate 100 --quick --quiet", env!("CARGO_BIN_EXE_imunoise"), pipe.display());
     let mut program = Command::new("script")
         .args(["--quiet", "--return", "--command", &command, "/dev/null"])
         .stdin(Stdio::null())

@@ -1,13 +1,13 @@
 //! Files that the program writes: none is a file that it reads, under whatever name; each is complete or as it was, and none that exists is
 //! overwritten unasked.
 
-use crate::program::{counts as table, error_line, host_sim, signal, wait_until, with_default_signals, write};
+use crate::program::{counts as table, error_line, imunoise, signal, wait_until, with_default_signals, write};
 use std::fs::{self, File};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use tempfile::tempdir;
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_host-sim");
+const PROGRAM: &str = env!("CARGO_BIN_EXE_imunoise");
 
 fn name(file: &Path) -> &str {
     file.to_str().expect("UTF-8")
@@ -23,7 +23,7 @@ fn the_profile_of_the_sensor_is_an_input() {
     let dir = tempdir().expect("a folder");
     let rows = table(&dir);
     let profile = write(&dir, "p.toml", b"name = \"x\"\n");
-    is_refused(&host_sim(&["analyze", name(&rows), "--sensor", name(&profile), "--json", name(&profile)]));
+    is_refused(&imunoise(&["analyze", name(&rows), "--sensor", name(&profile), "--json", name(&profile)]));
     assert_eq!(fs::read(&profile).expect("the profile"), b"name = \"x\"\n");
 }
 
@@ -34,7 +34,7 @@ fn another_name_of_an_input_is_the_input() {
     let content = fs::read(&rows).expect("rows");
     let hard = dir.path().join("hard.csv");
     fs::hard_link(&rows, &hard).expect("a link");
-    is_refused(&host_sim(&["analyze", name(&rows), "--json", name(&hard)]));
+    is_refused(&imunoise(&["analyze", name(&rows), "--json", name(&hard)]));
     assert!(fs::read(&rows).expect("the input") == content);
 }
 
@@ -46,7 +46,7 @@ fn a_picture_that_leads_to_an_input_is_the_input() {
     let pictures = dir.path().join("pictures");
     fs::create_dir(&pictures).expect("a folder");
     std::os::unix::fs::symlink(&rows, pictures.join("gyro_x-allan.svg")).expect("a link");
-    is_refused(&host_sim(&["analyze", name(&rows), "--pictures", name(&pictures)]));
+    is_refused(&imunoise(&["analyze", name(&rows), "--pictures", name(&pictures)]));
     assert!(fs::read(&rows).expect("the input") == content);
 }
 
@@ -157,12 +157,12 @@ fn a_full_disk_is_named() {
         &["simulate", "/dev/full", "--seconds", "5"][..],
         &["simulate", "/dev/full", "--seconds", "5", "--format", "frames"],
     ] {
-        let line = error_line(&host_sim(arguments));
+        let line = error_line(&imunoise(arguments));
         assert!(line.contains("/dev/full") && line.contains("No space left"), "{arguments:?}: {line}");
     }
     // The report is printed all the same.
     let dir = tempdir().expect("a folder");
-    let output = host_sim(&["analyze", name(&table(&dir)), "--export", "csv=/dev/full"]);
+    let output = imunoise(&["analyze", name(&table(&dir)), "--export", "csv=/dev/full"]);
     let error = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code() == Some(1) && error.contains("No space left"), "{error}");
     assert!(String::from_utf8_lossy(&output.stdout).contains("°/√h"));
@@ -183,18 +183,18 @@ fn outputs_are_checked_before_the_work_and_never_overwrite_the_input() {
     for (option, prefix) in [("--json", ""), ("--export", "kalibr=")] {
         let value = |file: &Path| format!("{prefix}{}", name(file));
         for same in [&file, &link] {
-            is_refused(&host_sim(&["analyze", name(&file), option, &value(same)]));
+            is_refused(&imunoise(&["analyze", name(&file), option, &value(same)]));
         }
-        let line = error_line(&host_sim(&["analyze", name(&file), option, &value(&nowhere)]));
+        let line = error_line(&imunoise(&["analyze", name(&file), option, &value(&nowhere)]));
         assert!(line.contains("No such file"), "{line}");
     }
     for (option, folder) in [("--page", &file), ("--pictures", &file), ("--page", &blocked), ("--pictures", &blocked)] {
-        let line = error_line(&host_sim(&["analyze", name(&file), option, name(folder)]));
+        let line = error_line(&imunoise(&["analyze", name(&file), option, name(folder)]));
         assert!(line.contains(name(folder)), "{option}: {line}");
     }
     let twice = dir.path().join("twice");
     let export = format!("csv={}", name(&twice));
-    let line = error_line(&host_sim(&["analyze", name(&file), "--json", name(&twice), "--export", &export]));
+    let line = error_line(&imunoise(&["analyze", name(&file), "--json", name(&twice), "--export", &export]));
     assert!(line.contains("named twice"), "{line}");
     for command in [
         &["compare", name(&file), "--data-sheet", "--json", name(&file)][..],
@@ -202,7 +202,7 @@ fn outputs_are_checked_before_the_work_and_never_overwrite_the_input() {
         &["convert", name(&file), name(&link)],
         &["export", "--format", "kalibr", name(&file), name(&link)],
     ] {
-        is_refused(&host_sim(command));
+        is_refused(&imunoise(command));
     }
     assert!(fs::read(&file).expect("the input") == rows);
 }
@@ -216,7 +216,7 @@ fn links_and_permissions_of_an_output_stay() {
     fs::set_permissions(&real, fs::Permissions::from_mode(0o640)).expect("permissions");
     let link = dir.path().join("link.csv");
     std::os::unix::fs::symlink(&real, &link).expect("a link");
-    let output = host_sim(&["convert", name(&rows), name(&link), "--force"]);
+    let output = imunoise(&["convert", name(&rows), name(&link), "--force"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(fs::symlink_metadata(&link).expect("the link").is_symlink());
     assert!(fs::read(&real).expect("a table").starts_with(b"time_s,gyro_x_counts\n"));
@@ -229,7 +229,7 @@ fn a_file_that_exists_is_overwritten_with_force_alone() {
     let dir = tempdir().expect("a folder");
     let rows = table(&dir);
     let report = dir.path().join("report.json");
-    assert!(host_sim(&["analyze", name(&rows), "--quiet", "--json", name(&report)]).status.success());
+    assert!(imunoise(&["analyze", name(&rows), "--quiet", "--json", name(&report)]).status.success());
     let [rows, report] = [name(&rows), name(&report)];
     let [old, page, picture] = ["old", "page/index.html", "pictures/overview.svg"].map(|file| dir.path().join(file));
     let reports = dir.path().join("reports");
@@ -241,9 +241,9 @@ fn a_file_that_exists_is_overwritten_with_force_alone() {
         (&["analyze", rows, "--quiet", "--export", &export], &old),
         (&["analyze", rows, "--quiet", "--page", name(of_page)], &page),
         (&["analyze", rows, "--quiet", "--pictures", name(of_pictures)], &picture),
-        (&["analyze", rows, "--quiet", "--reports", name(&reports)], &one_report),
+        (&["batch", rows, "--quiet", "-o", name(&reports)], &one_report),
         (&["replay", rows, "--quiet", "--json", name(&old)], &old),
-        (&["--seconds", "60", "--quiet", "--page", name(of_page)], &page),
+        (&["demo", "--seconds", "60", "--quiet", "--page", name(of_page)], &page),
         (&["compare", report, report, "--json", name(&old)], &old),
         (&["export", "--format", "csv", report, name(&old)], &old),
         (&["convert", rows, name(&old)], &old),
@@ -251,17 +251,17 @@ fn a_file_that_exists_is_overwritten_with_force_alone() {
     ] {
         fs::create_dir_all(file.parent().expect("a folder")).expect("a folder");
         fs::write(file, "what was there").expect("written");
-        let line = error_line(&host_sim(command));
+        let line = error_line(&imunoise(command));
         assert!(
             line.contains(name(file)) && line.contains("exists already; --force overwrites it"),
             "{command:?}: {line}"
         );
         assert_eq!(fs::read(file).expect("the file"), b"what was there", "{command:?}");
-        let output = host_sim(&[command, &["--force"]].concat());
+        let output = imunoise(&[command, &["--force"]].concat());
         assert!(output.status.success(), "{command:?}: {}", String::from_utf8_lossy(&output.stderr));
         assert_ne!(fs::read(file).expect("the file"), b"what was there", "{command:?}");
         // Nor is what the program wrote in the call before.
-        assert!(error_line(&host_sim(command)).contains("exists already"), "{command:?}");
+        assert!(error_line(&imunoise(command)).contains("exists already"), "{command:?}");
     }
 }
 
@@ -270,10 +270,10 @@ fn a_file_that_exists_is_overwritten_with_force_alone() {
 fn a_recording_of_a_device_is_not_overwritten() {
     let dir = tempdir().expect("a folder");
     let log = write(&dir, "night.csv", b"a night\n");
-    let line = error_line(&host_sim(&["record", name(&log), "--port", "/dev/null"]));
+    let line = error_line(&imunoise(&["record", name(&log), "--port", "/dev/null"]));
     assert!(line.contains("night.csv") && line.contains("exists already"), "{line}");
     let again = dir.path().join("again.csv");
-    let line = error_line(&host_sim(&["record", name(&again), "--port", "/dev/null", "--json", name(&again)]));
+    let line = error_line(&imunoise(&["record", name(&again), "--port", "/dev/null", "--json", name(&again)]));
     assert!(line.contains("is an input"), "{line}");
     assert_eq!(names(dir.path()), ["night.csv"]);
 }
@@ -286,10 +286,10 @@ fn an_export_does_not_overwrite_a_report() {
     let [one, other] = ["one.json", "other.json"].map(|name| dir.path().join(name));
     for report in [&one, &other] {
         let arguments = ["analyze", name(&table), "--quiet", "--json", name(report)];
-        assert!(host_sim(&arguments).status.success());
+        assert!(imunoise(&arguments).status.success());
     }
     let before = std::fs::read(&other).expect("a report");
-    let line = error_line(&host_sim(&["export", name(&one), name(&other), "--format", "kalibr"]));
+    let line = error_line(&imunoise(&["export", name(&one), name(&other), "--format", "kalibr"]));
     assert!(line.contains("other.json") && line.contains("is a report"), "{line}");
     assert_eq!(std::fs::read(&other).expect("a report"), before);
 }
@@ -310,20 +310,20 @@ fn the_parts_of_a_sensor_are_exported_as_one() {
     let accl = part("accl.csv", "t_s,ax_g,ay_g,az_g", 62.5, 0.01);
     let [gyro_json, accl_json, yaml] = ["gyro.json", "accl.json", "imu.yaml"].map(|file| dir.path().join(file));
     for (file, json) in [(&gyro, &gyro_json), (&accl, &accl_json)] {
-        assert!(host_sim(&["analyze", name(file), "--quick", "--quiet", "--json", name(json)]).status.success());
+        assert!(imunoise(&["analyze", name(file), "--quick", "--quiet", "--json", name(json)]).status.success());
     }
     let has_both = |file: &Path| {
         let text = fs::read_to_string(file).expect("a file");
         ["gyroscope_noise_density: ", "accelerometer_noise_density: "].iter().all(|key| text.contains(key))
     };
-    let exported = host_sim(&["export", "--format", "kalibr", name(&gyro_json), name(&accl_json), name(&yaml)]);
+    let exported = imunoise(&["export", "--format", "kalibr", name(&gyro_json), name(&accl_json), name(&yaml)]);
     assert!(exported.status.success() && has_both(&yaml), "{}", String::from_utf8_lossy(&exported.stderr));
     // Without a file to write nothing is overwritten, and a format of samples has one rate.
     let before = fs::read(&accl_json).expect("a report");
-    let line = error_line(&host_sim(&["export", "--format", "kalibr", name(&gyro_json), name(&accl_json)]));
+    let line = error_line(&imunoise(&["export", "--format", "kalibr", name(&gyro_json), name(&accl_json)]));
     assert!(line.contains("is a report") && fs::read(&accl_json).expect("a report") == before, "{line}");
     let vins = ["export", "--force", "--format", "vins", name(&gyro_json), name(&accl_json), name(&yaml)];
-    let line = error_line(&host_sim(&vins));
+    let line = error_line(&imunoise(&vins));
     assert!(line.contains("parts at 100"), "{line}");
     // The same in one table with blanks.
     let mut rows: Vec<(u32, String)> = Vec::new();
@@ -340,6 +340,6 @@ fn the_parts_of_a_sensor_are_exported_as_one() {
     let merged = write(&dir, "merged.csv", format!("t_ms,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g\n{rows}").as_bytes());
     let both = dir.path().join("both.yaml");
     let target = format!("kalibr={}", name(&both));
-    let output = host_sim(&["analyze", name(&merged), "--each-sensor", "--quiet", "--export", &target]);
+    let output = imunoise(&["analyze", name(&merged), "--each-sensor", "--quiet", "--export", &target]);
     assert!(output.status.success() && has_both(&both), "{}", String::from_utf8_lossy(&output.stderr));
 }

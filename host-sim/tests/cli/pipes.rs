@@ -1,6 +1,6 @@
 //! Recordings that come through standard input or a named pipe.
 
-use crate::program::{analysis_of, counts, host_sim, without_reading};
+use crate::program::{analysis_of, counts, imunoise, without_reading};
 use std::fs::{self, File};
 use std::process::{Command, Stdio};
 use tempfile::tempdir;
@@ -10,9 +10,9 @@ use tempfile::tempdir;
 fn standard_input_is_read_like_a_file() {
     let dir = tempdir().expect("a folder");
     let file = counts(&dir);
-    let direct = host_sim(&["analyze", file.to_str().expect("UTF-8")]);
+    let direct = imunoise(&["analyze", file.to_str().expect("UTF-8")]);
     assert!(direct.status.success(), "{}", String::from_utf8_lossy(&direct.stderr));
-    let piped = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+    let piped = Command::new(env!("CARGO_BIN_EXE_imunoise"))
         .args(["analyze", "-"])
         .stdin(File::open(&file).expect("written"))
         .output()
@@ -32,7 +32,7 @@ fn a_named_pipe_is_read_once() {
     assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo").success());
     for command in ["analyze", "replay"] {
         let out = dir.path().join(format!("{command}.json"));
-        let mut program = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+        let mut program = Command::new(env!("CARGO_BIN_EXE_imunoise"))
             .args([command, pipe.to_str().expect("UTF-8"), "--json", out.to_str().expect("UTF-8")])
             .stdout(Stdio::null())
             .spawn()

@@ -11,21 +11,21 @@ use std::time::Duration;
 use tempfile::TempDir;
 
 /// Runs the program.
-pub(crate) fn host_sim(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_host-sim")).args(arguments).output().expect("the program starts")
+pub(crate) fn imunoise(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_imunoise")).args(arguments).output().expect("the program starts")
 }
 
 /// The program as a terminal starts it: a shell in the background lets what it starts ignore interrupts, and `nohup` hang-ups.
 pub(crate) fn with_default_signals() -> Command {
     let mut command = Command::new("env");
-    command.args(["--default-signal=INT,HUP,TERM", env!("CARGO_BIN_EXE_host-sim")]);
+    command.args(["--default-signal=INT,HUP,TERM", env!("CARGO_BIN_EXE_imunoise")]);
     command
 }
 
 /// Runs the program with `--json` and returns the bytes of the report.
 pub(crate) fn json_of(dir: &TempDir, arguments: &[&str]) -> Vec<u8> {
     let out = dir.path().join("report.json");
-    let output = host_sim(&[arguments, &["--json", out.to_str().expect("UTF-8")]].concat());
+    let output = imunoise(&[arguments, &["--json", out.to_str().expect("UTF-8")]].concat());
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     let bytes = std::fs::read(&out).expect("a report");
     std::fs::remove_file(&out).expect("removed");

@@ -2,7 +2,7 @@
 //!
 //! The recordings have more rows than are held in memory, 2¹⁷, so that they are read in blocks.
 
-use crate::program::{analysis_of, gzip, host_sim, json_of, write};
+use crate::program::{analysis_of, gzip, imunoise, json_of, write};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
@@ -192,7 +192,7 @@ fn curves_of_numbers_in_any_unit_are_those_of_the_whole_analysis() {
     assert_eq!(reports[0]["channels"][2]["refused"], reports[1]["channels"][2]["refused"]);
     let array = dir.path().join("units.npy");
     let array = array.to_str().expect("UTF-8");
-    assert!(host_sim(&["convert", text.to_str().expect("UTF-8"), array]).status.success());
+    assert!(imunoise(&["convert", text.to_str().expect("UTF-8"), array]).status.success());
     let columns = ["--columns", "time=0,gyro_x=1,gyro_y=2,accl_z=3", "--units", "s,rad/s,m/s^2"];
     let reports = both(&dir, Path::new(array), &columns);
     assert_same_curves(&reports, 1e-9);
@@ -203,7 +203,7 @@ fn stamps_that_are_coarser_than_the_sample_period_are_read_like_others() {
     let dir = tempdir().expect("a folder");
     let table = counts("time_s,", |row, _| Some(format!("{:.1},", row as f64 / 100.0)));
     let file = write(&dir, "coarse.csv", table.as_bytes());
-    let output = host_sim(&["analyze", file.to_str().expect("UTF-8"), "--quick"]);
+    let output = imunoise(&["analyze", file.to_str().expect("UTF-8"), "--quick"]);
     let notes = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success() && notes.contains("coarser than the sample period"), "{notes}");
 }
@@ -213,7 +213,7 @@ fn the_number_of_cores_changes_no_byte_and_the_screen_says_what_is_missing() {
     let dir = tempdir().expect("a folder");
     let file = write(&dir, "x.csv", counts("", |_, _| Some(String::new())).as_bytes());
     let run = |cores: &[&str]| {
-        let program = [cores, &[env!("CARGO_BIN_EXE_host-sim")]].concat();
+        let program = [cores, &[env!("CARGO_BIN_EXE_imunoise")]].concat();
         let output = Command::new(program[0])
             .args(&program[1..])
             .args(["analyze", file.to_str().expect("UTF-8"), "--rate", "100", "--quick", "--json", "-"])
@@ -224,7 +224,7 @@ fn the_number_of_cores_changes_no_byte_and_the_screen_says_what_is_missing() {
     };
     assert_eq!(run(&[]), run(&["taskset", "-c", "0"]));
     let (page, file) = (dir.path().join("page"), file.to_str().expect("UTF-8"));
-    let output = host_sim(&["analyze", file, "--rate", "100", "--quick", "--page", page.to_str().expect("UTF-8")]);
+    let output = imunoise(&["analyze", file, "--rate", "100", "--quick", "--page", page.to_str().expect("UTF-8")]);
     let screen = String::from_utf8_lossy(&output.stdout).replace('\n', " ");
     let page = std::fs::read_to_string(page.join("index.html")).expect("a page");
     for (text, place) in [(&screen, "screen"), (&page, "page")] {

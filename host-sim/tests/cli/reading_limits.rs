@@ -18,7 +18,7 @@ const MOST_KILOBYTES: u64 = 500 * 1024;
 /// The only line of error of a command, which the system ends after its time, and this function beyond its memory.
 fn refusal(arguments: &[&str]) -> String {
     let mut child = Command::new("sh")
-        .args(["-c", &format!("ulimit -t {MOST_SECONDS}; exec \"$@\""), "sh", env!("CARGO_BIN_EXE_host-sim")])
+        .args(["-c", &format!("ulimit -t {MOST_SECONDS}; exec \"$@\""), "sh", env!("CARGO_BIN_EXE_imunoise")])
         .args(arguments)
         .stdin(Stdio::null())
         .stdout(Stdio::null())

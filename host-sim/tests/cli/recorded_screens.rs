@@ -82,7 +82,7 @@ fn screen(test: &str, file: &str, options: &[&str]) -> Option<String> {
     let folder = tempdir().expect("a folder");
     let json = folder.path().join("report.json");
     let arguments = [&["analyze", path.to_str()?, "--json", json.to_str()?], options].concat();
-    let output = host_sim(&arguments);
+    let output = imunoise(&arguments);
     assert!(output.status.success(), "{file}: {}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).expect("UTF-8");
     let report: Value = serde_json::from_slice(&std::fs::read(&json).expect("a report")).expect("JSON");

@@ -9,10 +9,10 @@ fn run(dir: &TempDir, arguments: &[&str]) -> String {
     let log = dir.path().join("bus.csv");
     let file = log.to_str().expect("UTF-8");
     if !log.exists() {
-        let simulated = host_sim(&["simulate", file, "--format", "frames", "--seconds", "30"]);
+        let simulated = imunoise(&["simulate", file, "--format", "frames", "--seconds", "30"]);
         assert!(simulated.status.success(), "{}", String::from_utf8_lossy(&simulated.stderr));
     }
-    let output = host_sim(&[&["analyze", file], arguments].concat());
+    let output = imunoise(&[&["analyze", file], arguments].concat());
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).expect("text")
 }
@@ -31,7 +31,7 @@ fn the_arguments_choose_what_is_printed() {
     assert!(full.contains("── supply") && full.contains("95 % interval"), "{full}");
     assert_eq!(run(&dir, &["--quiet"]), "");
     let report: Value = serde_json::from_str(&run(&dir, &["--json", "-"])).expect("JSON alone");
-    assert_eq!(report["schema"], 1);
+    assert_eq!(report["schema"], 2);
     let spectrum = &report["channels"][1]["spectrum"];
     let points = spectrum["density"].as_array().expect("a spectrum").len();
     assert!((50..=400).contains(&points), "{points}");

@@ -1,6 +1,6 @@
 //! The command on a serial port: a pseudo-terminal that the firmware's application serves.
 
-use crate::program::{host_sim, send};
+use crate::program::{imunoise, send};
 use ::host_sim::monitor;
 use recordings::serial::SerialLink;
 use simulation::Device;
@@ -37,13 +37,13 @@ impl NoisyDevice {
     }
 }
 
-/// Runs `host-sim` with these arguments, `PORT` replaced by the port of a simulated device, until it has printed all of `expected`, or to
+/// Runs `imunoise` with these arguments, `PORT` replaced by the port of a simulated device, until it has printed all of `expected`, or to
 /// its end where that is empty.
 fn with_device(arguments: &[&str], expected: &[&str]) -> Output {
     let (mut near, far, port) = pseudo_terminals(Duration::from_millis(1));
     let over = Arc::new(AtomicBool::new(false));
     let done = Arc::clone(&over);
-    let mut program = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+    let mut program = Command::new(env!("CARGO_BIN_EXE_imunoise"))
         .args(arguments.iter().map(|&argument| if argument == "PORT" { &port } else { argument }))
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -134,7 +134,7 @@ fn a_recording_of_a_device_and_its_replay_have_the_same_report() {
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{errors}");
     assert!(errors.contains(" 0 missing between them") && errors.contains(" 0 missing by their numbers"), "{errors}");
-    assert!(host_sim(&["replay", &log, "--json", &second]).status.success());
+    assert!(imunoise(&["replay", &log, "--json", &second]).status.success());
     let [first, second] = [first, second].map(|file| std::fs::read_to_string(file).expect("a report"));
     assert_eq!(first, second);
     let report: serde_json::Value = serde_json::from_str(&first).expect("JSON");
@@ -149,7 +149,7 @@ fn the_error_names_a_port_that_does_not_exist() {
     for arguments in
         [&["monitor", "/dev/no-such-port"][..], &["record", "/tmp/never.csv", "--port", "/dev/no-such-port"]]
     {
-        let output = host_sim(arguments);
+        let output = imunoise(arguments);
         assert!(!output.status.success());
         assert!(String::from_utf8_lossy(&output.stderr).contains("/dev/no-such-port"));
     }

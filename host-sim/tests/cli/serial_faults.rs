@@ -1,6 +1,6 @@
 //! Recordings over a serial port that end early, and a device that is silent.
 
-use crate::program::{host_sim, send, signal, with_default_signals};
+use crate::program::{imunoise, send, signal, with_default_signals};
 use ::host_sim::monitor;
 use recordings::serial::SerialLink;
 use simulation::Device;
@@ -71,7 +71,7 @@ fn record(log: &Path, fault: Fault) -> (Output, String) {
 
 fn samples(log: &Path) -> u64 {
     let json = log.with_extension("json");
-    let output = host_sim(&["replay", log.to_str().expect("UTF-8"), "--json", json.to_str().expect("UTF-8")]);
+    let output = imunoise(&["replay", log.to_str().expect("UTF-8"), "--json", json.to_str().expect("UTF-8")]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let report: serde_json::Value = serde_json::from_slice(&std::fs::read(json).expect("a report")).expect("JSON");
     report["samples"].as_u64().expect("a number")
@@ -106,17 +106,17 @@ fn a_file_is_kept_where_the_device_is_silent() {
 fn impossible_durations_are_refused() {
     let (_near, _far, port) = pseudo_terminals(Duration::from_millis(1));
     for seconds in ["nan", "inf", "0"] {
-        let output = host_sim(&["record", "/nonexistent/x.csv", "--port", &port, "--seconds", seconds]);
+        let output = imunoise(&["record", "/nonexistent/x.csv", "--port", &port, "--seconds", seconds]);
         assert!(!output.status.success(), "{seconds}");
     }
     let dir = tempdir().expect("a folder");
     let log = dir.path().join("x.csv");
     for seconds in ["nan", "inf", "0"] {
-        let output = host_sim(&["record", log.to_str().expect("UTF-8"), "--port", &port, "--seconds", seconds]);
+        let output = imunoise(&["record", log.to_str().expect("UTF-8"), "--port", &port, "--seconds", seconds]);
         assert!(String::from_utf8_lossy(&output.stderr).contains("must be positive and finite"), "{seconds}");
     }
     for seconds in ["1e19", "nan", "-1"] {
-        let output = host_sim(&["monitor", &port, &format!("--seconds={seconds}")]);
+        let output = imunoise(&["monitor", &port, &format!("--seconds={seconds}")]);
         let errors = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{seconds}: {errors}");
         assert!(errors.contains("duration"), "{seconds}: {errors}");
@@ -181,6 +181,6 @@ fn escape_sequences_of_a_device_do_not_reach_the_terminal() {
 #[test]
 fn the_monitor_ends_after_its_time() {
     let (_near, _far, port) = pseudo_terminals(Duration::from_millis(1));
-    let output = host_sim(&["monitor", &port, "--seconds", "0.1"]);
+    let output = imunoise(&["monitor", &port, "--seconds", "0.1"]);
     assert!(output.status.success() && String::from_utf8_lossy(&output.stdout).starts_with("0 messages, "));
 }

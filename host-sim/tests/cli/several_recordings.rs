@@ -1,11 +1,11 @@
-//! `analyze` of several recordings, and `compare`.
+//! `compare` of recordings and of reports, and `analyze --each-sensor`.
 
-use crate::program::{host_sim, json_of};
+use crate::program::{imunoise, json_of};
 use serde_json::Value;
 use tempfile::tempdir;
 
 fn text(arguments: &[&str]) -> String {
-    let output = host_sim(arguments);
+    let output = imunoise(arguments);
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
@@ -20,7 +20,7 @@ fn equal_parts_agree_a_louder_axis_differs_and_is_called_worse() {
     for (out, seed, gyro_y) in [(&one, "1", "0.04,0,0"), (&two, "2", "0.04,0,0"), (&three, "3", "0.06,0,0")] {
         text(&[&["simulate", out, "--seed", seed, "--gyro-y", gyro_y][..], &quiet].concat());
     }
-    let summary: Value = serde_json::from_slice(&json_of(&dir, &["analyze", &one, &two, &three])).expect("JSON");
+    let summary: Value = serde_json::from_slice(&json_of(&dir, &["compare", &one, &two, &three])).expect("JSON");
     let channels = summary["agreement"]["channels"].as_array().expect("channels");
     for channel in channels.iter().filter(|channel| {
         channel["name"].as_str().is_some_and(|name| name.starts_with("gyro") || name.starts_with("accl"))
@@ -30,7 +30,7 @@ fn equal_parts_agree_a_louder_axis_differs_and_is_called_worse() {
         assert_eq!(channel["joint"].as_array().map(Vec::is_empty), Some(!same));
     }
     let summary: Value =
-        serde_json::from_slice(&json_of(&dir, &["analyze", &one, &two, "--against", &three])).expect("JSON");
+        serde_json::from_slice(&json_of(&dir, &["compare", &one, &two, "--running", &three])).expect("JSON");
     let inflated = summary["inflation"]["channels"].as_array().expect("channels");
     let first = |name: &str| {
         let channel = inflated.iter().find(|channel| channel["name"] == name).expect("the channel");
@@ -42,7 +42,7 @@ fn equal_parts_agree_a_louder_axis_differs_and_is_called_worse() {
     let truth = ((0.06_f64.powi(2) + rounding) / (0.04_f64.powi(2) + rounding)).sqrt();
     let [low, factor, high] = first("gyro_y");
     assert!((factor / truth - 1.0).abs() < 0.035 && low < factor && factor < high, "{factor} [{low}, {high}]");
-    assert!(text(&["analyze", &one, "--against", &three]).contains("inflation"));
+    assert!(text(&["compare", &one, "--running", &three]).contains("inflation"));
 
     let [a, b, c] = ["a.json", "b.json", "c.json"].map(path);
     text(&["analyze", &one, "--json", &a]);
@@ -69,11 +69,12 @@ fn wrong_sets_of_recordings_and_reports_are_refused() {
         text(&["simulate", out, "--seconds", "20", "--rate", rate]);
     }
     for (arguments, expected) in [
-        (&["analyze", &one, &two][..], "recordings are compared at one rate"),
-        (&["analyze", &one, &one, "--export", "kalibr=x", "--page", &path("p")], "leave out --page, --export"),
-        (&["analyze", &one, &two, "--json", &two], "it would be overwritten"),
+        (&["compare", &one, &two][..], "recordings are compared at one rate"),
+        (&["compare", &one], "name another, or --running"),
+        (&["compare", &one, "--data-sheet"], "--data-sheet compares a report"),
+        (&["compare", &one, &two, "--json", &two], "it would be overwritten"),
     ] {
-        let output = host_sim(arguments);
+        let output = imunoise(arguments);
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(!output.status.success() && errors.contains(expected), "{arguments:?}: {errors}");
     }
@@ -94,7 +95,8 @@ fn each_sensor_of_a_file_is_a_recording() {
     let several: Value = serde_json::from_slice(&json_of(&dir, &analyze)).expect("JSON");
     assert_eq!(several["agreement"]["samples"], Value::from(vec![2000, 2000]));
     let reports = dir.path().join("reports");
-    assert!(host_sim(&[&analyze[..], &["--reports", reports.to_str().expect("UTF-8")]].concat()).status.success());
+    let batch = [&["batch"], &analyze[1..], &["-o", reports.to_str().expect("UTF-8")]].concat();
+    assert!(imunoise(&batch).status.success());
     assert_eq!(std::fs::read_dir(&reports).expect("a folder").count(), 2);
     let inspected = text(&["inspect", file.to_str().expect("UTF-8")]);
     assert!(inspected.contains("--topic left") && inspected.contains("--topic right"), "{inspected}");

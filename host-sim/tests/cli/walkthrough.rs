@@ -45,7 +45,7 @@ fn what_the_commands_of_ten_minutes_print_is_in_the_docs() {
     let blocks: Vec<&str> = page.split("```console\n$ ").skip(1).filter_map(|rest| rest.split("```").next()).collect();
     assert!(blocks.len() >= 5, "{} blocks", blocks.len());
     let folder = tempdir().expect("a folder");
-    let programs = Path::new(env!("CARGO_BIN_EXE_host-sim")).parent().expect("a folder").display().to_string();
+    let programs = Path::new(env!("CARGO_BIN_EXE_imunoise")).parent().expect("a folder").display().to_string();
     let path = format!("{programs}:{}", std::env::var("PATH").unwrap_or_default());
     for (number, block) in (1..).zip(blocks) {
         let mut text = "```console\n".to_owned();

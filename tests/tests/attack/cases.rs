@@ -452,8 +452,9 @@ fn nested(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     }
 }
 
-const COMMANDS: [&str; 11] = [
+const COMMANDS: [&str; 12] = [
     "analyze",
+    "batch",
     "inspect",
     "replay",
     "explain",
@@ -463,7 +464,7 @@ const COMMANDS: [&str; 11] = [
     "simulate",
     "completions",
     "uf2",
-    "--seconds",
+    "demo",
 ];
 const OPTIONS: [&str; 28] = [
     "--rate",
@@ -484,8 +485,8 @@ const OPTIONS: [&str; 28] = [
     "--pictures",
     "--export",
     "--axis",
-    "--reports",
-    "--against",
+    "--rows",
+    "--running",
     "--seed",
     "--plain",
     "--effect",
@@ -535,12 +536,12 @@ fn arguments(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let folder = campaign.folder().to_owned();
     for _ in 0..8 {
         let mut words = vec![*COMMANDS.choose(rng).expect("a command")];
-        if matches!(words[0], "simulate" | "--seconds") {
+        if matches!(words[0], "simulate" | "demo") {
             // Nothing is simulated for an hour.
             words = if words[0] == "simulate" {
                 vec!["simulate", "out/s.csv", "--seconds", "2"]
             } else {
-                vec!["--seconds", "2"]
+                vec!["demo", "--seconds", "2"]
             };
         }
         for _ in 0..rng.random_range(0..6) {

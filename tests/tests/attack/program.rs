@@ -106,7 +106,7 @@ impl Run {
                     && error.len() < 2000
                     && (rest.is_empty()
                         || rest.iter().any(|line| {
-                            line.starts_with("  host-sim ") || line.contains("; say which with --columns ")
+                            line.starts_with("  imunoise ") || line.contains("; say which with --columns ")
                         })) =>
             {
                 None

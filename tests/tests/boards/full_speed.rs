@@ -105,7 +105,7 @@ fn load_between(work: &[Work], (from, to): (f64, f64)) -> (u64, f64) {
     (instructions / (to.samples - from.samples), share)
 }
 
-/// The file that `host-sim record` writes from the serial bytes and a log of the frames that the sensor sent, with the
+/// The file that `imunoise record` writes from the serial bytes and a log of the frames that the sensor sent, with the
 /// times of its own clock, give the same report.
 fn assert_recorded_stream_gives_the_identical_report(decoded: &Decoded, bursts: &[(u64, [u8; BURST_BYTES])]) {
     let folder = tempfile::tempdir().expect("a folder");

@@ -6,6 +6,7 @@ use crate::formats::ardupilot_log::{self, ArduPilotSource};
 use crate::formats::hdf5::Hdf5Reader;
 use crate::formats::matlab::MatReader;
 use crate::formats::mcap_bag::McapSource;
+use crate::formats::memory_table::MemoryTable;
 use crate::formats::numpy::{NpyReader, NpzReader};
 use crate::formats::ros_bag::RosBagSource;
 use crate::formats::split_bag::SplitBag;
@@ -66,6 +67,8 @@ pub enum FileFormat {
     ArduPilot,
     /// HDF5, which is also MATLAB 7.3.
     Hdf5,
+    /// Arrays in memory.
+    Arrays,
 }
 
 impl FileFormat {
@@ -83,6 +86,7 @@ impl FileFormat {
             Self::Ulog => "a log of PX4",
             Self::ArduPilot => "a DataFlash log of ArduPilot",
             Self::Hdf5 => "HDF5",
+            Self::Arrays => "arrays in memory",
         }
     }
 }
@@ -105,8 +109,10 @@ const MAGICS: [(&[u8], FileFormat); 8] = [
 pub struct InputFile {
     /// As the user named it.
     name: PathBuf,
-    /// At least one; of a bag of ROS 2 in a folder all of its files, in their order.
+    /// At least one, which is empty where there are arrays; of a bag of ROS 2 in a folder all of its files, in their order.
     parts: Vec<InputPart>,
+    /// Arrays in memory in the place of files.
+    arrays: Option<Arc<MemoryTable>>,
     format: FileFormat,
     monitor: ReadMonitor,
     budget: Budget,
@@ -164,6 +170,21 @@ impl InputFile {
         Self::recognised(name, vec![FileBytes::in_memory(name, bytes)], &ReadMonitor::default())
     }
 
+    /// Arrays in memory that are called `name`.
+    #[must_use]
+    pub fn of_arrays(name: &Path, arrays: Arc<MemoryTable>, monitor: &ReadMonitor) -> Self {
+        let empty = FileBytes::in_memory(name, []);
+        let budget = Budget::new(arrays.bytes());
+        Self {
+            name: name.to_owned(),
+            parts: vec![InputPart { origin: empty.clone(), bytes: empty, budget }],
+            arrays: Some(arrays),
+            format: FileFormat::Arrays,
+            monitor: monitor.clone(),
+            budget,
+        }
+    }
+
     /// Recognises the format of files that are one recording called `name`.
     ///
     /// # Errors
@@ -179,7 +200,7 @@ impl InputFile {
         }
         let format = format.ok_or_else(|| InputError::file(name, Reason::Directory))?;
         let budget = Budget::joined(parts.iter().map(|part| part.budget));
-        Ok(Self { name: name.to_owned(), parts, format, monitor: monitor.clone(), budget })
+        Ok(Self { name: name.to_owned(), parts, arrays: None, format, monitor: monitor.clone(), budget })
     }
 
     /// What was recognised.
@@ -190,9 +211,19 @@ impl InputFile {
     /// Begins to make the hash of the bytes, as they were given.
     ///
     /// # Errors
-    /// The file cannot be opened.
+    /// The file cannot be opened; or there is none, but arrays.
     pub fn begin_hash(&self) -> io::Result<FileHash> {
+        if self.arrays.is_some() {
+            return Err(io::ErrorKind::Unsupported.into());
+        }
         FileHash::begin(&self.parts.iter().map(|part| part.origin.clone()).collect::<Vec<_>>())
+    }
+
+    /// How many rows there are, by the bytes that were read for the first `rows` of them; `None` where they are not counted.
+    pub fn expected_rows(&self, rows: u64) -> Option<u64> {
+        let [part] = self.parts.as_slice() else { return None };
+        let (length, read) = (part.bytes.length().ok()??, self.monitor.bytes());
+        (read > 0).then(|| (rows as f64 * length as f64 / read as f64) as u64)
     }
 
     /// As the user named it.
@@ -259,10 +290,7 @@ impl InputFile {
                     table => table.map(|table| vec![table]),
                 }
             }
-            _ => {
-                let source = self.source();
-                source.and_then(|mut source| topics::read_whole(name, source.as_mut(), topic, self.budget))
-            }
+            _ => self.source().and_then(|source| topics::read_whole(name, source, topic, self.budget)),
         };
         let inspect = |table: WholeTable| {
             let names: Vec<&str> = table.columns.iter().map(|of| of.column.name.as_str()).collect();
@@ -299,6 +327,9 @@ impl InputFile {
 
     /// The topics of a binary format.
     fn source(&self) -> Result<Box<dyn Source + '_>, InputError> {
+        if let Some(arrays) = &self.arrays {
+            return Ok(Box::new(arrays.source(&self.name, self.budget)?));
+        }
         let mut sources = self.parts.iter().map(|part| self.source_of(part)).collect::<Result<Vec<_>, _>>()?;
         match sources.pop() {
             Some(only) if sources.is_empty() => Ok(only),
@@ -309,7 +340,9 @@ impl InputFile {
     fn source_of<'a>(&self, part: &'a InputPart) -> Result<Box<dyn Source + 'a>, InputError> {
         let (bytes, budget) = (&part.bytes, part.budget.again());
         Ok(match self.format {
-            FileFormat::TextTable => return Err(bytes.error(Reason::NoTopic { format: "text" })),
+            FileFormat::TextTable | FileFormat::Arrays => {
+                return Err(bytes.error(Reason::NoTopic { format: self.format.name() }));
+            }
             FileFormat::Npy => Box::new(NpyReader::open(bytes, budget, &self.monitor)?),
             FileFormat::Npz => Box::new(NpzReader::open(bytes, budget)?),
             FileFormat::Mat => Box::new(MatReader::open(bytes, budget)?),

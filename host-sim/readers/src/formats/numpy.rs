@@ -76,12 +76,8 @@ impl ArrayReader for NpyReader {
         self.layout.columns(&mut self.input, columns, add)
     }
 
-    fn for_each_row(
-        &mut self,
-        _array: usize,
-        columns: &[usize],
-        each: &mut EachArrayRow,
-    ) -> Option<Result<(), InputError>> {
+    fn for_each_row(&mut self, places: &[(usize, usize)], each: &mut EachArrayRow) -> Option<Result<(), InputError>> {
+        let columns: Vec<usize> = places.iter().map(|(_, column)| *column).collect();
         let mut buffers = vec![Vec::new(); if self.layout.by_column { columns.len() } else { 1 }];
         // Of each column: the buffer with its numbers, where they begin in it, and how they are encoded.
         let place = |(number, &column): (usize, &usize)| {
@@ -92,7 +88,7 @@ impl ArrayReader for NpyReader {
         let mut row = Vec::with_capacity(columns.len());
         let mut first = 0;
         while first < self.layout.rows {
-            let rows = match self.fill(first, columns, &mut buffers) {
+            let rows = match self.fill(first, &columns, &mut buffers) {
                 Ok(rows) => rows,
                 Err(reason) => return Some(each(Err(reason))),
             };

@@ -9,6 +9,7 @@ use crate::input::gzip_members::{GZIP_MAGIC, GzipMembers};
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_ahead::ReadAhead;
 use crate::input::read_monitor::{Counted, ReadMonitor};
+use crate::input::threads::may_begin_threads;
 use encoding_rs_io::DecodeReaderBytes;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::PathBuf;
@@ -62,10 +63,10 @@ impl Lines {
         let bytes: Box<dyn Read + Send> = if compressed {
             let budget = Budget::of_file(file).map_err(|e| fail(Reason::Io(e)))?;
             let members = Metered::new(GzipMembers::new(whole), budget.meter());
-            if cfg!(target_family = "wasm") {
-                Box::new(members)
-            } else {
+            if may_begin_threads() {
                 Box::new(ReadAhead::new(members).map_err(|e| fail(Reason::Io(e)))?)
+            } else {
+                Box::new(members)
             }
         } else if is_utf16 {
             // As programs for Windows write it.
@@ -133,6 +134,18 @@ impl Lines {
         self.latin.extend(latin);
         self.is_latin = true;
         Ok(Some((self.line, &self.latin)))
+    }
+
+    /// The bytes of the next lines, as far as they are in memory; none where they cannot be read.
+    pub(crate) fn buffer(&mut self) -> &[u8] {
+        if self.again { &[] } else { self.input.fill_buf().unwrap_or_default() }
+    }
+
+    /// Consumes the next line, which has so many bytes with its end, and returns its number.
+    pub(crate) fn consume_line(&mut self, bytes: usize) -> u64 {
+        self.input.consume(bytes);
+        self.line += 1;
+        self.line
     }
 
     /// Bytes that are zero, which were left out.

@@ -1,6 +1,7 @@
 //! The SHA-256 of a file, which tells recordings of one name from each other.
 
 use crate::input::file_bytes::{FileBytes, OpenBytes};
+use crate::input::threads::may_begin_threads;
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
 use std::io::{self, ErrorKind, Read};
@@ -9,7 +10,7 @@ use std::thread::{self, JoinHandle};
 /// Bytes that are read at once.
 const PART_BYTES: usize = 1 << 18;
 
-/// A hash that another thread makes, where there are threads, while the file is read for its samples.
+/// A hash that another thread makes, where there may be one, while the file is read for its samples.
 #[derive(Debug)]
 pub struct FileHash(HashState);
 
@@ -26,10 +27,10 @@ impl FileHash {
     /// One cannot be opened.
     pub fn begin(files: &[FileBytes]) -> io::Result<Self> {
         let inputs: Vec<OpenBytes> = files.iter().map(FileBytes::open).collect::<Result<_, _>>()?;
-        Ok(Self(if cfg!(target_family = "wasm") {
-            HashState::Made(sha256(inputs))
-        } else {
+        Ok(Self(if may_begin_threads() {
             HashState::Running(thread::Builder::new().spawn(move || sha256(inputs))?)
+        } else {
+            HashState::Made(sha256(inputs))
         }))
     }
 

@@ -1,5 +1,6 @@
 //! How far the reading of a file is, and the request to end it before the end of the file.
 
+use std::fmt;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering::Relaxed};
@@ -19,8 +20,12 @@ pub enum ReadPass {
 #[derive(Debug, Clone, Default)]
 pub struct ReadMonitor(Arc<State>);
 
-#[derive(Debug, Default)]
+/// Says whether the reading shall end.
+type Question = dyn Fn() -> bool + Send + Sync;
+
+#[derive(Default)]
 struct State {
+    question: Option<Box<Question>>,
     bytes: AtomicU64,
     pass: AtomicU8,
     is_reading: AtomicBool,
@@ -30,11 +35,30 @@ struct State {
     watch: Option<fn(u64)>,
 }
 
+impl fmt::Debug for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("State").field("bytes", &self.bytes).field("pass", &self.pass).finish_non_exhaustive()
+    }
+}
+
 impl ReadMonitor {
     /// Calls `watch` with [`bytes`](Self::bytes) whenever it grows, on the thread that reads.
     #[must_use]
     pub fn watched(watch: fn(u64)) -> Self {
         Self(Arc::new(State { watch: Some(watch), ..State::default() }))
+    }
+
+    /// Asks `question` with each batch of rows, on the thread that takes them; the reading [stops](Self::stop) where it says so.
+    #[must_use]
+    pub fn asking(question: impl Fn() -> bool + Send + Sync + 'static) -> Self {
+        Self(Arc::new(State { question: Some(Box::new(question)), ..State::default() }))
+    }
+
+    /// Asks whether the reading shall end.
+    pub fn ask(&self) {
+        if self.0.question.as_ref().is_some_and(|question| question()) {
+            self.stop();
+        }
     }
 
     /// Bytes that were read from the file since it was opened last; compressed ones, where the file is compressed.

@@ -18,7 +18,7 @@ const LARGEST_OWN_TIME: f64 = (1u64 << 40) as f64;
 
 /// A number as a file holds it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Number {
+pub enum Number {
     /// Exact: time stamps in ns since 1970 need more digits than a float has.
     Integer(i64),
     /// Any other.

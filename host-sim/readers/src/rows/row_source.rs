@@ -214,6 +214,12 @@ impl<'a> FileRows<'a> {
         &self.columns
     }
 
+    /// Who watches the reading.
+    #[must_use]
+    pub fn monitor(&self) -> &ReadMonitor {
+        &self.monitor
+    }
+
     /// The rate that the file states beside its rows, Hz, where it has no time stamps: they say more.
     #[must_use]
     pub fn rate_hz(&self) -> Option<f64> {

@@ -1,0 +1,155 @@
+//! Arrays that a program holds in memory, such as those of NumPy or the columns of an Arrow table.
+
+use crate::columns::unit::Unit;
+use crate::formats::array_topics::{ArrayReader, ArraySource, EachArrayRow, NamedArray};
+use crate::input::budget::Budget;
+use crate::input::input_error::{InputError, Reason};
+use crate::rows::batch::Number;
+use std::fmt::Debug;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Rows that are read at once.
+const ROWS_AT_ONCE: usize = 4096;
+
+/// The numbers of one column.
+pub trait MemoryColumn: Debug + Send + Sync {
+    /// How many there are.
+    fn rows(&self) -> usize;
+
+    /// Puts the numbers from row `first` on into all of `numbers`; one that is missing is NaN.
+    fn read(&self, first: usize, numbers: &mut [Number]);
+}
+
+/// An array: a vector, or a matrix as its columns.
+#[derive(Debug, Clone)]
+pub struct MemoryArray {
+    /// Its name; empty where it is the only one.
+    pub name: String,
+    /// Unit of its numbers, such as `ns`, where it has one.
+    pub unit: Option<String>,
+    /// At least one, all of one length.
+    pub columns: Vec<Arc<dyn MemoryColumn>>,
+}
+
+/// Arrays that are one recording.
+#[derive(Debug, Clone, Default)]
+pub struct MemoryTable {
+    /// The arrays, in their order.
+    pub arrays: Vec<MemoryArray>,
+}
+
+impl MemoryTable {
+    /// Bytes of as many doubles.
+    pub(crate) fn bytes(&self) -> u64 {
+        let numbers = self.arrays.iter().flat_map(|array| &array.columns).map(|column| column.rows() as u64 * 8);
+        numbers.sum()
+    }
+
+    /// The arrays as those of a file.
+    pub(crate) fn source<'a>(
+        &'a self,
+        name: &'a Path,
+        budget: Budget,
+    ) -> Result<ArraySource<'a, &'a Self>, InputError> {
+        if self.arrays.iter().all(|array| array.columns.is_empty()) {
+            return Err(InputError::file(name, Reason::NoData));
+        }
+        let named = |array: &MemoryArray| NamedArray {
+            unit: array.unit.as_deref().and_then(Unit::parse),
+            ..NamedArray::matrix("", &array.name, array.columns.first().map_or(0, |of| of.rows()), array.columns.len())
+        };
+        Ok(ArraySource::new(name, self, self.arrays.iter().map(named).collect(), budget))
+    }
+}
+
+impl ArrayReader for &MemoryTable {
+    const FORMAT: &'static str = "arrays";
+
+    fn read(
+        &mut self,
+        array: usize,
+        columns: &[usize],
+        add: &mut dyn FnMut(u64) -> Result<(), Reason>,
+    ) -> Result<Vec<Vec<Number>>, Reason> {
+        let read = |&column: &usize| {
+            let column = &self.arrays[array].columns[column];
+            add(column.rows() as u64)?;
+            let mut numbers = vec![Number::Integer(0); column.rows()];
+            column.read(0, &mut numbers);
+            Ok(numbers)
+        };
+        columns.iter().map(read).collect()
+    }
+
+    fn for_each_row(&mut self, places: &[(usize, usize)], each: &mut EachArrayRow) -> Option<Result<(), InputError>> {
+        let columns: Vec<&Arc<dyn MemoryColumn>> =
+            places.iter().map(|&(array, column)| &self.arrays[array].columns[column]).collect();
+        let rows = columns.iter().map(|column| column.rows()).min().unwrap_or(0);
+        let mut buffers = vec![vec![Number::Integer(0); ROWS_AT_ONCE]; columns.len()];
+        let mut row = Vec::with_capacity(columns.len());
+        for first in (0..rows).step_by(ROWS_AT_ONCE) {
+            let count = ROWS_AT_ONCE.min(rows - first);
+            buffers.iter_mut().zip(&columns).for_each(|(buffer, column)| column.read(first, &mut buffer[..count]));
+            for at in 0..count {
+                row.clear();
+                row.extend(buffers.iter().map(|buffer| buffer[at]));
+                if let Err(error) = each(Ok(&row)) {
+                    return Some(Err(error));
+                }
+            }
+        }
+        Some(Ok(()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MemoryArray, MemoryColumn, MemoryTable, ROWS_AT_ONCE};
+    use crate::formats::file_format::InputFile;
+    use crate::input::read_monitor::ReadMonitor;
+    use crate::rows::any_sensor::ReadOptions;
+    use crate::rows::batch::Number;
+    use crate::rows::row_source::WantedRows;
+    use measurement::SensorProfile;
+    use std::path::Path;
+    use std::sync::Arc;
+
+    impl MemoryColumn for Vec<f64> {
+        fn rows(&self) -> usize {
+            self.len()
+        }
+
+        fn read(&self, first: usize, numbers: &mut [Number]) {
+            numbers.iter_mut().zip(&self[first..]).for_each(|(number, value)| *number = Number::Real(*value));
+        }
+    }
+
+    #[test]
+    fn arrays_of_one_length_are_a_table_of_several_blocks() {
+        let rows = ROWS_AT_ONCE + 5;
+        let column = |offset: f64| -> Arc<dyn MemoryColumn> {
+            Arc::new((0..rows).map(|row| row as f64 + offset).collect::<Vec<f64>>())
+        };
+        let gyro = MemoryArray {
+            name: "gyro".to_owned(),
+            unit: Some("rad/s".to_owned()),
+            columns: [0.1, 0.2, 0.3].map(column).into(),
+        };
+        let time = MemoryArray { name: "time".to_owned(), unit: Some("s".to_owned()), columns: vec![column(0.0)] };
+        let table = MemoryTable { arrays: vec![time, gyro] };
+        let file = InputFile::of_arrays(Path::new("arrays"), Arc::new(table), &ReadMonitor::default());
+        let options = ReadOptions::of_sensor(SensorProfile::generic());
+        let mut reader = file.rows(&options, &|_| None).expect("columns by name");
+        let names: Vec<&str> = reader.columns().iter().map(|column| column.profile.name).collect();
+        assert_eq!(names, ["gyro_x", "gyro_y", "gyro_z"]);
+        let (mut times, mut last) = (Vec::new(), Vec::new());
+        let read = reader.read(WantedRows::all(None), &mut |batch| {
+            times.extend(batch.times);
+            last.extend(&batch.values[2]);
+            true
+        });
+        assert_eq!(read.expect("numbers").rows, rows as u64);
+        assert_eq!((times.len(), last[rows - 1]), (rows, (rows - 1) as f64 + 0.3));
+    }
+}

@@ -1,0 +1,135 @@
+//! A report as rows of one flat table, for programs that ask many reports at once: one row for the recording, one for each
+//! coefficient of each channel, and one for each parameter of each finding in each of its channels.
+
+use crate::coefficients::SLOPES;
+use crate::finding_text::shown_effects;
+use crate::reading::ReadingRecord;
+use crate::saved_report::{SavedChannel, SavedParameter};
+use noise_analysis::report::{Finding, Parameter, Report, Validation};
+use serde::{Deserialize, Serialize};
+
+/// A row of the table. Fields that a row does not have are absent.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct ReportRow {
+    /// How the recording is called: its path, or its name.
+    pub recording: String,
+    /// Of its bytes, in hexadecimal digits.
+    pub sha256: Option<String>,
+    /// Version of the program.
+    pub version: Option<String>,
+    /// `complete`; `incomplete` where the recording was not read to its end; `failed` where there is no report.
+    pub status: String,
+    /// Why it is not complete.
+    pub reason: Option<String>,
+    /// What a reader should know of the recording, one sentence a line.
+    pub notes: Option<String>,
+    /// Name of the sensor's profile.
+    pub sensor: Option<String>,
+    /// Hz.
+    pub rate_hz: Option<f64>,
+    /// Length of the recording.
+    pub hours: Option<f64>,
+    /// `recording`, `coefficient` or `finding`.
+    pub row: String,
+    /// Such as `gyro_z`.
+    pub channel: Option<String>,
+    /// Of a coefficient such as `angle_random_walk`, of a finding such as `sinusoid`.
+    pub kind: Option<String>,
+    /// Of a finding such as `frequency`.
+    pub parameter: Option<String>,
+    /// In `unit`.
+    pub value: Option<f64>,
+    /// Lower 95 % bound.
+    pub low: Option<f64>,
+    /// Upper 95 % bound; absent where there is none.
+    pub high: Option<f64>,
+    /// Such as `deg/sqrt(s)`.
+    pub unit: Option<String>,
+    /// Of a finding: `yes`, `no` or `untestable` on the second half of the recording.
+    pub validated: Option<String>,
+    /// Of a finding its number in the report, from 0.
+    pub finding: Option<u64>,
+}
+
+impl ReportRow {
+    /// The only row of a recording that has no report.
+    #[must_use]
+    pub fn failed(recording: &str, reason: &str, version: &str) -> Self {
+        Self {
+            recording: recording.to_owned(),
+            version: Some(version.to_owned()),
+            status: "failed".to_owned(),
+            reason: Some(reason.to_owned()),
+            row: "recording".to_owned(),
+            ..Self::default()
+        }
+    }
+
+    fn with_value(self, Parameter { value, low, high, unit }: Parameter) -> Self {
+        let finite = |number: f64| Some(number).filter(|number| number.is_finite());
+        Self { value: finite(value), low: finite(low), high: finite(high), unit: Some(unit), ..self }
+    }
+}
+
+/// The rows of a report on the recording that is called `recording`.
+#[must_use]
+pub fn rows(report: &Report, recording: &str, reading: Option<&ReadingRecord>) -> Vec<ReportRow> {
+    let is_complete = reading.is_none_or(|reading| reading.complete);
+    let lines = |sentences: &[String]| Some(sentences.join("\n")).filter(|text| !text.is_empty());
+    let of_recording = ReportRow {
+        recording: recording.to_owned(),
+        sha256: reading.and_then(|reading| reading.sha256.clone()),
+        version: reading.map(|reading| reading.version.clone()),
+        status: (if is_complete { "complete" } else { "incomplete" }).to_owned(),
+        reason: reading.and_then(ReadingRecord::incomplete),
+        notes: reading.and_then(|reading| lines(&reading.notes)),
+        sensor: Some(report.part.name.clone()),
+        rate_hz: Some(report.sample_rate_hz),
+        hours: Some(report.samples as f64 / report.sample_rate_hz / 3600.0),
+        row: "recording".to_owned(),
+        ..ReportRow::default()
+    };
+    let mut rows = vec![of_recording.clone()];
+    for channel in &report.channels {
+        let saved = SavedChannel::from(channel);
+        for kind in SLOPES.iter().map(|(kind, ..)| *kind).chain(["quantization", "rate_ramp"]) {
+            let Some(SavedParameter { value, low, high, unit }) = saved.coefficient(kind) else { continue };
+            let row = ReportRow {
+                row: "coefficient".to_owned(),
+                channel: Some(channel.name.clone()),
+                kind: Some(kind.to_owned()),
+                ..of_recording.clone()
+            };
+            rows.push(row.with_value(Parameter { value, low, high, unit }));
+        }
+    }
+    for (index, Finding { effect, channels, validated, .. }) in report.findings.iter().enumerate() {
+        let row = |channel: &str| ReportRow {
+            row: "finding".to_owned(),
+            channel: Some(channel.to_owned()),
+            kind: Some(effect.name().to_owned()),
+            validated: Some(
+                match validated {
+                    Validation::Yes => "yes",
+                    Validation::No => "no",
+                    Validation::Untestable => "untestable",
+                }
+                .to_owned(),
+            ),
+            finding: Some(index as u64),
+            ..of_recording.clone()
+        };
+        let shown = shown_effects(report, index);
+        for channel in channels {
+            let own = shown.iter().find(|shown| shown.channel == channel).map_or(effect, |shown| shown.effect);
+            let parameters = own.parameters();
+            if parameters.is_empty() {
+                rows.push(row(channel));
+            }
+            for (name, parameter) in parameters {
+                rows.push(ReportRow { parameter: Some(name.to_owned()), ..row(channel) }.with_value(parameter));
+            }
+        }
+    }
+    rows
+}

@@ -1,0 +1,149 @@
+//! The command: runs a subcommand, prints its error, gives the exit code.
+
+use crate::cli::{self, Cli, Command, MonitorArguments, ReplayArguments};
+use crate::inspect::{self, Question};
+use crate::live::{self, DeviceSource, GrowingRecording};
+use crate::output::{self, Incomplete};
+use crate::output_files::OutputFiles;
+use crate::{analyze, batch, compare, convert, export, interrupt, monitor, record, simulate, tip};
+use anyhow::{Context, Result};
+use clap::{CommandFactory, Parser};
+use recordings::Printable;
+use std::ffi::OsString;
+use std::io::{self, Write};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// Folder of the page if none is named.
+const DEFAULT_PAGE: &str = "report";
+
+/// Exit codes.
+const SUCCESS: u8 = 0;
+const FAILURE: u8 = 1;
+/// Exit code of a result of a recording that was not read to its end.
+const INCOMPLETE: u8 = 3;
+
+/// Runs the command of `arguments`, the first of which is the name of the program. `prepare` is called before any other thread runs, with
+/// whether a simulation follows.
+///
+/// Exit code 0 for success, 1 for an error, 2 for wrong usage, 3 for a result of a recording that was not read to its end.
+#[must_use]
+pub fn run(arguments: Vec<OsString>, prepare: impl FnOnce(bool)) -> u8 {
+    let arguments = cli::with_subcommand(arguments);
+    output::show_progress();
+    cli::set_typed(&arguments);
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(mut error) => {
+            tip::suggest(&mut error);
+            // Where standard error is closed too, the exit code alone shows the error.
+            let _ = error.print();
+            return u8::try_from(error.exit_code()).unwrap_or(FAILURE);
+        }
+    };
+    prepare(matches!(cli.command, Command::Demo { .. }));
+    match interrupt::watch().and_then(|()| run_subcommand(cli)) {
+        Ok(()) => SUCCESS,
+        // The reader of standard output has closed it, as `head` does.
+        Err(error) if is_broken_pipe(&error) => SUCCESS,
+        Err(error) if error.is::<Incomplete>() => {
+            let _ = writeln!(io::stderr(), "warning: {}", Printable(&error.to_string()));
+            INCOMPLETE
+        }
+        Err(error) => {
+            // Where standard error is closed too, the exit code alone shows the error.
+            let _ = writeln!(io::stderr(), "error: {}", Printable(&output::brief(&format!("{error:#}"))));
+            if let Some(tip) = tip::tip(&error) {
+                let _ = writeln!(io::stderr(), "  tip: {}", Printable(&tip));
+            }
+            if let Some(question) = error.downcast_ref::<Question>() {
+                let _ = write!(io::stderr(), "{}{}", question.text, question.hint);
+            }
+            FAILURE
+        }
+    }
+}
+
+fn run_subcommand(Cli { command }: Cli) -> Result<()> {
+    match command {
+        Command::Demo { simulate, mut output } => {
+            output.page.get_or_insert_with(|| PathBuf::from(DEFAULT_PAGE));
+            let files = OutputFiles::new([], output.force);
+            output::check(&output, &files)?;
+            output::write_report(&record::simulate(&simulate.simulation(3600.0))?.into(), None, &output, &files)
+        }
+        Command::Analyze(arguments) => analyze::run(&arguments),
+        Command::Inspect(arguments) => inspect::run(&arguments, analyze::read_measurement),
+        Command::Replay(arguments) => {
+            let ReplayArguments { file, output, .. } = &arguments;
+            let files = OutputFiles::new([file.as_path()], output.force);
+            output::check(output, &files)?;
+            let report = analyze::analyze_replay(&arguments)?;
+            output::write_report(&report.into(), Some(&output::source_name(file)), output, &files)
+        }
+        Command::Bench(arguments) => record::bench_device(&arguments),
+        Command::Record { out, port, baud, seconds, output } => {
+            OutputFiles::new([], output.force).check(&out)?;
+            // The log is read again: nothing else is written to it.
+            let files = OutputFiles::new([out.as_path()], output.force);
+            output::check(&output, &files)?;
+            let report = record::record_device(&out, &port, baud, seconds)?;
+            output::write_report(&report.into(), Some(&output::source_name(&out)), &output, &files)
+        }
+        Command::Export(arguments) => export::run(&arguments),
+        Command::Batch(arguments) => batch::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
+        Command::Convert(arguments) => convert::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Completions { shell } => {
+            // Into memory first: the generator panics where its output is closed.
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), cli::PROGRAM, &mut script);
+            output::print(|out| out.write_all(&script))
+        }
+        Command::Monitor(arguments) => monitor_source(&arguments),
+    }
+}
+
+/// Shows a device or a recording live, or in lines where there is no terminal.
+fn monitor_source(arguments: &MonitorArguments) -> Result<()> {
+    let MonitorArguments { source, seconds, speed, .. } = arguments;
+    let deadline = seconds
+        .map(|seconds| {
+            let duration = Duration::try_from_secs_f64(seconds).ok();
+            let deadline = duration.and_then(|duration| Instant::now().checked_add(duration));
+            deadline.with_context(|| format!("a duration of {seconds} s: it must be positive and finite, and no age"))
+        })
+        .transpose()?;
+    if !source.is_file() && !source.is_dir() {
+        return monitor_device(arguments, deadline).with_context(|| source.display().to_string());
+    }
+    let name = source.file_name().unwrap_or_default().to_string_lossy();
+    let name = Printable(&name).to_string();
+    let mut recording = GrowingRecording::new(analyze::read_measurement(&arguments.recording())?, name.clone(), *speed);
+    let report = if live::has_terminal() {
+        live::show(&mut recording, deadline)?;
+        recording.into_report()
+    } else {
+        recording.write_lines(deadline, &mut io::stdout().lock())?
+    };
+    report.map_or(Ok(()), |report| output::show_screen(&report, Some(&name)))
+}
+
+fn monitor_device(arguments: &MonitorArguments, deadline: Option<Instant>) -> Result<()> {
+    let MonitorArguments { source, baud, send, .. } = arguments;
+    let port = source.to_str().context("a name of a port that is not UTF-8")?;
+    let mut cable = record::open_link(port, *baud)?;
+    for command in send {
+        cable.send_command(command)?;
+    }
+    if live::has_terminal() {
+        live::show(&mut DeviceSource::new(&mut cable, port.to_owned()), deadline)?;
+        return output::print(|out| writeln!(out, "{}", monitor::summary(&cable.counters())));
+    }
+    Ok(monitor::show(&mut cable, deadline, monitor::LONG_SILENCE, &mut io::stdout().lock())?)
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    error.downcast_ref::<io::Error>().is_some_and(|e| e.kind() == io::ErrorKind::BrokenPipe)
+}
