@@ -66,12 +66,14 @@ impl Recorded<'_> {
     /// The report, as the page shows and saves it.
     pub(crate) fn report(&self) -> Result<String> {
         let input = self.open()?;
-        let hash = input.begin_hash()?;
+        // A log of the bus has none, as the driver reads it.
+        let is_bus_log = matches!(input.format(), RecordedFormat::FrameLog | RecordedFormat::SpiExport);
+        let hash = if is_bus_log { None } else { input.begin_hash().ok() };
         let (stream, notes) = self.stream(input, KEPT)?;
         let mut reading = None;
         let mut report = analysed(stream, |stream| reading = Some(self.reading_record(stream)))?;
         if let Some(reading) = &mut reading {
-            reading.sha256 = hash.finish().ok();
+            reading.sha256 = hash.and_then(|hash| hash.finish().ok());
             reading.notes.splice(0..0, notes);
         }
         if report.findings.iter().any(|finding| matches!(finding.effect, Effect::MotionInterval(_))) {
