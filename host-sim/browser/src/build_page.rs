@@ -55,14 +55,11 @@ fn run(folder: Option<PathBuf>) -> Result<(), Box<dyn Error>> {
 
 /// Compiles the library for browsers.
 fn build(workspace: &Path, target: &Path) -> Result<Vec<u8>, Box<dyn Error>> {
-    // Every browser has it since 2023; results are the same to the bit.
-    let flags = format!("{} -C target-feature=+simd128", env::var("RUSTFLAGS").unwrap_or_default());
     // Cargo, which runs this program, may hold the lock of its own folder.
     let target = target.join("browser-build");
     let status = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(workspace)
         .env_remove("RUSTC_WORKSPACE_WRAPPER")
-        .env("RUSTFLAGS", flags.trim())
         .args(["rustc", "--locked", "--package", "browser", "--lib", "--crate-type", "cdylib"])
         .args(["--profile", PROFILE, "--target", TARGET, "--target-dir"])
         .arg(&target)
