@@ -19,7 +19,7 @@ check() { # PACKAGE OLDEST_RUST
     for file in Cargo.toml README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE src/lib.rs; do
         [ -s "$directory/$file" ] || { echo "$package: the package lacks $file" >&2; exit 1; }
     done
-    for field in description documentation repository readme keywords categories license rust-version; do
+    for field in description documentation readme keywords categories license rust-version; do
         grep -q "^$field = " "$directory/Cargo.toml" || { echo "$package: the package has no $field" >&2; exit 1; }
     done
     for version in "$oldest" nightly; do
@@ -38,7 +38,7 @@ check() { # PACKAGE OLDEST_RUST
     )
 }
 
-grep -q '^repository = "https://example.org' Cargo.toml && echo "state the public address, repository in Cargo.toml, before a release"
+grep -q '^repository' Cargo.toml || echo "before a release: state the public address, repository in Cargo.toml and in those of both libraries"
 check adis16405-driver 1.85
 check allan-core 1.88
 

@@ -2,7 +2,7 @@
 # Makes what a release consists of, in one folder: ./tests/release.sh [FOLDER]
 #
 # The packages of both libraries (each with `cargo publish --dry-run`), the Python wheel, the image of every board as an ELF and as
-# the file that its boot loader takes, the program, and SHA256SUMS over all of them. Publishes nothing. The folder is
+# the file that its boot loader takes, the program, the page for browsers as one file, and SHA256SUMS over all of them. Publishes nothing. The folder is
 # target/release-VERSION if none is named. Needs what tests/run.sh installs, and a tree without changes: a package is made of what is
 # committed.
 set -euo pipefail
@@ -43,6 +43,10 @@ image() { # BOARD TARGET ENDING
 image h405 thumbv7em-none-eabihf bin
 image feather thumbv7em-none-eabihf bin
 image pico thumbv6m-none-eabi uf2
+
+# The page
+run cargo run --locked --quiet --package browser -- "$target/browser"
+cp "$target/browser/observatory.html" "$out"
 
 cd "$out"
 sha256sum -- * >SHA256SUMS

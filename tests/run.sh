@@ -27,7 +27,8 @@ STEPS=(
     "format:formatting"
     "build:lints and build of the tests"
     "examples:lints of the libraries' examples for microcontrollers"
-    "systems:checks for Windows and for browsers"
+    "systems:check for Windows"
+    "page:the page for browsers"
     "documentation:documentation of the libraries"
     "dependencies:licences and sources of the dependencies"
     "python:the Python module and its tests"
@@ -138,14 +139,16 @@ examples() { # workspaces with the same frameworks, which are compiled once for 
         )
     done
 }
-systems() { # what needs neither a compiler of C nor, in a browser, a port
+systems() { # what needs no compiler of C
     (
         unset RUSTC_WORKSPACE_WRAPPER
         export RUSTFLAGS="-D warnings" # clippy measures types, whose sizes are those of the system
         run cargo check --quiet --locked --target "$WINDOWS" --no-default-features --features host-sim/hdf5 --package host-sim
-        run cargo check --quiet --locked --target "$BROWSER" --no-default-features --features readers/hdf5 \
-            --package readers --package recordings --package noise-analysis --package reports
     )
+}
+page() { # the tests open it
+    run "$TARGET/debug/build-page" "$TARGET/browser"
+    export BROWSER_PAGE=$TARGET/browser
 }
 documentation() {
     RUSTDOCFLAGS="-D warnings" run cargo doc --quiet --locked --no-deps --package adis16405-driver --package allan-core --all-features

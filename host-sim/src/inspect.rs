@@ -141,7 +141,7 @@ impl Contents {
         arguments.input.units.clone_from(&proposal.units);
         arguments.input.sensor = self.given.input.sensor.clone().or(proposal.sensor.map(str::to_owned));
         if let (None, Some(part)) = (self.given.time_range(), proposal.part) {
-            let TimeRange { from_s, to_s } = whole_tenths(part);
+            let TimeRange { from_s, to_s } = part.whole_tenths();
             (arguments.from, arguments.to) = (Some(from_s), Some(to_s));
         }
         arguments
@@ -309,13 +309,6 @@ fn rounded(value: f64, digits: i32) -> String {
     } else {
         format!("{value:.*e}", digits as usize - 1)
     }
-}
-
-/// The part between tenths of a second inside of it.
-fn whole_tenths(TimeRange { from_s, to_s }: TimeRange) -> TimeRange {
-    // A tenth is none in binary; what rounds up to 0 from below is −0, which the sum is not.
-    const ROUNDING: f64 = 1e-6;
-    TimeRange { from_s: (10.0 * from_s - ROUNDING).ceil() / 10.0 + 0.0, to_s: (10.0 * to_s + ROUNDING).floor() / 10.0 }
 }
 
 /// A text as one word of a shell, without what a terminal obeys.

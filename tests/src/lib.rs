@@ -109,6 +109,34 @@ impl Image<'_> {
     }
 }
 
+/// Runs a script of the workspace with the Python that `ADIS_PYTHON` names, and returns what it prints; `None`, with a note, without one.
+pub fn python(test: &str, script: &str, arguments: &[&str]) -> Option<Vec<u8>> {
+    let Some(python) = std::env::var_os("ADIS_PYTHON").filter(|python| Path::new(python).exists()) else {
+        note_skipped(test, "ADIS_PYTHON names no Python with the packages of tests/requirements.txt");
+        return None;
+    };
+    let output = Command::new(python).arg(workspace().join(script)).args(arguments).output().expect("Python starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    Some(output.stdout)
+}
+
+/// The folder of files that other programs wrote, with `truth.json`, which says what each holds; `None`, with a note, without Python.
+pub fn recorded_samples(test: &str) -> Option<PathBuf> {
+    const SCRIPT: &str = "host-sim/recordings/tests/make_samples.py";
+    let script = std::fs::read(workspace().join(SCRIPT)).expect("the script");
+    let folder = target_folder().join("tmp/samples");
+    // The first test writes the files, for as long as the script is the same.
+    let _writing = one_at_a_time(&folder.with_extension("lock"));
+    let written_by = folder.join("written-by.py");
+    if std::fs::read(&written_by).ok().as_ref() != Some(&script) {
+        // The writers of bags refuse a file that exists.
+        let _ = std::fs::remove_dir_all(&folder);
+        python(test, SCRIPT, &[folder.to_str().expect("UTF-8")])?;
+        std::fs::write(written_by, script).expect("room");
+    }
+    Some(folder)
+}
+
 /// Waits until no other process holds this file, which is made with its folder; it is held until it is dropped. Each test is a process.
 pub fn one_at_a_time(file: &Path) -> File {
     std::fs::create_dir_all(file.parent().expect("a folder")).expect("a folder");

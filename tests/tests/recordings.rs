@@ -49,7 +49,7 @@ fn a_static_recording_has_the_published_deviations_analyzed_and_replayed() {
     let [report, replayed] = ["analyze", "replay"].map(|command| report(&[command, "--rate", "100"], &run_1));
     assert!(report == replayed, "replayed over the bus");
 
-    assert_eq!(report["schema"], 1);
+    assert_eq!(report["schema"], 2);
     assert_eq!(report["samples"], 1_000_000);
     assert_eq!(report["dropped"]["gap"], 0);
     assert_eq!(report["channels"].as_array().map(Vec::len), Some(6));

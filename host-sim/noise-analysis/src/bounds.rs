@@ -21,7 +21,7 @@ impl MeasuredValue {
 }
 
 /// An estimate with its 95 % bounds.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct BoundedEstimate {
     /// Likeliest value.
     pub value: f64,

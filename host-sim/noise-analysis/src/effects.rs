@@ -86,10 +86,13 @@ pub use unexplained::{BandMismatch, Observation, Refutation, Unexplained, Unexpl
 pub use vibration_rectification::VibrationRectification;
 
 use crate::bounds::{BoundedEstimate, Parameter};
+use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// An effect beyond the baseline noise model, as a channel shows it.
-#[derive(Debug, Clone, PartialEq)]
+/// An effect beyond the baseline noise model, as a channel shows it. What is serialized of it is its evidence: the figures beside its
+/// [parameters](Effect::parameters).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
 pub enum Effect {
     /// The low-pass filter of the part.
     OutputFilter(OutputFilter),

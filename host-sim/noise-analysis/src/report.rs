@@ -28,7 +28,7 @@ use serde::{Deserialize, Serialize, Serializer};
 use std::collections::BTreeMap;
 
 /// Version of the JSON schema; the field names are fixed within a version.
-pub const SCHEMA: u32 = 1;
+pub const SCHEMA: u32 = 2;
 
 /// A whole analysis.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,12 +80,12 @@ pub struct PartReport {
     /// Samples of the sensor's own clock from one recorded sample to the next.
     pub decimation: Option<Parameter>,
     /// What the record does not identify, and why.
-    #[serde(skip)]
     pub notes: Vec<PartNote>,
 }
 
 /// Why a record does not identify the clock or the filter of a part, or not fully.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum PartNote {
     /// A quick report does not look for them.
     NotSought,

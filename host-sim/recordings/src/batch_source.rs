@@ -108,16 +108,16 @@ pub(crate) fn for_each_batch<B: Send>(
 
 /// What the burst validator says of register counts, which fit their fields; one that is missing is as if it had not been recorded.
 fn verdicts(validator: &mut Recorder, batch: &Batch) -> Vec<Verdict> {
-    for row in 0..batch.rows {
+    let verdict = |row: usize| {
         let mut counts = NOT_RECORDED;
         for (channel, column) in validator.channels().iter().zip(&batch.values) {
             if !column[row].is_nan() {
                 counts[*channel as usize] = column[row] as i16;
             }
         }
-        validator.push(TimeStamp::default(), &Burst::from_counts(&Counts::new(counts)));
-    }
-    validator.take_samples().iter().map(RecordedSample::verdict).collect()
+        validator.judge(&Burst::from_counts(&Counts::new(counts)))
+    };
+    (0..batch.rows).map(verdict).collect()
 }
 
 /// Samples in memory.

@@ -41,6 +41,13 @@ pub(crate) struct Verdict {
     pub(crate) refused: ChannelMask,
 }
 
+impl Verdict {
+    fn new(faults: Faults, refused: ChannelMask) -> Self {
+        let is_lost = refused == ChannelMask::ALL;
+        Self { loss: is_lost.then(|| (faults - Faults::WARNINGS).cause()).flatten(), faults, refused }
+    }
+}
+
 /// One sample of all channels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RecordedSample {
@@ -57,9 +64,7 @@ pub struct RecordedSample {
 impl RecordedSample {
     /// What the faults say of the sample.
     pub(crate) fn verdict(&self) -> Verdict {
-        let is_lost = self.refused == ChannelMask::ALL;
-        let loss = is_lost.then(|| (self.faults - Faults::WARNINGS).cause()).flatten();
-        Verdict { loss, faults: self.faults, refused: self.refused }
+        Verdict::new(self.faults, self.refused)
     }
 }
 
@@ -116,21 +121,19 @@ impl Recorder {
 
     /// Adds a burst.
     pub fn push(&mut self, time_stamp: TimeStamp, burst: &Burst) {
+        let Verdict { faults, refused, .. } = self.judge(burst);
+        self.recording.samples.push(RecordedSample { time_stamp, counts: burst.counts(), faults, refused });
+    }
+
+    /// What the burst validator says of the next burst, which is not added.
+    pub(crate) fn judge(&mut self, burst: &Burst) -> Verdict {
         let validity = self.validator.validate(burst);
-        let faults = validity.faults & self.detectable;
-        let sample = RecordedSample { time_stamp, counts: burst.counts(), faults, refused: validity.refused };
-        self.recording.samples.push(sample);
+        Verdict::new(validity.faults & self.detectable, validity.refused)
     }
 
     /// Sets the gyroscopes' range of the whole recording, bursts that were added before included.
     pub fn set_range(&mut self, range: GyroRange) {
         self.recording.range = range;
-    }
-
-    /// The samples that were added since they were taken last.
-    pub(crate) fn take_samples(&mut self) -> Vec<RecordedSample> {
-        let samples = self.recording.samples.len();
-        std::mem::replace(&mut self.recording.samples, Vec::with_capacity(samples))
     }
 
     /// The recording of all bursts that were added.

@@ -186,6 +186,157 @@ fn any_size_of_batches_gives_the_same_samples_notes_and_counts() {
     }
 }
 
+/// Tables that are drawn, split before each of their rows.
+#[test]
+fn a_table_is_the_same_wherever_it_is_split() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for seed in 0..4 {
+        let mut rng = ChaCha8Rng::seed_from_u64(100 + seed);
+        let mut draw = |most: f64| most * rng.random::<f64>();
+        let table = Table {
+            rows: 250 + draw(150.0) as u64,
+            seed,
+            noise: 1.0 + draw(9.0),
+            jitter: draw(0.4),
+            loss: draw(0.05),
+            again: draw(0.02),
+            missing: draw(0.05),
+            full_scale: draw(0.02),
+            back_every: 60 + draw(100.0) as u64,
+        };
+        let file = table.csv(&folder);
+        let reading = Reading::new(None, STREAMED);
+        let whole = read(&file, &[], Reading { batch_rows: usize::MAX, ..reading });
+        for batch_rows in 1..=table.rows as usize {
+            let parts = read(&file, &[], Reading { batch_rows, ..reading });
+            assert_eq!(parts, whole, "{table:?} in batches of {batch_rows}");
+        }
+    }
+}
+
+/// The same rows in another form: separators, order and unit of the columns, unit of the times, compression, format.
+#[test]
+fn a_table_in_another_form_has_the_same_samples() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for seed in 20..24 {
+        let rows = Table { loss: 0.02, missing: 0.02, seed, ..TABLE }.rows();
+        let write = |name: &str, bytes: &[u8]| {
+            let file = folder.path().join(name);
+            std::fs::write(&file, bytes).expect("room");
+            file
+        };
+        let text = |heading: &str, row: &dyn Fn(u64, [Option<f64>; 3]) -> String| {
+            let rows = rows.iter().map(|(stamp, values)| row(*stamp, values.map(|value| value.map(f64::from))) + "\n");
+            (heading.to_owned() + "\n" + &rows.collect::<String>()).into_bytes()
+        };
+        let cell = |value: Option<f64>| value.map_or(String::new(), |value| value.to_string());
+        let plain = text("timestamp,gx [deg/s],gy [deg/s],gz [deg/s]", &|stamp, [x, y, z]| {
+            format!("{stamp},{},{},{}", cell(x), cell(y), cell(z))
+        });
+        let shuffled = text("gz [deg/s];gx [deg/s];time_us;gy [deg/s]", &|stamp, [x, y, z]| {
+            format!("{};{};{stamp};{}", cell(z), cell(x), cell(y))
+        });
+        let in_radians = text("time_ns\tgx [rad/s]\tgy [rad/s]\tgz [rad/s]", &|stamp, values| {
+            let [x, y, z] = values.map(|value| cell(value.map(f64::to_radians)));
+            format!("{stamp}000\t{x}\t{y}\t{z}")
+        });
+        let quoted = text("\"time_us\",\"gx [deg/s]\",\"gy [deg/s]\",\"gz [deg/s]\"", &|stamp, [x, y, z]| {
+            format!("\"{stamp}\",\"{}\",\"{}\",\"{}\"", cell(x), cell(y), cell(z))
+        });
+        let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        std::io::Write::write_all(&mut gzip, &plain).expect("memory");
+        let forms = [
+            (write("plain.csv", &plain), &[][..]),
+            (write("shuffled.txt", &shuffled), &[]),
+            (write("radians.tsv", &in_radians), &[]),
+            (write("quoted.csv", &quoted), &[]),
+            (write("plain.csv.gz", &gzip.finish().expect("memory")), &[]),
+            (write("rows.npy", &array(&rows)), &["us", "deg/s"]),
+        ];
+        let whole = samples(&forms[0].0, forms[0].1);
+        assert!(whole.slots.len() > 2500, "{seed}");
+        for (file, units) in &forms[1..] {
+            let read = samples(file, units);
+            assert_eq!((&read.slots, &read.dropped), (&whole.slots, &whole.dropped), "{seed}: {}", file.display());
+            assert!((read.rate_hz / whole.rate_hz - 1.0).abs() < 1e-9, "{seed}: {}", file.display());
+            for (channel, values) in &whole.channels {
+                for (one, other) in values.iter().zip(&read.channels[channel]) {
+                    // A count of the other form may be another size.
+                    let is_same = one.is_nan() && other.is_nan() || (one - other).abs() < 1e-3;
+                    assert!(is_same, "{seed}: {}: {channel}: {one} {other}", file.display());
+                }
+            }
+        }
+    }
+}
+
+/// Rows in the opposite order, by a clock that runs backwards.
+#[test]
+fn a_reversed_recording_has_as_many_losses_and_the_same_rate() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for seed in 30..36 {
+        let rows = Table { loss: 0.01, seed, ..TABLE }.rows();
+        let end = 2 * rows.last().expect("rows").0;
+        let text = |rows: &mut dyn Iterator<Item = (u64, [Option<i32>; 3])>| {
+            let row = |(stamp, [x, y, z]): (u64, [Option<i32>; 3])| {
+                format!("{stamp},{},{},{}\n", x.expect("a number"), y.expect("a number"), z.expect("a number"))
+            };
+            "time_us,gx [deg/s],gy [deg/s],gz [deg/s]\n".to_owned() + &rows.map(row).collect::<String>()
+        };
+        let read = |name: &str, text: String| {
+            let file = folder.path().join(name);
+            std::fs::write(&file, text).expect("room");
+            samples(&file, &[])
+        };
+        let forwards = read("forwards.csv", text(&mut rows.iter().copied()));
+        let mut reversed = rows.iter().rev().map(|(stamp, values)| (end - stamp, *values));
+        let backwards = read("backwards.csv", text(&mut reversed));
+        assert_eq!((backwards.slots.len(), &backwards.dropped), (forwards.slots.len(), &forwards.dropped), "{seed}");
+        // A delay of a tenth of a period at either end, over 3000 of them.
+        assert!((backwards.rate_hz / forwards.rate_hz - 1.0).abs() < 0.2 / 3000.0, "{seed}");
+        let values = |of: &Samples| of.channels["gyro_y"].clone();
+        assert!(values(&forwards).iter().eq(values(&backwards).iter().rev()), "{seed}");
+    }
+}
+
+/// Samples in the unit of their channel; NaN where there is none.
+struct Samples {
+    slots: Vec<u64>,
+    rate_hz: f64,
+    dropped: std::collections::BTreeMap<&'static str, u64>,
+    channels: std::collections::BTreeMap<&'static str, Vec<f64>>,
+}
+
+fn samples(file: &Path, units: &[&str]) -> Samples {
+    let Result { description, slots, channels, .. } = read(file, units, Reading::new(None, STREAMED));
+    let values = |of: &Channel, lsb: f64| {
+        let mut values: Vec<f64> = of.counts.iter().map(|count| f64::from(*count) * lsb).collect();
+        of.refused.iter().for_each(|(at, _)| values[*at] = f64::NAN);
+        values
+    };
+    let profiles = description.channels.iter().zip(&channels);
+    let channels = profiles.map(|(profile, of)| (profile.name, values(of, profile.lsb))).collect();
+    Samples { slots, rate_hz: description.sample_rate_hz, dropped: description.dropped, channels }
+}
+
+/// An array of NumPy with names.
+fn array(rows: &[(u64, [Option<i32>; 3])]) -> Vec<u8> {
+    let mut header =
+        "{'descr': [('time', '<u8'), ('gx', '<f8'), ('gy', '<f8'), ('gz', '<f8')], 'fortran_order': False, \
+                      'shape': (ROWS,), }"
+            .replace("ROWS", &rows.len().to_string());
+    while !(10 + header.len() + 1).is_multiple_of(64) {
+        header.push(' ');
+    }
+    header.push('\n');
+    let mut bytes = [b"\x93NUMPY\x01\x00", &(header.len() as u16).to_le_bytes()[..], header.as_bytes()].concat();
+    for (stamp, values) in rows {
+        bytes.extend(stamp.to_le_bytes());
+        values.iter().for_each(|value| bytes.extend(value.map_or(f64::NAN, f64::from).to_le_bytes()));
+    }
+    bytes
+}
+
 /// More rows than those that tell the clock, and more than any recording that is one measurement has.
 #[test]
 fn a_longer_recording_is_read_as_a_shorter_one() {

@@ -9,15 +9,6 @@ use noise_analysis::effects::{
 };
 use noise_analysis::report::Finding;
 
-/// How the numbers of a sentence are written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum NumberStyle {
-    /// With exponents and the units of the report, as in its JSON.
-    Plain,
-    /// With prefixes, for the screen and the page.
-    Prefixed,
-}
-
 /// A sentence on the evidence, in two parts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct EvidenceText {
@@ -29,18 +20,18 @@ pub(crate) struct EvidenceText {
 
 impl EvidenceText {
     /// For an effect of one channel.
-    pub(crate) fn of_effect(effect: &Effect, style: NumberStyle) -> Self {
-        let Self { measured, rest } = Wording(style).effect(effect);
-        Self { measured: Wording(style).displayed(&measured), rest: Wording(style).displayed(&rest) }
+    pub(crate) fn of_effect(effect: &Effect) -> Self {
+        let Self { measured, rest } = of_kind(effect);
+        Self { measured: displayed(&measured), rest: displayed(&rest) }
     }
 
     /// For a finding, which may be in several channels.
-    pub(crate) fn of_finding(finding: &Finding, style: NumberStyle) -> Self {
-        let Self { measured, rest } = Self::of_effect(&finding.effect, style);
+    pub(crate) fn of_finding(finding: &Finding) -> Self {
+        let Self { measured, rest } = Self::of_effect(&finding.effect);
         match finding.channels.len() {
             0 | 1 => Self { measured, rest },
             count => Self {
-                measured: Wording(style).displayed(&format!("{}: {measured}", finding.channels[finding.clearest])),
+                measured: displayed(&format!("{}: {measured}", finding.channels[finding.clearest])),
                 rest: format!("{rest}; one cause in {count} channels"),
             },
         }
@@ -77,7 +68,7 @@ fn counted(count: u64, one: &str) -> String {
     format!("{count} {one}{}", if count == 1 { "" } else { "s" })
 }
 
-/// Names and symbols of the JSON, and those of the screen and the page.
+/// Names and symbols of the sentences below, and those of the screen and the page.
 const DISPLAYED: [(&str, &str); 6] =
     [("gyro_", "gyro "), ("accl_", "accel "), ("magn_", "magn "), ("tau =", "τ ="), (" sigma", " σ"), (" -", " −")];
 
@@ -87,514 +78,485 @@ const CORRELATED: &str = "a correlated fluctuation: thermal or electronic";
 /// Times as likely from which a sentence says no number.
 const MILLION: f64 = 1e6;
 
-/// How the numbers of a sentence are written, and the sentences.
-struct Wording(NumberStyle);
+/// A probability, without an exponent.
+fn chance(p_value: f64) -> String {
+    probability(p_value).replace('<', "below")
+}
 
-impl Wording {
-    /// A probability; on the screen and the page without an exponent.
-    fn chance(&self, p_value: f64) -> String {
-        match self.0 {
-            NumberStyle::Plain => format!("{p_value:.0e}"),
-            NumberStyle::Prefixed => probability(p_value).replace('<', "below"),
-        }
-    }
+/// How many times as likely a description is whose logarithm of the likelihood is larger by `gain`.
+fn likelier(gain: f64) -> String {
+    if gain > MILLION.ln() { "more than a million".to_owned() } else { significant(gain.exp(), 2) }
+}
 
-    /// How many times as likely a description is whose logarithm of the likelihood is larger by `gain`.
-    fn likelier(&self, gain: f64) -> String {
-        match self.0 {
-            NumberStyle::Plain => format!("e^{gain:.0}"),
-            NumberStyle::Prefixed if gain > MILLION.ln() => "more than a million".to_owned(),
-            NumberStyle::Prefixed => significant(gain.exp(), 2),
-        }
-    }
+/// A sentence with the names and symbols of its readers.
+fn displayed(text: &str) -> String {
+    let text = text.strip_prefix('-').map_or_else(|| text.to_owned(), |number| format!("−{number}"));
+    DISPLAYED.iter().fold(text, |text, (name, shown)| text.replace(name, shown))
+}
 
-    /// A sentence with the names and symbols of its readers.
-    fn displayed(&self, text: &str) -> String {
-        if self.0 == NumberStyle::Plain {
-            return text.to_owned();
-        }
-        let text = text.strip_prefix('-').map_or_else(|| text.to_owned(), |number| format!("−{number}"));
-        DISPLAYED.iter().fold(text, |text, (name, shown)| text.replace(name, shown))
-    }
+/// A number with its unit.
+fn amount(value: f64, unit: &str) -> String {
+    quantity_digits(value, unit, 3)
+}
 
-    /// A number with its unit, with so many decimals in front of an exponent.
-    fn amount(&self, value: f64, unit: &str, decimals: usize) -> String {
-        match self.0 {
-            NumberStyle::Plain => format!("{value:.decimals$e} {unit}"),
-            NumberStyle::Prefixed => quantity_digits(value, unit, 3),
-        }
-    }
-
-    fn effect(&self, effect: &Effect) -> EvidenceText {
-        match effect {
-            Effect::OutputFilter(of) => added(&of.evidence, &filter_meaning(of)),
-            Effect::LowPassFilter(of) => match of.design {
-                LowPassDesign::OneStage { time_constant_s } => text(
-                    excess(&of.evidence),
-                    format!(
-                        "; all the white noise is correlated over {} s and none is left: a low-pass filter of the first order",
-                        seconds(time_constant_s)
-                    ),
-                ),
-                LowPassDesign::TwoStages => {
-                    added(&of.evidence, "neighbours correlate as behind two equal low-pass stages of the first order")
-                }
-                LowPassDesign::Butterworth => {
-                    added(&of.evidence, "neighbours correlate as behind a Butterworth filter of the second order")
-                }
-            },
-            Effect::SinusoidalLine(of) => self.harmonic(of.multiples.as_ref(), &of.evidence),
-            Effect::ResonantLine(of) => self.harmonic(of.multiples.as_ref(), &of.evidence),
-            Effect::ModulatedLine(of) => self.modulated(of),
-            Effect::Chirp(of) => text(
+fn of_kind(effect: &Effect) -> EvidenceText {
+    match effect {
+        Effect::OutputFilter(of) => added(&of.evidence, &filter_meaning(of)),
+        Effect::LowPassFilter(of) => match of.design {
+            LowPassDesign::OneStage { time_constant_s } => text(
+                excess(&of.evidence),
                 format!(
-                    "a line whose frequency runs from {:.2} to {:.2} Hz over the record, {:+.0} % of the noise of short spectra, by \
-                     chance anywhere {}",
-                    of.start_hz.value,
-                    of.end_hz.value,
-                    100.0 * of.excess,
-                    self.chance(of.p_value)
+                    "; all the white noise is correlated over {} s and none is left: a low-pass filter of the first order",
+                    seconds(time_constant_s)
                 ),
-                "; a speed that changes",
             ),
-            Effect::Periodic(of) => text(
-                format!(
-                    "the same every {:.1} s, but no sinusoid: the harmonics have {:.0} % of the deviation of the fundamental, \
-                     {:.0} times the noise, by chance at any period {}",
-                    1.0 / of.frequency_hz.value,
-                    of.harmonics_percent.value,
-                    of.sum,
-                    self.chance(of.p_value)
-                ),
-                "; something that is switched by a clock or a thermostat",
-            ),
-            Effect::SquareWave(of) => text(
-                format!(
-                    "{} of a square wave at {:.4} Hz: amplitudes fall with the number of the harmonic",
-                    harmonics(&of.multiples),
-                    of.frequency_hz.value
-                ),
-                format!("; {}", self.line(&of.line).sentence()),
-            ),
-            Effect::ShotNoise(of) => text(
-                format!(
-                    "the third moment behind a filter for disturbances {} that decay within {:.2} s is {:.1} standard deviations from \
-                     that of a Gaussian process, by chance {}, and {:.1} behind the same filter in reversed time",
-                    if of.sum > 0.0 { "upwards" } else { "downwards" },
-                    of.time_constant_s.value,
-                    of.sum.abs(),
-                    self.chance(of.p_value),
-                    of.reversed.abs()
-                ),
-                "; shocks, or a load that comes on at random times",
-            ),
-            Effect::TelegraphNoise(of) => match &of.evidence {
-                TelegraphEvidence::Kurtosis { ratio, error, curve } => text(
-                    format!(
-                        "two levels: excess kurtosis {ratio:.2} ± {error:.2} of that of a telegraph signal, a Gaussian process has 0"
-                    ),
-                    format!("; {}", added(curve, CORRELATED).sentence()),
-                ),
-                TelegraphEvidence::Levels { jumps, gain } => text(
-                    format!(
-                        "two levels {} apart with {jumps:.0} jumps between them, {} times as likely as a Gaussian process of any \
-                         correlation time",
-                        self.amount(of.amplitude.value, of.amplitude.unit, 3),
-                        self.likelier(*gain)
-                    ),
-                    "; charges that are caught and let go in a transistor or a crystal",
-                ),
-            },
-            Effect::MarkovProcess(of) => match &of.evidence {
-                MarkovEvidence::Curve(curve) => added(curve, CORRELATED),
-                MarkovEvidence::Spectrum { corner_hz, gain } => text(
-                    format!(
-                        "the spectrum is flat below {} Hz, where a random walk would rise: {} times as likely",
-                        seconds(*corner_hz),
-                        self.likelier(*gain)
-                    ),
-                    format!("; {CORRELATED}"),
-                ),
-            },
-            Effect::CommonMode(of) => text(
-                format!(
-                    "moves with {}: their spectra are {} times as likely as those of channels with nothing in common, and no \
-                     measured cause explains it",
-                    of.others.join(" and "),
-                    self.likelier(of.gain)
-                ),
-                "; a shared reference, supply or temperature gradient",
-            ),
-            Effect::SharedDrift(of) => text(
-                format!(
-                    "moves with {} at {}, {:.0} sigma, which is more than {:.0} times the data sheet's sensitivity: both share a \
-                     drift whose cause was not measured",
-                    of.with,
-                    self.amount(of.ratio.value, &format!("{}/{}", of.ratio.unit, of.per), 2),
-                    of.sigmas,
-                    of.largest_multiple
-                ),
-                "",
-            ),
-            Effect::LinearDrift(of) => match &of.evidence {
-                LinearDriftEvidence::Curve(curve) => added(curve, "a steady drift: warming up, or ageing"),
-                LinearDriftEvidence::Regression { p_value } => text(
-                    format!(
-                        "the level moves by {} throughout, by chance {} in white, flicker and walking noise of any mixture",
-                        self.amount(of.slope.value, &of.slope_parameter().unit, 3),
-                        self.chance(*p_value)
-                    ),
-                    "; warm-up that no sensor shows, or aging",
-                ),
-            },
-            Effect::LevelStep(of) => text(
-                format!(
-                    "the level changes by {} at {:.1} s and stays, by chance anywhere {} in white, flicker and walking noise of any \
-                     mixture",
-                    self.amount(of.size.value, of.size.unit, 3),
-                    of.time_s.value,
-                    self.chance(of.p_value)
-                ),
-                "; a mechanical or thermal shock, or a fault that begins",
-            ),
-            Effect::LevelChange(of) => text(
-                format!(
-                    "the deviation of neighbours' differences changes by the factor {:.3} at {:.1} s and stays, which explains {:.0} % of \
-                     the changes of its level, by chance anywhere {}",
-                    of.ratio.value,
-                    of.time_s.value,
-                    100.0 * of.explained,
-                    self.chance(of.p_value)
-                ),
-                "; a machine that is switched on, or a setting of the sensor",
-            ),
-            Effect::TemperatureSensitivity(of) => text(
-                format!("follows the measured temperature, {:.0} sigma", of.sigmas),
-                "; a bias that drifts with temperature",
-            ),
-            Effect::TemperatureCurvature(of) => text(
-                format!(
-                    "follows the square of the measured temperature, by chance {} in white, flicker and walking noise of any mixture",
-                    self.chance(of.p_value)
-                ),
-                "; a sensitivity that itself changes with temperature",
-            ),
-            Effect::TurnOnTransient(of) => text(
-                format!(
-                    "the means decay exponentially from the first sample on, with a time constant of {:.0} s, by chance {} in white, flicker and walking \
-                     noise of any mixture",
-                    of.time_constant_s.value,
-                    self.chance(of.p_value)
-                ),
-                "; a part that warms itself after it was turned on",
-            ),
-            Effect::ThermalLag(of) => text(
-                format!(
-                    "follows the measured temperature behind a lag of {:.0} s, by chance {}, and better than without a lag",
-                    of.time_constant_s.value,
-                    self.chance(of.p_value)
-                ),
-                "; the sensing element warms up later than the thermometer",
-            ),
-            Effect::SupplySensitivity(of) => {
-                text(format!("follows the measured supply, {:.0} sigma", of.sigmas), "; a bias that is not regulated")
+            LowPassDesign::TwoStages => {
+                added(&of.evidence, "neighbours correlate as behind two equal low-pass stages of the first order")
             }
-            Effect::AccelerationSensitivity(of) => text(
-                format!("follows the measured specific force, {:.0} sigma", of.sigmas),
-                "; g-sensitivity of the gyro",
-            ),
-            Effect::VibrationRectification(of) => text(
-                format!(
-                    "follows the variance of {}, whose vibration reaches {} rms, by chance {} in white, flicker and walking noise of \
-                     any mixture",
-                    of.accelerometer,
-                    self.amount(of.strongest, of.per, 2),
-                    self.chance(of.p_value)
-                ),
-                "",
-            ),
-            Effect::AngleQuantization(of) => {
-                added(&of.evidence, "steps of the angle: a counter or an integrator before the output")
+            LowPassDesign::Butterworth => {
+                added(&of.evidence, "neighbours correlate as behind a Butterworth filter of the second order")
             }
-            Effect::EffectiveLsb(of) => text(
+        },
+        Effect::SinusoidalLine(of) => harmonic(of.multiples.as_ref(), &of.evidence),
+        Effect::ResonantLine(of) => harmonic(of.multiples.as_ref(), &of.evidence),
+        Effect::ModulatedLine(of) => modulated(of),
+        Effect::Chirp(of) => text(
+            format!(
+                "a line whose frequency runs from {:.2} to {:.2} Hz over the record, {:+.0} % of the noise of short spectra, by \
+                 chance anywhere {}",
+                of.start_hz.value,
+                of.end_hz.value,
+                100.0 * of.excess,
+                chance(of.p_value)
+            ),
+            "; a speed that changes",
+        ),
+        Effect::Periodic(of) => text(
+            format!(
+                "the same every {:.1} s, but no sinusoid: the harmonics have {:.0} % of the deviation of the fundamental, \
+                 {:.0} times the noise, by chance at any period {}",
+                1.0 / of.frequency_hz.value,
+                of.harmonics_percent.value,
+                of.sum,
+                chance(of.p_value)
+            ),
+            "; something that is switched by a clock or a thermostat",
+        ),
+        Effect::SquareWave(of) => text(
+            format!(
+                "{} of a square wave at {:.4} Hz: amplitudes fall with the number of the harmonic",
+                harmonics(&of.multiples),
+                of.frequency_hz.value
+            ),
+            format!("; {}", of_line(&of.line).sentence()),
+        ),
+        Effect::ShotNoise(of) => text(
+            format!(
+                "the third moment behind a filter for disturbances {} that decay within {:.2} s is {:.1} standard deviations from \
+                 that of a Gaussian process, by chance {}, and {:.1} behind the same filter in reversed time",
+                if of.sum > 0.0 { "upwards" } else { "downwards" },
+                of.time_constant_s.value,
+                of.sum.abs(),
+                chance(of.p_value),
+                of.reversed.abs()
+            ),
+            "; shocks, or a load that comes on at random times",
+        ),
+        Effect::TelegraphNoise(of) => match &of.evidence {
+            TelegraphEvidence::Kurtosis { ratio, error, curve } => text(
                 format!(
-                    "all {} values lie {} counts or a multiple of that apart, {} changes without an exception",
-                    of.values, of.counts, of.changes
+                    "two levels: excess kurtosis {ratio:.2} ± {error:.2} of that of a telegraph signal, a Gaussian process has 0"
                 ),
-                "; a converter of fewer bits, or rounding on the way",
+                format!("; {}", added(curve, CORRELATED).sentence()),
             ),
-            Effect::NoiseBelowCount(of) if of.deviation.value == 0.0 => text(
-                "the value never changes".to_owned(),
-                "; nothing is known of its noise but that it is below a count",
-            ),
-            Effect::NoiseBelowCount(of) => text(
+            TelegraphEvidence::Levels { jumps, gain } => text(
                 format!(
-                    "the Allan deviation at the shortest averaging times is {:.2} counts where it is nearest to the {:.2} counts from which \
-                     on rounding adds white noise alone",
-                    of.counts, of.dithered_counts
+                    "two levels {} apart with {jumps:.0} jumps between them, {} times as likely as a Gaussian process of any \
+                     correlation time",
+                    amount(of.amplitude.value, of.amplitude.unit),
+                    likelier(*gain)
                 ),
-                "; N, B and K are those of the rounded values",
+                "; charges that are caught and let go in a transistor or a crystal",
             ),
-            Effect::Spikes(of) => text(
+        },
+        Effect::MarkovProcess(of) => match &of.evidence {
+            MarkovEvidence::Curve(curve) => added(curve, CORRELATED),
+            MarkovEvidence::Spectrum { corner_hz, gain } => text(
                 format!(
-                    "{} off by more than {:.1} σ from what their neighbours tell, the largest by {:.1} σ",
-                    counted(of.count as u64, "sample"),
-                    of.threshold_sigmas,
-                    of.largest_sigmas
+                    "the spectrum is flat below {} Hz, where a random walk would rise: {} times as likely",
+                    seconds(*corner_hz),
+                    likelier(*gain)
                 ),
-                "; an electrical disturbance or a damaged word",
+                format!("; {CORRELATED}"),
             ),
-            Effect::NoisyInterval(of) => {
-                let shown = match of.channels.len() {
-                    0 | 1 => "this channel alone".to_owned(),
-                    count => format!("{count} channels ({})", of.channels.join(", ")),
-                };
-                text(
-                    format!(
-                        "from {:.1} s to {:.1} s the noise at tau = {:.3} s is {:.2} times that of the stretches around it, by chance \
-                         {}, in {shown}",
-                        of.from_s.value,
-                        of.to_s.value,
-                        of.tau_s,
-                        of.level.value,
-                        self.chance(of.p_value)
-                    ),
-                    "; a blow, a vehicle that passes, or work at the bench; kept out of the coefficients",
-                )
-            }
-            Effect::MotionInterval(of) => text(
+        },
+        Effect::CommonMode(of) => text(
+            format!(
+                "moves with {}: their spectra are {} times as likely as those of channels with nothing in common, and no \
+                 measured cause explains it",
+                of.others.join(" and "),
+                likelier(of.gain)
+            ),
+            "; a shared reference, supply or temperature gradient",
+        ),
+        Effect::SharedDrift(of) => text(
+            format!(
+                "moves with {} at {}, {:.0} sigma, which is more than {:.0} times the data sheet's sensitivity: both share a \
+                 drift whose cause was not measured",
+                of.with,
+                amount(of.ratio.value, &format!("{}/{}", of.ratio.unit, of.per)),
+                of.sigmas,
+                of.largest_multiple
+            ),
+            "",
+        ),
+        Effect::LinearDrift(of) => match &of.evidence {
+            LinearDriftEvidence::Curve(curve) => added(curve, "a steady drift: warming up, or ageing"),
+            LinearDriftEvidence::Regression { p_value } => text(
                 format!(
-                    "the mean of a second leaves the median by up to {:.3} {unit}, {}, in {} {} s: the platform was \
-                     moved",
-                    of.size.value,
-                    match of.scale {
-                        MotionScale::BiasError(error) => format!(
-                            "more than three times the {error:.3} {} by which the biases of parts differ",
-                            of.size.unit
-                        ),
-                        MotionScale::Scatter(scatter) =>
-                            format!("where such means scatter by {} {}", significant(scatter, 2), of.size.unit),
-                    },
-                    if of.stretches == 1 {
-                        "one stretch of".to_owned()
-                    } else {
-                        format!("{} stretches of together", of.stretches)
-                    },
-                    of.moved_s,
-                    unit = of.size.unit
+                    "the level moves by {} throughout, by chance {} in white, flicker and walking noise of any mixture",
+                    amount(of.slope.value, &of.slope_parameter().unit),
+                    chance(*p_value)
                 ),
-                "",
+                "; warm-up that no sensor shows, or aging",
             ),
-            Effect::Saturation(of) => text(
-                format!(
-                    "{} of {} samples lie at {}, {:.4} {}, no other value occurs more than {} times: what is beyond is cut off, and N, \
-                     B and K are lower limits",
-                    of.cut_off,
-                    of.samples,
-                    if of.is_end_of_range { "the end of the range" } else { "a limit" },
-                    of.level.value,
-                    of.level.unit,
-                    of.most_of_others
-                ),
-                "",
+        },
+        Effect::LevelStep(of) => text(
+            format!(
+                "the level changes by {} at {:.1} s and stays, by chance anywhere {} in white, flicker and walking noise of any \
+                 mixture",
+                amount(of.size.value, of.size.unit),
+                of.time_s.value,
+                chance(of.p_value)
             ),
-            Effect::MissingCodes(of) => text(
-                format!(
-                    "{} without a sample, beside {:.0} in their rarer neighbours",
-                    counted(of.codes.into(), "code"),
-                    of.expected
-                ),
-                "",
+            "; a mechanical or thermal shock, or a fault that begins",
+        ),
+        Effect::LevelChange(of) => text(
+            format!(
+                "the deviation of neighbours' differences changes by the factor {:.3} at {:.1} s and stays, which explains {:.0} % of \
+                 the changes of its level, by chance anywhere {}",
+                of.ratio.value,
+                of.time_s.value,
+                100.0 * of.explained,
+                chance(of.p_value)
             ),
-            Effect::StuckOutput(of) => text(
+            "; a machine that is switched on, or a setting of the sensor",
+        ),
+        Effect::TemperatureSensitivity(of) => text(
+            format!("follows the measured temperature, {:.0} sigma", of.sigmas),
+            "; a bias that drifts with temperature",
+        ),
+        Effect::TemperatureCurvature(of) => text(
+            format!(
+                "follows the square of the measured temperature, by chance {} in white, flicker and walking noise of any mixture",
+                chance(of.p_value)
+            ),
+            "; a sensitivity that itself changes with temperature",
+        ),
+        Effect::TurnOnTransient(of) => text(
+            format!(
+                "the means decay exponentially from the first sample on, with a time constant of {:.0} s, by chance {} in white, flicker and walking \
+                 noise of any mixture",
+                of.time_constant_s.value,
+                chance(of.p_value)
+            ),
+            "; a part that warms itself after it was turned on",
+        ),
+        Effect::ThermalLag(of) => text(
+            format!(
+                "follows the measured temperature behind a lag of {:.0} s, by chance {}, and better than without a lag",
+                of.time_constant_s.value,
+                chance(of.p_value)
+            ),
+            "; the sensing element warms up later than the thermometer",
+        ),
+        Effect::SupplySensitivity(of) => {
+            text(format!("follows the measured supply, {:.0} sigma", of.sigmas), "; a bias that is not regulated")
+        }
+        Effect::AccelerationSensitivity(of) => {
+            text(format!("follows the measured specific force, {:.0} sigma", of.sigmas), "; g-sensitivity of the gyro")
+        }
+        Effect::VibrationRectification(of) => text(
+            format!(
+                "follows the variance of {}, whose vibration reaches {} rms, by chance {} in white, flicker and walking noise of \
+                 any mixture",
+                of.accelerometer,
+                amount(of.strongest, of.per),
+                chance(of.p_value)
+            ),
+            "",
+        ),
+        Effect::AngleQuantization(of) => {
+            added(&of.evidence, "steps of the angle: a counter or an integrator before the output")
+        }
+        Effect::EffectiveLsb(of) => text(
+            format!(
+                "all {} values lie {} counts or a multiple of that apart, {} changes without an exception",
+                of.values, of.counts, of.changes
+            ),
+            "; a converter of fewer bits, or rounding on the way",
+        ),
+        Effect::NoiseBelowCount(of) if of.deviation.value == 0.0 => {
+            text("the value never changes".to_owned(), "; nothing is known of its noise but that it is below a count")
+        }
+        Effect::NoiseBelowCount(of) => text(
+            format!(
+                "the Allan deviation at the shortest averaging times is {:.2} counts where it is nearest to the {:.2} counts from which \
+                 on rounding adds white noise alone",
+                of.counts, of.dithered_counts
+            ),
+            "; N, B and K are those of the rounded values",
+        ),
+        Effect::Spikes(of) => text(
+            format!(
+                "{} off by more than {:.1} σ from what their neighbours tell, the largest by {:.1} σ",
+                counted(of.count as u64, "sample"),
+                of.threshold_sigmas,
+                of.largest_sigmas
+            ),
+            "; an electrical disturbance or a damaged word",
+        ),
+        Effect::NoisyInterval(of) => {
+            let shown = match of.channels.len() {
+                0 | 1 => "this channel alone".to_owned(),
+                count => format!("{count} channels ({})", of.channels.join(", ")),
+            };
+            text(
                 format!(
-                    "{} of {} samples are in {} of equal values that noise does not make, the longest from {:.2} s to {:.2} s",
-                    of.stuck,
-                    of.samples,
-                    counted(of.runs, "run"),
+                    "from {:.1} s to {:.1} s the noise at tau = {:.3} s is {:.2} times that of the stretches around it, by chance \
+                     {}, in {shown}",
                     of.from_s.value,
-                    of.to_s.value
+                    of.to_s.value,
+                    of.tau_s,
+                    of.level.value,
+                    chance(of.p_value)
                 ),
-                "; they are left out",
-            ),
-            Effect::DroppedSamples(of) => text(
-                format!(
-                    "{} of {} samples never arrived, in {}",
-                    of.missing,
-                    of.samples,
-                    counted(of.gaps as u64, "gap")
-                ),
-                "; a reader that comes too late, or a full queue",
-            ),
-            Effect::RepeatedSamples(of) => text(
-                format!(
-                    "{} of {} samples equal the one before in all {} channels, {:.1} at most by chance",
-                    of.equal, of.samples, of.channels, of.by_chance
-                ),
-                "; a register that is read before it is renewed",
-            ),
-            Effect::ClockDeviation(ClockDeviation { change: Some(of), .. }) => text(
-                format!(
-                    "{:.4} Hz by the time stamps up to {:.0} s and {:.4} Hz from then on, {:.1} σ apart; neither wanders",
-                    of.before_hz.value, of.time_s.value, of.after_hz.value, of.sigmas
-                ),
-                "",
-            ),
-            Effect::ClockDeviation(of) => text(
-                format!(
-                    "{:.4} Hz by the time stamps, {:+.1} ppm from the nominal {:.4} Hz, {:.1} σ of an ordinary host's clock",
-                    of.rate_hz.value,
-                    1e6 * (of.rate_hz.value / of.nominal_hz - 1.0),
-                    of.nominal_hz,
-                    of.sigmas
-                ),
-                "; the tolerance of the part's oscillator",
-            ),
-            Effect::Unexplained(of) => self.unexplained(of),
+                "; a blow, a vehicle that passes, or work at the bench; kept out of the coefficients",
+            )
         }
-    }
-
-    /// A line by itself.
-    fn modulated(&self, of: &ModulatedLine) -> EvidenceText {
-        let (frequency_hz, period_s) = (of.frequency_hz.value, of.period_s.value);
-        match &of.evidence {
-            ModulationEvidence::Envelope { sigmas } => {
-                let (changes, depth) = if of.of_phase {
-                    ("its phase goes to and fro", format!("{:.2} rad", of.depth.value))
-                } else {
-                    ("its amplitude swells and fades", format!("{:.0} %", 100.0 * of.depth.value))
-                };
-                text(
-                    format!(
-                        "a line at {frequency_hz:.4} Hz, {sigmas:.0} sigma, whose sidebands are {:.4} Hz away: {changes} by {depth} \
-                         every {period_s:.0} s",
-                        1.0 / period_s
+        Effect::MotionInterval(of) => text(
+            format!(
+                "the mean of a second leaves the median by up to {:.3} {unit}, {}, in {} {} s: the platform was \
+                 moved",
+                of.size.value,
+                match of.scale {
+                    MotionScale::BiasError(error) => format!(
+                        "more than three times the {error:.3} {} by which the biases of parts differ",
+                        of.size.unit
                     ),
-                    ", which no sinusoid does",
-                )
-            }
-            ModulationEvidence::Sidebands(line) => text(
+                    MotionScale::Scatter(scatter) =>
+                        format!("where such means scatter by {} {}", significant(scatter, 2), of.size.unit),
+                },
+                if of.stretches == 1 {
+                    "one stretch of".to_owned()
+                } else {
+                    format!("{} stretches of together", of.stretches)
+                },
+                of.moved_s,
+                unit = of.size.unit
+            ),
+            "",
+        ),
+        Effect::Saturation(of) => text(
+            format!(
+                "{} of {} samples lie at {}, {:.4} {}, no other value occurs more than {} times: what is beyond is cut off, and N, \
+                 B and K are lower limits",
+                of.cut_off,
+                of.samples,
+                if of.is_end_of_range { "the end of the range" } else { "a limit" },
+                of.level.value,
+                of.level.unit,
+                of.most_of_others
+            ),
+            "",
+        ),
+        Effect::MissingCodes(of) => text(
+            format!(
+                "{} without a sample, beside {:.0} in their rarer neighbours",
+                counted(of.codes.into(), "code"),
+                of.expected
+            ),
+            "",
+        ),
+        Effect::StuckOutput(of) => text(
+            format!(
+                "{} of {} samples are in {} of equal values that noise does not make, the longest from {:.2} s to {:.2} s",
+                of.stuck,
+                of.samples,
+                counted(of.runs, "run"),
+                of.from_s.value,
+                of.to_s.value
+            ),
+            "; they are left out",
+        ),
+        Effect::DroppedSamples(of) => text(
+            format!("{} of {} samples never arrived, in {}", of.missing, of.samples, counted(of.gaps as u64, "gap")),
+            "; a reader that comes too late, or a full queue",
+        ),
+        Effect::RepeatedSamples(of) => text(
+            format!(
+                "{} of {} samples equal the one before in all {} channels, {:.1} at most by chance",
+                of.equal, of.samples, of.channels, of.by_chance
+            ),
+            "; a register that is read before it is renewed",
+        ),
+        Effect::ClockDeviation(ClockDeviation { change: Some(of), .. }) => text(
+            format!(
+                "{:.4} Hz by the time stamps up to {:.0} s and {:.4} Hz from then on, {:.1} σ apart; neither wanders",
+                of.before_hz.value, of.time_s.value, of.after_hz.value, of.sigmas
+            ),
+            "",
+        ),
+        Effect::ClockDeviation(of) => text(
+            format!(
+                "{:.4} Hz by the time stamps, {:+.1} ppm from the nominal {:.4} Hz, {:.1} σ of an ordinary host's clock",
+                of.rate_hz.value,
+                1e6 * (of.rate_hz.value / of.nominal_hz - 1.0),
+                of.nominal_hz,
+                of.sigmas
+            ),
+            "; the tolerance of the part's oscillator",
+        ),
+        Effect::Unexplained(of) => unexplained(of),
+    }
+}
+
+/// A line by itself.
+fn modulated(of: &ModulatedLine) -> EvidenceText {
+    let (frequency_hz, period_s) = (of.frequency_hz.value, of.period_s.value);
+    match &of.evidence {
+        ModulationEvidence::Envelope { sigmas } => {
+            let (changes, depth) = if of.of_phase {
+                ("its phase goes to and fro", format!("{:.2} rad", of.depth.value))
+            } else {
+                ("its amplitude swells and fades", format!("{:.0} %", 100.0 * of.depth.value))
+            };
+            text(
                 format!(
-                    "a line at {frequency_hz:.4} Hz between two equal ones {:.4} Hz away: its amplitude swells and fades every \
-                     {period_s:.0} s, which no sinusoid of one amplitude does",
+                    "a line at {frequency_hz:.4} Hz, {sigmas:.0} sigma, whose sidebands are {:.4} Hz away: {changes} by {depth} \
+                     every {period_s:.0} s",
                     1.0 / period_s
                 ),
-                format!("; {}", self.line(line).sentence()),
+                ", which no sinusoid does",
+            )
+        }
+        ModulationEvidence::Sidebands(line) => text(
+            format!(
+                "a line at {frequency_hz:.4} Hz between two equal ones {:.4} Hz away: its amplitude swells and fades every \
+                 {period_s:.0} s, which no sinusoid of one amplitude does",
+                1.0 / period_s
             ),
-        }
+            format!("; {}", of_line(line).sentence()),
+        ),
     }
+}
 
-    fn line(&self, line: &LineEvidence) -> EvidenceText {
-        let meaning = if line.has_width {
-            "a narrow band: a mechanical resonance or an unsteady vibration"
-        } else {
-            "a steady line: a vibration, or an interference folded into the band"
-        };
-        match &line.source {
-            LineSource::Curve(curve) => added(curve, meaning),
-            LineSource::Spectrum(of) => {
-                let meaning = if of.is_at_half_rate {
-                    "half of the sample rate: every second sample has an offset"
-                } else {
-                    meaning
-                };
-                let width = of.width_hz.map_or_else(
-                    || "no wider than the record resolves".to_owned(),
-                    |width_hz| format!("{width_hz:.4} Hz wide"),
-                );
-                text(
-                    format!(
-                        "line at {:.4} Hz in the spectrum, {width}, {:.0} sigma, by chance anywhere {}",
-                        of.frequency_hz,
-                        of.sigmas,
-                        self.chance(of.p_value)
-                    ),
-                    format!("; {meaning}"),
-                )
-            }
-        }
-    }
-
-    /// A line that may be one of several of one signal.
-    fn harmonic(&self, multiples: Option<&Multiples>, line: &LineEvidence) -> EvidenceText {
-        match multiples {
-            None => self.line(line),
-            Some(multiples) => text(
-                format!("{} of one periodic signal", harmonics(multiples)),
-                format!("; {}", self.line(line).sentence()),
-            ),
-        }
-    }
-
-    fn unexplained(&self, of: &Unexplained) -> EvidenceText {
-        let percent = of.excess_percent.map_or(0.0, |of| of.value);
-        let frequency_hz = of.frequency_hz().map_or(0.0, |of| of.value);
-        match &of.observation {
-            Observation::PointOfCurve { p_value } => text(
+fn of_line(line: &LineEvidence) -> EvidenceText {
+    let meaning = if line.has_width {
+        "a narrow band: a mechanical resonance or an unsteady vibration"
+    } else {
+        "a steady line: a vibration, or an interference folded into the band"
+    };
+    match &line.source {
+        LineSource::Curve(curve) => added(curve, meaning),
+        LineSource::Spectrum(of) => {
+            let meaning =
+                if of.is_at_half_rate { "half of the sample rate: every second sample has an offset" } else { meaning };
+            let width = of.width_hz.map_or_else(
+                || "no wider than the record resolves".to_owned(),
+                |width_hz| format!("{width_hz:.4} Hz wide"),
+            );
+            text(
                 format!(
-                    "{percent:+.0} % of the model's Allan deviation at tau = {:.3} s, by chance anywhere in the curve {}",
-                    of.tau_s().map_or(0.0, |of| of.value),
-                    self.chance(*p_value)
+                    "line at {:.4} Hz in the spectrum, {width}, {:.0} sigma, by chance anywhere {}",
+                    of.frequency_hz,
+                    of.sigmas,
+                    chance(of.p_value)
                 ),
-                "; no effect that is known here explains it",
+                format!("; {meaning}"),
+            )
+        }
+    }
+}
+
+/// A line that may be one of several of one signal.
+fn harmonic(multiples: Option<&Multiples>, line: &LineEvidence) -> EvidenceText {
+    match multiples {
+        None => of_line(line),
+        Some(multiples) => {
+            text(format!("{} of one periodic signal", harmonics(multiples)), format!("; {}", of_line(line).sentence()))
+        }
+    }
+}
+
+fn unexplained(of: &Unexplained) -> EvidenceText {
+    let percent = of.excess_percent.map_or(0.0, |of| of.value);
+    let frequency_hz = of.frequency_hz().map_or(0.0, |of| of.value);
+    match &of.observation {
+        Observation::PointOfCurve { p_value } => text(
+            format!(
+                "{percent:+.0} % of the model's Allan deviation at tau = {:.3} s, by chance anywhere in the curve {}",
+                of.tau_s().map_or(0.0, |of| of.value),
+                chance(*p_value)
             ),
-            Observation::RefutedTerm { curve, by } => text(format!("{} {}", excess(curve), self.refutation(by)), ""),
-            Observation::Band { width_hz, sigmas, mismatch } => {
-                let why = match mismatch {
-                    BandMismatch::Shape { p_value } => format!(
-                        "has not the spectrum of a resonance, by chance {}: a frequency or a strength that changes",
-                        self.chance(*p_value)
-                    ),
-                    BandMismatch::Curve => "the Allan deviation contradicts a resonance there".to_owned(),
-                };
-                text(
-                    format!(
-                        "a band around {frequency_hz:.4} Hz, {width_hz:.4} Hz wide, stands out of the noise ({sigmas:.0} sigma) and {why}"
-                    ),
-                    "",
-                )
-            }
-            Observation::LevelByTemperature { range_degc: [coldest, warmest], explained } => text(
+            "; no effect that is known here explains it",
+        ),
+        Observation::RefutedTerm { curve, by } => text(format!("{} {}", excess(curve), refutation(by)), ""),
+        Observation::Band { width_hz, sigmas, mismatch } => {
+            let why = match mismatch {
+                BandMismatch::Shape { p_value } => format!(
+                    "has not the spectrum of a resonance, by chance {}: a frequency or a strength that changes",
+                    chance(*p_value)
+                ),
+                BandMismatch::Curve => "the Allan deviation contradicts a resonance there".to_owned(),
+            };
+            text(
                 format!(
-                    "the level of the noise changes by {percent:+.0} % from {coldest:.1} to {warmest:.1} degC: {:.0} % of its changes \
-                     follow the measured temperature, and no effect that is known here changes it",
-                    100.0 * explained
+                    "a band around {frequency_hz:.4} Hz, {width_hz:.4} Hz wide, stands out of the noise ({sigmas:.0} sigma) and {why}"
                 ),
                 "",
-            ),
+            )
         }
+        Observation::LevelByTemperature { range_degc: [coldest, warmest], explained } => text(
+            format!(
+                "the level of the noise changes by {percent:+.0} % from {coldest:.1} to {warmest:.1} degC: {:.0} % of its changes \
+                 follow the measured temperature, and no effect that is known here changes it",
+                100.0 * explained
+            ),
+            "",
+        ),
     }
+}
 
-    /// What contradicts a term that fits an octave of the curve.
-    fn refutation(&self, by: &Refutation) -> String {
-        let forgets = |time_constant_s: f64| {
-            format!("with the spectrum of a process that forgets within {} s", seconds(time_constant_s))
-        };
-        match *by {
-            Refutation::FewPeriods => {
-                "as by a line of a few periods in the record, which its curve does not tell from a drift".to_owned()
-            }
-            Refutation::NotInSpectrum { frequency_hz } => {
-                format!("as by a line at {frequency_hz:.4} Hz, where the spectrum has none")
-            }
-            Refutation::ShapeOfSpectrum { p_value } => format!(
-                "as by quantization, whose density rises with the square of the frequency; the spectrum has another shape, by chance {}",
-                self.chance(p_value)
-            ),
-            Refutation::Irreversible { time_constant_s } => format!(
-                "{}, but its changes up and down differ: disturbances that begin at once and decay",
-                forgets(time_constant_s)
-            ),
-            Refutation::RareDisturbances { time_constant_s, kurtosis: [ratio, error] } => format!(
-                "{}, but an excess kurtosis {ratio:.1} ± {error:.1} times that of a telegraph signal: rare disturbances",
-                forgets(time_constant_s)
-            ),
-            Refutation::UndecidedLevels { time_constant_s, kurtosis: [ratio, error] } => format!(
-                "{}: its excess kurtosis, {ratio:.1} ± {error:.1} times that of a telegraph signal, does not tell whether that has two \
-                 levels",
-                forgets(time_constant_s)
-            ),
+/// What contradicts a term that fits an octave of the curve.
+fn refutation(by: &Refutation) -> String {
+    let forgets = |time_constant_s: f64| {
+        format!("with the spectrum of a process that forgets within {} s", seconds(time_constant_s))
+    };
+    match *by {
+        Refutation::FewPeriods => {
+            "as by a line of a few periods in the record, which its curve does not tell from a drift".to_owned()
         }
+        Refutation::NotInSpectrum { frequency_hz } => {
+            format!("as by a line at {frequency_hz:.4} Hz, where the spectrum has none")
+        }
+        Refutation::ShapeOfSpectrum { p_value } => format!(
+            "as by quantization, whose density rises with the square of the frequency; the spectrum has another shape, by chance {}",
+            chance(p_value)
+        ),
+        Refutation::Irreversible { time_constant_s } => format!(
+            "{}, but its changes up and down differ: disturbances that begin at once and decay",
+            forgets(time_constant_s)
+        ),
+        Refutation::RareDisturbances { time_constant_s, kurtosis: [ratio, error] } => format!(
+            "{}, but an excess kurtosis {ratio:.1} ± {error:.1} times that of a telegraph signal: rare disturbances",
+            forgets(time_constant_s)
+        ),
+        Refutation::UndecidedLevels { time_constant_s, kurtosis: [ratio, error] } => format!(
+            "{}: its excess kurtosis, {ratio:.1} ± {error:.1} times that of a telegraph signal, does not tell whether that has two \
+             levels",
+            forgets(time_constant_s)
+        ),
     }
 }
 

@@ -163,7 +163,7 @@ mod tests {
             |sensor: &str, unit: &str| ["x", "y", "z"].map(|axis| channel(&format!("{sensor}_{axis}"), unit)).join(",");
         let own = channel(name, "deg/s");
         let channels = [axes("gyro", "deg/s"), axes("accl", "g"), own].join(",");
-        SavedReport::from_json(&format!(r#"{{"schema":1,"sample_rate_hz":100.0,"channels":[{channels}]}}"#))
+        SavedReport::from_json(&format!(r#"{{"schema":2,"sample_rate_hz":100.0,"channels":[{channels}]}}"#))
             .expect("a report")
     }
 

@@ -594,7 +594,7 @@ fn relative(difference: f64) -> String {
 mod tests {
     use super::examples::{examples, line};
     use super::*;
-    use crate::evidence::{EvidenceText, NumberStyle};
+    use crate::evidence::EvidenceText;
     use noise_analysis::effects::{
         LevelStep, LineEvidence, LineSource, MotionInterval, MotionScale, Multiples, SharedDrift, SinusoidalLine,
         SpectrumEvidence, SquareWave, StuckOutput, TelegraphEvidence, TelegraphNoise,
@@ -734,42 +734,40 @@ mod tests {
         let LineSource::Spectrum(spectrum) = line.evidence.source else { panic!("{line:?}") };
         let source = LineSource::Spectrum(SpectrumEvidence { p_value: 0.0, ..spectrum });
         let line = SinusoidalLine { evidence: LineEvidence { source, ..line.evidence }, ..line };
-        let [plain, prefixed] = [NumberStyle::Plain, NumberStyle::Prefixed]
-            .map(|style| EvidenceText::of_finding(&finding(line.clone()), style).measured);
+        let measured = EvidenceText::of_finding(&finding(line)).measured;
         let beginning =
-            "line at 20.5000 Hz in the spectrum, no wider than the record resolves, 220 sigma, by chance anywhere";
-        assert_eq!(plain, format!("{beginning} 0e0"));
-        assert_eq!(prefixed, format!("{} below 0.001", beginning.replace("sigma", "σ")));
+            "line at 20.5000 Hz in the spectrum, no wider than the record resolves, 220 σ, by chance anywhere";
+        assert_eq!(measured, format!("{beginning} below 0.001"));
         let step = LevelStep {
             time_s: BoundedEstimate::exact(333.0),
             size: BoundedEstimate::exact(-3.1e-5).in_unit("g"),
             p_value: 3e-9,
         };
-        let of_step = |style| EvidenceText::of_finding(&finding(step), style).sentence();
+        let of_step = EvidenceText::of_finding(&finding(step)).sentence();
         let rest = |chance: &str| {
             format!(
                 "at 333.0 s and stays, by chance anywhere {chance} in white, flicker and walking noise of any mixture; a mechanical or \
                  thermal shock, or a fault that begins"
             )
         };
-        assert_eq!(of_step(NumberStyle::Plain), format!("the level changes by -3.100e-5 g {}", rest("3e-9")));
-        assert_eq!(of_step(NumberStyle::Prefixed), format!("the level changes by −31.0 µg {}", rest("below 0.001")));
+        assert_eq!(of_step, format!("the level changes by −31.0 µg {}", rest("below 0.001")));
         // Nothing is said of a weight that is not known.
         assert_eq!(describe(&finding(step), &[]).weight, "");
         let mut in_two = finding(step);
         in_two.channels.insert(0, "accl_x".to_owned());
         in_two.clearest = 1;
-        for (style, name) in [(NumberStyle::Plain, "gyro_z: the level"), (NumberStyle::Prefixed, "gyro z: the level")] {
-            let sentence = EvidenceText::of_finding(&in_two, style).sentence();
-            assert!(sentence.starts_with(name) && sentence.ends_with("; one cause in 2 channels"), "{sentence}");
-        }
+        let sentence = EvidenceText::of_finding(&in_two).sentence();
+        assert!(
+            sentence.starts_with("gyro z: the level") && sentence.ends_with("; one cause in 2 channels"),
+            "{sentence}"
+        );
     }
 
     /// The page has no names of the JSON, and one run is no "runs".
     #[test]
     fn the_evidence_of_the_page_has_names_symbols_and_numbers_as_its_readers_write_them() {
         for effect in &examples() {
-            let text = EvidenceText::of_effect(effect, NumberStyle::Prefixed).sentence();
+            let text = EvidenceText::of_effect(effect).sentence();
             let of_json = ["gyro_", "accl_", "tau", "sigma", " -"];
             assert!(!of_json.iter().any(|name| text.contains(name)), "{text}");
         }
@@ -781,7 +779,7 @@ mod tests {
             stuck: 5,
             samples: 12_000,
         };
-        let text = EvidenceText::of_effect(&stuck.into(), NumberStyle::Prefixed).measured;
+        let text = EvidenceText::of_effect(&stuck.into()).measured;
         assert!(text.starts_with("5 of 12000 samples are in 1 run of equal values"), "{text}");
     }
 

@@ -3,7 +3,7 @@
 use crate::coefficient_notes::coefficient_notes;
 use crate::coefficients::{self, CoefficientRow};
 use crate::curve_numbers::curve_numbers;
-use crate::evidence::{EvidenceText, NumberStyle};
+use crate::evidence::EvidenceText;
 use crate::explanation;
 use crate::finding_text::FindingText;
 use crate::formatting::{
@@ -141,7 +141,7 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "{}", wrap(&format!("! {text}."), WIDTH.into()))?;
     }
     for ChannelEffect { effect, .. } in &channel.effects {
-        let evidence = EvidenceText::of_effect(effect, NumberStyle::Prefixed).sentence();
+        let evidence = EvidenceText::of_effect(effect).sentence();
         writeln!(out, "{}", wrap(&format!("• {}: {evidence}", words(effect.name())), WIDTH.into()))?;
     }
     for text in explanation::course(channel) {

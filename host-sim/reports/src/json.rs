@@ -1,10 +1,9 @@
-//! The JSON of a report, schema 1. Effects and findings have names for their kinds and their parameters, and a sentence on their
+//! The JSON of a report, schema 2. Effects and findings have names for their kinds and their parameters, and the figures of their
 //! evidence; the rest is as in [`Report`].
 
-use crate::evidence::{EvidenceText, NumberStyle};
 use crate::finding_text::shown_effects;
-use crate::part_note;
 use crate::reading::ReadingRecord;
+use noise_analysis::effects::Effect;
 use noise_analysis::report::assessment::Assessment;
 use noise_analysis::report::{
     ChannelEffect, ChannelReport, CommonModeRegression, CurvePoint, FigureData, Finding, MissingSamples,
@@ -26,19 +25,11 @@ pub struct ReportJson<'a> {
     samples: u64,
     dropped: &'a BTreeMap<String, u64>,
     flagged: &'a BTreeMap<String, u64>,
-    part: PartJson<'a>,
+    part: &'a PartReport,
     findings: Vec<FindingJson<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     common_mode: Option<&'a CommonModeRegression>,
     channels: Vec<ChannelJson<'a>>,
-}
-
-/// A [`PartReport`], with its notes in one text.
-#[derive(Debug, Serialize)]
-struct PartJson<'a> {
-    #[serde(flatten)]
-    part: &'a PartReport,
-    note: Option<String>,
 }
 
 /// A [`Finding`].
@@ -49,7 +40,7 @@ struct FindingJson<'a> {
     clearest: Option<&'a String>,
     parameters: BTreeMap<&'static str, Parameter>,
     in_channels: BTreeMap<&'a str, BTreeMap<&'static str, Parameter>>,
-    evidence: String,
+    evidence: &'a Effect,
     validated: Validation,
     share_percent: &'a BTreeMap<String, f64>,
 }
@@ -66,7 +57,7 @@ struct ChannelJson<'a> {
     unseen_adev: &'a [f64],
     read_off: &'a SlopeMethodReport,
     before: &'a ModelReport,
-    effects: Vec<EffectJson>,
+    effects: Vec<EffectJson<'a>>,
     after: &'a ModelReport,
     first_half_curve: &'a ModelErrorReport,
     #[serde(rename = "final")]
@@ -81,10 +72,10 @@ struct ChannelJson<'a> {
 
 /// A [`ChannelEffect`].
 #[derive(Debug, Serialize)]
-struct EffectJson {
+struct EffectJson<'a> {
     kind: &'static str,
     parameters: BTreeMap<&'static str, Parameter>,
-    evidence: String,
+    evidence: &'a Effect,
     finding: usize,
 }
 
@@ -119,18 +110,11 @@ impl<'a> From<&'a Report> for ReportJson<'a> {
             samples: *samples,
             dropped,
             flagged,
-            part: PartJson::from(part),
+            part,
             findings: (0..findings.len()).map(|index| FindingJson::new(report, index)).collect(),
             common_mode: common_mode.as_ref(),
             channels: channels.iter().map(ChannelJson::from).collect(),
         }
-    }
-}
-
-impl<'a> From<&'a PartReport> for PartJson<'a> {
-    fn from(part: &'a PartReport) -> Self {
-        let sentences: Vec<String> = part.notes.iter().map(part_note::sentence).collect();
-        Self { part, note: (!sentences.is_empty()).then(|| sentences.join(" ")) }
     }
 }
 
@@ -145,7 +129,7 @@ impl<'a> FindingJson<'a> {
             clearest: channels.get(*clearest),
             parameters: effect.parameters(),
             in_channels: shown.map(|shown| (shown.channel, shown.effect.parameters())).collect(),
-            evidence: EvidenceText::of_finding(finding, NumberStyle::Plain).sentence(),
+            evidence: effect,
             validated: *validated,
             share_percent,
         }
@@ -193,13 +177,8 @@ impl<'a> From<&'a ChannelReport> for ChannelJson<'a> {
     }
 }
 
-impl From<&ChannelEffect> for EffectJson {
-    fn from(ChannelEffect { effect, finding }: &ChannelEffect) -> Self {
-        Self {
-            kind: effect.name(),
-            parameters: effect.parameters(),
-            evidence: EvidenceText::of_effect(effect, NumberStyle::Plain).sentence(),
-            finding: *finding,
-        }
+impl<'a> From<&'a ChannelEffect> for EffectJson<'a> {
+    fn from(ChannelEffect { effect, finding }: &'a ChannelEffect) -> Self {
+        Self { kind: effect.name(), parameters: effect.parameters(), evidence: effect, finding: *finding }
     }
 }

@@ -4,7 +4,7 @@
 mod tables;
 
 use crate::coefficient_notes::coefficient_notes;
-use crate::evidence::{EvidenceText, NumberStyle};
+use crate::evidence::EvidenceText;
 use crate::explanation;
 use crate::figure::{self, Plot};
 use crate::finding_text::{self, ShownEffect, channel_list, channel_name};
@@ -20,8 +20,10 @@ use noise_analysis::report::assessment::Assessment;
 use noise_analysis::report::{ChannelReport, Finding, Report};
 use std::path::{Path, PathBuf};
 
-const STYLE: &str = include_str!("page/style.css");
-const SCRIPT: &str = include_str!("page/script.js");
+/// The style of the page.
+pub const STYLE: &str = include_str!("page/style.css");
+/// The script of the page, as it stands in its element.
+pub const SCRIPT: &str = include_str!("page/script.js");
 /// Only what is in the file itself; a figure that is saved as PNG is an image of its own text.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
 
@@ -265,7 +267,7 @@ fn finding_card(report: &Report, index: usize, number: usize) -> Markup {
             details {
                 summary { "Parameters and evidence" }
                 (parameters(report, index))
-                p { (capital(&EvidenceText::of_finding(finding, NumberStyle::Prefixed).sentence())) "." }
+                p { (capital(&EvidenceText::of_finding(finding).sentence())) "." }
             }
         }
     }

@@ -1,5 +1,5 @@
 //! The part of a report that other programs need: sample rate, and each channel's curve and final model. It is read from the
-//! JSON of schema 1 or taken from a report in memory.
+//! JSON of schema 2 or taken from a report in memory.
 
 use crate::coefficients::{self, SLOPES};
 use noise_analysis::bounds::BoundedEstimate;
@@ -298,7 +298,7 @@ mod tests {
 
     fn report(terms: &str) -> String {
         format!(
-            r#"{{"schema":1,"sample_rate_hz":100.0,"channels":[{{"name":"gyro_x","unit":"deg/s","curve":[{POINT}],
+            r#"{{"schema":2,"sample_rate_hz":100.0,"channels":[{{"name":"gyro_x","unit":"deg/s","curve":[{POINT}],
             "final":{{"terms":[{terms}],"adev":[0.4]}}}}]}}"#
         )
     }
@@ -372,7 +372,7 @@ mod tests {
             error(&report("").replace("sample_rate_hz", "rate"))
                 .starts_with("the report: missing field `sample_rate_hz`")
         );
-        assert_eq!(error(r#"{"schema":2}"#), "schema 2, where this program reads schema 1");
+        assert_eq!(error(r#"{"schema":1}"#), "schema 1, where this program reads schema 2");
         for text in ["", "{}", "sample,gyro_x_counts"] {
             assert!(matches!(SavedReport::from_json(text), Err(SavedReportError::NoReport(_))), "{text}");
         }

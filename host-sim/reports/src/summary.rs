@@ -295,6 +295,8 @@ pub fn headline(report: &Report, source: Option<&str>) -> Vec<String> {
 
 /// Cause of a sample that was read twice: it has the time of the one before.
 const REPEATED: &str = "repeated";
+/// Cause of a sample of a channel that has no value in the recording.
+const MISSING: &str = "missing";
 
 /// Sample periods of the record with its gaps.
 fn periods(report: &Report) -> u64 {
@@ -583,7 +585,18 @@ fn losses(report: &Report) -> String {
         .collect();
     let lost =
         if lost == 0 { "No sample lost".to_owned() } else { format!("{} samples lost ({percent} %)", count(lost)) };
+    let lost = format!("{lost}{}", missing_values(report));
     if refused.is_empty() { format!("{lost}.") } else { format!("{lost}, refused: {}.", refused.join(", ")) }
+}
+
+/// How many samples of some channels have no value, to be added to a sentence; empty without one.
+fn missing_values(report: &Report) -> String {
+    let missing = |channel: &ChannelReport| channel.missing.refused.get(MISSING).copied().unwrap_or(0);
+    let with_missing: Vec<&ChannelReport> = report.channels.iter().filter(|channel| missing(channel) > 0).collect();
+    let Some(most) = with_missing.iter().map(|channel| missing(channel)).max() else { return String::new() };
+    let up_to = if with_missing.iter().all(|channel| missing(channel) == most) { "" } else { "up to " };
+    let names: Vec<String> = with_missing.iter().map(|channel| channel.name.clone()).collect();
+    format!(", {up_to}{} values missing in {}", count(most), channel_list(&names))
 }
 
 /// Largest relative half-width of an interval that is told as ±20 %.

@@ -136,8 +136,9 @@ impl BenchPlan {
             setting("clear", &["statistics reset"]),
             raw(Topic::Bursts, self.bursts_s),
             silence(),
-            step(Topic::Measurement, "measure", 2.0, Answered::By(&["DRDY: high for", "DRDY: no pulse"]), false),
             step(Topic::BurstReport, "r", 15.0, Answered::ByReport, true),
+            // Behind the report, which would count the samples that are lost meanwhile.
+            step(Topic::Measurement, "measure", 2.0, Answered::By(&["DRDY: high for", "DRDY: no pulse"]), false),
         ]);
         steps
     }

@@ -213,9 +213,9 @@ fn register_value(line: &str) -> Option<u16> {
     u16::from_str_radix(line.split_whitespace().nth(2)?.strip_prefix("0x")?, 16).ok()
 }
 
-/// The number behind `prefix` in a line.
+/// The number behind `prefix` in a line, in which commas may stand between thousands.
 fn number_behind(line: &str, prefix: &str) -> Option<f64> {
-    line.split_once(prefix)?.1.split_whitespace().next()?.trim_end_matches([',', ':']).parse().ok()
+    line.split_once(prefix)?.1.split_whitespace().next()?.trim_end_matches(':').replace(',', "").parse().ok()
 }
 
 fn identity(transcript: &Transcript) -> Option<u16> {

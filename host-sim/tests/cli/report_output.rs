@@ -31,7 +31,7 @@ fn the_arguments_choose_what_is_printed() {
     assert!(full.contains("── supply") && full.contains("95 % interval"), "{full}");
     assert_eq!(run(&dir, &["--quiet"]), "");
     let report: Value = serde_json::from_str(&run(&dir, &["--json", "-"])).expect("JSON alone");
-    assert_eq!(report["schema"], 1);
+    assert_eq!(report["schema"], 2);
     let spectrum = &report["channels"][1]["spectrum"];
     let points = spectrum["density"].as_array().expect("a spectrum").len();
     assert!((50..=400).contains(&points), "{points}");

@@ -353,6 +353,11 @@ impl Stream {
     }
 
     fn place(&mut self, rows: &[RowStamp], is_last: bool) -> Vec<Place> {
+        if self.waiting.is_empty() && rows.iter().all(|row| row.time_s.is_none()) {
+            // Without times no row is a repeat, and all are placed at once.
+            let stamps = rows.iter().map(|row| Stamp { time_s: None, index: row.index });
+            return self.clock.place(stamps, is_last).into_iter().map(Place::At).collect();
+        }
         let mut arrived = Vec::with_capacity(rows.len());
         for row in rows {
             let is_repeat = self.repeats.is_repeat(row, self.before_s);

@@ -28,6 +28,8 @@ pub const FLASH_CR: u64 = 0x4002_3C10;
 pub const FLASH_OPTCR: u64 = 0x4002_3C14;
 /// Control register 1 of SPI1, whose bits 0 and 1 are CPHA and CPOL (RM0090 section 28.5.1).
 pub const SPI1_CR1: u64 = 0x4001_3000;
+/// CRC polynomial of SPI1, which the firmware does not use: 7 after a reset of the peripheral (RM0090 section 28.5.5).
+pub const SPI1_CRCPR: u64 = 0x4001_3010;
 /// Which port each of the lines 0 to 7 of the external interrupt controller is connected to (RM0090 section 9.2).
 pub const SYSCFG_EXTICR: [u64; 2] = [0x4001_3808, 0x4001_380C];
 /// Lines that raise an interrupt, and those whose rising and whose falling edges do (RM0090 section 12.3).
@@ -98,6 +100,8 @@ pub enum Event {
     LoseBurstEnd,
     /// The stream that receives the next burst stops within it, as after an error on the bus.
     StopReceiving,
+    /// A register of the microcontroller holds this value, as if its bits had flipped.
+    ChangeRegister(u64, u64),
     /// The microsecond counter stops.
     StopCounter,
     /// The next access to the timer is answered with a bus error.
@@ -119,6 +123,8 @@ pub struct Scenario {
     pub events: Vec<(f64, Event)>,
     pub seconds: f64,
     pub probe: Option<Probe>,
+    /// The core executes an instruction in eight cycles in the place of one: what waits for a peripheral costs an eighth to emulate.
+    pub slow_core: bool,
 }
 
 impl Default for Scenario {
@@ -131,6 +137,7 @@ impl Default for Scenario {
             events: vec![],
             seconds: 0.0,
             probe: None,
+            slow_core: false,
         }
     }
 }

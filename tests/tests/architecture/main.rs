@@ -39,6 +39,7 @@ const MAY_DEPEND_ON: &[(&str, &str)] = &[
     ("virtual-sensor", ""),
     ("simulation", "adis16405-driver firmware link recordings virtual-sensor"),
     ("reports", "allan-core noise-analysis"),
+    ("browser", "adis16405-driver measurement noise-analysis recordings reports simulation"),
     ("benchmarks", "adis16405-driver allan-core fourier measurement noise-analysis recordings reports simulation virtual-sensor"),
     ("host-sim", "adis16405-driver link measurement noise-analysis recordings reports simulation"),
     ("imunoise-python", "allan-core host-sim noise-analysis recordings reports"),

@@ -3,11 +3,13 @@
 use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use measurement::Quantity;
+use serde::Serialize;
 
 /// A sensitivity to the specific force.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AccelerationSensitivity {
     /// Along x, y and z, in the unit per g; `None` where there is no such channel or the rate does not follow it.
+    #[serde(skip)]
     pub sensitivity: [Option<ChannelEstimate>; 3],
     /// Significance of the clearest of them, standard deviations.
     pub sigmas: f64,

@@ -5,11 +5,13 @@ use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use crate::units::coefficient_unit;
 use allan_core::NoiseTerm;
+use serde::Serialize;
 
 /// White noise of the angle.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AngleQuantization {
     /// Q, in the unit times s.
+    #[serde(skip)]
     pub coefficient: ChannelEstimate,
     /// What the curve shows of it.
     pub evidence: CurveEvidence,

@@ -2,13 +2,16 @@
 
 use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use serde::Serialize;
 
 /// A step of the bias.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LevelStep {
     /// When, s from the first sample.
+    #[serde(skip)]
     pub time_s: BoundedEstimate,
     /// New level less the old one.
+    #[serde(skip)]
     pub size: ChannelEstimate,
     /// Probability of such a step anywhere by chance in white, flicker and walking noise of any mixture.
     pub p_value: f64,

@@ -3,20 +3,25 @@
 use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use super::sinusoid::avar_of_sine;
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use serde::Serialize;
 
 /// Frequencies of a run whose Allan variances are averaged.
 const FREQUENCIES: u32 = 32;
 
 /// A line whose frequency runs.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Chirp {
     /// Frequency at the beginning of the record, Hz.
+    #[serde(skip)]
     pub start_hz: BoundedEstimate,
     /// Frequency at its end, Hz.
+    #[serde(skip)]
     pub end_hz: BoundedEstimate,
     /// Change of the frequency, Hz/s.
+    #[serde(skip)]
     pub rate_hz_per_s: BoundedEstimate,
     /// Amplitude.
+    #[serde(skip)]
     pub amplitude: ChannelEstimate,
     /// Power over the noise of short spectra.
     pub excess: f64,

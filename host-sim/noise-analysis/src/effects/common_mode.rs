@@ -2,13 +2,16 @@
 
 use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use serde::Serialize;
 
 /// A drift in common.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CommonMode {
     /// Standard deviation.
+    #[serde(skip)]
     pub deviation: ChannelEstimate,
     /// Correlation time, s.
+    #[serde(skip)]
     pub time_constant_s: BoundedEstimate,
     /// Names of the other channels that have it.
     pub others: Vec<&'static str>,

@@ -2,11 +2,13 @@
 
 use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, Parameter};
+use serde::Serialize;
 
 /// Lost samples.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DroppedSamples {
     /// Part of all samples.
+    #[serde(skip)]
     pub fraction: BoundedEstimate,
     /// Their number.
     pub missing: f64,

@@ -3,11 +3,13 @@
 use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use crate::distributions::ROUNDING;
+use serde::Serialize;
 
 /// A resolution of several counts.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EffectiveLsb {
     /// Smallest distance of two values; it is exact.
+    #[serde(skip)]
     pub step: ChannelEstimate,
     /// The same in counts.
     pub counts: u32,

@@ -3,13 +3,15 @@
 use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use measurement::Quantity;
+use serde::Serialize;
 
 macro_rules! sensitivity {
     ($(#[$doc:meta])* $kind:ident, $name:literal, $quantity:ident, $per:literal) => {
         $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq)]
+        #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
         pub struct $kind {
             #[doc = concat!("In the unit per ", $per, ".")]
+            #[serde(skip)]
             pub sensitivity: ChannelEstimate,
             /// Significance, standard deviations.
             pub sigmas: f64,

@@ -1,9 +1,10 @@
 //! What several kinds of effects were told by.
 
 use crate::bounds::{BoundedEstimate, Parameter};
+use serde::Serialize;
 
 /// Where the curve departs from the model without an added term.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CurveEvidence {
     /// `σ/σ_model − 1` at the averaging time where it is most significant.
     pub excess: f64,
@@ -16,7 +17,7 @@ pub struct CurveEvidence {
 }
 
 /// What shows a line.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LineEvidence {
     /// Whether the line has a width.
     pub has_width: bool,
@@ -25,7 +26,8 @@ pub struct LineEvidence {
 }
 
 /// Where a line was seen.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum LineSource {
     /// In the curve alone.
     Curve(CurveEvidence),
@@ -34,7 +36,7 @@ pub enum LineSource {
 }
 
 /// A line of a spectrum.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SpectrumEvidence {
     /// Hz
     pub frequency_hz: f64,
@@ -49,7 +51,7 @@ pub struct SpectrumEvidence {
 }
 
 /// The lines of one periodic signal.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Multiples {
     /// Numbers of the harmonics, by frequency.
     pub harmonics: Vec<u32>,

@@ -2,15 +2,19 @@
 
 use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, Parameter};
+use serde::Serialize;
 
 /// A time of larger noise.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoisyInterval {
     /// Beginning, s from the first sample.
+    #[serde(skip)]
     pub from_s: BoundedEstimate,
     /// End, s.
+    #[serde(skip)]
     pub to_s: BoundedEstimate,
     /// Deviation of the noise over that of the stretches around it.
+    #[serde(skip)]
     pub level: BoundedEstimate,
     /// Averaging time at which the levels are compared, s.
     pub tau_s: f64,

@@ -2,13 +2,16 @@
 
 use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, Parameter};
+use serde::Serialize;
 
 /// A change of the level of the noise.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LevelChange {
     /// When, s from the first sample.
+    #[serde(skip)]
     pub time_s: BoundedEstimate,
     /// Deviation of the noise after it over that before.
+    #[serde(skip)]
     pub ratio: BoundedEstimate,
     /// Part of the changes of the level from block to block that this one explains.
     pub explained: f64,

@@ -3,11 +3,13 @@
 use super::evidence::CurveEvidence;
 use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, Parameter};
+use serde::Serialize;
 
 /// A low-pass filter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LowPassFilter {
     /// Frequency at which half of the power is left.
+    #[serde(skip)]
     pub bandwidth_hz: BoundedEstimate,
     /// Its design.
     pub design: LowPassDesign,
@@ -16,7 +18,8 @@ pub struct LowPassFilter {
 }
 
 /// What a low-pass filter is made of.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum LowPassDesign {
     /// One stage of the first order, of one channel: a Markov process in the place of its white noise.
     OneStage {

@@ -3,20 +3,24 @@
 use super::evidence::CurveEvidence;
 use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use serde::Serialize;
 
 /// A Markov process.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MarkovProcess {
     /// Standard deviation.
+    #[serde(skip)]
     pub deviation: ChannelEstimate,
     /// Correlation time, s.
+    #[serde(skip)]
     pub time_constant_s: BoundedEstimate,
     /// What shows it.
     pub evidence: MarkovEvidence,
 }
 
 /// What shows a Markov process.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum MarkovEvidence {
     /// The curve.
     Curve(CurveEvidence),

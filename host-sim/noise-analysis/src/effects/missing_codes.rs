@@ -2,13 +2,15 @@
 
 use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use serde::Serialize;
 
 /// Missing codes of a converter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MissingCodes {
     /// How many of the codes that the record covers never occur.
     pub codes: u32,
     /// The largest distance of which all distances between missing codes are multiples; it is exact.
+    #[serde(skip)]
     pub spacing: ChannelEstimate,
     /// Samples that the missing codes would have if each had as many as the rarer of its neighbours.
     pub expected: f64,

@@ -5,17 +5,22 @@ use super::kind::{AddedVariance, AveragingTime, Kind, amplitude_at_frequency, no
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use allan_core::NoiseTerm;
 use allan_core::term::Sinusoid;
+use serde::Serialize;
 
 /// A line with an even change of its amplitude or of its phase.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModulatedLine {
     /// Hz
+    #[serde(skip)]
     pub frequency_hz: BoundedEstimate,
     /// Amplitude in the middle between its largest and its smallest value.
+    #[serde(skip)]
     pub amplitude: ChannelEstimate,
     /// Amplitude of the change over that of the line, or of the change of the phase in rad.
+    #[serde(skip)]
     pub depth: BoundedEstimate,
     /// Time from one maximum to the next, s.
+    #[serde(skip)]
     pub period_s: BoundedEstimate,
     /// Whether the phase changes, and not the amplitude.
     pub of_phase: bool,
@@ -24,7 +29,8 @@ pub struct ModulatedLine {
 }
 
 /// What shows that a line changes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ModulationEvidence {
     /// Its envelope over the record.
     Envelope {

@@ -2,9 +2,11 @@
 
 use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use serde::Serialize;
 
 /// By how much the mean of a second of a channel at rest may leave the median.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum MotionScale {
     /// By how much the biases of parts differ (1 σ), by the data sheet, in the unit of the channel.
     BiasError(f64),
@@ -13,13 +15,16 @@ pub enum MotionScale {
 }
 
 /// A motion.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MotionInterval {
     /// Beginning of the first stretch, s from the first sample.
+    #[serde(skip)]
     pub from_s: BoundedEstimate,
     /// End of the last one, s.
+    #[serde(skip)]
     pub to_s: BoundedEstimate,
     /// Largest distance of the mean of a second from the median.
+    #[serde(skip)]
     pub size: ChannelEstimate,
     /// What the distance is compared with.
     pub scale: MotionScale,

@@ -2,12 +2,14 @@
 
 use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use serde::Serialize;
 
 /// Noise below a count.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct NoiseBelowCount {
     /// Allan deviation at the shortest averaging times, where it is nearest to what dithers; 0 if the value never changes. Before the
     /// rounding it may be anything up to the upper bound.
+    #[serde(skip)]
     pub deviation: ChannelEstimate,
     /// The same in counts.
     pub counts: f64,

@@ -5,15 +5,19 @@ use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use crate::units::coefficient_unit;
 use allan_core::NoiseTerm;
+use serde::Serialize;
 
 /// The part's filter, as one channel shows it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct OutputFilter {
     /// Taps of each moving average.
+    #[serde(skip)]
     pub taps: BoundedEstimate,
     /// Samples of the part's own clock from one recorded sample to the next.
+    #[serde(skip)]
     pub decimation: BoundedEstimate,
     /// N of the white noise before the filter, in the unit times √s.
+    #[serde(skip)]
     pub white_noise: ChannelEstimate,
     /// Number of moving averages behind each other.
     pub stages: u8,

@@ -3,15 +3,19 @@
 use super::kind::{AddedVariance, AveragingTime, Kind, amplitude_at_frequency, no_course};
 use super::sinusoid::avar_of_sine;
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use serde::Serialize;
 
 /// A signal that repeats.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Periodic {
     /// Of its fundamental, Hz.
+    #[serde(skip)]
     pub frequency_hz: BoundedEstimate,
     /// Amplitude of the fundamental.
+    #[serde(skip)]
     pub amplitude: ChannelEstimate,
     /// Deviation of the second to the last harmonic over that of the fundamental, %.
+    #[serde(skip)]
     pub harmonics_percent: BoundedEstimate,
     /// Amplitudes of these harmonics, in the unit of the channel: 0 of one that does not show.
     pub harmonics: Vec<f64>,

@@ -5,18 +5,21 @@ use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use crate::units::coefficient_unit;
 use allan_core::NoiseTerm;
+use serde::Serialize;
 
 /// A steady drift.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LinearDrift {
     /// In the unit per s.
+    #[serde(skip)]
     pub slope: ChannelEstimate,
     /// What shows it.
     pub evidence: LinearDriftEvidence,
 }
 
 /// What shows a steady drift.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum LinearDriftEvidence {
     /// The curve.
     Curve(CurveEvidence),

@@ -2,11 +2,13 @@
 
 use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, Parameter};
+use serde::Serialize;
 
 /// Samples that were read twice.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RepeatedSamples {
     /// Part of all samples.
+    #[serde(skip)]
     pub fraction: BoundedEstimate,
     /// Number of those that equal the one before.
     pub equal: u64,

@@ -5,15 +5,19 @@ use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use allan_core::NoiseTerm;
 use allan_core::term::Resonance;
+use serde::Serialize;
 
 /// A line with a width.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ResonantLine {
     /// Hz
+    #[serde(skip)]
     pub frequency_hz: BoundedEstimate,
     /// Full width at half maximum, Hz.
+    #[serde(skip)]
     pub bandwidth_hz: BoundedEstimate,
     /// Standard deviation of the whole band.
+    #[serde(skip)]
     pub deviation: ChannelEstimate,
     /// The lines of the same signal, this one among them; `None` where it is alone.
     pub multiples: Option<Multiples>,

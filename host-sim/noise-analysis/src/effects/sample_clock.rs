@@ -2,11 +2,13 @@
 
 use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, Parameter};
+use serde::Serialize;
 
 /// A clock that is off, or that changes its rate.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ClockDeviation {
     /// By the time stamps of the whole record.
+    #[serde(skip)]
     pub rate_hz: BoundedEstimate,
     /// As stated, or the nearest usual one.
     pub nominal_hz: f64,
@@ -17,13 +19,16 @@ pub struct ClockDeviation {
 }
 
 /// A change of the sample rate at one time.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RateChange {
     /// When, s from the first sample.
+    #[serde(skip)]
     pub time_s: BoundedEstimate,
     /// The rate before it.
+    #[serde(skip)]
     pub before_hz: BoundedEstimate,
     /// The rate after it.
+    #[serde(skip)]
     pub after_hz: BoundedEstimate,
     /// Their difference in standard deviations.
     pub sigmas: f64,

@@ -2,13 +2,16 @@
 
 use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use serde::Serialize;
 
 /// Values at a limit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Saturation {
     /// Part of the samples that lie at a limit.
+    #[serde(skip)]
     pub fraction: BoundedEstimate,
     /// The limit with the most samples; it is exact.
+    #[serde(skip)]
     pub level: ChannelEstimate,
     /// Whether that is an end of the range.
     pub is_end_of_range: bool,

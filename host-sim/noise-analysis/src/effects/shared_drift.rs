@@ -2,11 +2,13 @@
 
 use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use serde::Serialize;
 
 /// A drift that looks like a sensitivity.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SharedDrift {
     /// Drift of the channel over that of the other one, in the unit over `per`.
+    #[serde(skip)]
     pub ratio: ChannelEstimate,
     /// Unit of the other channel.
     pub per: &'static str,

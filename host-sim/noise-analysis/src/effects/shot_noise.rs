@@ -6,17 +6,22 @@
 
 use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use serde::Serialize;
 
 /// Disturbances of one direction.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ShotNoise {
     /// Of disturbances of one size that make up the same, 1/h.
+    #[serde(skip)]
     pub rate_per_hour: BoundedEstimate,
     /// Their size, at the beginning of each; below 0 where they go downwards.
+    #[serde(skip)]
     pub size: ChannelEstimate,
     /// Time in which each falls to 1/e of its size, s.
+    #[serde(skip)]
     pub time_constant_s: BoundedEstimate,
     /// Standard deviation of the sum of all.
+    #[serde(skip)]
     pub deviation: ChannelEstimate,
     /// Third moment behind a filter for such disturbances, in standard deviations of that of a Gaussian process.
     pub sum: f64,

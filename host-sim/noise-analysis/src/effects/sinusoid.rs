@@ -5,13 +5,16 @@ use super::kind::{AddedVariance, AveragingTime, Kind, amplitude_at_frequency, no
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use allan_core::NoiseTerm;
 use allan_core::term::Sinusoid;
+use serde::Serialize;
 
 /// A steady line.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SinusoidalLine {
     /// Hz
+    #[serde(skip)]
     pub frequency_hz: BoundedEstimate,
     /// Amplitude.
+    #[serde(skip)]
     pub amplitude: ChannelEstimate,
     /// The lines of the same signal, this one among them; `None` where it is alone.
     pub multiples: Option<Multiples>,

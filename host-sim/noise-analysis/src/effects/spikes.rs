@@ -2,13 +2,16 @@
 
 use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use serde::Serialize;
 
 /// Samples that stand out.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spikes {
     /// 1/h
+    #[serde(skip)]
     pub rate_per_hour: BoundedEstimate,
     /// Distance from what the neighbours tell; in front of a filter, of the first sample that it changes from what those before it tell.
+    #[serde(skip)]
     pub size: ChannelEstimate,
     /// Number that was found.
     pub count: usize,

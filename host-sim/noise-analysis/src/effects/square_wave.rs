@@ -3,13 +3,16 @@
 use super::evidence::{LineEvidence, Multiples};
 use super::kind::{Kind, amplitude_at_frequency, no_variance};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use serde::Serialize;
 
 /// A signal that is switched.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SquareWave {
     /// Hz
+    #[serde(skip)]
     pub frequency_hz: BoundedEstimate,
     /// Half the distance of its levels.
+    #[serde(skip)]
     pub amplitude: ChannelEstimate,
     /// Its lines.
     pub multiples: Multiples,

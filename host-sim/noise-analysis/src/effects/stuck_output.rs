@@ -2,15 +2,19 @@
 
 use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, Parameter};
+use serde::Serialize;
 
 /// Runs of equal samples.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StuckOutput {
     /// Part of the samples that are in such runs.
+    #[serde(skip)]
     pub fraction: BoundedEstimate,
     /// Beginning of the longest run, s from the first sample.
+    #[serde(skip)]
     pub from_s: BoundedEstimate,
     /// Its end, s.
+    #[serde(skip)]
     pub to_s: BoundedEstimate,
     /// Number of the runs.
     pub runs: u64,

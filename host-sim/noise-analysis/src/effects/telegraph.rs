@@ -3,20 +3,24 @@
 use super::evidence::CurveEvidence;
 use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use serde::Serialize;
 
 /// Two levels.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TelegraphNoise {
     /// Time constant of the autocorrelation, s: half of the mean time between two jumps, where the levels are as frequent.
+    #[serde(skip)]
     pub time_constant_s: BoundedEstimate,
     /// Distance of the levels.
+    #[serde(skip)]
     pub amplitude: ChannelEstimate,
     /// What tells it from a Markov process.
     pub evidence: TelegraphEvidence,
 }
 
 /// What tells random telegraph noise from a Gaussian process of the same spectrum.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum TelegraphEvidence {
     /// The kurtosis behind the term of the curve.
     Kurtosis {

@@ -4,19 +4,23 @@ use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use super::response::ResponseVariance;
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use measurement::Quantity;
+use serde::Serialize;
 
 /// A sensitivity that changes with the temperature.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TemperatureCurvature {
     /// At the reference temperature, in the unit per °C.
+    #[serde(skip)]
     pub sensitivity: ChannelEstimate,
     /// Factor of the square, in the unit per °C².
+    #[serde(skip)]
     pub curvature: ChannelEstimate,
     /// Temperature at which the parabola is expanded, °C: the mean of the record.
     pub reference_degc: f64,
     /// Probability of such a curvature by chance in white, flicker and walking noise of any mixture.
     pub p_value: f64,
     /// Allan variance of the part that follows the square.
+    #[serde(skip)]
     pub response: ResponseVariance,
 }
 

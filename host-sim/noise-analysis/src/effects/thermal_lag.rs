@@ -4,17 +4,21 @@ use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use super::response::ResponseVariance;
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
 use measurement::Quantity;
+use serde::Serialize;
 
 /// A sensitivity to the temperature of some time ago.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ThermalLag {
     /// In the unit per °C.
+    #[serde(skip)]
     pub sensitivity: ChannelEstimate,
     /// Time constant of the lag, s.
+    #[serde(skip)]
     pub time_constant_s: BoundedEstimate,
     /// Probability of such a sensitivity by chance in white, flicker and walking noise of any mixture.
     pub p_value: f64,
     /// Allan variance of the bias that follows.
+    #[serde(skip)]
     pub response: ResponseVariance,
 }
 

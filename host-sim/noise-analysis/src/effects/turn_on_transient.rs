@@ -3,17 +3,21 @@
 use super::kind::{AddedVariance, AveragingTime, BiasBlocks, Kind, Occurrence};
 use super::response::ResponseVariance;
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use serde::Serialize;
 
 /// A transient of the bias after the start.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TurnOnTransient {
     /// Bias at the start less the bias that it settles to.
+    #[serde(skip)]
     pub size: ChannelEstimate,
     /// Time constant, s.
+    #[serde(skip)]
     pub time_constant_s: BoundedEstimate,
     /// Probability of such a transient by chance in white, flicker and walking noise of any mixture.
     pub p_value: f64,
     /// Allan variance of the transient.
+    #[serde(skip)]
     pub response: ResponseVariance,
 }
 

@@ -3,13 +3,16 @@
 use super::evidence::CurveEvidence;
 use super::kind::{Kind, Occurrence, no_variance};
 use crate::bounds::{BoundedEstimate, Parameter};
+use serde::Serialize;
 
 /// Something that no kind describes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Unexplained {
     /// Where it is.
+    #[serde(skip)]
     pub place: UnexplainedPlace,
     /// By how much the deviation there exceeds that of the model, %; `None` where it is not known to better than itself.
+    #[serde(skip)]
     pub excess_percent: Option<BoundedEstimate>,
     /// What was seen.
     pub observation: Observation,
@@ -32,7 +35,8 @@ pub enum UnexplainedPlace {
 }
 
 /// What was seen of something unexplained.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Observation {
     /// A point of the curve that the model does not reach.
     PointOfCurve {
@@ -65,7 +69,8 @@ pub enum Observation {
 }
 
 /// What contradicts a term that fits an octave of the curve.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Refutation {
     /// A line of a few periods in the record, which its curve does not tell from a drift.
     FewPeriods,
@@ -101,7 +106,8 @@ pub enum Refutation {
 }
 
 /// What contradicts a resonance.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum BandMismatch {
     /// The form of its spectrum.
     Shape {

@@ -3,11 +3,13 @@
 use super::kind::{AddedVariance, AveragingTime, Kind, Occurrence, no_course};
 use super::response::ResponseVariance;
 use crate::bounds::{BoundedEstimate, ChannelEstimate, Parameter};
+use serde::Serialize;
 
 /// A sensitivity to the strength of the vibration.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VibrationRectification {
     /// In the unit over the square of `per`.
+    #[serde(skip)]
     pub sensitivity: ChannelEstimate,
     /// Unit of the accelerometer.
     pub per: &'static str,
@@ -18,6 +20,7 @@ pub struct VibrationRectification {
     /// Probability of such a sensitivity by chance in white, flicker and walking noise of any mixture.
     pub p_value: f64,
     /// Allan variance of the bias that follows.
+    #[serde(skip)]
     pub response: ResponseVariance,
 }
 

@@ -253,20 +253,22 @@ impl ColumnSelection {
         chosen.iter().copied().filter(is_unitless).map(|(_, position)| position).collect()
     }
 
-    /// Which of the columns are not among the `chosen` ones, and why, and which units their names tell: a sentence each; none where the user
-    /// chooses the columns.
+    /// Which of the columns are not among the `chosen` ones, and why, and which units their names tell: a sentence each.
     pub(crate) fn notes(
         &self,
         available: &[AvailableColumn],
         chosen: &[ChosenColumn],
         sensor: &SensorProfile,
     ) -> Vec<String> {
+        let is_used = |at: &usize| chosen.iter().any(|column| column.position == *at);
         if !self.assignments.is_empty() {
-            return Vec::new();
+            let others = available.iter().enumerate().filter(|(at, _)| !is_used(at));
+            let others: Vec<&str> = others.map(|(_, column)| column.name.as_str()).collect();
+            let note = || format!("{} left out: --columns does not name it", listed(&others));
+            return (!others.is_empty()).then(note).into_iter().collect();
         }
         let named = by_name(available, sensor).unwrap_or_default();
         let unitless = self.unitless_companions(&named, available);
-        let is_used = |at: &usize| chosen.iter().any(|column| column.position == *at);
         let (mut no_channel, mut other_unit) = (Vec::new(), Vec::new());
         for (_, column) in available.iter().enumerate().filter(|(at, _)| !is_used(at) && !unitless.contains(at)) {
             match (sensor.channel(&column.name).or_else(|| column.channel(sensor)), column.unit) {
@@ -277,24 +279,24 @@ impl ColumnSelection {
         let mut notes = Vec::new();
         if !unitless.is_empty() {
             let names: Vec<&str> = unitless.iter().map(|&at| available[at].name.as_str()).collect();
-            notes.push(format!("{} left out: no unit; --units gives one", some_of(&names)));
+            notes.push(format!("{} left out: no unit; --units gives one", listed(&names)));
         }
         if !other_unit.is_empty() {
             let names: Vec<&str> = other_unit.iter().map(String::as_str).collect();
             notes.push(format!(
                 "{} left out: a unit of another quantity than the name; --columns reads it",
-                some_of(&names)
+                listed(&names)
             ));
         }
         if !no_channel.is_empty() {
-            notes.push(format!("{} left out: no known name of a channel; --columns reads it", some_of(&no_channel)));
+            notes.push(format!("{} left out: no known name of a channel; --columns reads it", listed(&no_channel)));
         }
         let by_interface = chosen.iter().filter(|column| self.unit_of_interface(column).is_some());
         let by_interface: Vec<&str> = by_interface.map(|column| column.label.as_str()).collect();
         if !by_interface.is_empty() {
             let of =
                 "in the units of the industrial I/O interface of Linux, rad/s, m/s^2 and gauss; --units says otherwise";
-            notes.push(format!("{} taken to be {of}", some_of(&by_interface)));
+            notes.push(format!("{} taken to be {of}", listed(&by_interface)));
         }
         notes
     }
@@ -443,11 +445,26 @@ fn names(available: &[AvailableColumn]) -> String {
     format!("{}{more}", shown.join(", "))
 }
 
-/// Names of columns in a note; of many the first, and how many there are.
-fn some_of(names: &[&str]) -> String {
-    const SHOWN: usize = 8;
-    let shown = names.iter().take(SHOWN).copied().collect::<Vec<_>>().join(", ");
-    if names.len() > SHOWN { format!("{shown}, … ({} columns)", names.len()) } else { shown }
+/// Names of columns in a note: `a[0…8]` are nine elements of an array.
+fn listed(names: &[&str]) -> String {
+    let element = |name: &str| {
+        let (array, number) = name.strip_suffix(']')?.rsplit_once('[')?;
+        Some((array.to_owned(), number.parse::<usize>().ok()?))
+    };
+    let mut all: Vec<String> = Vec::new();
+    let mut rest = names;
+    while let Some((&first, after)) = rest.split_first() {
+        let follows = |(at, name): &(usize, &&str)| {
+            element(first).is_some_and(|(array, start)| element(name) == Some((array, start + at)))
+        };
+        let elements = rest.iter().enumerate().take_while(follows).count();
+        match element(first).filter(|_| elements > 1) {
+            Some((array, start)) => all.push(format!("{array}[{start}…{}]", start + elements - 1)),
+            None => all.push(first.to_owned()),
+        }
+        rest = if elements > 1 { &rest[elements..] } else { after };
+    }
+    all.join(", ")
 }
 
 /// The unit of a magnetic field in `G`, which is gauss and not gravity.
@@ -684,6 +701,22 @@ mod tests {
             (format!("{role}={}", column.position), column.factor)
         };
         Ok(selection.choose(&available, &SensorProfile::generic())?.into_iter().map(describe).collect())
+    }
+
+    #[test]
+    fn every_column_that_is_left_out_is_named_with_why() {
+        let headings = ["t [s]", "gx [dps]", "gy [dps]", "gz [dps]", "cov[0]", "cov[1]", "cov[2]", "cov[4]", "state"];
+        let available: Vec<AvailableColumn> = headings.iter().map(|text| AvailableColumn::from_heading(text)).collect();
+        for (columns, expected) in [
+            (&[][..], "cov[0…2], cov[4], state left out: no known name of a channel; --columns reads it"),
+            (&["time=t", "gyro_x=gx"], "gy, gz, cov[0…2], cov[4], state left out: --columns does not name it"),
+        ] {
+            let columns: Vec<String> = columns.iter().map(|text| (*text).to_owned()).collect();
+            let selection = ColumnSelection::parse(&columns, &[]).expect("columns");
+            let sensor = SensorProfile::generic();
+            let chosen = selection.choose(&available, &sensor).expect("columns");
+            assert_eq!(selection.notes(&available, &chosen, &sensor), [expected]);
+        }
     }
 
     #[test]

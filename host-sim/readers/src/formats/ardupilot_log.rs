@@ -4,7 +4,7 @@
 
 use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::AvailableColumn;
-use crate::formats::topics::{EachRow, Ending, Source, Topic, TopicSensor};
+use crate::formats::topics::{EachRow, Ending, Offer, Source, Topic, TopicSensor};
 use crate::input::budget::{Budget, Metered};
 use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::{InputError, Reason};
@@ -94,9 +94,8 @@ impl Rows {
 /// An open log.
 pub(crate) struct ArduPilotSource<'a> {
     file: &'a FileBytes,
-    topics: Vec<Topic>,
+    offer: Offer,
     rows: Vec<Rows>,
-    preferred: Option<String>,
     budget: Budget,
 }
 
@@ -117,21 +116,13 @@ impl<'a> ArduPilotSource<'a> {
         let topics: Vec<Topic> = counted.iter().map(|(rows, count)| rows.topic(format(rows), *count)).collect();
         let rows: Vec<Rows> = counted.into_keys().collect();
         let preferred = topics.iter().find(|topic| !topic.sensors.is_empty()).map(|topic| topic.name.clone());
-        Ok(Self { file, topics, rows, preferred, budget })
+        Ok(Self { file, offer: Offer { preferred, ..Offer::new(FORMAT, topics) }, rows, budget })
     }
 }
 
 impl Source for ArduPilotSource<'_> {
-    fn format(&self) -> &'static str {
-        FORMAT
-    }
-
-    fn topics(&self) -> &[Topic] {
-        &self.topics
-    }
-
-    fn preferred(&self) -> Option<&str> {
-        self.preferred.as_deref()
+    fn offer(&self) -> &Offer {
+        &self.offer
     }
 
     fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError> {

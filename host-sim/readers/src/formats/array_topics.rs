@@ -3,7 +3,7 @@
 use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::{AvailableColumn, known_by_name};
 use crate::columns::unit::Unit;
-use crate::formats::topics::{EachRow, Ending, Source, Topic, TopicSensor};
+use crate::formats::topics::{EachRow, Ending, Offer, Source, Topic, TopicSensor};
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
 use crate::rows::batch::Number;
@@ -120,7 +120,7 @@ pub(crate) struct ArraySource<'a, R> {
     file: &'a Path,
     reader: R,
     arrays: Vec<NamedArray>,
-    topics: Vec<Topic>,
+    offer: Offer,
     /// Array and column of each column of the whole file, and those columns of each topic.
     places: Vec<(usize, usize)>,
     members: Vec<Vec<usize>>,
@@ -136,7 +136,8 @@ impl<'a, R: ArrayReader> ArraySource<'a, R> {
             .enumerate()
             .flat_map(|(number, array)| (0..array.columns.len()).map(move |column| (number, column)))
             .collect();
-        let mut source = Self { file, reader, arrays, topics: Vec::new(), places, members: Vec::new(), budget };
+        let offer = Offer { whole: Some(0), ..Offer::new(R::FORMAT, Vec::new()) };
+        let mut source = Self { file, reader, arrays, offer, places, members: Vec::new(), budget };
         let paths: Vec<String> = source.arrays.iter().map(NamedArray::path).collect();
         let groups_of: Vec<String> = source.arrays.iter().map(|array| array.group.clone()).collect();
         source.add_topic(String::new(), |_| true);
@@ -144,7 +145,7 @@ impl<'a, R: ArrayReader> ArraySource<'a, R> {
         for group in groups_of.iter().filter(|group| known.insert(group.as_str())) {
             let name = group.trim_end_matches(['.', '/']).to_owned();
             let topic = if name.is_empty() { 0 } else { source.add_topic(name, |at| groups_of[at].starts_with(group)) };
-            source.topics[topic].sensors = source.sensor(group, topic).into_iter().collect();
+            source.offer.topics[topic].sensors = source.sensor(group, topic).into_iter().collect();
         }
         for path in paths.iter().filter(|path| !path.is_empty()) {
             source.add_topic(path.clone(), |at| paths[at] == *path);
@@ -161,9 +162,9 @@ impl<'a, R: ArrayReader> ArraySource<'a, R> {
         };
         let columns = members.iter().map(available).collect();
         let rows = members.first().map(|&at| self.arrays[self.places[at].0].rows as u64);
-        self.topics.push(Topic { name, rows, columns, ..Topic::default() });
+        self.offer.topics.push(Topic { name, rows, columns, ..Topic::default() });
         self.members.push(members);
-        self.topics.len() - 1
+        self.offer.topics.len() - 1
     }
 
     /// The rate that the file states for some columns of a topic, Hz, and what states it.
@@ -244,16 +245,8 @@ fn set_stated_rates(reader: &mut impl ArrayReader, arrays: &mut [NamedArray]) {
 }
 
 impl<R: ArrayReader> Source for ArraySource<'_, R> {
-    fn format(&self) -> &'static str {
-        R::FORMAT
-    }
-
-    fn topics(&self) -> &[Topic] {
-        &self.topics
-    }
-
-    fn whole(&self) -> Option<usize> {
-        Some(0)
+    fn offer(&self) -> &Offer {
+        &self.offer
     }
 
     /// Arrays of one length: all of them where their names are those of one sensor, else those of a group and the groups in it.
@@ -262,7 +255,7 @@ impl<R: ArrayReader> Source for ArraySource<'_, R> {
         for (at, member) in self.members[topic].iter().enumerate() {
             by_rows.entry(self.arrays[self.places[*member].0].rows).or_default().push(at);
         }
-        let columns = &self.topics[topic].columns;
+        let columns = &self.offer.topics[topic].columns;
         let mut tables = Vec::new();
         // Arrays of one number come last.
         for all in by_rows.into_values().rev() {

@@ -151,29 +151,39 @@ const EXACT_DIGITS: usize = 15;
 
 /// Most numbers: at most 18 digits without decimals, or 15 of which some are decimals; `None` for other texts.
 fn short_number(field: &[u8]) -> Option<Number> {
+    leading_number(field).filter(|(_, rest)| rest.is_empty()).map(|(number, _)| number)
+}
+
+/// Such a number at the start of `text`, and what follows it.
+#[inline]
+pub(crate) fn leading_number(text: &[u8]) -> Option<(Number, &[u8])> {
     const POWERS: [f64; EXACT_DIGITS + 1] =
         [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
-    let (is_negative, text) = field.strip_prefix(b"-").map_or((false, field), |text| (true, text));
-    if text.len() > 18 {
+    const MOST: usize = 18;
+    let is_negative = text.first() == Some(&b'-');
+    let start = usize::from(is_negative);
+    let (mut end, mut value, mut point) = (start, 0_i64, None);
+    while let Some(byte) = text.get(end) {
+        match byte.wrapping_sub(b'0') {
+            digit if digit < 10 => value = value.wrapping_mul(10).wrapping_add(i64::from(digit)),
+            _ if *byte == b'.' && point.is_none() => point = Some(end),
+            _ => break,
+        }
+        end += 1;
+    }
+    let (length, rest) = (end - start, &text[end..]);
+    if length == 0 || length > MOST {
         return None;
     }
-    let (mut value, mut point) = (0_i64, None);
-    for (at, byte) in text.iter().enumerate() {
-        match byte.wrapping_sub(b'0') {
-            digit if digit < 10 => value = 10 * value + i64::from(digit),
-            _ if *byte == b'.' && point.is_none() => point = Some(at),
-            _ => return None,
-        }
-    }
     let Some(point) = point else {
-        return (!text.is_empty()).then_some(Number::Integer(if is_negative { -value } else { value }));
+        return Some((Number::Integer(if is_negative { -value } else { value }), rest));
     };
-    let digits = text.len() - 1;
+    let digits = length - 1;
     if digits == 0 || digits > EXACT_DIGITS {
         return None;
     }
-    let size = value as f64 / POWERS[digits - point];
-    Some(Number::Real(if is_negative { -size } else { size }))
+    let size = value as f64 / POWERS[digits + start - point];
+    Some((Number::Real(if is_negative { -size } else { size }), rest))
 }
 
 #[cfg(test)]

@@ -219,6 +219,13 @@ impl InputFile {
         FileHash::begin(&self.parts.iter().map(|part| part.origin.clone()).collect::<Vec<_>>())
     }
 
+    /// How many rows there are, by the bytes that were read for the first `rows` of them; `None` where they are not counted.
+    pub fn expected_rows(&self, rows: u64) -> Option<u64> {
+        let [part] = self.parts.as_slice() else { return None };
+        let (length, read) = (part.bytes.length().ok()??, self.monitor.bytes());
+        (read > 0).then(|| (rows as f64 * length as f64 / read as f64) as u64)
+    }
+
     /// As the user named it.
     pub fn name(&self) -> &Path {
         &self.name
@@ -283,10 +290,7 @@ impl InputFile {
                     table => table.map(|table| vec![table]),
                 }
             }
-            _ => {
-                let source = self.source();
-                source.and_then(|mut source| topics::read_whole(name, source.as_mut(), topic, self.budget))
-            }
+            _ => self.source().and_then(|source| topics::read_whole(name, source, topic, self.budget)),
         };
         let inspect = |table: WholeTable| {
             let names: Vec<&str> = table.columns.iter().map(|of| of.column.name.as_str()).collect();

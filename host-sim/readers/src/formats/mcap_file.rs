@@ -1,23 +1,30 @@
-//! Records of an MCAP file, those in chunks included, in the memory of one record.
+//! Records of an MCAP file, those in chunks included, in the memory of one chunk.
 //!
 //! The crate `mcap` is not used: its decompression needs a compiler of C.
 
-use crate::input::budget::Budget;
+use crate::input::budget::{Budget, Meter, Metered};
 use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::{InputError, Reason};
 use crate::input::zstd_frames::ZstdFrames;
 use flate2::Crc;
 use lz4_flex::frame::FrameDecoder;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
 pub(crate) const FORMAT: &str = "MCAP";
 
 /// Largest record or chunk, compressed or not, bytes: images are larger than a message of an IMU, but not so large.
 const MAX_RECORD: usize = 1 << 28;
-/// First bytes of a file.
-const MAGIC_BYTES: u64 = 8;
+/// Largest summary that is read, bytes: it has the index of each chunk.
+const MAX_SUMMARY: u64 = 1 << 26;
+/// First and last bytes of a file.
+const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 /// Type and length before each record.
 const HEADER_BYTES: usize = 1 + 8;
+/// The footer, whose first field is the position of the summary, and the last bytes of a file.
+const END_BYTES: usize = HEADER_BYTES + 8 + 8 + 4 + MAGIC.len();
+/// Position of the messages of each channel in the statistics, and length of one entry.
+const COUNTS_AT: usize = 8 + 2 + 4 * 4 + 2 * 8;
+const COUNT_BYTES: usize = 2 + 8;
 /// Position of the CRC of a chunk, and after it the name of its compression: after its times and its uncompressed size.
 const CRC_AT: usize = 8 + 8 + 8;
 
@@ -28,6 +35,7 @@ mod op {
     pub(super) const CHANNEL: u8 = 4;
     pub(super) const MESSAGE: u8 = 5;
     pub(super) const CHUNK: u8 = 6;
+    pub(super) const STATISTICS: u8 = 11;
 }
 
 /// The records that tell what messages there are, and the messages.
@@ -51,6 +59,22 @@ pub(crate) enum McapRecord<'a> {
         log_ns: u64,
         data: &'a [u8],
     },
+    /// How many messages each channel has, in a summary.
+    Counts(MessageCounts<'a>),
+}
+
+/// Messages of each channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct MessageCounts<'a>(&'a [u8]);
+
+impl MessageCounts<'_> {
+    /// Each channel with its number of messages.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (u16, u64)> {
+        self.0.chunks_exact(COUNT_BYTES).filter_map(|entry| {
+            let (channel, count) = entry.split_first_chunk()?;
+            Some((u16::from_le_bytes(*channel), u64::from_le_bytes(*count.first_chunk()?)))
+        })
+    }
 }
 
 impl<'a> McapRecord<'a> {
@@ -70,6 +94,7 @@ impl<'a> McapRecord<'a> {
                 })
             }
             op::MESSAGE => fields.message(),
+            op::STATISTICS => fields.take(COUNTS_AT).and_then(|_| fields.bytes()).map(MessageCounts).map(Self::Counts),
             _ => return Ok(None),
         };
         record.map(Some).ok_or_else(|| damaged("a record is cut off"))
@@ -92,8 +117,7 @@ impl<'a> Fields<'a> {
 
     fn schema(&mut self) -> Option<McapRecord<'a>> {
         let (id, name, encoding) = (self.number()?, self.text()?, self.text()?);
-        let length = u32::from_le_bytes(*self.take(4)?.first_chunk()?);
-        Some(McapRecord::Schema { id, name, encoding, definition: self.take(length as usize)? })
+        Some(McapRecord::Schema { id, name, encoding, definition: self.bytes()? })
     }
 
     fn message(&mut self) -> Option<McapRecord<'a>> {
@@ -103,14 +127,22 @@ impl<'a> Fields<'a> {
         Some(McapRecord::Message { channel, log_ns, data: self.0 })
     }
 
-    fn text(&mut self) -> Option<&'a str> {
+    fn bytes(&mut self) -> Option<&'a [u8]> {
         let length = u32::from_le_bytes(*self.take(4)?.first_chunk()?);
-        std::str::from_utf8(self.take(length as usize)?).ok()
+        self.take(length as usize)
+    }
+
+    fn text(&mut self) -> Option<&'a str> {
+        std::str::from_utf8(self.bytes()?).ok()
     }
 }
 
 fn damaged(error: &str) -> Reason {
     Reason::Format { format: FORMAT, error: error.to_owned().into() }
+}
+
+fn cut_off() -> Reason {
+    damaged("a chunk is cut off")
 }
 
 /// Type and length of the record that begins with `header`.
@@ -132,42 +164,59 @@ impl From<Reason> for Stop {
     }
 }
 
+/// Takes the records of a file.
+type EachRecord<'a> = dyn FnMut(McapRecord) -> Result<(), InputError> + 'a;
+
 /// Gives every record to `each`; and why there are no more where the file is damaged or ends early.
 pub(crate) fn for_each_record(
     file: &FileBytes,
     budget: Budget,
     mut each: impl FnMut(McapRecord) -> Result<(), InputError>,
 ) -> Result<Option<Reason>, InputError> {
-    let mut meter = budget.meter();
-    let mut each = |opcode: u8, bytes: &[u8]| match meter
-        .add_bytes(bytes.len() as u64)
-        .and_then(|()| McapRecord::decode(opcode, bytes))
-    {
-        Ok(record) => record.map_or(Ok(()), |record| each(record).map_err(Stop::Refusal)),
-        Err(reason) => Err(Stop::Damage(reason)),
-    };
-    match read(file, &mut each) {
+    match read(file, &mut budget.meter(), &mut each) {
         Ok(()) => Ok(None),
         Err(Stop::Damage(reason)) => Ok(Some(reason)),
         Err(Stop::Refusal(error)) => Err(error),
     }
 }
 
-/// Bytes of a chunk that are decompressed at once.
-const PIECE_BYTES: usize = 1 << 16;
+/// Gives the records of the summary at the end of a file to `each`: all schemas and channels, and how many messages there are. False where
+/// the file has no such summary, as after a recording that was interrupted.
+pub(crate) fn for_each_of_summary(file: &FileBytes, mut each: impl FnMut(McapRecord)) -> bool {
+    let summary = || -> io::Result<Vec<u8>> {
+        let mut input = file.open()?;
+        let end = input.seek(SeekFrom::End(-(END_BYTES as i64)))?;
+        let mut footer = [0; END_BYTES];
+        input.read_exact(&mut footer)?;
+        let start = footer[HEADER_BYTES..].first_chunk().map_or(0, |start| u64::from_le_bytes(*start));
+        let is_whole = footer[0] == op::FOOTER && footer.ends_with(MAGIC) && (1..end).contains(&start);
+        let mut summary = Vec::new();
+        if is_whole && end - start <= MAX_SUMMARY {
+            input.seek(SeekFrom::Start(start))?;
+            input.take(end - start).read_to_end(&mut summary)?;
+        }
+        Ok(summary)
+    };
+    let mut has_counts = false;
+    let read = summary().map(|summary| {
+        records(&summary, &mut |record| {
+            has_counts |= matches!(record, McapRecord::Counts(_));
+            each(record);
+            Ok(())
+        })
+    });
+    has_counts && matches!(read, Ok(Ok(())))
+}
 
-/// Takes the operation code and the content of a record.
-type EachRecord<'a> = dyn FnMut(u8, &[u8]) -> Result<(), Stop> + 'a;
-
-fn read(file: &FileBytes, each: &mut EachRecord) -> Result<(), Stop> {
+fn read(file: &FileBytes, meter: &mut Meter, each: &mut EachRecord) -> Result<(), Stop> {
     let fail = |error| Stop::Refusal(file.error(Reason::Io(error)));
     let mut input = BufReader::new(file.open().map_err(fail)?);
-    let mut data = Vec::new();
+    let (mut data, mut unpacked) = (Vec::new(), Vec::new());
     let mut next = |bytes: u64, data: &mut Vec<u8>| {
         data.clear();
         input.by_ref().take(bytes).read_to_end(data).map_err(fail)
     };
-    next(MAGIC_BYTES, &mut data)?;
+    next(MAGIC.len() as u64, &mut data)?;
     loop {
         next(HEADER_BYTES as u64, &mut data)?;
         let Some(&header) = data.first_chunk() else {
@@ -177,9 +226,9 @@ fn read(file: &FileBytes, each: &mut EachRecord) -> Result<(), Stop> {
         next(length as u64, &mut data)?;
         let is_whole = data.len() == length;
         match opcode {
-            op::CHUNK => chunk(&data, each)?,
+            op::CHUNK => chunk(&data, &mut unpacked, meter, each)?,
             op::FOOTER => return Ok(()),
-            _ if is_whole => each(opcode, &data)?,
+            _ if is_whole => give(opcode, &data, each)?,
             _ => {}
         }
         if !is_whole {
@@ -188,54 +237,50 @@ fn read(file: &FileBytes, each: &mut EachRecord) -> Result<(), Stop> {
     }
 }
 
-/// The records of a chunk, which may be cut off.
-fn chunk(data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
-    let cut_off = || damaged("a chunk is cut off");
+fn give(opcode: u8, data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
+    McapRecord::decode(opcode, data)?.map_or(Ok(()), |record| each(record).map_err(Stop::Refusal))
+}
+
+/// The records of a chunk, which may be cut off; `unpacked` is where they are decompressed.
+fn chunk(data: &[u8], unpacked: &mut Vec<u8>, meter: &mut Meter, each: &mut EachRecord) -> Result<(), Stop> {
     let mut fields = Fields(data.get(CRC_AT..).ok_or_else(cut_off)?);
     let crc = fields.take(4).and_then(|bytes| bytes.first_chunk().copied()).map(u32::from_le_bytes);
     let (crc, compression) = crc.zip(fields.text()).ok_or_else(cut_off)?;
     // The length of the records, which follow.
     fields.take(8).ok_or_else(cut_off)?;
     let packed = fields.0;
-    let unpacked: Box<dyn Read + '_> = match compression {
-        "" => Box::new(packed),
+    let decoder: Box<dyn Read + '_> = match compression {
+        "" => Box::new(io::empty()),
         "lz4" => Box::new(FrameDecoder::new(packed)),
         "zstd" => Box::new(ZstdFrames::new(packed)),
         other => return Err(damaged(&format!("a chunk is compressed by {other}, which is not known")).into()),
     };
-    // The checksum and the decoders are slow in pieces of a record.
-    let mut input = BufReader::with_capacity(PIECE_BYTES, Summed { input: unpacked, crc: Crc::new() });
-    let failed = |error: io::Error| Stop::Damage(damaged(&format!("a chunk is damaged: {error}")));
-    let mut record = Vec::new();
-    loop {
-        record.clear();
-        input.by_ref().take(HEADER_BYTES as u64).read_to_end(&mut record).map_err(failed)?;
-        let Some(&header) = record.first_chunk() else { break };
-        let (opcode, length) = type_and_length(header)?;
-        record.clear();
-        input.by_ref().take(length as u64).read_to_end(&mut record).map_err(failed)?;
-        if record.len() < length {
-            return Err(cut_off().into());
-        }
-        each(opcode, &record)?;
+    unpacked.clear();
+    let failure = Metered::new(decoder, meter).take(MAX_RECORD as u64).read_to_end(unpacked).err();
+    let content = if compression.is_empty() { packed } else { unpacked.as_slice() };
+    // Those before the damage can be used.
+    let read = records(content, each);
+    if let Some(error) = failure {
+        return Err(match Reason::from_io(error) {
+            Reason::Io(error) => damaged(&format!("a chunk is damaged: {error}")).into(),
+            limit => limit.into(),
+        });
     }
-    // Less than a header may be left of a chunk that is cut off.
-    let is_right = record.is_empty() && (crc == 0 || crc == input.get_ref().crc.sum());
-    if is_right { Ok(()) } else { Err(damaged("the checksum of a chunk is wrong").into()) }
+    read?;
+    let mut sum = Crc::new();
+    sum.update(content);
+    if crc == 0 || crc == sum.sum() { Ok(()) } else { Err(damaged("the checksum of a chunk is wrong").into()) }
 }
 
-/// An input, and the checksum of what was read of it.
-struct Summed<'a> {
-    input: Box<dyn Read + 'a>,
-    crc: Crc,
-}
-
-impl Read for Summed<'_> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let read = self.input.read(buffer)?;
-        self.crc.update(&buffer[..read]);
-        Ok(read)
+/// The records in `bytes`, one after the other.
+fn records(mut bytes: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
+    while let Some((header, rest)) = bytes.split_first_chunk() {
+        let (opcode, length) = type_and_length(*header)?;
+        let (record, rest) = rest.split_at_checked(length).ok_or_else(cut_off)?;
+        give(opcode, record, each)?;
+        bytes = rest;
     }
+    if bytes.is_empty() { Ok(()) } else { Err(cut_off().into()) }
 }
 
 #[cfg(test)]

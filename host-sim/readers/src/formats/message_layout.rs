@@ -144,6 +144,36 @@ impl MessageLayout {
         Ok(Self { columns: builder.columns, steps })
     }
 
+    /// The same columns, of which only the wanted ones are decoded; nothing after the last of them is read.
+    pub(crate) fn only(&self, is_wanted: impl Fn(usize) -> bool) -> Self {
+        let mut steps: Vec<Step> = Vec::new();
+        let mut end = 0;
+        for step in &self.steps {
+            let has_wanted = match step {
+                Step::Number(_, column) | Step::Time(column) => column.is_some_and(&is_wanted),
+                Step::Sequence(_, first, columns) => (*first..first + columns).any(&is_wanted),
+                Step::Text | Step::Repeat(..) | Step::Unknown => false,
+            };
+            match (step, steps.last_mut()) {
+                // Numbers of one size one after the other are skipped as one.
+                (Step::Number(scalar, _), Some(Step::Repeat(Repeat::Times(count), each)))
+                    if !has_wanted && matches!(each[..], [Step::Number(of, _)] if of.bytes() == scalar.bytes()) =>
+                {
+                    *count += 1;
+                }
+                (Step::Number(scalar, _), _) if !has_wanted => {
+                    steps.push(Step::Repeat(Repeat::Times(1), vec![Step::Number(*scalar, None)]));
+                }
+                (step, _) => steps.push(step.clone()),
+            }
+            if has_wanted {
+                end = steps.len();
+            }
+        }
+        steps.truncate(end);
+        Self { columns: self.columns.clone(), steps }
+    }
+
     /// The columns, in the order of the message.
     pub(crate) fn columns(&self) -> &[MessageColumn] {
         &self.columns
@@ -251,8 +281,9 @@ fn run(steps: &[Step], cursor: &mut Cursor, row: &mut [Number]) -> Option<()> {
             }
             Step::Time(column) => {
                 let (seconds, nanoseconds) = (cursor.word(4)?, cursor.word(4)?);
-                // Signed in ROS 2; unsigned seconds of ROS 1 end in 2106.
-                let seconds = i64::from((seconds as u32).cast_signed());
+                // Seconds are signed in ROS 2 and unsigned in ROS 1.
+                let seconds = seconds as u32;
+                let seconds = if cursor.is_packed { i64::from(seconds) } else { i64::from(seconds.cast_signed()) };
                 if let Some(column) = column {
                     row[*column] = Number::Integer(seconds * 1_000_000_000 + nanoseconds.cast_signed());
                 }
@@ -306,13 +337,14 @@ struct Cursor<'a> {
     origin: usize,
     most: usize,
     is_big: bool,
+    is_packed: bool,
 }
 
 impl<'a> Cursor<'a> {
     fn new(bytes: &'a [u8], encoding: Encoding) -> Option<Self> {
         const ENCAPSULATION: usize = 4;
         let (most, is_big) = match encoding {
-            Encoding::Packed => return Some(Self { bytes, at: 0, origin: 0, most: 1, is_big: false }),
+            Encoding::Packed => return Some(Self { bytes, at: 0, origin: 0, most: 1, is_big: false, is_packed: true }),
             // Plain CDR of version 1 and 2 (DDS-XTypes 1.3, table 60), which differ in the alignment of 8 bytes.
             Encoding::Cdr => match bytes.get(..2)? {
                 [0, 0] => (8, true),
@@ -323,7 +355,7 @@ impl<'a> Cursor<'a> {
             },
         };
         bytes.get(..ENCAPSULATION)?;
-        Some(Self { bytes, at: ENCAPSULATION, origin: ENCAPSULATION, most, is_big })
+        Some(Self { bytes, at: ENCAPSULATION, origin: ENCAPSULATION, most, is_big, is_packed: false })
     }
 
     fn align(&mut self, size: usize) {
@@ -340,13 +372,34 @@ impl<'a> Cursor<'a> {
         self.align(size);
         let own = self.bytes.get(self.at..self.at.checked_add(size)?)?;
         self.at += size;
-        let mut word = [0; 8];
-        for (to, from) in word.iter_mut().zip(own) {
-            *to = *from;
+        let word = match *own {
+            [byte] => u64::from(byte),
+            [a, b] => u64::from(u16::from_le_bytes([a, b])),
+            [a, b, c, d] => u64::from(u32::from_le_bytes([a, b, c, d])),
+            _ => u64::from_le_bytes(own.try_into().ok()?),
+        };
+        Some(if self.is_big { word.swap_bytes() >> (64 - 8 * size) } else { word })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Encoding;
+    use crate::formats::ros_definition::{RosVersion, layout};
+    use crate::rows::batch::Number;
+
+    /// 2065 in ROS 1, whose seconds are unsigned; before 1970 in ROS 2, whose seconds are signed.
+    #[test]
+    fn seconds_beyond_31_bits_are_those_of_the_version() {
+        let stamp = [3_000_000_000u32.to_le_bytes(), 500u32.to_le_bytes()].concat();
+        for (version, kind, encoding, head, expected) in [
+            (RosVersion::Ros1, "time", Encoding::Packed, &[][..], 3_000_000_000_000_000_500),
+            (RosVersion::Ros2, "builtin_interfaces/Time", Encoding::Cdr, &[0, 1, 0, 0], -1_294_967_295_999_999_500),
+        ] {
+            let layout = layout("test/Stamp", &format!("{kind} stamp\n"), version).expect("a definition");
+            let mut row = Vec::new();
+            layout.decode(&[head, &stamp].concat(), encoding, &mut row).expect("a message");
+            assert_eq!(row, [Number::Integer(expected)], "{kind}");
         }
-        if self.is_big {
-            word[..size].reverse();
-        }
-        Some(u64::from_le_bytes(word))
     }
 }

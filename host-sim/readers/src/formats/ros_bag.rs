@@ -7,14 +7,14 @@
 use crate::formats::message_layout::{Encoding, MessageLayout};
 use crate::formats::ros_definition::{self, RosVersion};
 use crate::formats::ros_message::{self, RosRows};
-use crate::formats::topics::{EachRow, Ending, Source, Topic};
+use crate::formats::topics::{EachRow, Ending, Offer, Source};
 use crate::input::budget::{Budget, Meter, Metered};
 use crate::input::file_bytes::{FileBytes, OpenBytes};
 use crate::input::input_error::{InputError, Reason};
 use bzip2::read::BzDecoder;
 use lz4_flex::frame::FrameDecoder;
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom};
+use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom};
 
 const FORMAT: &str = "ROS 1 bag";
 /// First line of every bag.
@@ -23,6 +23,9 @@ const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 const MOST_HEADER_BYTES: u32 = 1 << 20;
 /// Bytes of a message, or of the definition of one: images have some of ten million.
 const MOST_DATA_BYTES: u32 = 1 << 28;
+
+/// Size of each buffer: many messages of a sensor.
+const BUFFER_BYTES: usize = 1 << 16;
 
 /// Kinds of records.
 const MESSAGE: u8 = 2;
@@ -68,7 +71,7 @@ type EachRecord<'a> = dyn FnMut(Record) -> Result<(), InputError> + 'a;
 /// An open bag.
 pub(crate) struct RosBagSource<'a> {
     file: &'a FileBytes,
-    topics: Vec<Topic>,
+    offer: Offer,
     /// Of each topic.
     layouts: Vec<MessageLayout>,
     connections: Vec<BTreeSet<u32>>,
@@ -122,17 +125,13 @@ impl<'a> RosBagSource<'a> {
             layouts.push(layout);
             connections.push(ids);
         }
-        Ok(Self { file, topics, layouts, connections, budget })
+        Ok(Self { file, offer: Offer::new(FORMAT, topics), layouts, connections, budget })
     }
 }
 
 impl Source for RosBagSource<'_> {
-    fn format(&self) -> &'static str {
-        FORMAT
-    }
-
-    fn topics(&self) -> &[Topic] {
-        &self.topics
+    fn offer(&self) -> &Offer {
+        &self.offer
     }
 
     fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError> {
@@ -156,7 +155,7 @@ struct BagBytes {
 
 impl BagBytes {
     fn open(file: &FileBytes) -> Result<Self, Reason> {
-        let mut input = BufReader::new(file.open().map_err(Reason::Io)?);
+        let mut input = BufReader::with_capacity(BUFFER_BYTES, file.open().map_err(Reason::Io)?);
         input.seek(SeekFrom::Start(MAGIC.len() as u64)).map_err(Reason::Io)?;
         Ok(Self { input })
     }
@@ -192,40 +191,70 @@ fn for_each_record(
     }
 }
 
-fn read_records(input: &mut dyn Read, meter: &mut Meter, has_chunks: bool, each: &mut EachRecord) -> Result<(), Stop> {
+fn read_records(
+    input: &mut dyn BufRead,
+    meter: &mut Meter,
+    has_chunks: bool,
+    each: &mut EachRecord,
+) -> Result<(), Stop> {
     let (mut header, mut data) = (Vec::new(), Vec::new());
-    while next_record(input, &mut header)? {
-        let kind = kind(&header);
-        if kind == Some(CHUNK) && has_chunks {
+    loop {
+        // Most records lie in the buffer as a whole.
+        if let Some((header, data)) = whole_record(input.fill_buf().map_err(refused)?)
+            && (kind(header) != Some(CHUNK) || !has_chunks)
+        {
+            give(header, data, each)?;
+            let length = 4 + header.len() + 4 + data.len();
+            input.consume(length);
+            continue;
+        }
+        if !next_record(input, &mut header)? {
+            return Ok(());
+        }
+        if kind(&header) == Some(CHUNK) && has_chunks {
             let mut length = [0; 4];
             fill(input, &mut length)?;
             read_chunk(&mut Read::take(&mut *input, number(&length)), &header, meter, each)?;
             continue;
         }
         read_data(input, &mut data)?;
-        let id = field(&header, b"conn").map(|value| number(value) as u32);
-        let record = match (kind, id) {
-            (Some(MESSAGE), Some(connection)) => {
-                let time = field(&header, b"time").unwrap_or_default();
-                let [seconds, nanos] = [0, 4].map(|at| number(time.get(at..at + 4).unwrap_or_default()) as i64);
-                Record::Message { connection, recorded_ns: seconds * 1_000_000_000 + nanos, data: &data }
-            }
-            (Some(CONNECTION), Some(id)) => {
-                let text =
-                    |of: &[u8], name: &[u8]| String::from_utf8_lossy(field(of, name).unwrap_or_default()).into_owned();
-                let [kind, definition] = [&b"type"[..], b"message_definition"].map(|name| text(&data, name));
-                Record::Connection(Connection { id, topic: text(&header, b"topic"), kind, definition })
-            }
-            (Some(CHUNK_INFO), _) => Record::ChunkInfo(&data),
-            _ => continue,
-        };
-        each(record).map_err(Stop::Refusal)?;
+        give(&header, &data, each)?;
     }
-    Ok(())
+}
+
+/// Header and data of the record that begins with these bytes, where they have all of it.
+fn whole_record(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
+    let part = |bytes| -> Option<(&[u8], &[u8])> {
+        let (length, rest) = <[u8]>::split_first_chunk::<4>(bytes)?;
+        rest.split_at_checked(u32::from_le_bytes(*length) as usize)
+    };
+    let (header, rest) = part(bytes)?;
+    Some((header, part(rest)?.0))
+}
+
+/// Gives a record, if it is used.
+fn give(header: &[u8], data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
+    let id = field(header, b"conn").map(|value| number(value) as u32);
+    let record = match (kind(header), id) {
+        (Some(MESSAGE), Some(connection)) => {
+            let time = field(header, b"time").unwrap_or_default();
+            let [seconds, nanos] = [0, 4].map(|at| number(time.get(at..at + 4).unwrap_or_default()) as i64);
+            Record::Message { connection, recorded_ns: seconds * 1_000_000_000 + nanos, data }
+        }
+        (Some(CONNECTION), Some(id)) => {
+            let text =
+                |of: &[u8], name: &[u8]| String::from_utf8_lossy(field(of, name).unwrap_or_default()).into_owned();
+            let [kind, definition] = [&b"type"[..], b"message_definition"].map(|name| text(data, name));
+            Record::Connection(Connection { id, topic: text(header, b"topic"), kind, definition })
+        }
+        (Some(CHUNK_INFO), _) => Record::ChunkInfo(data),
+        _ => return Ok(()),
+    };
+    each(record).map_err(Stop::Refusal)
 }
 
 /// Reads the records of a chunk, of which `input` has the bytes.
-fn read_chunk(input: &mut dyn Read, header: &[u8], meter: &mut Meter, each: &mut EachRecord) -> Result<(), Stop> {
+fn read_chunk(input: &mut dyn BufRead, header: &[u8], meter: &mut Meter, each: &mut EachRecord) -> Result<(), Stop> {
     let read = match field(header, b"compression") {
         Some(b"none") => read_records(input, meter, false, each),
         Some(b"lz4") => {
@@ -250,11 +279,11 @@ fn read_chunk(input: &mut dyn Read, header: &[u8], meter: &mut Meter, each: &mut
 /// The records of decompressed data, which are counted as they come.
 fn read_expanded(expanded: impl Read, each: &mut EachRecord) -> Result<(), Stop> {
     let mut none = Budget::new(0).meter();
-    read_records(&mut BufReader::new(expanded), &mut none, false, each)
+    read_records(&mut BufReader::with_capacity(BUFFER_BYTES, expanded), &mut none, false, each)
 }
 
 /// Reads the header of the next record; false at the end.
-fn next_record(input: &mut dyn Read, header: &mut Vec<u8>) -> Result<bool, Reason> {
+fn next_record(input: &mut dyn BufRead, header: &mut Vec<u8>) -> Result<bool, Reason> {
     let mut length = [0; 4];
     let read = Read::take(&mut *input, 1).read(&mut length).map_err(refused)?;
     if read == 0 {
@@ -270,7 +299,7 @@ fn next_record(input: &mut dyn Read, header: &mut Vec<u8>) -> Result<bool, Reaso
 }
 
 /// Reads the data of a record.
-fn read_data(input: &mut dyn Read, data: &mut Vec<u8>) -> Result<(), Reason> {
+fn read_data(input: &mut dyn BufRead, data: &mut Vec<u8>) -> Result<(), Reason> {
     let mut length = [0; 4];
     fill(input, &mut length)?;
     let length = u32::from_le_bytes(length);
@@ -281,13 +310,13 @@ fn read_data(input: &mut dyn Read, data: &mut Vec<u8>) -> Result<(), Reason> {
 }
 
 /// Reads so many bytes, of which memory is taken as they come.
-fn read_exactly(input: &mut dyn Read, count: u32, bytes: &mut Vec<u8>) -> Result<(), Reason> {
+fn read_exactly(input: &mut dyn BufRead, count: u32, bytes: &mut Vec<u8>) -> Result<(), Reason> {
     bytes.clear();
     let read = Read::take(&mut *input, u64::from(count)).read_to_end(bytes).map_err(refused)?;
     if read as u64 == u64::from(count) { Ok(()) } else { Err(Reason::Truncated { format: FORMAT }) }
 }
 
-fn fill(input: &mut dyn Read, bytes: &mut [u8]) -> Result<(), Reason> {
+fn fill(input: &mut dyn BufRead, bytes: &mut [u8]) -> Result<(), Reason> {
     input.read_exact(bytes).map_err(refused)
 }
 

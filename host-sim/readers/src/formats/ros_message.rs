@@ -100,7 +100,7 @@ fn time_column(columns: &[MessageColumn], prefix: &str) -> usize {
 
 /// Makes rows of the columns that are read of the messages of one topic.
 pub(crate) struct RosRows<'a> {
-    layout: &'a MessageLayout,
+    layout: MessageLayout,
     encoding: Encoding,
     /// Positions of the columns; one after the last of the layout is the time of recording.
     columns: &'a [usize],
@@ -113,7 +113,7 @@ pub(crate) struct RosRows<'a> {
 }
 
 impl<'a> RosRows<'a> {
-    pub(crate) fn new(layout: &'a MessageLayout, encoding: Encoding, columns: &'a [usize]) -> Self {
+    pub(crate) fn new(layout: &MessageLayout, encoding: Encoding, columns: &'a [usize]) -> Self {
         let known = layout.columns();
         let guard = |&column: &usize| {
             let name = &known.get(column)?.name;
@@ -121,7 +121,8 @@ impl<'a> RosRows<'a> {
             let guard = format!("{path}{COVARIANCE}");
             known.iter().position(|column| column.name == guard)
         };
-        let guards = columns.iter().map(guard).collect();
+        let guards: Vec<Option<usize>> = columns.iter().map(guard).collect();
+        let layout = layout.only(|column| columns.contains(&column) || guards.contains(&Some(column)));
         Self { layout, encoding, columns, guards, is_unset: None, decoded: Vec::new(), row: Vec::new() }
     }
 

@@ -52,6 +52,18 @@ impl RowKind {
     }
 }
 
+/// Fields that have numbers in some rows, and in how many.
+struct Part {
+    fields: Vec<usize>,
+    rows: usize,
+}
+
+/// A name in a field, and how many rows have it.
+struct Label<'a> {
+    name: &'a str,
+    rows: usize,
+}
+
 /// The kinds of rows of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct RowKinds(
@@ -80,56 +92,57 @@ impl RowKinds {
         };
         let is_common = |at: &usize| rows.iter().all(|row| has_number(row, *at));
         let parted: Vec<usize> = (0..columns.len()).filter(|at| !is_common(at)).collect();
-        let mut parts: Vec<(Vec<usize>, usize)> = Vec::new();
+        let mut parts: Vec<Part> = Vec::new();
         for row in rows {
-            let part: Vec<usize> = parted.iter().copied().filter(|at| has_number(row, *at)).collect();
-            match parts.iter_mut().find(|(known, _)| *known == part) {
-                Some((_, count)) => *count += 1,
+            let fields: Vec<usize> = parted.iter().copied().filter(|at| has_number(row, *at)).collect();
+            match parts.iter_mut().find(|part| part.fields == fields) {
+                Some(part) => part.rows += 1,
                 // A row without any number is of no kind.
-                None if part.is_empty() => {}
-                None => parts.push((part, 1)),
+                None if fields.is_empty() => {}
+                None => parts.push(Part { fields, rows: 1 }),
             }
         }
-        let are_apart = |one: usize, other: usize| !parts[one].0.iter().any(|at| parts[other].0.contains(at));
-        let all_apart = (0..parts.len()).all(|one| (0..one).all(|other| are_apart(one, other)));
-        let is_often = parts.iter().all(|(_, count)| *count >= LEAST_ROWS);
+        let are_apart = |one: &Part, other: &Part| !one.fields.iter().any(|at| other.fields.contains(at));
+        let all_apart = (0..parts.len()).all(|one| parts[..one].iter().all(|other| are_apart(&parts[one], other)));
+        let is_often = parts.iter().all(|part| part.rows >= LEAST_ROWS);
         if !(2..=MOST_KINDS).contains(&parts.len()) || !all_apart || !is_often {
             return None;
         }
-        let group = |part: &[usize]| {
-            let (_, channel) = columns[*part.first()?].prefix_and_channel()?;
+        let group = |part: &Part| {
+            let (_, channel) = columns[*part.fields.first()?].prefix_and_channel()?;
             Some(channel.split('_').next().unwrap_or(channel).to_owned())
         };
-        let groups: Vec<Option<String>> = parts.iter().map(|(part, _)| group(part)).collect();
+        let groups: Vec<Option<String>> = parts.iter().map(group).collect();
         let is_unique =
             |name: &Option<String>| name.is_some() && groups.iter().filter(|other| *other == name).count() == 1;
         let are_unique = groups.iter().all(is_unique);
-        let kind = |(at, (part, _)): (usize, &(Vec<usize>, usize))| RowKind::Filled {
-            own: part.clone(),
-            others: parted.iter().copied().filter(|at| !part.contains(at)).collect(),
-            name: groups[at].clone().filter(|_| are_unique).unwrap_or_else(|| columns[part[0]].name.clone()),
-        };
-        Some(Self(parts.iter().enumerate().map(kind).collect()))
+        let mut kinds = Vec::new();
+        for (Part { fields: own, .. }, group) in parts.into_iter().zip(&groups) {
+            let others = parted.iter().copied().filter(|at| !own.contains(at)).collect();
+            let name = group.clone().filter(|_| are_unique).unwrap_or_else(|| columns[own[0]].name.clone());
+            kinds.push(RowKind::Filled { own, others, name });
+        }
+        Some(Self(kinds))
     }
 
     fn of_labels(rows: &[Vec<&str>], at: usize, is_label: impl Fn(&str) -> bool) -> Option<Self> {
-        let mut counts: Vec<(&str, usize)> = Vec::new();
-        for field in rows.iter().map(|row| row[at]) {
-            if !is_label(field) {
+        let mut labels: Vec<Label> = Vec::new();
+        for name in rows.iter().map(|row| row[at]) {
+            if !is_label(name) {
                 return None;
             }
-            match counts.iter_mut().find(|(name, _)| *name == field) {
-                Some((_, count)) => *count += 1,
-                None => counts.push((field, 1)),
+            match labels.iter_mut().find(|label| label.name == name) {
+                Some(label) => label.rows += 1,
+                None => labels.push(Label { name, rows: 1 }),
             }
         }
-        let is_several = (2..=MOST_KINDS).contains(&counts.len());
         let has_numbers = |name: &str| {
             let row = rows.iter().find(|row| row[at] == name);
             row.is_some_and(|row| row.iter().filter(|field| field.parse::<f64>().is_ok()).count() >= LEAST_NUMBERS)
         };
-        let names = counts.iter().filter(|(name, count)| *count >= LEAST_ROWS && has_numbers(name));
-        let kinds: Vec<RowKind> = names.map(|(name, _)| RowKind::Labelled { at, name: (*name).to_owned() }).collect();
+        let is_several = (2..=MOST_KINDS).contains(&labels.len());
+        let known = labels.iter().filter(|label| label.rows >= LEAST_ROWS && has_numbers(label.name));
+        let kinds: Vec<RowKind> = known.map(|label| RowKind::Labelled { at, name: label.name.to_owned() }).collect();
         (is_several && !kinds.is_empty()).then_some(Self(kinds))
     }
 

@@ -1,6 +1,6 @@
 //! A bag of ROS 2 in a folder, which `ros2 bag record` may split into several files: their topics are one.
 
-use crate::formats::topics::{EachRow, Ending, Source, Topic};
+use crate::formats::topics::{EachRow, Ending, Offer, Source, Topic};
 use crate::input::input_error::InputError;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -35,7 +35,7 @@ pub fn files_of_bag(folder: &Path) -> io::Result<Vec<PathBuf>> {
 pub(crate) struct SplitBag<'a> {
     files: Vec<Box<dyn Source + 'a>>,
     /// Of all files.
-    topics: Vec<Topic>,
+    offer: Offer,
 }
 
 impl<'a> SplitBag<'a> {
@@ -48,7 +48,7 @@ impl<'a> SplitBag<'a> {
                 None => topics.push(topic.clone()),
             }
         }
-        Self { files, topics }
+        Self { offer: Offer::new(files[0].offer().format, topics), files }
     }
 }
 
@@ -58,18 +58,14 @@ fn is_same(one: &Topic, other: &Topic) -> bool {
 }
 
 impl Source for SplitBag<'_> {
-    fn format(&self) -> &'static str {
-        self.files[0].format()
-    }
-
-    fn topics(&self) -> &[Topic] {
-        &self.topics
+    fn offer(&self) -> &Offer {
+        &self.offer
     }
 
     fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError> {
         let mut all = Ending::default();
         for file in &mut self.files {
-            let Some(at) = file.topics().iter().position(|of| is_same(of, &self.topics[topic])) else { continue };
+            let Some(at) = file.topics().iter().position(|of| is_same(of, &self.offer.topics[topic])) else { continue };
             let Ending { damage, notes } = file.read(at, columns, each)?;
             all.notes.extend(notes);
             if damage.is_some() {

@@ -4,7 +4,7 @@
 use crate::formats::message_layout::{Encoding, MessageLayout};
 use crate::formats::ros_definition::{self, RosVersion};
 use crate::formats::ros_message::{self, RosRows};
-use crate::formats::topics::{EachRow, Ending, Source, Topic};
+use crate::formats::topics::{EachRow, Ending, Offer, Source, Topic};
 use crate::input::budget::{Budget, Metered};
 use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::{InputError, Reason};
@@ -24,7 +24,7 @@ pub(crate) struct SqliteSource<'a> {
     /// The file of the database, where the bytes are in memory.
     _copy: Option<FileBytes>,
     database: Connection,
-    topics: Vec<Topic>,
+    offer: Offer,
     /// Of each topic: its number in the database, and its layout where that is known.
     layouts: Vec<(i64, Option<MessageLayout>)>,
     budget: Budget,
@@ -63,7 +63,7 @@ impl<'a> SqliteSource<'a> {
             });
             layouts.push((id, layout));
         }
-        Ok(Self { file, _copy: copy, database, topics, layouts, budget })
+        Ok(Self { file, _copy: copy, database, offer: Offer::new(FORMAT, topics), layouts, budget })
     }
 }
 
@@ -106,12 +106,8 @@ fn damaged_message(error: io::Error) -> Reason {
 }
 
 impl Source for SqliteSource<'_> {
-    fn format(&self) -> &'static str {
-        FORMAT
-    }
-
-    fn topics(&self) -> &[Topic] {
-        &self.topics
+    fn offer(&self) -> &Offer {
+        &self.offer
     }
 
     fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError> {

@@ -3,7 +3,7 @@
 
 use crate::columns::column_selection::{AvailableColumn, ChosenColumn, Role, SelectionError, as_they_are};
 use crate::formats::calendar::{CalendarClock, CalendarColumns};
-use crate::formats::fields::{number, split};
+use crate::formats::fields::{leading_number, number, split};
 use crate::formats::labelled_row;
 use crate::formats::nmea::{self, Sentence};
 use crate::formats::row_kinds::{RowKind, RowKinds};
@@ -14,9 +14,9 @@ use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::{InputError, Reason};
 use crate::input::read_monitor::ReadMonitor;
 use crate::rows::any_sensor::ReadOptions;
-use crate::rows::batch::{BatchBuilder, Number, RowFault};
+use crate::rows::batch::{Number, RowFault};
 use crate::rows::row_source::{EachRow, Ending, Refusal, RowSource};
-use crate::rows::whole_table::{WholeTable, most_rows};
+use crate::rows::whole_table::WholeTable;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 
@@ -63,18 +63,7 @@ impl RowSource for TextRows<'_> {
             Some(table) => table,
             None => TextTable::open(self.file, &self.options, &self.monitor)?,
         };
-        while let Some(line) = table.next_row()? {
-            match each(&table.row) {
-                Ok(()) => table.damaged.rows += 1,
-                Err(Refusal::Fault(fault)) => {
-                    let error = table.fault(line, fault);
-                    table.damaged.add(error)?;
-                }
-                Err(Refusal::Enough) => break,
-            }
-        }
-        table.damaged.check()?;
-        Ok(Ending { damage: None, notes: table.notes() })
+        table.read(each)
     }
 }
 
@@ -84,35 +73,9 @@ pub(crate) fn read_whole(
     topic: Option<&str>,
     monitor: &ReadMonitor,
 ) -> Result<WholeTable, InputError> {
-    let mut table = TextTable::open_with(file, topic, monitor, &|available| Ok(as_they_are(available)))?;
-    table.is_lenient = true;
-    let mut builder = BatchBuilder::new(&table.chosen, &[], None);
-    let most = most_rows(table.chosen.len());
-    let mut whole = WholeTable { name: topic.unwrap_or_default().to_owned(), ..WholeTable::default() };
-    loop {
-        whole.is_cut = builder.rows() >= most;
-        let row = table.next_row().and_then(|line| {
-            let Some(line) = line.filter(|_| !whole.is_cut) else { return Ok(false) };
-            table.damaged.rows += 1;
-            builder.push(&table.row).map(|()| true).map_err(|fault| table.fault(line, fault))
-        });
-        let row = match row {
-            Ok(false) => table.damaged.check().map(|()| false),
-            row => row,
-        };
-        match row {
-            Ok(true) => {}
-            Ok(false) => break,
-            Err(error) if builder.rows() == 0 => return Err(error),
-            Err(error) => {
-                whole.notes.push(format!("{error}; the {} rows before that are shown", builder.rows()));
-                break;
-            }
-        }
-    }
-    whole.notes.extend(table.notes());
-    whole.rate_hz = table.rate_hz;
-    Ok(whole.with_rows(table.chosen, builder))
+    let table = TextTable::open_with(file, topic, monitor, &|available| Ok(as_they_are(available)))?;
+    let whole = WholeTable { name: topic.unwrap_or_default().to_owned(), ..WholeTable::default() };
+    whole.read(&mut TextTable { is_lenient: true, ..table })
 }
 
 /// Chooses the columns to read of those that there are.
@@ -376,6 +339,36 @@ impl Opened<'_> {
     }
 }
 
+impl RowSource for TextTable {
+    fn chosen(&self) -> &[ChosenColumn] {
+        &self.chosen
+    }
+
+    fn rate_hz(&self) -> Option<f64> {
+        self.rate_hz
+    }
+
+    fn budget(&self) -> Option<Budget> {
+        None
+    }
+
+    /// The rows that were not read yet.
+    fn read(&mut self, each: &mut EachRow) -> Result<Ending, InputError> {
+        while let Some(line) = self.next_row()? {
+            match each(&self.row) {
+                Ok(()) => self.damaged.rows += 1,
+                Err(Refusal::Fault(fault)) => {
+                    let error = self.fault(line, fault);
+                    self.damaged.add(error)?;
+                }
+                Err(Refusal::Enough) => break,
+            }
+        }
+        self.damaged.check()?;
+        Ok(Ending { damage: None, notes: self.notes() })
+    }
+}
+
 impl TextTable {
     /// What the user should know of the rows that were read, one sentence each.
     fn notes(&self) -> Vec<String> {
@@ -415,7 +408,16 @@ impl TextTable {
     /// Reads the next row into `row`; its line, or `None` at the end.
     fn next_row(&mut self) -> Result<Option<u64>, InputError> {
         let Self { file, lines, chosen, layout, is_lenient, fields: of_row, first, row, damaged, .. } = self;
+        let plain = match layout {
+            Layout::Columns { separator, calendar: None, kind: None, .. } if first.is_empty() => *separator,
+            _ => None,
+        };
         loop {
+            if let Some(separator) = plain
+                && let Some(bytes) = of_row.plain_numbers(lines.buffer(), separator, row)
+            {
+                return Ok(Some(lines.consume_line(bytes)));
+            }
             let first = first.pop_front();
             let (line, text) = match &first {
                 Some((line, text)) => (*line, text.as_str()),
@@ -529,6 +531,8 @@ struct RowFields {
     may_be_short: bool,
     /// Position of each field that is read, in ascending order, and which of the chosen columns it is.
     read: Vec<(usize, usize)>,
+    /// Which of the chosen columns each field is; empty where a field is two of them.
+    plain: Vec<Option<usize>>,
 }
 
 impl RowFields {
@@ -536,7 +540,35 @@ impl RowFields {
         let mut read: Vec<(usize, usize)> =
             chosen.iter().enumerate().map(|(at, column)| (column.position, at)).collect();
         read.sort_unstable();
-        Self { width, may_be_short, read }
+        let column_at = |position| read.iter().find(|(of, _)| *of == position).map(|(_, at)| *at);
+        let plain: Vec<Option<usize>> = (0..width).map(column_at).collect();
+        let plain = if plain.iter().flatten().count() == read.len() { plain } else { Vec::new() };
+        Self { width, may_be_short, read, plain }
+    }
+
+    /// The same as [`numbers`](Self::numbers) of the line that `text` begins with, and the bytes of the line with its end, where it is as
+    /// nearly all are: numbers without an exponent, and letters and digits in the fields that are not read. `None` for any other line.
+    fn plain_numbers(&self, text: &[u8], separator: char, row: &mut Vec<Number>) -> Option<usize> {
+        row.resize(self.read.len(), Number::Real(f64::NAN));
+        let (mut rest, last) = (text, self.plain.len().checked_sub(1)?);
+        for (position, column) in self.plain.iter().enumerate() {
+            rest = match column {
+                Some(column) => {
+                    let (number, after) = leading_number(rest)?;
+                    row[*column] = number;
+                    after
+                }
+                None => {
+                    let is_plain = |byte: &u8| byte.is_ascii_alphanumeric() || matches!(byte, b'.' | b'-' | b'_');
+                    &rest[rest.iter().take_while(|byte| is_plain(byte)).count()..]
+                }
+            };
+            if position < last {
+                rest = rest.strip_prefix(&[separator as u8])?;
+            }
+        }
+        let rest = rest.strip_prefix(b"\r").unwrap_or(rest).strip_prefix(b"\n")?;
+        Some(text.len() - rest.len())
     }
 
     /// The numbers of the chosen columns of a row.

@@ -8,9 +8,9 @@ use crate::columns::unit::Unit;
 use crate::input::budget::Budget;
 use crate::input::input_error::{InputError, Reason};
 use crate::rows::any_sensor::ReadOptions;
-use crate::rows::batch::{BatchBuilder, Number};
+use crate::rows::batch::Number;
 use crate::rows::row_source::{self, Refusal, RowSource};
-use crate::rows::whole_table::{WholeSensor, WholeTable, most_rows};
+use crate::rows::whole_table::{WholeSensor, WholeTable};
 use measurement::SensorProfile;
 use std::path::Path;
 
@@ -83,6 +83,26 @@ impl From<&Topic> for TopicDescription {
     }
 }
 
+/// What a file has to be read.
+#[derive(Debug, Default)]
+pub(crate) struct Offer {
+    /// Name of the format.
+    pub(crate) format: &'static str,
+    /// All that there is.
+    pub(crate) topics: Vec<Topic>,
+    /// The name of the sensor that is read where the user says nothing; `None` where the user has to say.
+    pub(crate) preferred: Option<String>,
+    /// The topic that has the columns of all others.
+    pub(crate) whole: Option<usize>,
+}
+
+impl Offer {
+    /// Of topics of which the user chooses one.
+    pub(crate) fn new(format: &'static str, topics: Vec<Topic>) -> Self {
+        Self { format, topics, ..Self::default() }
+    }
+}
+
 /// How the reading of a topic ended.
 #[derive(Debug, Default)]
 pub(crate) struct Ending {
@@ -97,20 +117,12 @@ pub(crate) type EachRow<'a> = dyn FnMut(&[Number]) -> Result<(), InputError> + '
 
 /// A file with several sources of rows.
 pub(crate) trait Source: Send {
-    /// Name of the format.
-    fn format(&self) -> &'static str;
+    /// What there is.
+    fn offer(&self) -> &Offer;
 
-    /// All that there is.
-    fn topics(&self) -> &[Topic];
-
-    /// The name of the sensor that is read where the user says nothing; `None` where the user has to say.
-    fn preferred(&self) -> Option<&str> {
-        None
-    }
-
-    /// The topic that has the columns of all others.
-    fn whole(&self) -> Option<usize> {
-        None
+    /// All topics.
+    fn topics(&self) -> &[Topic] {
+        &self.offer().topics
     }
 
     /// The rate that the file states for these columns of a topic, Hz.
@@ -158,10 +170,11 @@ pub(crate) fn names_of_several(source: &dyn Source) -> Vec<String> {
     let topics = source.topics();
     let all = sensors(topics);
     let kind = |choice: &Choice| (topics[choice.topic].kind.as_str(), shape(&topics[choice.topic], choice.sensor));
-    let first = all.iter().find(|(name, _)| source.preferred().is_none_or(|preferred| preferred == name));
+    let first =
+        all.iter().find(|(name, _)| source.offer().preferred.as_deref().is_none_or(|preferred| preferred == name));
     let Some(first) = first.map(|(_, choice)| kind(choice)) else { return Vec::new() };
     // Where the user would have to choose, all are offered; where one is preferred, those of its kind.
-    let is_offered = |choice: &Choice| source.preferred().is_none() || kind(choice) == first;
+    let is_offered = |choice: &Choice| source.offer().preferred.as_deref().is_none() || kind(choice) == first;
     let names: Vec<String> = all.into_iter().filter(|(_, choice)| is_offered(choice)).map(|(name, _)| name).collect();
     if names.len() > 1 { names } else { Vec::new() }
 }
@@ -173,7 +186,7 @@ fn shape(topic: &Topic, sensor: Option<usize>) -> Vec<&'static str> {
 
 /// The topic that the options name, or the only one that they can mean.
 fn choose(source: &dyn Source, options: &ReadOptions) -> Result<Choice, Reason> {
-    let (topics, format) = (source.topics(), source.format());
+    let (topics, format) = (source.topics(), source.offer().format);
     let known = sensors(topics);
     let names = |of: &[(String, Choice)]| of.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
     if topics.is_empty() {
@@ -189,13 +202,13 @@ fn choose(source: &dyn Source, options: &ReadOptions) -> Result<Choice, Reason> 
         return sensor.or_else(|| topic().map(|topic| Choice { topic, sensor: None })).ok_or_else(unknown);
     }
     if options.selection.has_columns() {
-        if let Some(topic) = source.whole() {
+        if let Some(topic) = source.offer().whole {
             return Ok(Choice { topic, sensor: None });
         }
         // Those that have the columns that are named.
         let has = |topic: &Topic| options.selection.is_covered(&topic.columns);
         let able: Vec<usize> = (0..topics.len()).filter(|&at| has(&topics[at])).collect();
-        let preferred = known.iter().find(|(name, _)| Some(name.as_str()) == source.preferred());
+        let preferred = known.iter().find(|(name, _)| Some(name.as_str()) == source.offer().preferred.as_deref());
         return match (able.as_slice(), preferred) {
             ([topic], _) => Ok(Choice { topic: *topic, sensor: None }),
             ([], _) if topics.len() == 1 => Ok(Choice { topic: 0, sensor: None }),
@@ -209,13 +222,16 @@ fn choose(source: &dyn Source, options: &ReadOptions) -> Result<Choice, Reason> 
             }
         };
     }
-    if let Some((_, choice)) = known.iter().find(|(name, _)| Some(name.as_str()) == source.preferred()) {
+    if let Some((_, choice)) = known.iter().find(|(name, _)| Some(name.as_str()) == source.offer().preferred.as_deref())
+    {
         return Ok(*choice);
     }
     match (known.as_slice(), topics) {
         ([(_, choice)], _) => Ok(*choice),
         ([], [_]) => Ok(Choice { topic: 0, sensor: None }),
-        ([], _) if source.whole().is_some() => Ok(Choice { topic: source.whole().unwrap_or(0), sensor: None }),
+        ([], _) if source.offer().whole.is_some() => {
+            Ok(Choice { topic: source.offer().whole.unwrap_or(0), sensor: None })
+        }
         ([], _) => Err(Reason::NoSensor { format, topics: describe(topics) }),
         (several, _) => Err(Reason::SeveralTopics(names(several))),
     }
@@ -280,7 +296,7 @@ impl<'a> TopicRows<'a> {
         let topic = &source.topics()[choice.topic];
         if topic.columns.is_empty() {
             return Err(fail(match &topic.encoding {
-                _ if source.whole().is_some() => Reason::NoTopic { format: source.format() },
+                _ if source.offer().whole.is_some() => Reason::NoTopic { format: source.offer().format },
                 Some(encoding) => Reason::Encoding(Box::new((topic.name.clone(), encoding.clone()))),
                 None => Reason::NoDefinition(Box::new((topic.name.clone(), topic.kind.clone()))),
             }));
@@ -292,7 +308,7 @@ impl<'a> TopicRows<'a> {
         notes.extend(sensor.and_then(|sensor| sensor.note.clone()).filter(|_| !states_units(&options.selection)));
         notes.extend(options.selection.notes(&topic.columns, &chosen, &options.sensor));
         let name = sensor.map_or_else(|| topic.name.clone(), |sensor| sensor_name(topic, sensor));
-        if options.topic.is_none() && source.preferred() == Some(name.as_str()) {
+        if options.topic.is_none() && source.offer().preferred.as_deref() == Some(name.as_str()) {
             let all = sensors(source.topics());
             let others: Vec<&str> = all.iter().map(|(name, _)| name.as_str()).filter(|other| *other != name).collect();
             if !others.is_empty() {
@@ -352,18 +368,18 @@ impl RowSource for TopicRows<'_> {
 const MOST_TOPICS: usize = 8;
 
 /// All columns of the topic that is named; else of those with a known sensor; else of the first ones.
-pub(crate) fn read_whole(
-    file: &Path,
-    source: &mut dyn Source,
+pub(crate) fn read_whole<'a>(
+    file: &'a Path,
+    mut source: Box<dyn Source + 'a>,
     topic: Option<&str>,
     budget: Budget,
 ) -> Result<Vec<WholeTable>, InputError> {
     let known = sensors(source.topics());
-    let topics: Vec<usize> = match (topic, source.whole()) {
+    let topics: Vec<usize> = match (topic, source.offer().whole) {
         (Some(wanted), _) => {
             let selection = ColumnSelection::default();
             let options = ReadOptions { sensor: SensorProfile::generic(), selection, topic: Some(wanted.to_owned()) };
-            vec![choose(source, &options).map_err(|reason| InputError::file(file, reason))?.topic]
+            vec![choose(source.as_ref(), &options).map_err(|reason| InputError::file(file, reason))?.topic]
         }
         (None, Some(whole)) => vec![whole],
         (None, None) if known.is_empty() => {
@@ -376,11 +392,24 @@ pub(crate) fn read_whole(
             topics
         }
     };
-    let mut tables = Vec::new();
+    let (mut tables, mut refused) = (Vec::new(), None);
     for at in topics {
         for columns in source.tables(at) {
-            tables.push(read_columns(file, source, at, &columns, budget)?);
+            let all = &source.topics()[at].columns;
+            let available: Vec<AvailableColumn> = columns.iter().map(|&at| all[at].clone()).collect();
+            let whole = described(source.as_ref(), at, &available);
+            let mut chosen = as_they_are(&available);
+            chosen.iter_mut().for_each(|column| column.position = columns[column.position]);
+            let mut rows = TopicRows { file, source, topic: at, chosen, notes: Vec::new(), budget };
+            match whole.read(&mut rows) {
+                Ok(table) => tables.push(table),
+                Err(error) => refused = refused.or(Some(error)),
+            }
+            source = rows.source;
         }
+    }
+    if let Some(error) = refused.filter(|error| tables.is_empty() || error.reason.is_limit()) {
+        return Err(error);
     }
     // A name of one of several sensors of a topic.
     for table in &mut tables {
@@ -391,21 +420,14 @@ pub(crate) fn read_whole(
     Ok(tables)
 }
 
-/// These columns of a topic, as they are.
-fn read_columns(
-    file: &Path,
-    source: &mut dyn Source,
-    topic: usize,
-    columns: &[usize],
-    budget: Budget,
-) -> Result<WholeTable, InputError> {
-    let Topic { name, kind, columns: all, .. } = &source.topics()[topic];
-    let chosen: Vec<AvailableColumn> = columns.iter().map(|&at| all[at].clone()).collect();
-    let is_of_arrays = source.whole().is_some();
+/// What is known of these columns of a topic before they are read.
+fn described(source: &dyn Source, topic: usize, chosen: &[AvailableColumn]) -> WholeTable {
+    let Topic { name, kind, .. } = &source.topics()[topic];
+    let is_of_arrays = source.offer().whole.is_some();
     let mut whole = WholeTable { name: name.clone(), kind: kind.clone(), is_of_arrays, ..WholeTable::default() };
     // The same column may be in several topics, under one name.
     let position = |name: &str| chosen.iter().position(|column| column.name == name);
-    for of in source.topics().iter().filter(|of| source.whole().is_some() || of.name == *name) {
+    for of in source.topics().iter().filter(|of| is_of_arrays || of.name == *name) {
         for sensor in &of.sensors {
             let column = |&(channel, at, unit): &(&'static str, usize, Option<Unit>)| {
                 Some((channel, position(&of.columns[at].name)?, unit))
@@ -415,26 +437,5 @@ fn read_columns(
             }
         }
     }
-    let most = most_rows(columns.len());
-    let chosen = as_they_are(&chosen);
-    let mut builder = BatchBuilder::new(&chosen, &[], Some(budget));
-    let mut is_cut = false;
-    let ending = source.read(topic, columns, &mut |row| {
-        is_cut = builder.rows() >= most;
-        let fail = |reason| InputError::file(file, reason);
-        if is_cut { Err(fail(Reason::TooManySamples)) } else { builder.push(row).map_err(|fault| fail(fault.reason)) }
-    });
-    whole.is_cut = is_cut;
-    whole.rate_hz = source.rate_hz(topic, columns);
-    match ending {
-        Err(_) if is_cut => {}
-        ending => {
-            let Ending { damage, notes } = ending?;
-            whole
-                .notes
-                .extend(damage.map(|reason| format!("{reason}; the {} rows before that are shown", builder.rows())));
-            whole.notes.extend(notes);
-        }
-    }
-    Ok(whole.with_rows(chosen, builder))
+    whole
 }

@@ -6,7 +6,7 @@
 use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::AvailableColumn;
 use crate::formats::message_layout::{Definitions, Encoding, Field, FieldType, MessageLayout, Repeat, Scalar};
-use crate::formats::topics::{EachRow, Ending, Source, Topic, TopicSensor};
+use crate::formats::topics::{EachRow, Ending, Offer, Source, Topic, TopicSensor};
 use crate::input::budget::Budget;
 use crate::input::file_bytes::{FileBytes, OpenBytes};
 use crate::input::input_error::{InputError, Reason};
@@ -122,10 +122,9 @@ impl Pairing {
 /// An open log.
 pub(crate) struct UlogSource<'a> {
     file: &'a FileBytes,
-    topics: Vec<Topic>,
+    /// Preferred is the gyroscope with the most samples, with its accelerometer; without a gyroscope the accelerometer with the most.
+    offer: Offer,
     rows: Vec<Rows>,
-    /// The gyroscope with the most samples, with its accelerometer; the accelerometer with the most where there is no gyroscope.
-    preferred: Option<String>,
     budget: Budget,
 }
 
@@ -147,7 +146,7 @@ impl<'a> UlogSource<'a> {
                 Ok(())
             })
         })?;
-        let mut source = Self { file, topics: Vec::new(), rows: Vec::new(), preferred: None, budget };
+        let mut source = Self { file, offer: Offer::new(FORMAT, Vec::new()), rows: Vec::new(), budget };
         let count = |key: &Key| samples.get(key).or(messages.get(key)).copied().unwrap_or(0);
         for (key, layout) in &layouts {
             source.add(key, layout, count(key));
@@ -168,7 +167,8 @@ impl<'a> UlogSource<'a> {
             (has(GYROSCOPE), topic.rows, has(ACCELEROMETER), std::cmp::Reverse(*at))
         };
         let is_single = |at: &usize| !matches!(source.rows[*at], Rows::Pair(..));
-        let known = source.topics.iter().enumerate().filter(|(at, topic)| !topic.sensors.is_empty() && is_single(at));
+        let known =
+            source.offer.topics.iter().enumerate().filter(|(at, topic)| !topic.sensors.is_empty() && is_single(at));
         let best = known.max_by_key(rank).map(|(at, topic)| match &source.rows[at] {
             Rows::Messages((name, instance)) | Rows::Fifo((name, instance)) => {
                 let with_other = pairs.iter().find(|(pair, of)| pair.contains(&name.as_str()) && of == instance);
@@ -176,9 +176,9 @@ impl<'a> UlogSource<'a> {
             }
             Rows::Pair(..) => topic.name.clone(),
         });
-        source.preferred = best;
+        source.offer.preferred = best;
         match damage {
-            Some(damage) if source.topics.is_empty() => Err(file.error(damage)),
+            Some(damage) if source.offer.topics.is_empty() => Err(file.error(damage)),
             _ => Ok(source),
         }
     }
@@ -191,7 +191,7 @@ impl<'a> UlogSource<'a> {
             let columns = sample_columns(&XYZ);
             let mut sensor = TopicSensor { columns: vec![("time", 0, None)], ..TopicSensor::default() };
             vector.add_to(&mut sensor, [1, 2, 3]);
-            self.topics.push(Topic { columns, sensors: vec![sensor], ..topic });
+            self.offer.topics.push(Topic { columns, sensors: vec![sensor], ..topic });
             self.rows.push(Rows::Fifo(key.clone()));
             return;
         }
@@ -213,7 +213,7 @@ impl<'a> UlogSource<'a> {
             }
         }
         let sensors = Some(sensor).filter(|sensor| sensor.columns.len() > 1).into_iter().collect();
-        self.topics.push(Topic { columns: all, sensors, ..topic });
+        self.offer.topics.push(Topic { columns: all, sensors, ..topic });
         self.rows.push(Rows::Messages(key.clone()));
     }
 
@@ -223,7 +223,7 @@ impl<'a> UlogSource<'a> {
         Vector::Rate.add_to(&mut sensor, [1, 2, 3]);
         Vector::Force.add_to(&mut sensor, [4, 5, 6]);
         let (name, kind, rows) = (pair_name(pair, instance), pair.join("+"), Some(rows));
-        self.topics.push(Topic { name, kind, rows, columns, sensors: vec![sensor], ..Topic::default() });
+        self.offer.topics.push(Topic { name, kind, rows, columns, sensors: vec![sensor], ..Topic::default() });
         self.rows.push(Rows::Pair(pair, instance));
     }
 }
@@ -244,16 +244,8 @@ fn pair_of(message: &str) -> Option<([&'static str; 2], usize)> {
 }
 
 impl Source for UlogSource<'_> {
-    fn format(&self) -> &'static str {
-        FORMAT
-    }
-
-    fn topics(&self) -> &[Topic] {
-        &self.topics
-    }
-
-    fn preferred(&self) -> Option<&str> {
-        self.preferred.as_deref()
+    fn offer(&self) -> &Offer {
+        &self.offer
     }
 
     fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError> {
@@ -284,7 +276,7 @@ impl Source for UlogSource<'_> {
             _ => Ok(()),
         })?;
         let alone = pairing.alone + pairing.waiting.len() as u64;
-        let name = &self.topics[topic].name;
+        let name = &self.offer.topics[topic].name;
         let note =
             format!("{alone} samples of {name} have no sample of the other sensor at their time and are left out");
         Ok(Ending { damage, notes: Some(note).filter(|_| alone > 0).into_iter().collect() })

@@ -136,6 +136,18 @@ impl Lines {
         Ok(Some((self.line, &self.latin)))
     }
 
+    /// The bytes of the next lines, as far as they are in memory; none where they cannot be read.
+    pub(crate) fn buffer(&mut self) -> &[u8] {
+        if self.again { &[] } else { self.input.fill_buf().unwrap_or_default() }
+    }
+
+    /// Consumes the next line, which has so many bytes with its end, and returns its number.
+    pub(crate) fn consume_line(&mut self, bytes: usize) -> u64 {
+        self.input.consume(bytes);
+        self.line += 1;
+        self.line
+    }
+
     /// Bytes that are zero, which were left out.
     pub(crate) fn zero_bytes(&self) -> u64 {
         self.zero_bytes

@@ -32,6 +32,7 @@ struct State {
     stop: AtomicBool,
     is_interrupted: AtomicBool,
     is_cut: AtomicBool,
+    watch: Option<fn(u64)>,
 }
 
 impl fmt::Debug for State {
@@ -41,6 +42,12 @@ impl fmt::Debug for State {
 }
 
 impl ReadMonitor {
+    /// Calls `watch` with [`bytes`](Self::bytes) whenever it grows, on the thread that reads.
+    #[must_use]
+    pub fn watched(watch: fn(u64)) -> Self {
+        Self(Arc::new(State { watch: Some(watch), ..State::default() }))
+    }
+
     /// Asks `question` with each batch of rows, on the thread that takes them; the reading [stops](Self::stop) where it says so.
     #[must_use]
     pub fn asking(question: impl Fn() -> bool + Send + Sync + 'static) -> Self {
@@ -121,7 +128,10 @@ impl ReadMonitor {
 
     /// Counts bytes that were read.
     pub(crate) fn count(&self, bytes: usize) {
-        self.0.bytes.fetch_add(bytes as u64, Relaxed);
+        let before = self.0.bytes.fetch_add(bytes as u64, Relaxed);
+        if let Some(watch) = self.0.watch {
+            watch(before + bytes as u64);
+        }
     }
 }
 

@@ -2,7 +2,9 @@
 
 use crate::columns::column_selection::{AvailableColumn, ChosenColumn};
 use crate::columns::unit::Unit;
+use crate::input::input_error::InputError;
 use crate::rows::batch::BatchBuilder;
+use crate::rows::row_source::{Ending, Refusal, RowSource};
 
 /// Numbers that are held at most, 128 MiB.
 const MOST_VALUES: u64 = 1 << 24;
@@ -11,7 +13,7 @@ const MOST_VALUES: u64 = 1 << 24;
 pub const MAX_SAMPLES: u64 = 1 << 25;
 
 /// Rows of so many columns that are looked at: a recording of a day of a usual sensor.
-pub(crate) fn most_rows(columns: usize) -> u64 {
+fn most_rows(columns: usize) -> u64 {
     MOST_VALUES / (columns.max(1) as u64)
 }
 
@@ -54,13 +56,34 @@ pub(crate) struct WholeTable {
 }
 
 impl WholeTable {
-    /// The columns that were chosen as they are, with their numbers.
-    pub(crate) fn with_rows(self, chosen: Vec<ChosenColumn>, mut builder: BatchBuilder) -> Self {
+    /// With the rows of `source`, whose columns were chosen as they are.
+    ///
+    /// # Errors
+    /// It has no row that can be read.
+    pub(crate) fn read(mut self, source: &mut dyn RowSource) -> Result<Self, InputError> {
+        let chosen = source.chosen().to_vec();
+        let most = most_rows(chosen.len());
+        let mut builder = BatchBuilder::new(&chosen, &[], source.budget());
+        let mut is_cut = false;
+        let read = source.read(&mut |row| {
+            is_cut = builder.rows() >= most;
+            if is_cut { Err(Refusal::Enough) } else { builder.push(row).map_err(Refusal::Fault) }
+        });
+        let damage = match read {
+            Ok(Ending { damage, notes }) => {
+                self.notes.extend(notes);
+                damage
+            }
+            Err(error) if builder.rows() == 0 || error.reason.is_limit() => return Err(error),
+            Err(error) => Some(error.to_string()),
+        };
+        self.notes.extend(damage.map(|damage| format!("{damage}; the {} rows before that are shown", builder.rows())));
         let column = |(chosen, values): (ChosenColumn, Vec<f64>)| WholeColumn {
             column: AvailableColumn { name: chosen.label, unit: chosen.unit },
             values,
         };
-        Self { columns: chosen.into_iter().zip(builder.take_last().values).map(column).collect(), ..self }
+        let columns = chosen.into_iter().zip(builder.take_last().values).map(column).collect();
+        Ok(Self { columns, is_cut, rate_hz: source.rate_hz(), ..self })
     }
 
     /// Number of rows.

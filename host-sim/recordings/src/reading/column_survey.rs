@@ -25,12 +25,15 @@ const MOST_KEPT: usize = 1 << 17;
 
 /// Why a number of a row is no measurement, if so.
 pub(crate) fn refusal(column: &ValueColumn, value: f64, verdict: Option<&Verdict>) -> Option<&'static str> {
-    match (channel(column), verdict) {
-        _ if value.is_nan() => Some("missing"),
-        (Some(channel), Some(verdict)) => refusal_of_register(channel, value, *verdict),
-        _ if value.is_infinite() => Some("not_finite"),
-        _ if (value * column.factor).abs() > largest_value(&column.profile) => Some("out_of_range"),
-        _ => None,
+    if value.is_nan() {
+        return Some("missing");
+    }
+    match verdict.filter(|_| column.register.is_some()) {
+        Some(verdict) if verdict.refused.is_empty() => None,
+        Some(verdict) => refusal_of_register(channel(column)?, value, *verdict),
+        None if value.is_infinite() => Some("not_finite"),
+        None if (value * column.factor).abs() > largest_value(&column.profile) => Some("out_of_range"),
+        None => None,
     }
 }
 
@@ -80,30 +83,33 @@ impl ColumnSurvey {
 
     /// Adds the numbers of rows that arrived, and makes those that are refused NaN.
     pub(crate) fn add(&mut self, column: &ValueColumn, values: &mut [f64], verdicts: &[Verdict]) {
-        for (row, own) in values.iter_mut().enumerate() {
-            let value = *own;
-            let refused = refusal(column, value, verdicts.get(row));
-            let value = match refused {
-                Some(cause) => {
-                    *self.refused.entry(cause).or_insert(0) += 1;
-                    f64::NAN
-                }
-                None => value,
-            };
-            *own = value;
-            self.is_usable |= refused.is_none();
-            self.has_other_than_zero |= value != 0.0 && !value.is_nan();
-            if self.is_kept() {
-                if self.values.len() == MOST_KEPT {
-                    self.thin();
-                    self.stride *= 2;
-                }
-                if self.is_kept() {
-                    self.values.push(value);
-                }
+        for (row, value) in values.iter_mut().enumerate() {
+            if let Some(cause) = refusal(column, *value, verdicts.get(row)) {
+                *self.refused.entry(cause).or_insert(0) += 1;
+                *value = f64::NAN;
+                continue;
             }
-            self.seen += 1;
+            self.is_usable = true;
+            self.has_other_than_zero |= *value != 0.0;
         }
+        let mut rest = &*values;
+        while !rest.is_empty() {
+            let (run, after) = rest.split_at(rest.len().min(RUN - self.seen % RUN));
+            if self.is_kept() && self.values.len() == MOST_KEPT {
+                self.thin();
+                self.stride *= 2;
+            }
+            if self.is_kept() {
+                self.values.extend_from_slice(run);
+            }
+            self.seen += run.len();
+            rest = after;
+        }
+    }
+
+    /// Numbers that were added.
+    pub(crate) fn rows(&self) -> usize {
+        self.seen
     }
 
     /// Whether all numbers that can be used are zero.

@@ -51,6 +51,11 @@ impl KeptInMemory {
     /// All of them.
     pub const ALL: Self = Self { rows: u64::MAX, rows_with_losses: u64::MAX, most_lost: 1.0 };
 
+    /// Rows of the longest recording that may be one measurement.
+    fn most_rows(self) -> u64 {
+        self.rows_with_losses.max(self.rows)
+    }
+
     /// Whether so many samples in so many sample periods are one measurement.
     fn has_room(self, samples: u64, periods: u64) -> bool {
         samples <= if lost_part(samples, periods) > self.most_lost { self.rows_with_losses } else { self.rows }
@@ -118,6 +123,14 @@ impl Origin<'_> {
         match self {
             Self::File { input, options, range } => input.batches(options, *range),
             Self::Recording(recording) => Ok(BatchSource::Recording(RecordedRows::new(recording))),
+        }
+    }
+
+    /// How many rows there are, where the first `rows` of them tell it.
+    fn expected_rows(&self, rows: u64) -> Option<u64> {
+        match self {
+            Self::File { input, .. } => input.expected_rows(rows),
+            Self::Recording(_) => None,
         }
     }
 
@@ -299,7 +312,9 @@ impl Totals {
             self.leave_out("repeated");
             return None;
         };
-        for cause in verdict.into_iter().flat_map(|verdict| (verdict.faults & Faults::WARNINGS).causes()) {
+        // Hardly any row has one.
+        let warnings = verdict.map(|verdict| verdict.faults & Faults::WARNINGS).filter(|faults| !faults.is_empty());
+        for cause in warnings.into_iter().flat_map(Faults::causes) {
             *self.flagged.entry(cause).or_insert(0) += 1;
         }
         let lost = match self.first {
@@ -405,7 +420,9 @@ impl Placer {
 
     /// What the clock has to know of the rows.
     fn stamps(&mut self, batch: &Batch) -> Vec<RowStamp> {
-        let equals = if self.can_repeat { self.before.equals(batch) } else { vec![false; batch.rows] };
+        // Without times no row is a repeat.
+        let can_repeat = self.can_repeat && !batch.times.is_empty();
+        let equals = if can_repeat { self.before.equals(batch) } else { vec![false; batch.rows] };
         let stamp = |(row, is_equal)| RowStamp {
             time_s: batch.times.get(row).copied(),
             index: batch.indices.get(row).copied(),
@@ -437,51 +454,69 @@ struct Survey {
     full_scale: u64,
     full_scale_notes: Vec<String>,
     read: RowsRead,
-    /// The first rows, or all of them.
+    /// The first rows, or all of them, of so many.
     kept: VecDeque<Batch>,
     has_all_rows: bool,
+    rows: u64,
 }
 
 impl Survey {
     /// Reads `most_rows` rows, without the padding at either end of them.
     fn read(origin: &Origin, reading: Reading, most_rows: u64, monitor: &ReadMonitor) -> Result<Self, StreamError> {
         let mut padding = PaddingFinder::default();
-        let survey = Self::read_rows(origin, reading, most_rows, monitor, Unpadded::ALL, Some(&mut padding));
+        let survey = Self::read_kept(origin, reading, most_rows, monitor, Unpadded::ALL, &mut padding);
         let Some(unpadded) = padding.finish() else { return survey };
-        let mut survey = Self::read_rows(origin, reading, most_rows, monitor, unpadded, None)?;
+        let mut survey = Self::read_kept(origin, reading, most_rows, monitor, unpadded, &mut PaddingFinder::default())?;
         survey.read.padding = unpadded.first + padding.rows() - unpadded.end;
         survey.read.notes.push(unpadded.note(padding.rows()));
         Ok(survey)
     }
 
-    fn read_rows(
+    /// The same of these rows. A file that has fewer rows than its first ones let expect is read once more, since they have to be kept.
+    fn read_kept(
         origin: &Origin,
         reading: Reading,
         most_rows: u64,
         monitor: &ReadMonitor,
         unpadded: Unpadded,
-        mut padding: Option<&mut PaddingFinder>,
+        padding: &mut PaddingFinder,
+    ) -> Result<Self, StreamError> {
+        let read = |kept: Kept, padding: &mut PaddingFinder| {
+            Self::read_rows(origin, reading.wanted(most_rows), kept, monitor, unpadded, padding)
+        };
+        let kept = Kept { is_by_expectation: reading.part.is_none(), ..Kept::new(reading.kept) };
+        let survey = read(kept, padding)?;
+        let is_as_expected = survey.has_all_rows || survey.rows > reading.kept.most_rows();
+        if is_as_expected { Ok(survey) } else { read(Kept::new(reading.kept), &mut PaddingFinder::default()) }
+    }
+
+    fn read_rows(
+        origin: &Origin,
+        wanted: WantedRows,
+        mut kept: Kept,
+        monitor: &ReadMonitor,
+        unpadded: Unpadded,
+        padding: &mut PaddingFinder,
     ) -> Result<Self, StreamError> {
         monitor.begin_pass(ReadPass::FirstRows);
         let mut source = origin.open()?;
         let columns: Vec<ValueColumn> = source.columns().to_vec();
-        let stated_hz = reading.stated_hz.or(source.rate_hz());
+        let stated_hz = wanted.stated_hz.or(source.rate_hz());
         let mut placer = Placer::new(Clock::new(stated_hz)?, columns.len());
         let mut surveys = vec![ColumnSurvey::new(); columns.len()];
         let mut full_scale = FullScale::new(&columns);
-        let mut kept = Kept::new(reading.kept, columns.len() as u64);
         let mut rows_before = 0u64;
         // The numbers of a batch, NaN where they are refused.
         let mut usable: Vec<Vec<f64>> = Vec::new();
         let are_registers = columns.iter().any(|column| column.register.is_some());
-        let read = source.for_each_batch(reading.wanted(most_rows), |mut batch| {
+        let read = source.for_each_batch(wanted, |mut batch| {
             let all_rows = batch.rows as u64;
             unpadded.apply(rows_before, &mut batch);
             // Registers that do not change are frozen ones, which the burst validator counts.
-            if let Some(padding) = padding.as_deref_mut().filter(|_| !are_registers) {
+            if !are_registers {
                 padding.add(&batch);
             }
-            if kept.add(&batch) {
+            if kept.add(&batch, |rows| origin.expected_rows(rows)) {
                 monitor.begin_pass(ReadPass::Survey);
             }
             usable.clone_from(&batch.values);
@@ -529,6 +564,7 @@ impl Survey {
             full_scale_notes,
             read,
             has_all_rows: kept.has_all_rows,
+            rows: kept.rows,
             kept: kept.batches,
         })
     }
@@ -582,11 +618,34 @@ impl Survey {
             };
             notes.push(format!("{} ({}) {what}, and is left out", column.profile.name, column.label));
         }
+        notes.extend(self.missing_notes());
         let rounded = self.columns.iter().filter_map(|of| Some((&of.column.profile, of.quantizer.as_ref()?)));
         notes.extend(rounding_note(rounded));
         notes.extend(self.stamps.iter().flat_map(StampQuality::notes));
         notes.extend(self.clock.note().map(str::to_owned));
         notes
+    }
+
+    /// Sentences on numbers that are no measurement; channels that have as many share one.
+    fn missing_notes(&self) -> Vec<String> {
+        let mut channels: BTreeMap<(&str, u64, usize), Vec<&str>> = BTreeMap::new();
+        for StreamedColumn { column, survey, .. } in self.columns.iter().filter(|of| of.quantizer.is_some()) {
+            for (cause, count) in &survey.refused {
+                let what = match *cause {
+                    "missing" => "missing",
+                    "not_finite" => "infinite",
+                    "out_of_range" => "outside of any range",
+                    // The reports count the faults of a register.
+                    _ => continue,
+                };
+                channels.entry((what, *count, survey.rows())).or_default().push(column.profile.name);
+            }
+        }
+        let note = |((what, count, rows), names): ((&str, u64, usize), Vec<&str>)| {
+            let are = if count == 1 { "is" } else { "are" };
+            format!("{count} of {rows} values of {} {are} {what}", names.join(", "))
+        };
+        channels.into_iter().map(note).collect()
     }
 
     /// Gives the columns that are set in `off_step` other counts, and unsets them.
@@ -671,6 +730,12 @@ impl StreamedColumn {
     /// Its numbers as counts; `off_step` is set where one is no multiple of the step of the others.
     fn channel(&self, values: &[f64], verdicts: &[Verdict], off_step: &mut bool) -> Option<MeasuredChannel> {
         let (quantizer, profile) = (self.quantizer.as_ref()?, self.profile()?);
+        if self.column.register.is_some() && verdicts.iter().all(|verdict| verdict.refused.is_empty()) {
+            // All words of the register are counts, but for those that are missing.
+            if !values.iter().any(|value| value.is_nan()) {
+                return Some(MeasuredChannel::new(profile, values.iter().map(|value| *value as i32).collect()));
+            }
+        }
         let mut counts = Vec::with_capacity(values.len());
         let mut refused: BTreeMap<&'static str, Vec<usize>> = BTreeMap::new();
         for (position, &value) in values.iter().enumerate() {
@@ -698,23 +763,28 @@ impl StreamedColumn {
 /// Rows that are kept from the first reading.
 struct Kept {
     limit: KeptInMemory,
-    columns: u64,
     batches: VecDeque<Batch>,
     rows: u64,
     has_all_rows: bool,
+    /// Whether they are dropped as soon as more are expected than can be kept.
+    is_by_expectation: bool,
 }
 
 impl Kept {
-    fn new(limit: KeptInMemory, columns: u64) -> Self {
-        Self { limit, columns, batches: VecDeque::new(), rows: 0, has_all_rows: true }
+    fn new(limit: KeptInMemory) -> Self {
+        Self { limit, batches: VecDeque::new(), rows: 0, has_all_rows: true, is_by_expectation: false }
     }
 
-    /// Keeps a batch; true if from now on not all rows are kept.
-    fn add(&mut self, batch: &Batch) -> bool {
+    /// Keeps a batch; true if from now on not all rows are kept. `expected` tells by a number of rows how many there are in all.
+    fn add(&mut self, batch: &Batch, expected: impl Fn(u64) -> Option<u64>) -> bool {
         let had_all_rows = self.has_all_rows;
         self.rows += batch.rows as u64;
-        let most = self.limit.rows_with_losses.max(self.limit.rows).max(MOST_KEPT_VALUES / self.columns.max(1));
-        if self.has_all_rows && self.rows > most {
+        let most = self.limit.most_rows().max(MOST_KEPT_VALUES / batch.values.len().max(1) as u64);
+        let is_expected_more = || {
+            let can_tell = self.is_by_expectation && self.rows >= ROWS_OF_BEGINNING as u64;
+            can_tell && expected(self.rows).is_some_and(|expected| expected > most)
+        };
+        if self.has_all_rows && (self.rows > most || is_expected_more()) {
             self.has_all_rows = false;
             let mut rows = 0;
             self.batches.retain(|batch| {

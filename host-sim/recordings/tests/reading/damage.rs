@@ -16,7 +16,7 @@ fn damaged_files_of_every_format_end_in_a_result_or_one_line() {
     let no_columns = ColumnSelection::parse(&[], &[]).expect("nothing");
     let mut rng = ChaCha8Rng::seed_from_u64(18);
     let (mut refused, mut read) = (0, 0);
-    for Sample { name, file, options, .. } in samples {
+    for Sample { name, file, options, .. } in &samples {
         let whole = std::fs::read(file).expect("written");
         let ending = Path::new(name).extension().expect("an ending").to_str().expect("UTF-8");
         let file = folder.path().join(format!("damaged.{ending}"));

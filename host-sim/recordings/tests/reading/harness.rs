@@ -17,7 +17,6 @@ use recordings::time_base::TimeRange;
 use recordings::{ColumnSelection, InputError};
 use std::io::Write;
 use std::path::Path;
-use std::process::Command;
 
 /// Recordings of so many rows are read into memory, longer ones in blocks.
 const ROWS_IN_MEMORY: u64 = 1 << 18;
@@ -220,17 +219,4 @@ pub(crate) fn gzip(bytes: &[u8]) -> Vec<u8> {
 pub(crate) fn normal(seed: u64) -> impl FnMut() -> f64 {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     move || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
-}
-
-/// Runs a script of this folder's parent with the Python that `ADIS_PYTHON` names, and returns what it prints; `None`, with a note, without
-/// one.
-pub(crate) fn python(test: &str, script: &str, arguments: &[&str]) -> Option<Vec<u8>> {
-    let Some(python) = std::env::var_os("ADIS_PYTHON").filter(|python| Path::new(python).exists()) else {
-        system_tests::note_skipped(test, "ADIS_PYTHON names no Python with the packages of tests/requirements.txt");
-        return None;
-    };
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests").join(script);
-    let output = Command::new(python).arg(&script).args(arguments).output().expect("Python starts");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    Some(output.stdout)
 }

@@ -1,11 +1,11 @@
 //! Recordings of other sensors that other people made: they open as the documentation says, and their Allan deviations are those that other
 //! programs find (`reference_curves.py`).
 
-use super::harness::{Reading, inspect, python, read_file};
+use super::harness::{Reading, inspect, read_file};
 use serde_json::Value;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
-use system_tests::recording;
+use system_tests::{python, recording};
 
 /// A file of the folder `others`.
 fn other(test: &str, file: &str) -> Option<PathBuf> {
@@ -23,7 +23,7 @@ fn refusal(file: &Path, options: &[&str]) -> String {
 /// What `reference_curves.py` finds with a reader and its argument.
 fn reference(test: &str, reader: &str, file: &Path, argument: &str) -> Option<Value> {
     let arguments = [reader, file.to_str().expect("UTF-8"), argument];
-    let output = python(test, "reference_curves.py", &arguments)?;
+    let output = python(test, "host-sim/recordings/tests/reference_curves.py", &arguments)?;
     Some(serde_json::from_slice(&output).expect("JSON"))
 }
 

@@ -1,12 +1,11 @@
 //! Files of every format that other programs wrote, with known noise, rate and losses (`make_samples.py`).
 
-use super::harness::{python, read, read_file, rows, write_array};
+use super::harness::{read, read_file, rows, write_array};
 use recordings::file_format::{RecordedFormat, RecordedInput};
 use recordings::sample_stream::StreamError;
 use serde_json::Value;
-use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
-use system_tests::one_at_a_time;
+use std::path::PathBuf;
+use system_tests::recorded_samples;
 
 /// A file, and what is known of it.
 pub(crate) struct Sample {
@@ -16,37 +15,19 @@ pub(crate) struct Sample {
     truth: Value,
 }
 
-/// The files that `make_samples.py` has written, once for all tests; `None`, with a note, without Python.
-pub(crate) fn samples(test: &str) -> Option<&'static [Sample]> {
-    static SAMPLES: OnceLock<Option<Vec<Sample>>> = OnceLock::new();
-    let samples = SAMPLES.get_or_init(|| {
-        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/make_samples.py");
-        let script = std::fs::read(script).expect("the script");
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("samples");
-        // The first test writes the files, for as long as the script is the same.
-        let _writing = one_at_a_time(&folder.with_extension("lock"));
-        let written_by = folder.join("written-by.py");
-        if std::fs::read(&written_by).ok().as_ref() != Some(&script) {
-            // The writers of bags refuse a file that exists.
-            let _ = std::fs::remove_dir_all(&folder);
-            python(test, "make_samples.py", &[folder.to_str().expect("UTF-8")])?;
-            std::fs::write(written_by, script).expect("room");
-        }
-        let text = std::fs::read(folder.join("truth.json")).expect("written");
-        let truth: Vec<Value> = serde_json::from_slice(&text).expect("a list in JSON");
-        assert!(truth.len() >= 20, "{} samples", truth.len());
-        let sample = |truth: Value| {
-            let name = truth["file"].as_str().expect("a name").to_owned();
-            let options = truth["arguments"].as_array().expect("a list").iter();
-            let options = options.map(|text| text.as_str().expect("text").to_owned()).collect();
-            Sample { file: folder.join(&name), name, options, truth }
-        };
-        Some(truth.into_iter().map(sample).collect())
-    });
-    if samples.is_none() {
-        python(test, "make_samples.py", &[]);
-    }
-    samples.as_deref()
+/// The files that `make_samples.py` has written; `None`, with a note, without Python.
+pub(crate) fn samples(test: &str) -> Option<Vec<Sample>> {
+    let folder = recorded_samples(test)?;
+    let text = std::fs::read(folder.join("truth.json")).expect("written");
+    let truth: Vec<Value> = serde_json::from_slice(&text).expect("a list in JSON");
+    assert!(truth.len() >= 20, "{} samples", truth.len());
+    let sample = |truth: Value| {
+        let name = truth["file"].as_str().expect("a name").to_owned();
+        let options = truth["arguments"].as_array().expect("a list").iter();
+        let options = options.map(|text| text.as_str().expect("text").to_owned()).collect();
+        Sample { file: folder.join(&name), name, options, truth }
+    };
+    Some(truth.into_iter().map(sample).collect())
 }
 
 fn number(value: &Value) -> f64 {
@@ -61,7 +42,7 @@ fn number(value: &Value) -> f64 {
 #[test]
 fn samples_of_other_programs_have_their_rate_losses_and_numbers() {
     let Some(samples) = samples("samples_of_other_programs_have_their_rate_losses_and_numbers") else { return };
-    for Sample { name, file, options, truth } in samples {
+    for Sample { name, file, options, truth } in &samples {
         let read = read_file(file, options).unwrap_or_else(|error| panic!("{name} {options:?}: {error}"));
         assert_eq!(read.samples.len() as u64, truth["rows"], "{name}: samples");
         assert_eq!(read.missing(), truth["missing"], "{name}: missing samples");
@@ -81,7 +62,7 @@ fn every_format_is_converted() {
     let Some(samples) = samples("every_format_is_converted") else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let [array, back] = ["back.npy", "back.csv"].map(|name| folder.path().join(name));
-    for Sample { name, file, options, truth } in samples {
+    for Sample { name, file, options, truth } in &samples {
         // A log of the bus has no columns.
         if RecordedInput::open(file).expect(name).format() == RecordedFormat::SpiExport {
             continue;

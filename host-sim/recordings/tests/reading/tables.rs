@@ -1,6 +1,8 @@
 //! Tables in text as loggers and programs write them.
 
 use super::harness::{Reading, gzip, normal, read};
+use rand::seq::IndexedRandom;
+use rand::seq::index::sample;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -506,20 +508,45 @@ fn a_damaged_place_costs_its_rows_and_is_told() {
         );
         assert!(read.notes_contain(note), "{name}: {:?}", read.notes);
     }
-    for word in ["-", "#N/A", "1.#QNAN", "ovf", "NaN", ""] {
-        let text = table(&move |rows| {
-            for row in rows.iter_mut().skip(7).step_by(50) {
-                let time = row.split(',').next().expect("a time").to_owned();
-                *row = format!("{time},{word},{word},{word}");
-            }
-        });
-        let read = reading(word, &text, &[]);
-        assert_eq!((read.samples.len() as u32, read.refused("gyro_y", "missing")), (ROWS, 120), "{word}");
-    }
     // A tenth of the rows is another file.
     let text = table(&|rows| rows.iter_mut().step_by(8).for_each(|row| row.push_str(",x")));
     let error = read("damaged.csv", text.as_bytes(), &[""; 0]).err().expect("refused").to_string();
     assert!(error.contains("line 10") && error.contains("5 fields"), "{error}");
+}
+
+/// Words for no value at places that are drawn, as many in each channel as is drawn: the samples stay, and the channels are told with how
+/// many of their values are missing.
+#[test]
+fn values_that_are_missing_are_told_by_channel() {
+    const WORDS: [&str; 9] = ["-", "#N/A", "1.#QNAN", "ovf", "NaN", "", "null", "---", "n/a"];
+    for seed in 0..12 {
+        let (mut random, mut normal) = (ChaCha8Rng::seed_from_u64(seed), normal(40 + seed));
+        let word = *WORDS.choose(&mut random).expect("words");
+        let mut cells: Vec<[String; 3]> =
+            (0..ROWS).map(|_| [(); 3].map(|()| format!("{:.5}", NOISE * normal()))).collect();
+        let [x, y] = [(); 2].map(|()| random.random_range(1..400_usize));
+        // Two channels lack values in the same rows, the third in others.
+        for (row, axes) in [(x, &[0, 1][..]), (y, &[2])]
+            .into_iter()
+            .flat_map(|(count, axes)| sample(&mut random, ROWS as usize, count).into_iter().map(move |row| (row, axes)))
+        {
+            axes.iter().for_each(|axis| word.clone_into(&mut cells[row][*axis]));
+        }
+        let rows = (0..ROWS).zip(&cells).map(|(row, cells)| format!("{},{}\n", seconds(row), cells.join(",")));
+        let text = format!("t_s,gx_rad_s,gy_rad_s,gz_rad_s\n{}", rows.collect::<String>());
+        let read = reading(word, &text, &[]);
+        assert_eq!(read.samples.len() as u32, ROWS, "{seed}: {word}");
+        for (channels, count) in [(&["gyro_x", "gyro_y"][..], x), (&["gyro_z"], y)] {
+            for channel in channels {
+                assert_eq!(read.refused(channel, "missing"), count, "{seed}: {word}");
+            }
+            // Channels that lack as many are told together.
+            let channels = if x == y { "gyro_x, gyro_y, gyro_z".to_owned() } else { channels.join(", ") };
+            let are = if count == 1 { "is" } else { "are" };
+            let note = format!("{count} of {ROWS} values of {channels} {are} missing");
+            assert!(read.notes_contain(&note), "{seed}: {note:?} is not in {:?}", read.notes);
+        }
+    }
 }
 
 /// Delimiters after the last cell, texts with delimiters, headings in two lines, lines before the table.

@@ -45,7 +45,7 @@ fn report() -> Value {
     let axes = ["x", "y", "z"].into_iter();
     let gyro = axes.clone().zip(GYRO).map(|(axis, of)| channel(&format!("gyro_{axis}"), "deg/s", of, GYRO_Y_BOUND));
     let accl = axes.zip(ACCL).map(|(axis, of)| channel(&format!("accl_{axis}"), "g", of, ACCL_Z_BOUND));
-    json!({"schema": 1, "sample_rate_hz": RATE_HZ, "channels": gyro.chain(accl).collect::<Vec<_>>()})
+    json!({"schema": 2, "sample_rate_hz": RATE_HZ, "channels": gyro.chain(accl).collect::<Vec<_>>()})
 }
 
 /// The coefficient at `index` (N, B, K) of the three axes in SI units; a K of 0 as its bound.

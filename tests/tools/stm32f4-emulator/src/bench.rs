@@ -5,7 +5,7 @@ use crate::probe::Probe;
 use crate::sensor::{Sensor, Terminal};
 use emulation::{
     DBGMCU_APB1_FZ, EXTI_FTSR, EXTI_IMR, EXTI_RTSR, Event, FLASH_CR, FLASH_OPTCR, FLASH_SR, ODR, OSPEEDR, Outcome,
-    PUPDR, SPI1_CR1, SYSCFG_EXTICR, SYSCFG_MEMRMP, Scenario, Wiring, Work, gpio,
+    PUPDR, SPI1_CR1, SPI1_CRCPR, SYSCFG_EXTICR, SYSCFG_MEMRMP, Scenario, Wiring, Work, gpio,
 };
 use rigless::cpu::armv7m as cpu;
 use rigless::device::Level;
@@ -24,6 +24,8 @@ use std::num::{NonZeroU32, NonZeroU64};
 use std::path::Path;
 
 const CORE_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).unwrap();
+/// Instructions a second of a slow core.
+const SLOW_HZ: NonZeroU64 = NonZeroU64::new(21_000_000).unwrap();
 const SUPPLY_MV: u32 = 3300;
 const CHIP_SELECT: u8 = 4; // PA4
 const SPI1: usize = 0;
@@ -38,11 +40,12 @@ const TCIE: u64 = 1 << 4;
 /// Its bit that lets the stream run.
 const EN: u64 = 1;
 /// Registers that a run returns beside those of the ports.
-const CONFIGURATION: [u64; 11] = [
+const CONFIGURATION: [u64; 12] = [
     FLASH_SR,
     FLASH_CR,
     FLASH_OPTCR,
     SPI1_CR1,
+    SPI1_CRCPR,
     SYSCFG_EXTICR[0],
     SYSCFG_EXTICR[1],
     EXTI_IMR,
@@ -60,12 +63,14 @@ const PULSE_NS: u64 = 100_000;
 struct Bench {
     microcontroller: Microcontroller,
     wiring: Wiring,
+    instructions_per_second: NonZeroU64,
 }
 
 impl Store for Bench {}
 
 impl Bench {
-    fn new(wiring: Wiring, sensor: Option<Sensor>, terminal: Terminal) -> Result<Self, Error> {
+    fn new(scenario: &Scenario, sensor: Option<Sensor>, terminal: Terminal) -> Result<Self, Error> {
+        let wiring = scenario.wiring;
         let mut part = Stm32f427::new()?;
         part.rcc.attach_crystals(wiring.crystal_hz, 0);
         part.set_supply(SUPPLY_MV);
@@ -74,7 +79,10 @@ impl Bench {
             part.spi[SPI1].attach_selected(sensor, select);
         }
         part.usart[wiring.usart].attach(terminal);
-        Ok(Self { microcontroller: Microcontroller::new(part)?, wiring })
+        let instructions_per_second = if scenario.slow_core { SLOW_HZ } else { CORE_HZ };
+        let mut microcontroller = Microcontroller::new(part)?;
+        microcontroller.crystal_fails = scenario.crystal_fails;
+        Ok(Self { microcontroller, wiring, instructions_per_second })
     }
 
     fn sensor(&mut self) -> Option<&mut Sensor> {
@@ -103,7 +111,7 @@ impl Board for Bench {
             interrupt_lines: NonZeroU32::new(interrupt_lines).unwrap(),
             priority_bits: 4,
             refclk_divider: NonZeroU32::new(8).unwrap(),
-            instructions_per_second: CORE_HZ,
+            instructions_per_second: self.instructions_per_second,
             boot: "flash",
         };
         let windows = cpu::windows(Mcu::bus(&self.microcontroller));
@@ -176,6 +184,7 @@ impl Plant {
             }
             Event::LoseBurstEnd => self.burst_fault = TCIE,
             Event::StopReceiving => self.burst_fault = EN,
+            Event::ChangeRegister(address, value) => write(session, host, address, value),
             Event::StopCounter => write(session, host, RCC_APB1RSTR, TIM2RST),
             Event::BusError => session.fail_next(TIM2.start, TIM2.end),
             Event::ClearInMemory(value) => clear_in_memory(host, value),
@@ -249,8 +258,7 @@ pub(crate) fn run(image: &Path, scenario: Scenario) -> Outcome {
     let keys = scenario.keys.iter().flat_map(|(at, keys)| keys.iter().map(move |&key| (ns(*at), key)));
     let terminal = Terminal { keys: keys.collect(), ..Terminal::default() };
     let sensor = scenario.sensor.map(|sensor| Sensor::new(sensor.part()));
-    let mut bench = Bench::new(scenario.wiring, sensor, terminal).expect("the emulator knows the part");
-    bench.microcontroller.crystal_fails = scenario.crystal_fails;
+    let bench = Bench::new(&scenario, sensor, terminal).expect("the emulator knows the part");
     let plant = Plant {
         end: ns(scenario.seconds),
         pulse_end: None,

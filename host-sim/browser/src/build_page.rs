@@ -1,0 +1,111 @@
+//! `cargo run -p browser -- [FOLDER]` builds the page: FOLDER/index.html with the program beside it, for a web server, and
+//! FOLDER/observatory.html, one file with everything inside, which is opened from a disk. FOLDER is `target/browser` if none is named.
+
+use clap::ValueEnum;
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use reports::export::ExportFormat;
+use sha2::{Digest, Sha256};
+use std::error::Error;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+use std::{env, fs};
+
+const PAGE: &str = include_str!("../page/page.html");
+/// After that of a report.
+const STYLE: &str = include_str!("../page/style.css");
+const SCRIPT: &str = include_str!("../page/page.js");
+const WORKER: &str = include_str!("../page/worker.js");
+const TARGET: &str = "wasm32-unknown-unknown";
+const PROFILE: &str = "browser";
+/// The program beside the page, compressed: not every server compresses it.
+const PROGRAM: &str = "observatory.wasm.gz";
+
+fn main() -> ExitCode {
+    match run(env::args_os().nth(1).map(PathBuf::from)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(folder: Option<PathBuf>) -> Result<(), Box<dyn Error>> {
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from);
+    let folder = folder.unwrap_or_else(|| target.join("browser"));
+    let mut program = GzEncoder::new(Vec::new(), Compression::best());
+    program.write_all(&build(&workspace, &target)?)?;
+    let program = program.finish()?;
+    fs::create_dir_all(&folder)?;
+    let files = [
+        ("index.html", page(None).into_bytes()),
+        ("observatory.html", page(Some(&base64(&program))).into_bytes()),
+        (PROGRAM, program),
+    ];
+    for (name, content) in files {
+        let file = folder.join(name);
+        fs::write(&file, &content).map_err(|error| format!("{}: {error}", file.display()))?;
+        println!("{}, {} kB", file.display(), content.len() / 1000);
+    }
+    Ok(())
+}
+
+/// Compiles the library for browsers.
+fn build(workspace: &Path, target: &Path) -> Result<Vec<u8>, Box<dyn Error>> {
+    // Cargo, which runs this program, may hold the lock of its own folder.
+    let target = target.join("browser-build");
+    let status = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+        .current_dir(workspace)
+        .env_remove("RUSTC_WORKSPACE_WRAPPER")
+        .args(["rustc", "--locked", "--package", "browser", "--lib", "--crate-type", "cdylib"])
+        .args(["--profile", PROFILE, "--target", TARGET, "--target-dir"])
+        .arg(&target)
+        .status()
+        .map_err(|error| format!("cargo does not start: {error}"))?;
+    if !status.success() {
+        return Err(format!("the page does not build; its target comes with: rustup target add {TARGET}").into());
+    }
+    let file = target.join(TARGET).join(PROFILE).join("browser.wasm");
+    Ok(fs::read(&file).map_err(|error| format!("{}: {error}", file.display()))?)
+}
+
+/// The page, with the program inside as text or beside it. Its policy allows the scripts in it and in a report, by their hashes; no
+/// request but that for the program; and that only until it is loaded, as the script sees to.
+fn page(program: Option<&str>) -> String {
+    let scripts = [SCRIPT, reports::page::SCRIPT].map(|script| format!("'sha256-{}'", base64(&Sha256::digest(script))));
+    let connect = if program.is_some() { "" } else { " connect-src 'self';" };
+    let policy = format!(
+        "default-src 'none'; script-src {} 'wasm-unsafe-eval'; worker-src blob:; style-src 'unsafe-inline'; img-src data:;{connect} \
+         base-uri 'none'; form-action 'none'",
+        scripts.join(" ")
+    );
+    let style = format!("{}{STYLE}", reports::page::STYLE);
+    let formats = ExportFormat::value_variants().iter().filter_map(ValueEnum::to_possible_value);
+    let formats: String = formats.map(|format| format!("<option>{}</option>", format.get_name())).collect();
+    let parts = [
+        ("POLICY", policy.as_str()),
+        ("STYLE", &style),
+        ("FORMATS", &formats),
+        ("WORKER", WORKER),
+        ("PROGRAM", program.unwrap_or("")),
+        ("SCRIPT", SCRIPT),
+    ];
+    parts.iter().fold(PAGE.to_owned(), |page, (name, text)| page.replacen(&format!("{{{{{name}}}}}"), text, 1))
+}
+
+/// Base 64 (RFC 4648).
+fn base64(bytes: &[u8]) -> String {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for part in bytes.chunks(3) {
+        let bits = part.iter().enumerate().fold(0, |bits, (at, byte)| bits | u32::from(*byte) << (16 - 8 * at));
+        for digit in 0..4 {
+            let is_used = digit <= part.len();
+            text.push(if is_used { DIGITS[(bits >> (18 - 6 * digit)) as usize & 63] as char } else { '=' });
+        }
+    }
+    text
+}

@@ -1,0 +1,184 @@
+//! The analysis in a browser: functions that a page calls in a worker, without any generated code between them.
+//!
+//! The page writes a request into the memory that [`reserve_request`] gives, as JSON, and the bytes of a recording into that of
+//! [`reserve_file`]; it calls a function, and reads the answer at [`answer_pointer`]. A function returns 0 where the answer is what was
+//! asked for, and 1 where it is the sentence of an error. On the way it calls the imported function `progress`.
+
+mod analysis;
+mod host;
+mod inspection;
+mod recording_options;
+
+use analysis::Recorded;
+use anyhow::{Context, Result};
+use measurement::Measurement;
+use noise_analysis::report::several;
+use recording_options::RecordingOptions;
+use reports::export::{AxisChoice, ExportFormat};
+use reports::saved_report::SavedReport;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use simulation::Simulation;
+use std::cell::RefCell;
+use std::sync::Arc;
+
+/// What the page has given, and what it is given.
+#[derive(Default)]
+struct Exchange {
+    request: Vec<u8>,
+    file: Option<Arc<[u8]>>,
+    /// Recordings whose noise is to be compared.
+    measured: Vec<Measurement>,
+    answer: Vec<u8>,
+}
+
+thread_local! {
+    static EXCHANGE: RefCell<Exchange> = RefCell::default();
+}
+
+fn with<R>(change: impl FnOnce(&mut Exchange) -> R) -> R {
+    EXCHANGE.with_borrow_mut(change)
+}
+
+/// Memory for a request of so many bytes.
+#[unsafe(no_mangle)]
+pub extern "C" fn reserve_request(bytes: usize) -> *mut u8 {
+    with(|exchange| {
+        exchange.request = vec![0; bytes];
+        exchange.request.as_mut_ptr()
+    })
+}
+
+/// Memory for a recording of so many bytes, which replaces the one before it.
+#[unsafe(no_mangle)]
+pub extern "C" fn reserve_file(bytes: usize) -> *mut u8 {
+    with(|exchange| {
+        exchange.file = None;
+        let mut file: Arc<[u8]> = std::iter::repeat_n(0, bytes).collect();
+        let pointer = Arc::get_mut(&mut file).map_or(std::ptr::null_mut(), <[u8]>::as_mut_ptr);
+        exchange.file = Some(file);
+        pointer
+    })
+}
+
+/// Where the answer begins.
+#[unsafe(no_mangle)]
+pub extern "C" fn answer_pointer() -> *const u8 {
+    with(|exchange| exchange.answer.as_ptr())
+}
+
+/// Length of the answer, bytes of UTF-8.
+#[unsafe(no_mangle)]
+pub extern "C" fn answer_length() -> usize {
+    with(|exchange| exchange.answer.len())
+}
+
+/// A request that names a recording, and says how it is read.
+#[derive(Deserialize)]
+struct RecordingRequest {
+    name: String,
+    /// Whether it is the first of those to be compared.
+    #[serde(default, rename = "isFirst")]
+    is_first: bool,
+    #[serde(flatten)]
+    options: RecordingOptions,
+}
+
+impl RecordingRequest {
+    fn recorded(&self) -> Result<Recorded<'_>> {
+        let bytes = with(|exchange| exchange.file.clone()).context("no recording")?;
+        Ok(Recorded { name: &self.name, bytes, options: &self.options })
+    }
+}
+
+/// What is in a recording: HTML with a form for each sensor.
+#[unsafe(no_mangle)]
+pub extern "C" fn inspect() -> u32 {
+    answer(|request: RecordingRequest| inspection::html(&request.recorded()?))
+}
+
+/// The report of a recording: its page and its JSON.
+#[unsafe(no_mangle)]
+pub extern "C" fn analyse() -> u32 {
+    answer(|request: RecordingRequest| request.recorded()?.report())
+}
+
+/// A simulation to analyse.
+#[derive(Deserialize)]
+struct SimulationRequest {
+    seconds: f64,
+    seed: u64,
+    /// N, B and K alone.
+    plain: bool,
+}
+
+/// The report of the virtual sensor, as that of a recording.
+#[unsafe(no_mangle)]
+pub extern "C" fn simulate() -> u32 {
+    answer(|SimulationRequest { seconds, seed, plain }: SimulationRequest| {
+        let simulation =
+            if plain { Simulation::paper(seconds, seed) } else { Simulation::demonstration(seconds, seed) };
+        analysis::simulated(&simulation)
+    })
+}
+
+/// Keeps the samples of a recording for [`compare`]; with the first one, forgets those before it.
+#[unsafe(no_mangle)]
+pub extern "C" fn keep() -> u32 {
+    answer(|request: RecordingRequest| {
+        let measurement = request.recorded()?.measurement()?;
+        with(|exchange| {
+            if request.is_first {
+                exchange.measured.clear();
+            }
+            exchange.measured.push(measurement);
+        });
+        Ok(String::new())
+    })
+}
+
+/// Whether the recordings that were kept have the same noise.
+#[unsafe(no_mangle)]
+pub extern "C" fn compare() -> u32 {
+    answer(|(): ()| {
+        let measured = with(|exchange| std::mem::take(&mut exchange.measured));
+        let mut text = Vec::new();
+        reports::several::write_agreement(&several::compare(&measured)?, &mut text)?;
+        Ok(String::from_utf8(text)?)
+    })
+}
+
+/// A report to write in the format of another program.
+#[derive(Deserialize)]
+struct ExportRequest {
+    /// Its JSON.
+    report: String,
+    /// As the option `--export` calls it.
+    format: String,
+    /// As the option `--axis` calls it.
+    axis: String,
+}
+
+/// The noise of a report in the format of another program.
+#[unsafe(no_mangle)]
+pub extern "C" fn export() -> u32 {
+    fn named<T: clap::ValueEnum>(name: &str) -> Result<T> {
+        T::from_str(name, false).map_err(anyhow::Error::msg)
+    }
+    answer(|ExportRequest { report, format, axis }: ExportRequest| {
+        let report = SavedReport::from_json(&report)?;
+        Ok(reports::export::export(&report, named::<ExportFormat>(&format)?, named::<AxisChoice>(&axis)?)?.text)
+    })
+}
+
+/// Serves the request that the page has written.
+fn answer<T: DeserializeOwned>(serve: impl FnOnce(T) -> Result<String>) -> u32 {
+    host::set_panic_hook();
+    let request = with(|exchange| std::mem::take(&mut exchange.request));
+    let served = serde_json::from_slice(&request).context("request").and_then(serve);
+    let status = u32::from(served.is_err());
+    // A message that quotes its input has no character that a page must not show: the page sets it as text.
+    let text = served.unwrap_or_else(|error| format!("{error:#}"));
+    with(|exchange| exchange.answer = text.into_bytes());
+    status
+}

@@ -1,0 +1,89 @@
+//! How a recording is read: the options of the command `imunoise`, as the page sends them.
+
+use adis16405_driver::GyroRange;
+use anyhow::{Context, Result, bail};
+use measurement::{SensorProfile, adis16405, profile_file};
+use recordings::Printable;
+use recordings::time_base::TimeRange;
+use serde::Deserialize;
+
+/// Name of the sensor whose register counts need no profile, and that of a sensor without a data sheet.
+const ADIS16405: &str = "adis16405";
+const GENERIC: &str = "generic";
+
+/// The options; what is not said is left out.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct RecordingOptions {
+    pub(crate) topic: Option<String>,
+    /// As in `gyro_x=wx`.
+    pub(crate) columns: Vec<String>,
+    pub(crate) units: Vec<String>,
+    /// Hz.
+    pub(crate) rate: Option<f64>,
+    /// Name of an included profile.
+    pub(crate) sensor: Option<String>,
+    /// Full scale of the gyros of an ADIS16405, °/s, if it is not 300.
+    pub(crate) range: Option<u32>,
+    /// s from the first sample.
+    pub(crate) from: Option<f64>,
+    /// s from the first sample.
+    pub(crate) to: Option<f64>,
+}
+
+impl RecordingOptions {
+    /// As they are typed for the command.
+    pub(crate) fn words(&self) -> Vec<String> {
+        let Self { topic, columns, units, rate, sensor, range, from, to } = self;
+        let list = |texts: &[String]| Some(texts.join(",")).filter(|text| !text.is_empty());
+        let number = |number: &Option<f64>| number.map(|number| number.to_string());
+        let options = [
+            ("--topic", topic.clone()),
+            ("--columns", list(columns)),
+            ("--units", list(units)),
+            ("--rate", number(rate)),
+            ("--sensor", sensor.clone()),
+            ("--range", range.map(|range| range.to_string())),
+            ("--from", number(from)),
+            ("--to", number(to)),
+        ];
+        options.into_iter().filter_map(|(name, value)| Some([name.to_owned(), value?])).flatten().collect()
+    }
+
+    /// The part of the recording that is read; `None` for all of it.
+    pub(crate) fn time_range(&self) -> Option<TimeRange> {
+        let is_part = self.from.is_some() || self.to.is_some();
+        is_part.then(|| TimeRange { from_s: self.from.unwrap_or(0.0), to_s: self.to.unwrap_or(f64::INFINITY) })
+    }
+
+    /// The range of the gyros of an ADIS16405.
+    ///
+    /// # Errors
+    /// It has no such range.
+    pub(crate) fn gyro_range(&self) -> Result<GyroRange> {
+        Ok(match self.range {
+            None | Some(300) => GyroRange::Dps300,
+            Some(150) => GyroRange::Dps150,
+            Some(75) => GyroRange::Dps75,
+            Some(other) => bail!("range {other} °/s: none of 300, 150 and 75"),
+        })
+    }
+
+    /// The profile of the sensor, if one is named.
+    ///
+    /// # Errors
+    /// There is no such profile.
+    pub(crate) fn profile(&self) -> Result<Option<SensorProfile>> {
+        let Some(sensor) = &self.sensor else { return Ok(None) };
+        Ok(Some(match sensor.to_lowercase().as_str() {
+            ADIS16405 => adis16405::profile(self.gyro_range()?.lsb()),
+            GENERIC => SensorProfile::generic(),
+            name => profile_file::included(name).with_context(|| format!("sensor {}: not known", Printable(name)))?,
+        }))
+    }
+
+    /// Names of sensors whose profile is included.
+    pub(crate) fn sensors() -> impl Iterator<Item = &'static str> {
+        [ADIS16405].into_iter().chain(profile_file::included_names()).chain([GENERIC])
+    }
+}

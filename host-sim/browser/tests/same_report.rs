@@ -1,0 +1,122 @@
+//! The report of the page and that of the command, of the same file with the same options.
+
+use crate::harness::drive;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use system_tests::{host_sim, recorded_samples};
+
+/// Largest relative difference of two numbers in the reports of a file: libraries of elementary functions differ in the last bit.
+const TOLERANCE: f64 = 1e-6;
+/// The same in those of a simulation: its supply is known to a few counts, and the deviance of a model of it changes by less than the 10⁻⁹
+/// at which a search ends where its parameters change by 3·10⁻⁵, the square root.
+const TOLERANCE_OF_SIMULATION: f64 = 1e-4;
+/// Names of options and of fields of the page.
+const OPTIONS: [(&str, &str); 5] =
+    [("--columns", "columns"), ("--units", "units"), ("--rate", "rate"), ("--sensor", "sensor"), ("--topic", "topic")];
+
+/// What two values differ in: kinds, order, words and integers are equal, numbers to a relative `tolerance`.
+fn differences(path: &str, one: &Value, other: &Value, tolerance: f64, found: &mut Vec<String>) {
+    match (one, other) {
+        (Value::Object(a), Value::Object(b)) if a.keys().eq(b.keys()) => {
+            a.iter()
+                .for_each(|(name, value)| differences(&format!("{path}.{name}"), value, &b[name], tolerance, found));
+        }
+        (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
+            let pairs = a.iter().zip(b).enumerate();
+            pairs.for_each(|(at, (a, b))| differences(&format!("{path}[{at}]"), a, b, tolerance, found));
+        }
+        (Value::Number(a), Value::Number(b)) if a.is_f64() && b.is_f64() => {
+            let [a, b] = [a, b].map(|number| number.as_f64().expect("a number"));
+            if (a - b).abs() > tolerance * a.abs().max(b.abs()) {
+                found.push(format!("{path}: {a} and {b}"));
+            }
+        }
+        (a, b) if a == b => {}
+        (a, b) => found.push(format!("{path}: {a} and {b}")),
+    }
+}
+
+fn analysed(arguments: &[String], report: &Path) {
+    let output = Command::new(host_sim()).args(arguments).arg("--quiet").arg("--json").arg(report).output();
+    let output = output.expect("imunoise starts");
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// Ten files of as many formats, of which one has effects, and a simulation.
+#[test]
+fn the_page_makes_the_report_of_the_command() {
+    const TEST: &str = "same_report::the_page_makes_the_report_of_the_command";
+    let Some(samples) = recorded_samples(TEST) else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let truth = std::fs::read(samples.join("truth.json")).expect("written");
+    let truth: Vec<Value> = serde_json::from_slice(&truth).expect("a list in JSON");
+    let known = |name: &str| {
+        let known = truth.iter().find(|known| known["file"] == name).unwrap_or_else(|| panic!("no {name}"));
+        let options =
+            known["arguments"].as_array().expect("a list").iter().map(|of| of.as_str().expect("text").to_owned());
+        (samples.join(name), options.collect::<Vec<String>>())
+    };
+    let names = [
+        "euroc.csv",
+        "counts.tsv",
+        "transposed.npy",
+        "level5.mat",
+        "table.h5",
+        "one.bag",
+        "foxglove.mcap",
+        "single.ulg",
+        "imu.bin",
+    ];
+    let mut files: Vec<(PathBuf, Vec<String>)> = names.into_iter().map(known).collect();
+    // A line and a temperature effect, in the program's own format, compressed.
+    let counts = folder.path().join("effects.csv.gz");
+    let effects = [
+        "--effect",
+        "sinusoid:gyro_z:frequency=20,amplitude=0.1",
+        "--environment",
+        "temperature:rise=8,time_constant=300",
+    ];
+    let simulated =
+        Command::new(host_sim()).arg("simulate").arg(&counts).args(["--seconds", "900"]).args(effects).status();
+    assert!(simulated.expect("imunoise starts").success());
+    files.push((counts, Vec::new()));
+    assert_eq!(files.len(), 10);
+
+    let mut jobs = Vec::new();
+    for (at, (file, options)) in files.iter().enumerate() {
+        let field = |(option, field): (&str, &str)| {
+            let at = options.iter().position(|of| of == option);
+            (field.to_owned(), at.map_or("", |at| options[at + 1].as_str()).into())
+        };
+        let fields: serde_json::Map<String, Value> = OPTIONS.into_iter().map(field).collect();
+        jobs.push(json!({ "name": format!("page{at}.json"), "file": file, "fields": fields }));
+    }
+    jobs.push(json!({ "name": "page10.json", "simulate": { "seconds": 600, "seed": 1 } }));
+    if !drive(TEST, "reports.js", "observatory.html", folder.path(), &Value::from(jobs).to_string()) {
+        return;
+    }
+    let simulation = ["demo", "--seconds", "600", "--seed", "1", "--page"].map(str::to_owned);
+    let page = folder.path().join("page").display().to_string();
+    let mut failed = String::new();
+    for at in 0..=10 {
+        let report = folder.path().join(format!("command{at}.json"));
+        match files.get(at) {
+            Some((file, options)) => {
+                analysed(&[&["analyze".to_owned(), file.display().to_string()], options.as_slice()].concat(), &report);
+            }
+            None => analysed(&[simulation.as_slice(), std::slice::from_ref(&page)].concat(), &report),
+        }
+        let read =
+            |file: &Path| -> Value { serde_json::from_slice(&std::fs::read(file).expect("written")).expect("JSON") };
+        let mut found = Vec::new();
+        let tolerance = if at < files.len() { TOLERANCE } else { TOLERANCE_OF_SIMULATION };
+        differences("", &read(&report), &read(&folder.path().join(format!("page{at}.json"))), tolerance, &mut found);
+        if !found.is_empty() {
+            let file = files.get(at).map_or_else(|| "simulation".to_owned(), |(file, _)| file.display().to_string());
+            failed +=
+                &format!("{file}: {} differences, such as {}\n", found.len(), found[..found.len().min(5)].join("; "));
+        }
+    }
+    assert!(failed.is_empty(), "{failed}");
+}

@@ -1,0 +1,6 @@
+//! The page in headless Chromium, with the files of other programs and the command `imunoise`. Where there is no Chromium or no Node.js the
+//! tests are reported as skipped.
+
+mod harness;
+mod same_report;
+mod use_of_the_page;
