@@ -231,7 +231,8 @@ fn a_file_that_exists_is_overwritten_with_force_alone() {
     let report = dir.path().join("report.json");
     assert!(imunoise(&["analyze", name(&rows), "--quiet", "--json", name(&report)]).status.success());
     let [rows, report] = [name(&rows), name(&report)];
-    let [old, page, picture] = ["old", "page/index.html", "pictures/overview-gyros.svg"].map(|file| dir.path().join(file));
+    let [old, page, picture] =
+        ["old", "page/index.html", "pictures/overview-gyros.svg"].map(|file| dir.path().join(file));
     let reports = dir.path().join("reports");
     let one_report = reports.join("rows.json");
     let [of_page, of_pictures] = [&page, &picture].map(|file| file.parent().expect("a folder"));
