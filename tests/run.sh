@@ -147,7 +147,7 @@ systems() { # what needs no compiler of C
     )
 }
 page() { # the tests open it
-    run "$TARGET/debug/build-page" "$TARGET/browser"
+    run "$TARGET/debug/build-page" --quick "$TARGET/browser"
     export BROWSER_PAGE=$TARGET/browser
 }
 documentation() {

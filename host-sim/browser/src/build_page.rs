@@ -1,5 +1,6 @@
-//! `cargo run -p browser -- [FOLDER]` builds the page: FOLDER/index.html with the program beside it, for a web server, and
+//! `cargo run -p browser -- [--quick] [FOLDER]` builds the page: FOLDER/index.html with the program beside it, for a web server, and
 //! FOLDER/observatory.html, one file with everything inside, which is opened from a disk. FOLDER is `target/browser` if none is named.
+//! `--quick` builds in less time a program that is larger and slower.
 
 use clap::ValueEnum;
 use flate2::Compression;
@@ -7,6 +8,7 @@ use flate2::write::GzEncoder;
 use reports::export::ExportFormat;
 use sha2::{Digest, Sha256};
 use std::error::Error;
+use std::ffi::OsString;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -18,12 +20,16 @@ const STYLE: &str = include_str!("../page/style.css");
 const SCRIPT: &str = include_str!("../page/page.js");
 const WORKER: &str = include_str!("../page/worker.js");
 const TARGET: &str = "wasm32-unknown-unknown";
+/// Profiles of cargo: for whoever uses the page, and for whoever builds often.
 const PROFILE: &str = "browser";
+const QUICK_PROFILE: &str = "quick";
 /// The program beside the page, compressed: not every server compresses it.
 const PROGRAM: &str = "observatory.wasm.gz";
 
 fn main() -> ExitCode {
-    match run(env::args_os().nth(1).map(PathBuf::from)) {
+    let (options, folders): (Vec<OsString>, Vec<OsString>) = env::args_os().skip(1).partition(|of| *of == "--quick");
+    let profile = if options.is_empty() { PROFILE } else { QUICK_PROFILE };
+    match run(folders.first().map(PathBuf::from), profile) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
@@ -32,12 +38,12 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(folder: Option<PathBuf>) -> Result<(), Box<dyn Error>> {
+fn run(folder: Option<PathBuf>, profile: &str) -> Result<(), Box<dyn Error>> {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from);
     let folder = folder.unwrap_or_else(|| target.join("browser"));
     let mut program = GzEncoder::new(Vec::new(), Compression::best());
-    program.write_all(&build(&workspace, &target)?)?;
+    program.write_all(&build(&workspace, &target, profile)?)?;
     let program = program.finish()?;
     fs::create_dir_all(&folder)?;
     let files = [
@@ -53,22 +59,22 @@ fn run(folder: Option<PathBuf>) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Compiles the library for browsers.
-fn build(workspace: &Path, target: &Path) -> Result<Vec<u8>, Box<dyn Error>> {
+/// Compiles the library for browsers in a profile of cargo.
+fn build(workspace: &Path, target: &Path, profile: &str) -> Result<Vec<u8>, Box<dyn Error>> {
     // Cargo, which runs this program, may hold the lock of its own folder.
     let target = target.join("browser-build");
     let status = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(workspace)
         .env_remove("RUSTC_WORKSPACE_WRAPPER")
         .args(["rustc", "--locked", "--package", "browser", "--lib", "--crate-type", "cdylib"])
-        .args(["--profile", PROFILE, "--target", TARGET, "--target-dir"])
+        .args(["--profile", profile, "--target", TARGET, "--target-dir"])
         .arg(&target)
         .status()
         .map_err(|error| format!("cargo does not start: {error}"))?;
     if !status.success() {
         return Err(format!("the page does not build; its target comes with: rustup target add {TARGET}").into());
     }
-    let file = target.join(TARGET).join(PROFILE).join("browser.wasm");
+    let file = target.join(TARGET).join(profile).join("browser.wasm");
     Ok(fs::read(&file).map_err(|error| format!("{}: {error}", file.display()))?)
 }
 

@@ -19,7 +19,8 @@ fn page() -> PathBuf {
     }
     let folder = target_folder().join("browser");
     let _building = one_at_a_time(&folder.with_extension("lock"));
-    let status = Command::new(env!("CARGO_BIN_EXE_build-page")).arg(&folder).stdout(Stdio::null()).status();
+    let status =
+        Command::new(env!("CARGO_BIN_EXE_build-page")).arg("--quick").arg(&folder).stdout(Stdio::null()).status();
     assert!(status.expect("the program starts").success(), "the page does not build");
     folder
 }

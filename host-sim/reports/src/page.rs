@@ -195,17 +195,20 @@ fn unparted(text: &str) -> String {
 /// Advice with links to its findings, and how many places have no explanation.
 fn what_to_do(report: &Report) -> Markup {
     html! {
-        @let advice = summary::advice(report);
-        @if !advice.is_empty() {
+        @let (advice, for_filter) = (summary::advice(report), summary::for_filter(report));
+        @if !advice.is_empty() || for_filter.is_some() {
             h3 { "What to do" }
-            ul { @for (step, numbers) in advice { li {
-                (step.trim_end_matches('.')) " ("
-                @for (at, number) in numbers.iter().enumerate() {
-                    @if at > 0 { ", " }
-                    a href={ "#evidence-" (number) } { (number) }
-                }
-                ")."
-            } } }
+            ul {
+                @for (step, numbers) in advice { li {
+                    (step.trim_end_matches('.')) " ("
+                    @for (at, number) in numbers.iter().enumerate() {
+                        @if at > 0 { ", " }
+                        a href={ "#evidence-" (number) } { (number) }
+                    }
+                    ")."
+                } }
+                @if let Some(step) = for_filter { li { (step) } }
+            }
         }
         @if let Some(text) = summary::unexplained_in_short(report) { p.warning { "Not explained: " (unparted(&text)) "." } }
         @if let Some(text) = summary::contradictions_in_short(report) {
