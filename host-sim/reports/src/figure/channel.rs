@@ -26,7 +26,7 @@ pub(super) fn allan_deviation_plot(report: &Report, channel: &ChannelReport) -> 
     }
     lines.push(model_line(channel, &channel.refitted, "model of the whole record", Look::Model));
     lines.push(data);
-    let [curve, residual] = frames([330.0, 120.0]);
+    let [curve, residual] = frames([330.0, 120.0]).map(|frame| below_legend(frame, &lines));
     let across = Axis::logarithmic("averaging time τ, s", lines.iter().flat_map(places), [LEFT, RIGHT]);
     // The terms may lead out of the panel, but for the flat line of B.
     let shown = lines.iter().filter(|line| line.look != Look::Term || is_flat(line)).flat_map(heights);
@@ -185,6 +185,8 @@ fn terms(report: &Report, channel: &ChannelReport) -> Vec<Line> {
     };
     let known = whole.terms().iter().filter(|term| term.value > 0.0);
     let mut lines: Vec<Line> = known.map(line).filter(|line| !line.points.is_empty()).collect();
+    // White noise of several terms is one N.
+    lines.iter_mut().filter(|line| line.mark == *n).skip(1).for_each(|line| line.mark.clear());
     if let Some(first) = lines.first_mut() {
         (first.name, first.in_legend) = ("terms of the whole record".to_owned(), true);
     }
