@@ -24,11 +24,10 @@ use recordings::recording::Recording;
 use recordings::sample_stream::{KeptInMemory, Reading, SampleStream, StreamError, part_of};
 use recordings::time_base::TimeRange;
 use recordings::{ColumnSelection, FileHash, Printable, ReadMonitor, count_table};
-use reports::reading::ReadingRecord;
+use reports::reading::{ReadingRecord, rows_left_out};
 use reports::saved_report::SavedReport;
 use reports::summary::longest_at_rest;
 use simulation::Replay;
-use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
@@ -214,16 +213,6 @@ fn reading_record(
     notes: Vec<String>,
 ) -> ReadingRecord {
     let read = stream.rows_read();
-    let mut left_out: BTreeMap<String, u64> = stream
-        .description()
-        .dropped
-        .iter()
-        .filter(|(cause, _)| **cause != "gap")
-        .map(|(cause, rows)| ((*cause).to_owned(), *rows))
-        .collect();
-    left_out.insert("outside_part".to_owned(), read.outside);
-    left_out.insert("padding".to_owned(), read.padding);
-    left_out.retain(|_, rows| *rows > 0);
     ReadingRecord {
         file: output::source_name(&recording.input.file),
         sha256: None,
@@ -231,7 +220,7 @@ fn reading_record(
         version: env!("CARGO_PKG_VERSION").to_owned(),
         options: recording.options(is_quick),
         rows: read.rows,
-        left_out,
+        left_out: rows_left_out(&stream.description().dropped, read.outside, read.padding),
         complete: read.is_complete(),
         damage: read.damage.clone(),
         notes,

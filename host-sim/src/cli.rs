@@ -9,6 +9,7 @@ use recordings::file_format::RecordedInput;
 use recordings::time_base::TimeRange;
 use recordings::{InputError, MemoryTable, ReadMonitor, serial};
 use reports::export::{AxisChoice, ExportFormat};
+use reports::reading::ReadingOptions;
 use simulation::Simulation;
 use std::ffi::OsString;
 use std::num::NonZeroUsize;
@@ -513,25 +514,14 @@ impl RecordingArguments {
     /// The options that say how it is read, as they are typed.
     pub(crate) fn options(&self, is_quick: bool) -> Vec<String> {
         let Self { input: InputArguments { columns, units, topic, range, sensor, .. }, rate, from, to } = self;
-        let list = |texts: &[String]| Some(texts.join(",")).filter(|text| !text.is_empty());
-        let number = |number: &Option<f64>| number.map(|number| number.to_string());
         let range = match range {
             GyroRangeArgument::Dps300 => None,
-            GyroRangeArgument::Dps150 => Some("150".to_owned()),
-            GyroRangeArgument::Dps75 => Some("75".to_owned()),
+            GyroRangeArgument::Dps150 => Some(150),
+            GyroRangeArgument::Dps75 => Some(75),
         };
-        let options = [
-            ("--topic", topic.clone()),
-            ("--columns", list(columns)),
-            ("--units", list(units)),
-            ("--rate", number(rate)),
-            ("--sensor", sensor.clone()),
-            ("--range", range),
-            ("--from", number(from)),
-            ("--to", number(to)),
-        ];
-        let typed = options.into_iter().filter_map(|(name, value)| Some([name.to_owned(), value?])).flatten();
-        typed.chain(is_quick.then(|| "--quick".to_owned())).collect()
+        let (topic, sensor) = (topic.as_deref(), sensor.as_deref());
+        let options = ReadingOptions { topic, columns, units, rate: *rate, sensor, range, from_s: *from, to_s: *to };
+        options.words().into_iter().chain(is_quick.then(|| "--quick".to_owned())).collect()
     }
 
     /// The part of the recording that is read; `None` for all of it.

@@ -15,11 +15,10 @@ use recordings::time_base::TimeRange;
 use recordings::{ColumnSelection, Printable, ReadMonitor, ReadOptions};
 use reports::json::ReportJson;
 use reports::page;
-use reports::reading::ReadingRecord;
+use reports::reading::{ReadingRecord, rows_left_out};
 use reports::summary::longest_at_rest;
 use serde::Serialize;
 use simulation::{Replay, Simulation};
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -125,11 +124,6 @@ impl Recorded<'_> {
 
     fn reading_record(&self, stream: &SampleStream) -> ReadingRecord {
         let read = stream.rows_read();
-        let dropped = stream.description().dropped.iter().filter(|(cause, _)| **cause != "gap");
-        let mut left_out: BTreeMap<String, u64> = dropped.map(|(cause, rows)| ((*cause).to_owned(), *rows)).collect();
-        left_out.insert("outside_part".to_owned(), read.outside);
-        left_out.insert("padding".to_owned(), read.padding);
-        left_out.retain(|_, rows| *rows > 0);
         ReadingRecord {
             file: Printable(self.name).to_string(),
             sha256: None,
@@ -137,7 +131,7 @@ impl Recorded<'_> {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             options: self.options.words(),
             rows: read.rows,
-            left_out,
+            left_out: rows_left_out(&stream.description().dropped, read.outside, read.padding),
             complete: read.is_complete(),
             damage: read.damage.clone(),
             notes: stream.notes().to_vec(),

@@ -5,6 +5,7 @@ use anyhow::{Context, Result, bail};
 use measurement::{SensorProfile, adis16405, profile_file};
 use recordings::Printable;
 use recordings::time_base::TimeRange;
+use reports::reading::ReadingOptions;
 use serde::Deserialize;
 
 /// Name of the sensor whose register counts need no profile, and that of a sensor without a data sheet.
@@ -35,19 +36,8 @@ impl RecordingOptions {
     /// As they are typed for the command.
     pub(crate) fn words(&self) -> Vec<String> {
         let Self { topic, columns, units, rate, sensor, range, from, to } = self;
-        let list = |texts: &[String]| Some(texts.join(",")).filter(|text| !text.is_empty());
-        let number = |number: &Option<f64>| number.map(|number| number.to_string());
-        let options = [
-            ("--topic", topic.clone()),
-            ("--columns", list(columns)),
-            ("--units", list(units)),
-            ("--rate", number(rate)),
-            ("--sensor", sensor.clone()),
-            ("--range", range.map(|range| range.to_string())),
-            ("--from", number(from)),
-            ("--to", number(to)),
-        ];
-        options.into_iter().filter_map(|(name, value)| Some([name.to_owned(), value?])).flatten().collect()
+        let (topic, sensor) = (topic.as_deref(), sensor.as_deref());
+        ReadingOptions { topic, columns, units, rate: *rate, sensor, range: *range, from_s: *from, to_s: *to }.words()
     }
 
     /// The part of the recording that is read; `None` for all of it.

@@ -54,13 +54,13 @@ fn seconds(tau: f64) -> String {
 
 /// Where the curve departs from the model.
 fn excess(curve: &CurveEvidence) -> String {
-    format!("{:+.1} % at tau = {} s ({:.0} sigma)", 100.0 * curve.excess, seconds(curve.tau_s), curve.sigmas.abs())
+    format!("{:+.1} % at τ = {} s ({:.0} σ)", 100.0 * curve.excess, seconds(curve.tau_s), curve.sigmas.abs())
 }
 
 /// A term that was added, with what it usually is.
 fn added(curve: &CurveEvidence, meaning: &str) -> EvidenceText {
     let gain = curve.gain_sigmas;
-    text(excess(curve), format!(" before it was added, which takes {gain:.0} sigma off the fit; {meaning}"))
+    text(excess(curve), format!(" before it was added, which takes {gain:.0} σ off the fit; {meaning}"))
 }
 
 /// Such as `1 run` and `2 runs`.
@@ -68,9 +68,8 @@ fn counted(count: u64, one: &str) -> String {
     format!("{count} {one}{}", if count == 1 { "" } else { "s" })
 }
 
-/// Names and symbols of the sentences below, and those of the screen and the page.
-const DISPLAYED: [(&str, &str); 6] =
-    [("gyro_", "gyro "), ("accl_", "accel "), ("magn_", "magn "), ("tau =", "τ ="), (" sigma", " σ"), (" -", " −")];
+/// Names and signs of the sentences below, and those of the screen and the page.
+const DISPLAYED: [(&str, &str); 4] = [("gyro_", "gyro "), ("accl_", "accel "), ("magn_", "magn "), (" -", " −")];
 
 /// What a Markov process usually is.
 const CORRELATED: &str = "a correlated fluctuation: thermal or electronic";
@@ -201,7 +200,7 @@ fn of_kind(effect: &Effect) -> EvidenceText {
         ),
         Effect::SharedDrift(of) => text(
             format!(
-                "moves with {} at {}, {:.0} sigma, which is more than {:.0} times the data sheet's sensitivity: both share a \
+                "moves with {} at {}, {:.0} σ, which is more than {:.0} times the data sheet's sensitivity: both share a \
                  drift whose cause was not measured",
                 of.with,
                 amount(of.ratio.value, &format!("{}/{}", of.ratio.unit, of.per)),
@@ -243,7 +242,7 @@ fn of_kind(effect: &Effect) -> EvidenceText {
             "; a machine that is switched on, or a setting of the sensor",
         ),
         Effect::TemperatureSensitivity(of) => text(
-            format!("follows the measured temperature, {:.0} sigma", of.sigmas),
+            format!("follows the measured temperature, {:.0} σ", of.sigmas),
             "; a bias that drifts with temperature",
         ),
         Effect::TemperatureCurvature(of) => text(
@@ -271,10 +270,10 @@ fn of_kind(effect: &Effect) -> EvidenceText {
             "; the sensing element warms up later than the thermometer",
         ),
         Effect::SupplySensitivity(of) => {
-            text(format!("follows the measured supply, {:.0} sigma", of.sigmas), "; a bias that is not regulated")
+            text(format!("follows the measured supply, {:.0} σ", of.sigmas), "; a bias that is not regulated")
         }
         Effect::AccelerationSensitivity(of) => {
-            text(format!("follows the measured specific force, {:.0} sigma", of.sigmas), "; g-sensitivity of the gyro")
+            text(format!("follows the measured specific force, {:.0} σ", of.sigmas), "; g-sensitivity of the gyro")
         }
         Effect::VibrationRectification(of) => text(
             format!(
@@ -323,7 +322,7 @@ fn of_kind(effect: &Effect) -> EvidenceText {
             };
             text(
                 format!(
-                    "from {:.1} s to {:.1} s the noise at tau = {:.3} s is {:.2} times that of the stretches around it, by chance \
+                    "from {:.1} s to {:.1} s the noise at τ = {:.3} s is {:.2} times that of the stretches around it, by chance \
                      {}, in {shown}",
                     of.from_s.value,
                     of.to_s.value,
@@ -433,7 +432,7 @@ fn modulated(of: &ModulatedLine) -> EvidenceText {
             };
             text(
                 format!(
-                    "a line at {frequency_hz:.4} Hz, {sigmas:.0} sigma, whose sidebands are {:.4} Hz away: {changes} by {depth} \
+                    "a line at {frequency_hz:.4} Hz, {sigmas:.0} σ, whose sidebands are {:.4} Hz away: {changes} by {depth} \
                      every {period_s:.0} s",
                     1.0 / period_s
                 ),
@@ -468,7 +467,7 @@ fn of_line(line: &LineEvidence) -> EvidenceText {
             );
             text(
                 format!(
-                    "line at {:.4} Hz in the spectrum, {width}, {:.0} sigma, by chance anywhere {}",
+                    "line at {:.4} Hz in the spectrum, {width}, {:.0} σ, by chance anywhere {}",
                     of.frequency_hz,
                     of.sigmas,
                     chance(of.p_value)
@@ -495,7 +494,7 @@ fn unexplained(of: &Unexplained) -> EvidenceText {
     match &of.observation {
         Observation::PointOfCurve { p_value } => text(
             format!(
-                "{percent:+.0} % of the model's Allan deviation at tau = {:.3} s, by chance anywhere in the curve {}",
+                "{percent:+.0} % of the model's Allan deviation at τ = {:.3} s, by chance anywhere in the curve {}",
                 of.tau_s().map_or(0.0, |of| of.value),
                 chance(*p_value)
             ),
@@ -512,7 +511,7 @@ fn unexplained(of: &Unexplained) -> EvidenceText {
             };
             text(
                 format!(
-                    "a band around {frequency_hz:.4} Hz, {width_hz:.4} Hz wide, stands out of the noise ({sigmas:.0} sigma) and {why}"
+                    "a band around {frequency_hz:.4} Hz, {width_hz:.4} Hz wide, stands out of the noise ({sigmas:.0} σ) and {why}"
                 ),
                 "",
             )

@@ -9,7 +9,8 @@ mod plot;
 use crate::finding_text::channel_name;
 use crate::summary;
 use axis::{Axis, has_logarithm};
-use channel::{allan_deviation_plot, bias_plot, measured, spectrum_plot};
+pub(crate) use channel::bias_plot;
+use channel::{allan_deviation_plot, measured, spectrum_plot};
 pub(crate) use evidence::evidence;
 use noise_analysis::report::{ChannelReport, DataSheetReport, Report};
 pub(crate) use plot::Plot;
@@ -95,11 +96,6 @@ pub(crate) fn channel_plots(report: &Report, channel: &ChannelReport) -> Vec<Plo
         .collect()
 }
 
-/// The bias of a channel over time; `None` of one without means.
-pub(crate) fn course(channel: &ChannelReport) -> Option<Plot> {
-    bias_plot(channel)
-}
-
 /// The Allan deviation of `channel` as an SVG document.
 #[must_use]
 pub fn allan_deviation(report: &Report, channel: &ChannelReport) -> String {
@@ -137,7 +133,7 @@ pub(crate) fn overviews(report: &Report) -> Vec<Plot> {
         .collect()
 }
 
-/// Of the channels whose names begin with `prefix`; `None` without any.
+/// One picture of the channels whose names begin with `prefix`; `None` without any.
 fn overview(report: &Report, prefix: &str, name: &str) -> Option<Plot> {
     let has_curve = |channel: &&ChannelReport| channel.curve.iter().any(|point| has_logarithm(point.adev));
     let of_prefix = report.channels.iter().filter(|channel| channel.name.starts_with(prefix));

@@ -11,7 +11,7 @@ use crate::formatting::{capital, moment};
 use crate::rounding::{plain, quantity, quantity_digits, signed, significant, span};
 use amounts::{Amounts, Label};
 pub use channel_names::channel_list;
-pub(crate) use channel_names::{ALL_CHANNELS, channel_name};
+pub(crate) use channel_names::{ALL_CHANNELS, SENSED, channel_name};
 use noise_analysis::bounds::{BoundedEstimate, Parameter};
 use noise_analysis::effects::{Effect, Observation, Unexplained, UnexplainedPlace};
 use noise_analysis::report::{Finding, Report, Validation};

@@ -7,7 +7,7 @@ use crate::coefficient_notes::coefficient_notes;
 use crate::evidence::EvidenceText;
 use crate::explanation;
 use crate::figure::{self, Plot};
-use crate::finding_text::{self, ShownEffect, channel_list, channel_name};
+use crate::finding_text::{self, SENSED, ShownEffect, channel_list, channel_name};
 use crate::formatting::{
     capital, count, filter_consistency, interval, missing_samples, number, parameter_name, recording_advice, words,
     worst_deviations,
@@ -142,8 +142,8 @@ fn what_was_read(reading: &ReadingRecord) -> Markup {
 /// Gyros, accelerometers, then the conditions.
 fn in_reading_order(report: &Report) -> impl Iterator<Item = &ChannelReport> {
     let rank = |channel: &ChannelReport| {
-        let known = ["gyro_", "accl_", "magn_"].iter().position(|prefix| channel.name.starts_with(prefix));
-        known.unwrap_or(3)
+        let known = SENSED.iter().position(|prefix| channel.name.starts_with(prefix));
+        known.unwrap_or(SENSED.len())
     };
     let mut channels: Vec<&ChannelReport> = report.channels.iter().collect();
     channels.sort_by_key(|channel| rank(channel));
@@ -164,7 +164,7 @@ fn contents(report: &Report) -> Markup {
     }
 }
 
-/// Whether the recording can be trusted, N, B and K, and what to do.
+/// The answer whether the recording can be trusted, N, B and K, and what to do.
 fn verdict(report: &Report) -> Markup {
     let answer = summary::answer(report);
     html! {
@@ -217,7 +217,7 @@ fn what_to_do(report: &Report) -> Markup {
     }
 }
 
-/// Where data and model disagree.
+/// The places where data and model disagree.
 fn disagreements(report: &Report) -> Markup {
     let contradictions = summary::contradictions(report);
     html! {
@@ -313,7 +313,7 @@ fn channels(report: &Report) -> Markup {
                     summary {
                         strong { (channel_name(channel)) } " "
                         span.faint {
-                            @if is_sensed(channel) {
+                            @if summary::is_sensed(channel) {
                                 (summary::coefficients_in_short(report, &channel.name).into_iter()
                                     .filter(|text| text.contains(' ')).collect::<Vec<_>>().join(" · "))
                             } @else { (count(channel.samples)) " samples" }
@@ -326,19 +326,14 @@ fn channels(report: &Report) -> Markup {
     }
 }
 
-/// Whether a channel has a noise model that anybody uses: temperature and supply are conditions.
-fn is_sensed(channel: &ChannelReport) -> bool {
-    ["gyro_", "accl_", "magn_"].iter().any(|prefix| channel.name.starts_with(prefix))
-}
-
 /// One channel with its figures and tables; of a condition its course alone.
 fn channel_section(report: &Report, channel: &ChannelReport) -> Markup {
     let missing = missing_samples(&channel.missing);
     html! {
         p.faint { (unit(&channel.unit)) " · " (count(channel.samples)) " samples"
             @if !missing.is_empty() { " · missing: " (missing) } }
-        @if !is_sensed(channel) {
-            @if let Some(plot) = figure::course(channel) { (drawing(&plot)) }
+        @if !summary::is_sensed(channel) {
+            @if let Some(plot) = figure::bias_plot(channel) { (drawing(&plot)) }
         } @else {
             @if channel.curve.is_empty() { p { "The record is too short for a point of the curve." } }
             div.cards { @for plot in figure::channel_plots(report, channel) { (drawing(&plot)) } }

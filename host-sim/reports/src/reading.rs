@@ -30,6 +30,55 @@ pub struct ReadingRecord {
     pub notes: Vec<String>,
 }
 
+/// Rows that are no samples, by cause: those that were `dropped`, those outside of the part that is read, and padding. A gap has no rows.
+#[must_use]
+pub fn rows_left_out(dropped: &BTreeMap<&'static str, u64>, outside_part: u64, padding: u64) -> BTreeMap<String, u64> {
+    let dropped = dropped.iter().filter(|(cause, _)| **cause != "gap").map(|(cause, rows)| (*cause, *rows));
+    let causes = dropped.chain([("outside_part", outside_part), ("padding", padding)]);
+    causes.filter(|(_, rows)| *rows > 0).map(|(cause, rows)| (cause.to_owned(), rows)).collect()
+}
+
+/// The options that say how a recording is read.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ReadingOptions<'a> {
+    /// Topic, message or array of a file with several.
+    pub topic: Option<&'a str>,
+    /// Each as in `gyro_x=wx`.
+    pub columns: &'a [String],
+    /// One per quantity, as in `deg/s`.
+    pub units: &'a [String],
+    /// Sample rate, Hz.
+    pub rate: Option<f64>,
+    /// Name of a sensor, or its profile file.
+    pub sensor: Option<&'a str>,
+    /// Full scale of the gyros of an ADIS16405, °/s.
+    pub range: Option<u32>,
+    /// Beginning of the part that is read, s from the first sample.
+    pub from_s: Option<f64>,
+    /// Its end, s from the first sample.
+    pub to_s: Option<f64>,
+}
+
+impl ReadingOptions<'_> {
+    /// As they are typed for the command; an option that is not given is left out.
+    #[must_use]
+    pub fn words(&self) -> Vec<String> {
+        let list = |texts: &[String]| Some(texts.join(",")).filter(|text| !text.is_empty());
+        let number = |number: Option<f64>| number.map(|number| number.to_string());
+        let options = [
+            ("--topic", self.topic.map(str::to_owned)),
+            ("--columns", list(self.columns)),
+            ("--units", list(self.units)),
+            ("--rate", number(self.rate)),
+            ("--sensor", self.sensor.map(str::to_owned)),
+            ("--range", self.range.map(|range| range.to_string())),
+            ("--from", number(self.from_s)),
+            ("--to", number(self.to_s)),
+        ];
+        options.into_iter().filter_map(|(name, value)| Some([name.to_owned(), value?])).flatten().collect()
+    }
+}
+
 impl ReadingRecord {
     /// A sentence for the screen, where the recording was not read to its end.
     #[must_use]

@@ -2,7 +2,7 @@
 //! the coefficients in the units of their users, where data and model disagree, and what to do next.
 
 use crate::coefficients;
-use crate::finding_text::{ALL_CHANNELS, FindingText, channel_list, departure, describe, shown_effects};
+use crate::finding_text::{ALL_CHANNELS, FindingText, SENSED, channel_list, departure, describe, shown_effects};
 use crate::formatting::{count, enumerated, words};
 use crate::part_note;
 use crate::rounding::{
@@ -273,6 +273,11 @@ pub(crate) fn inertial(report: &Report) -> impl Iterator<Item = &ChannelReport> 
     report.channels.iter().filter(|channel| ["gyro_", "accl_"].iter().any(|prefix| channel.name.starts_with(prefix)))
 }
 
+/// Is true of a gyro, an accelerometer and a magnetometer.
+pub(crate) fn is_sensed(channel: &ChannelReport) -> bool {
+    SENSED.iter().any(|prefix| channel.name.starts_with(prefix))
+}
+
 /// Name of the part; of one without a profile what it is.
 #[must_use]
 pub fn part_name(report: &Report) -> &str {
@@ -317,10 +322,7 @@ const QUICK: &str = "Quick report, of the curves alone: spectra, spikes, steps, 
 /// What is said where nothing was found, and of which channels.
 #[must_use]
 pub fn nothing_found(report: &Report) -> String {
-    let is_sensed = |channel: &&ChannelReport| {
-        ["gyro_", "accl_", "magn_"].iter().any(|prefix| channel.name.starts_with(prefix)) && !is_constant(channel)
-    };
-    let sensed = || report.channels.iter().filter(is_sensed);
+    let sensed = || report.channels.iter().filter(|channel| is_sensed(channel) && !is_constant(channel));
     let named = |channels: Vec<&ChannelReport>| match channel_list(
         &channels.iter().map(|channel| channel.name.clone()).collect::<Vec<_>>(),
     ) {

@@ -90,7 +90,7 @@ impl Axis {
         part.is_finite().then_some(self.start + part * (self.end - self.start))
     }
 
-    /// What stands at the axis: its name, and the unit with the prefix of the numbers at the ticks.
+    /// The text at the axis: its name, and the unit with the prefix of the numbers at the ticks.
     pub(super) fn title(&self) -> String {
         match self.label.rsplit_once(", ") {
             Some((name, unit)) => format!("{name}, {}{unit}", self.prefix().0),

@@ -193,7 +193,7 @@ fn terms(report: &Report, channel: &ChannelReport) -> Vec<Line> {
     lines
 }
 
-/// Whether a line is level, as that of B is.
+/// Is true of a level line, as that of B is.
 fn is_flat(line: &Line) -> bool {
     line.points.first().map(|of| of.1) == line.points.last().map(|of| of.1)
 }
@@ -272,7 +272,7 @@ pub(super) fn spectrum_plot(report: &Report, channel: &ChannelReport) -> Option<
 }
 
 /// The bias over time, with what it follows; beneath, what is left. `None` where there is none.
-pub(super) fn bias_plot(channel: &ChannelReport) -> Option<Plot> {
+pub(crate) fn bias_plot(channel: &ChannelReport) -> Option<Plot> {
     let bias = channel.figure_data.bias_over_time.as_ref()?;
     let (scale, per) = time_unit(bias.time_s.last().copied().unwrap_or(0.0));
     let along = |values: &[f64]| -> Vec<(f64, f64)> {

@@ -70,7 +70,7 @@ pub(super) struct Line {
     pub in_legend: bool,
     /// Text beside an end of the line; empty without.
     pub mark: String,
-    /// Whether that is the right end.
+    /// The text is beside the right end, not the left one.
     pub mark_is_right: bool,
 }
 

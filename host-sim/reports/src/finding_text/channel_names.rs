@@ -8,6 +8,9 @@ pub(crate) fn channel_name(channel: &ChannelReport) -> String {
     channel_list(std::slice::from_ref(&channel.name))
 }
 
+/// Beginnings of the names of gyros, accelerometers and magnetometers; the other channels are conditions, such as the temperature.
+pub(crate) const SENSED: [&str; 3] = ["gyro_", "accl_", "magn_"];
+
 /// Gyros and accelerometers, in a list of channels.
 pub(crate) const ALL_CHANNELS: &str = "all channels";
 
@@ -29,6 +32,6 @@ pub fn channel_list(names: &[String]) -> String {
         group(&accelerometers, "accel", "accels"),
         group(&magnetometers, "magn", "magns"),
     ];
-    let others = names.iter().filter(|name| ["gyro_", "accl_", "magn_"].iter().all(|prefix| !name.starts_with(prefix)));
+    let others = names.iter().filter(|name| SENSED.iter().all(|prefix| !name.starts_with(prefix)));
     groups.into_iter().flatten().chain(others.map(|name| words(name))).collect::<Vec<_>>().join(", ")
 }
