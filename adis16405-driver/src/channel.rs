@@ -214,12 +214,12 @@ impl ChannelMask {
         Self(self.0 | 1 << channel as u8)
     }
 
-    /// Whether `channel` is in the set.
+    /// True if `channel` is in the set.
     pub const fn contains(self, channel: Channel) -> bool {
         self.0 >> channel as u8 & 1 != 0
     }
 
-    /// Whether no channel is in the set.
+    /// True if no channel is in the set.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }

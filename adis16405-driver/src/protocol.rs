@@ -109,7 +109,7 @@ pub(crate) type ProtocolError = Error<Infallible>;
 pub(crate) struct DriverState {
     pub(crate) config: Config,
     pub(crate) timing: Timing,
-    /// Whether changed registers are read back and compared.
+    /// True if changed registers are read back and compared.
     pub(crate) verify: bool,
     /// The power mode of the part. While it is unknown or changes, low-power mode, which has the longer stall.
     pub(crate) mode: ClockMode,

@@ -302,7 +302,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.ended.saturating_add(self.elapsed - self.absent)
     }
 
-    /// Whether no sample was taken.
+    /// True if no sample was taken.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.len() == 0
@@ -320,7 +320,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.octaves.iter().map(|octave| u64::from(octave.interpolation.replaced())).sum()
     }
 
-    /// Whether a sum of squares is full, so that the curve is a lower bound there; see the range of [`Cascade`].
+    /// True if a sum of squares is full, so that the curve is a lower bound there; see the range of [`Cascade`].
     #[must_use]
     pub fn is_saturated(&self) -> bool {
         self.octaves.iter().any(|octave| octave.moments.squares.is_full())
@@ -379,7 +379,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
             .then(|| second_difference(self.sum, self.sum_before(level, n), self.sum_before(level, 2 * n)))
     }
 
-    /// Whether the newest sample ends a stride of `level`.
+    /// True if the newest sample ends a stride of `level`.
     #[inline]
     pub(crate) const fn ends_stride(&self, level: usize) -> bool {
         self.elapsed.trailing_zeros() as usize >= level

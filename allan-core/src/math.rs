@@ -193,7 +193,7 @@ pub(crate) fn floor(x: f64) -> f64 {
     libm::floor(x)
 }
 
-/// Whether `x` is neither infinite nor NaN: `f64::is_finite` without a comparison in double precision.
+/// True if `x` is neither infinite nor NaN: `f64::is_finite` without a comparison in double precision.
 pub(crate) fn is_finite(x: f64) -> bool {
     x.to_bits() >> 52 & 0x7ff != 0x7ff
 }

@@ -101,7 +101,7 @@ pub(crate) const fn rounded(difference: i64, bits: u32) -> i64 {
     (difference + (1 << bits >> 1)) >> bits
 }
 
-/// Whether the fourth power fits in 60 bits.
+/// True if the fourth power fits in 60 bits.
 #[inline]
 const fn is_small(difference: i64) -> bool {
     difference.wrapping_add(1 << 15) as u64 >> 16 == 0

@@ -25,7 +25,7 @@ pub struct KurtosisRatio {
 }
 
 impl KurtosisRatio {
-    /// Whether the ratio is nearer to a telegraph signal than to a Gaussian process, and 3 standard deviations above 0.
+    /// True if the ratio is nearer to a telegraph signal than to a Gaussian process, and 3 standard deviations above 0.
     #[must_use]
     pub fn is_telegraph(&self) -> bool {
         self.ratio > 0.5 && self.ratio > 3.0 * self.error

@@ -203,7 +203,7 @@ impl NoiseTerm {
         with_process!(self, process => process.avar(n, sample_period))
     }
 
-    /// Whether noise of this kind arises before the filter of a model and passes it: flicker noise, random walks and Gauss–Markov processes
+    /// True if noise of this kind arises before the filter of a model and passes it: flicker noise, random walks and Gauss–Markov processes
     /// do, rounding and what is added to the samples do not. White noise that does is [`Filtered`](Self::Filtered).
     #[must_use]
     pub const fn passes_filter(&self) -> bool {
@@ -249,7 +249,7 @@ impl NoiseTerm {
         }
     }
 
-    /// Whether it contributes the same to every record, so that it adds no scatter of its own to an estimate.
+    /// True if it contributes the same to every record, so that it adds no scatter of its own to an estimate.
     pub(crate) const fn is_deterministic(&self) -> bool {
         matches!(self, Self::RateRamp | Self::Sinusoid(_))
     }

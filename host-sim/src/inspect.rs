@@ -365,7 +365,7 @@ pub(crate) fn read_or_ask<R>(
     Err(Question { error, text: contents.to_string(), hint }.into())
 }
 
-/// Whether a column, a unit, a topic or a rate is missing.
+/// True if a column, a unit, a topic or a rate is missing.
 fn is_answered_by_columns(error: &anyhow::Error) -> bool {
     let by_reason = |error: &InputError| {
         use Reason::{NoSensor, NoTimeUnit, Selection, SeveralTopics, UnequalRows};

@@ -61,7 +61,7 @@ impl From<Report> for Analysed {
 }
 
 impl Analysed {
-    /// Whether the recording was read to its end.
+    /// True if the recording was read to its end.
     #[must_use]
     pub fn is_complete(&self) -> bool {
         self.reading.as_ref().is_none_or(|reading| reading.complete)

@@ -13,7 +13,7 @@ use tempfile::{NamedTempFile, PersistError};
 /// Longest ending of the name of a file that the one beside it keeps, bytes: writers choose the compression by it.
 const LONGEST_ENDING: usize = 32;
 
-/// Whether `-` is given for a file: standard input or standard output.
+/// True if `-` is given for a file: standard input or standard output.
 pub(crate) fn is_standard_stream(file: &Path) -> bool {
     file.as_os_str() == "-"
 }

@@ -36,7 +36,7 @@ pub struct AnalysisOptions {
     pub topic: Option<String>,
     /// Name of a sensor, or its profile file.
     pub sensor: Option<String>,
-    /// Whether curves and models alone are wanted.
+    /// True if curves and models alone are wanted.
     pub is_quick: bool,
 }
 

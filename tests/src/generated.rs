@@ -26,7 +26,7 @@ pub fn generated_within(page: &str, name: &str, text: &str, tolerance: f64) {
     Part { root: workspace(), page, name }.check(text, |old, new| is_within(old, new, tolerance), writes_docs());
 }
 
-/// Whether generated documentation is written instead of compared.
+/// True if generated documentation is written instead of compared.
 pub fn writes_docs() -> bool {
     std::env::var_os("WRITE_DOCS").is_some()
 }
@@ -75,7 +75,7 @@ impl Part<'_> {
     }
 }
 
-/// Whether two texts have the same words, and numbers that differ by at most this part of those of the first.
+/// True if two texts have the same words, and numbers that differ by at most this part of those of the first.
 fn is_within(old: &str, new: &str, tolerance: f64) -> bool {
     let [old, new] = [old, new].map(WordsAndNumbers::of);
     let is_near = |(old, new): (&f64, &f64)| (new - old).abs() <= tolerance * old.abs();

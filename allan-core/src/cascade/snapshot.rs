@@ -29,7 +29,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Snapshot<OCTAVES, OVERLAP> {
         self.samples
     }
 
-    /// Whether no sample had been taken.
+    /// True if no sample had been taken.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.samples == 0

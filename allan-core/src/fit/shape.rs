@@ -33,7 +33,7 @@ pub(crate) enum FreeShapes<'a> {
 }
 
 impl FreeShapes<'_> {
-    /// Whether the shape of this term is adjusted.
+    /// True if the shape of this term is adjusted.
     pub(super) fn has<T: TermSet>(self, kind: &NoiseTerm) -> bool {
         let can_be_known = matches!(kind, NoiseTerm::Sinusoid(_) | NoiseTerm::Filtered(_) | NoiseTerm::LowPass(_));
         let is_fixed = |known: &[NoiseTerm]| can_be_known && known.contains(kind);

@@ -24,7 +24,7 @@ const SHORT: usize = 6;
 /// Residual of one of them, in standard deviations, that marks a poor model.
 const MISFIT: f64 = 6.0;
 
-/// Whether `model` does not describe the shortest octaves of the curve to which it was fitted. These have thousands of
+/// True if `model` does not describe the shortest octaves of the curve to which it was fitted. These have thousands of
 /// degrees of freedom and dominate the fit, so that the long octaves are described badly too.
 pub(super) fn is_poor(model: &Model, points: &[AllanPoint]) -> bool {
     points.iter().take(SHORT).any(|point| {

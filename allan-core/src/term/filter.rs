@@ -87,7 +87,7 @@ impl MovingAverageFilter {
         if self.stages == 1 { square } else { square * square }
     }
 
-    /// Whether averages over `n` samples are so long against the filter that what passes it is the same as before: two averages over L
+    /// True if averages over `n` samples are so long against the filter that what passes it is the same as before: two averages over L
     /// samples take `L²/2n²` of the Allan variance of a random walk, 1/2,000, and 1/700 of that of flicker noise.
     pub(super) fn is_short_against(&self, n: u64) -> bool {
         n as f64 * self.decimation > LONG * f64::from(self.taps)

@@ -43,7 +43,7 @@ pub(super) enum Family {
 }
 
 impl Family {
-    /// Whether it replaces a term of the model. Starting shapes of such a family fit much worse than the best shape does.
+    /// True if it replaces a term of the model. Starting shapes of such a family fit much worse than the best shape does.
     pub(super) fn replaces_a_term(self) -> bool {
         matches!(self, Self::DecimatedFilter)
     }

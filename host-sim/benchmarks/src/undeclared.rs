@@ -66,7 +66,7 @@ pub struct UndeclaredPlan {
     pub loss_percent: f64,
     /// First seed of each group; its sum with any number of recordings is below [`SEEDS_PER_GROUP`].
     pub seed: u64,
-    /// Whether the sealed seeds are used instead of the open ones.
+    /// True if the sealed seeds are used instead of the open ones.
     pub sealed: bool,
     /// Number of threads.
     pub jobs: usize,

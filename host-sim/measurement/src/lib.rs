@@ -97,7 +97,7 @@ impl MeasuredChannel {
         }
     }
 
-    /// Whether the sample at `position` was refused for any cause.
+    /// True if the sample at `position` was refused for any cause.
     #[must_use]
     pub fn is_refused(&self, position: usize) -> bool {
         self.refused.values().any(|positions| positions.binary_search(&position).is_ok())
@@ -117,7 +117,7 @@ impl Measurement {
         self.slots.len()
     }
 
-    /// Whether there is no sample.
+    /// True if there is no sample.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.slots.is_empty()

@@ -192,7 +192,7 @@ pub struct SensorProfile {
     pub native_rates_hz: Vec<f64>,
     /// Low-pass filters that the sensor may have put before its samples, every value of which is read, the shortest first.
     pub filters: Vec<MovingAverageFilter>,
-    /// Whether a low-pass filter of the second order may be in their place, in the part or in what reads it.
+    /// True if a low-pass filter of the second order may be in their place, in the part or in what reads it.
     pub may_be_low_pass: bool,
     /// Allan variance of a channel at the shortest octaves, in counts², above which rounding to counts adds white noise and
     /// nothing else.

@@ -69,7 +69,7 @@ pub struct InspectedTable {
     pub kind: String,
     /// Number of rows.
     pub rows: usize,
-    /// Whether the file has more rows, which were not looked at.
+    /// True if the file has more rows, which were not looked at.
     pub is_cut: bool,
     /// The columns, in their order.
     pub columns: Vec<InspectedColumn>,
@@ -160,12 +160,12 @@ impl InspectedTable {
         self.steady_s.filter(|_| is_part)
     }
 
-    /// Whether the part at rest is so short that the sensor was moved, and not touched alone.
+    /// True if the part at rest is so short that the sensor was moved, and not touched alone.
     fn is_moved(&self) -> bool {
         self.steady.as_ref().is_some_and(|steady| (steady.rows.len() as f64) < MOVED * self.rows as f64)
     }
 
-    /// Whether a column is taken for `channel`, which is a channel's name, `time` or `sample`.
+    /// True if a column is taken for `channel`, which is a channel's name, `time` or `sample`.
     #[must_use]
     pub fn has(&self, channel: &str) -> bool {
         self.columns.iter().any(|column| column.guess.as_ref().is_some_and(|guess| guess.channel == channel))

@@ -50,7 +50,7 @@ fn pieces(text: &str) -> Vec<String> {
     pieces
 }
 
-/// Whether `piece` ends with a number and `word` is its unit.
+/// True if `piece` ends with a number and `word` is its unit.
 fn is_unit_of(piece: &str, word: &str) -> bool {
     let word = word.trim_end_matches([',', ';', '.', ':', ')']);
     let is_unit = SIMPLE_UNITS.contains(&word) || word.contains(['%', '°', 'µ', 'σ', '/', '√']);

@@ -22,7 +22,7 @@ pub struct ReadingRecord {
     pub rows: u64,
     /// Rows that are no samples, by cause.
     pub left_out: BTreeMap<String, u64>,
-    /// Whether it was read to its end.
+    /// True if it was read to its end.
     pub complete: bool,
     /// Why it was not, where it is damaged.
     pub damage: Option<String>,

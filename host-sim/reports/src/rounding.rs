@@ -89,7 +89,7 @@ pub fn estimate(value: f64, low: f64, high: f64) -> String {
     if low == high { value } else { format!("{value} ({low} … {high})") }
 }
 
-/// Whether only the upper bound of an estimate is known.
+/// True if only the upper bound of an estimate is known.
 pub(crate) fn is_upper_bound(value: f64, low: f64) -> bool {
     low <= 0.0 && value >= 0.0
 }

@@ -117,7 +117,7 @@ pub enum SavedReportError {
     SameChannel(String),
 }
 
-/// Whether rates differ by no more than two clocks do.
+/// True if rates differ by no more than two clocks do.
 fn is_same_rate(one: f64, other: f64) -> bool {
     (one / other - 1.0).abs() < 0.01
 }
@@ -242,7 +242,7 @@ impl SavedTerm {
         self.parameters.get(if is_white { "value" } else { BELOW_CORNER })
     }
 
-    /// Whether it is a process that stands in the place of white noise.
+    /// True if it is a process that stands in the place of white noise.
     pub(crate) fn is_in_place_of_white_noise(&self) -> bool {
         self.parameters.contains_key(BELOW_CORNER)
     }

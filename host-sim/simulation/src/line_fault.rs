@@ -15,7 +15,7 @@ pub enum LineFault {
     AnswerRun,
     /// From a bit on the answer is low or high.
     StuckFrom {
-        /// Whether it reads ones.
+        /// True if it reads ones.
         high: bool,
     },
     /// The sensor sees a clock less, and the bits that follow come early.
@@ -54,7 +54,7 @@ impl LineFault {
         Self::DoubledEdge,
     ];
 
-    /// Whether it meets bits; the others meet bursts.
+    /// True if it meets bits; the others meet bursts.
     pub fn is_of_bits(self) -> bool {
         matches!(self, Self::AnswerBits | Self::RequestBits)
     }
@@ -83,7 +83,7 @@ impl RandomFault {
         self.fault
     }
 
-    /// Whether it meets, if it is `fault`.
+    /// True if it meets, if it is `fault`.
     pub(crate) fn meets(&mut self, fault: LineFault) -> bool {
         self.fault == fault && self.random.random_bool(self.probability)
     }

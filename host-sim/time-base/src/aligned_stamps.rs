@@ -27,12 +27,12 @@ pub(crate) struct AlignedStamps {
     pub(crate) tick_s: Option<f64>,
     /// Width of the lateness of ordinary samples, periods.
     pub(crate) width: f64,
-    /// Whether single losses are told from the rounding of the stamps.
+    /// True if single losses are told from the rounding of the stamps.
     pub(crate) resolved: bool,
     /// The shortest loss that is told from late delivery, samples.
     pub(crate) least_loss: u64,
-    /// Whether the rate changes by more than a track follows; its interval is then the range that it takes.
+    /// True if the rate changes by more than a track follows; its interval is then the range that it takes.
     pub(crate) is_rate_changing: bool,
-    /// Whether a loop wrote them that asks for samples when it has time.
+    /// True if a loop wrote them that asks for samples when it has time.
     pub(crate) is_of_loop: bool,
 }

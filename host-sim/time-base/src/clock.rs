@@ -285,7 +285,7 @@ impl KnownPlaces {
     }
 }
 
-/// Whether it is the stamps that are at fault: a stated rate needs none.
+/// True if it is the stamps that are at fault: a stated rate needs none.
 fn is_of_stamps(error: &TimeBaseError) -> bool {
     matches!(
         error,
@@ -517,7 +517,7 @@ fn contradiction(times: &[f64], alignment: &AlignedStamps, stated_hz: f64) -> Re
     }
 }
 
-/// Whether the gaps of `samples` samples that span so many periods are too long.
+/// True if the gaps of `samples` samples that span so many periods are too long.
 fn is_too_sparse(samples: u64, span: u64) -> bool {
     span / MAX_PERIODS_PER_SAMPLE > samples && span > MAX_PERIODS
 }

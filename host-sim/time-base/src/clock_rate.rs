@@ -149,7 +149,7 @@ impl LocalPeriod {
 pub(crate) struct SteadyStream {
     clock: LocalPeriod,
     regularity: Regularity,
-    /// Whether the rate has changed.
+    /// True if the rate has changed.
     is_changing: bool,
     /// Stamps that are not returned yet, and before them those of the window around the first of them.
     times: Vec<f64>,

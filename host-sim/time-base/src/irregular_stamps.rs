@@ -77,7 +77,7 @@ pub(crate) fn of_loop(times: &[f64], tick_s: Option<f64>) -> Option<AlignedStamp
     })
 }
 
-/// Whether a tick of these stamps holds so many samples that they are counted through.
+/// True if a tick of these stamps holds so many samples that they are counted through.
 pub(crate) fn is_of_many(times: &[f64], tick_s: f64) -> bool {
     let span_s = times.last().zip(times.first()).map_or(0.0, |(last, first)| last - first);
     tick_s * (times.len() as f64) > MANY * span_s && span_s > 0.0

@@ -56,7 +56,7 @@ pub struct LostStretch {
     pub before: usize,
     /// Sample periods without a sample.
     pub missing: u64,
-    /// Whether nothing but a loss explains the stamps.
+    /// True if nothing but a loss explains the stamps.
     pub certain: bool,
 }
 
@@ -178,7 +178,7 @@ impl Track {
         track
     }
 
-    /// Whether the losses are as independent of each other as the durations of many samples let them be, which gain `persistent` s² of
+    /// True if the losses are as independent of each other as the durations of many samples let them be, which gain `persistent` s² of
     /// variance a sample. Samples that wait and then come together, and stamps that beat, look like losses at distances that make up for
     /// each other.
     pub(crate) fn are_losses_independent(&self, persistent: f64) -> bool {

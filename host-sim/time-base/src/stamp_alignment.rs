@@ -216,7 +216,7 @@ fn search(times: &[f64], stated_s: Option<f64>, tick_s: Option<f64>) -> Option<f
     Some(better.map_or(found.period_s, |(_, track)| track.period_s))
 }
 
-/// Whether a quarter of the intervals is far longer than another quarter, or a quarter is as short as a tick or two.
+/// True if a quarter of the intervals is far longer than another quarter, or a quarter is as short as a tick or two.
 fn are_unlike_or_ticks(times: &[f64], tick_s: f64) -> bool {
     let mut intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let [short, long] = [1, 3].map(|parts| quantile(&mut intervals, parts, 4));
@@ -269,7 +269,7 @@ const MIN_SCATTERED: usize = 8;
 /// losses shows with a standard deviation of about 0.5.
 const SCATTERED: f64 = 0.4;
 
-/// Whether losses lie at so different distances that rounding cannot have made most of them.
+/// True if losses lie at so different distances that rounding cannot have made most of them.
 fn are_scattered(losses: &[LostStretch]) -> bool {
     let distances = || losses.windows(2).map(|pair| (pair[1].before - pair[0].before) as f64);
     let count = distances().count() as f64;
@@ -278,7 +278,7 @@ fn are_scattered(losses: &[LostStretch]) -> bool {
     losses.len() >= MIN_SCATTERED && variance >= SCATTERED * mean * mean
 }
 
-/// Whether intervals of one tick differ by more than the rounding of a time in f64: the stamps are not multiples of the tick,
+/// True if intervals of one tick differ by more than the rounding of a time in f64: the stamps are not multiples of the tick,
 /// and it is the sample period that they show.
 fn is_finer(times: &[f64], tick_s: f64) -> bool {
     let single =
@@ -289,7 +289,7 @@ fn is_finer(times: &[f64], tick_s: f64) -> bool {
     most - least > rounding
 }
 
-/// Whether single losses lie so regularly in a record of `samples` that a slightly longer period explains all of them.
+/// True if single losses lie so regularly in a record of `samples` that a slightly longer period explains all of them.
 fn is_beat(losses: &[LostStretch], samples: usize) -> bool {
     let (Some(first), Some(last)) = (losses.first(), losses.last()) else { return false };
     if losses.len() < MIN_BEATS || losses.iter().any(|loss| loss.missing != 1) {

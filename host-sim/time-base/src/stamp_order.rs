@@ -141,7 +141,7 @@ impl StampOrder {
         self.accepted = self.accepted.saturating_sub(1);
     }
 
-    /// Whether the first row is wrong, as the rows after it show, whose times are these.
+    /// True if the first row is wrong, as the rows after it show, whose times are these.
     pub fn is_first_wrong(&mut self, times: &[f64]) -> bool {
         let [first, second, ..] = times else { return false };
         let mut intervals: Vec<f64> = times[1..].windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -151,7 +151,7 @@ impl StampOrder {
         is_wrong
     }
 
-    /// Whether no row but the first was used, which lies after all others.
+    /// True if no row but the first was used, which lies after all others.
     pub fn has_first_alone(&self) -> bool {
         self.accepted <= 1
     }

@@ -17,13 +17,13 @@ pub struct StampQuality {
     pub losses: Vec<LostStretch>,
     /// Samples in losses that something else may explain.
     pub uncertain: u64,
-    /// Whether losses of single samples are told from the rounding of the stamps.
+    /// True if losses of single samples are told from the rounding of the stamps.
     pub resolved: bool,
     /// The shortest loss that is told from late delivery, samples: more than 1 where samples come in bursts that differ by as much.
     pub least_loss: u64,
-    /// Whether the rate changes in the course of the record; the interval of [`rate`](Self::rate) is then the range that it takes.
+    /// True if the rate changes in the course of the record; the interval of [`rate`](Self::rate) is then the range that it takes.
     pub is_rate_changing: bool,
-    /// Whether a loop wrote them that asks for samples when it has time: its periods are as long as it takes.
+    /// True if a loop wrote them that asks for samples when it has time: its periods are as long as it takes.
     pub is_of_loop: bool,
     /// Samples that were read at least a period later than the others.
     pub late: u64,

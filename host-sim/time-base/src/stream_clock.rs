@@ -203,7 +203,7 @@ impl StreamClock {
         placed
     }
 
-    /// Whether one of the last intervals is as long as a lost sample makes it.
+    /// True if one of the last intervals is as long as a lost sample makes it.
     fn has_long_interval(&self) -> bool {
         self.recent.iter().zip(self.recent.iter().skip(1)).any(|(one, next)| next - one >= self.least_growth)
     }

@@ -297,7 +297,7 @@ impl EffectSource {
         })
     }
 
-    /// Whether the outputs repeat the previous sample this time. To be called once a sample.
+    /// True if the outputs repeat the previous sample this time. To be called once a sample.
     pub(crate) fn repeats_sample(&mut self) -> bool {
         let repeats = |active: &mut ActiveEffect| match active.effect {
             InjectedEffect::RepeatedSamples { fraction } => active.random.random_bool(probability(fraction)),

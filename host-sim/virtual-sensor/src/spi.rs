@@ -278,7 +278,7 @@ pub(crate) struct SpiPort {
     selected: bool,
     /// When chip select fell last, ns.
     selected_at_ns: u64,
-    /// Whether chip select has fallen since the part fell asleep.
+    /// True if chip select has fallen since the part fell asleep.
     may_wake: bool,
     /// When chip select fell before the latest word, ns.
     word_select_at_ns: Option<u64>,
@@ -369,12 +369,12 @@ impl SpiPort {
         (self.selected && self.may_wake).then(|| now_ns - self.selected_at_ns)
     }
 
-    /// Whether what gets a note is a violation.
+    /// True if what gets a note is a violation.
     pub(crate) fn is_pedantic(&self) -> bool {
         matches!(self.strictness, Strictness::Pedantic { .. })
     }
 
-    /// Whether the next byte is the first of a word.
+    /// True if the next byte is the first of a word.
     pub(crate) fn at_word_begin(&self) -> bool {
         self.upper_byte.is_none()
     }

@@ -69,7 +69,7 @@ fn functions(image: &Path) -> BTreeMap<u32, Function> {
     functions
 }
 
-/// Whether a function panics, or is one that finds out whether to.
+/// True if a function panics, or is one that finds out whether to.
 fn is_panic(name: &str) -> bool {
     [
         "core::slice::index::SliceIndex",

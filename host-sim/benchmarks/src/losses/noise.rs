@@ -20,7 +20,7 @@ const COUNTS: f64 = 64.0;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TestNoise {
     mixture: Mixture,
-    /// Whether the signal passes through the filter of the part.
+    /// True if the signal passes through the filter of the part.
     filtered: bool,
 }
 

@@ -65,7 +65,7 @@ pub struct SpectrumOctave {
     pub measured_error: f64,
     /// Relative standard deviation of `by_spectrum` by the degrees of freedom of the spectrum.
     pub by_spectrum_error: f64,
-    /// Whether the segments of the spectrum are long enough for this averaging time.
+    /// True if the segments of the spectrum are long enough for this averaging time.
     pub resolved: bool,
 }
 

@@ -336,7 +336,7 @@ impl<'a> ChannelUnderTest<'a> {
         self.gain(frequency) * baseline + self.known_density(frequency)
     }
 
-    /// Whether the white noise, behind the filter, has an Allan deviation of less than half a count at all averaging times up to the
+    /// True if the white noise, behind the filter, has an Allan deviation of less than half a count at all averaging times up to the
     /// length of the longest filter, so that rounding is no white noise; or of less than half of a coarser quantum.
     pub(super) fn is_below_a_count(&self) -> bool {
         let quantum = |effect: &InjectedEffect| match *effect {

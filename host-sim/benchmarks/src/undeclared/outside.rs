@@ -151,7 +151,7 @@ impl OutsideEffect {
         self.shares.iter().map(|(channel, _)| *channel)
     }
 
-    /// Whether `found` is a part of it that is there without the rest: the carrier of a line that changes. Each sideband of one that swells
+    /// True if `found` is a part of it that is there without the rest: the carrier of a line that changes. Each sideband of one that swells
     /// and fades by half has a sixteenth of its power, and at the detection limit of the carrier they are in the noise.
     pub(super) fn has_part(&self, found: &Effect) -> bool {
         let [carrier_hz, change_hz] = self.frequencies_hz;
@@ -160,7 +160,7 @@ impl OutsideEffect {
             if changes && (line.frequency_hz.value - carrier_hz).abs() < 0.5 * change_hz)
     }
 
-    /// Whether it shows in `channel`.
+    /// True if it shows in `channel`.
     pub(super) fn shows_in(&self, channel: OutputRegister) -> bool {
         self.shares.is_empty() || self.channels().any(|of| of == channel)
     }
@@ -311,7 +311,7 @@ impl OutsideEffect {
         }
     }
 
-    /// Whether the converter of missing codes never gives `code`.
+    /// True if the converter of missing codes never gives `code`.
     pub(super) fn is_missing(&self, code: i32) -> bool {
         let modulus = (1.0 / self.frequencies_hz[0]).round() as i32;
         code.rem_euclid(modulus) == modulus - 1

@@ -68,7 +68,7 @@ pub struct EffectScore {
     pub kind: EffectKind,
     /// Size over the detection limit.
     pub strength: f64,
-    /// Whether the report lists it in its channels.
+    /// True if the report lists it in its channels.
     pub named: bool,
     /// Whether a test that is given channel and waveform, but not the noise, detects it; absent in pairs, and for effects
     /// that are not a known waveform of the bias.
@@ -114,9 +114,9 @@ pub struct OutsideScore {
     pub kind: OutsideKind,
     /// Size over the detection limit.
     pub strength: f64,
-    /// Whether the report says that something is unexplained in its channel.
+    /// True if the report says that something is unexplained in its channel.
     pub unexplained: bool,
-    /// Whether the report has a name for it that describes it, in its channel.
+    /// True if the report has a name for it that describes it, in its channel.
     pub named: bool,
 }
 
@@ -227,7 +227,7 @@ fn score_outside(effect: &OutsideEffect, strength: f64, scored: &[(Channel, &Cha
     OutsideScore { kind: effect.kind(), strength, unexplained: names.contains(&UNEXPLAINED), named }
 }
 
-/// Whether `effect` is in `channel`. Effects without channels concern the samples of all channels.
+/// True if `effect` is in `channel`. Effects without channels concern the samples of all channels.
 fn shows_in(effect: &InjectedEffect, channel: Channel) -> bool {
     effect.channels().is_empty() || effect.channels().contains(&simulation::output_register(channel))
 }

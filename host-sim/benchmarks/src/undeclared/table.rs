@@ -150,7 +150,7 @@ impl ParameterScore {
 }
 
 impl OutsideScore {
-    /// Whether the report says in its channel that something is unexplained, or describes it.
+    /// True if the report says in its channel that something is unexplained, or describes it.
     #[must_use]
     pub fn is_told(&self) -> bool {
         self.unexplained || self.named
@@ -161,19 +161,19 @@ impl UnseenErrors {
     /// Largest ratio to another error that counts as equally good.
     const TOLERANCE: f64 = 1.5;
 
-    /// Whether the model with the added terms is as good as the true model.
+    /// True if the model with the added terms is as good as the true model.
     #[must_use]
     pub fn is_near_truth(&self) -> bool {
         self.after <= Self::TOLERANCE * self.truth
     }
 
-    /// Whether the model with the added terms is as good as the fitted true terms.
+    /// True if the model with the added terms is as good as the fitted true terms.
     #[must_use]
     pub fn is_near_true_terms(&self) -> bool {
         self.after <= Self::TOLERANCE * self.refitted
     }
 
-    /// Whether the fitted true terms are as good as the true model.
+    /// True if the fitted true terms are as good as the true model.
     #[must_use]
     pub fn are_true_terms_near_truth(&self) -> bool {
         self.refitted <= Self::TOLERANCE * self.truth

@@ -20,7 +20,7 @@ use virtual_sensor::{ChannelNoise, InjectedEffect, OutputRegister, SensorScenari
 /// documentation promises.
 const FALSE_ALARM: f64 = 2e-4;
 
-/// Whether an estimator could remove the effect from the data. Other effects are terms of the true model.
+/// True if an estimator could remove the effect from the data. Other effects are terms of the true model.
 fn is_removable(effect: &InjectedEffect) -> bool {
     !matches!(
         effect,

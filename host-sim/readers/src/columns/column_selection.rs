@@ -161,7 +161,7 @@ impl ColumnSelection {
         Ok(Self { assignments, units: known })
     }
 
-    /// Whether the user says nothing.
+    /// True if the user says nothing.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.assignments.is_empty() && self.units.is_empty()
@@ -179,17 +179,17 @@ impl ColumnSelection {
         self.units.iter().copied().find(|unit| unit.base == base)
     }
 
-    /// Whether the user assigns columns.
+    /// True if the user assigns columns.
     pub(crate) fn has_columns(&self) -> bool {
         !self.assignments.is_empty()
     }
 
-    /// Whether the user states units.
+    /// True if the user states units.
     pub(crate) fn has_units(&self) -> bool {
         !self.units.is_empty()
     }
 
-    /// Whether every column that the user names is one of `available`.
+    /// True if every column that the user names is one of `available`.
     pub(crate) fn is_covered(&self, available: &[AvailableColumn]) -> bool {
         self.assignments.iter().all(|(_, wanted)| available.iter().any(|column| column.name == *wanted))
     }
@@ -421,12 +421,12 @@ impl AvailableColumn {
         }
     }
 
-    /// Whether its unit may be that of a channel.
+    /// True if its unit may be that of a channel.
     fn may_measure(&self, profile: &ChannelProfile) -> bool {
         self.unit.is_none_or(|unit| unit.measures(profile.quantity) || unit.base == COUNT)
     }
 
-    /// Whether its name is that of a time.
+    /// True if its name is that of a time.
     pub(crate) fn is_time(&self) -> bool {
         matches!(role_of(&self.name), Some(NamedRole::Time))
     }
@@ -473,7 +473,7 @@ fn gauss_of_field(name: &str, unit: &str) -> Option<Unit> {
     Unit::parse("gauss").filter(|_| is_field && unit.trim() == "G")
 }
 
-/// Whether a heading is the name of an output register in the data sheets of the ADIS164xx.
+/// True if a heading is the name of an output register in the data sheets of the ADIS164xx.
 pub fn is_output_register(heading: &str) -> bool {
     const OF_PART: [&str; 3] = ["SUPPLY_OUT", "TEMP_OUT", "AUX_ADC"];
     let of_axis = heading.strip_suffix("_OUT").and_then(|name| name.strip_prefix(['X', 'Y', 'Z']));
@@ -631,7 +631,7 @@ const AXES: [(&str, [&str; 3]); 3] = [
     ("magn", ["magn_x", "magn_y", "magn_z"]),
 ];
 
-/// Whether a time column has the times of the samples by its name, where a file has several.
+/// True if a time column has the times of the samples by its name, where a file has several.
 fn is_time_of_sample(name: &str) -> bool {
     let name = name.to_lowercase();
     name.ends_with("stamp_sample") || name.ends_with("header.stamp") || name.starts_with("sensor")

@@ -84,13 +84,13 @@ impl Unit {
         UNITS.iter().map(|(spellings, ..)| spellings[0])
     }
 
-    /// Whether it is a unit of times.
+    /// True if it is a unit of times.
     #[must_use]
     pub(crate) fn is_time(&self) -> bool {
         self.base == SECOND
     }
 
-    /// Whether it is a unit of `quantity`.
+    /// True if it is a unit of `quantity`.
     #[must_use]
     pub(crate) fn measures(&self, quantity: Quantity) -> bool {
         self.base == quantity.unit()

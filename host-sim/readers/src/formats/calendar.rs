@@ -48,7 +48,7 @@ struct WrittenDate {
     year: i64,
     /// Month and day; where the year is last, as they are written.
     parts: [i64; 2],
-    /// Whether the order is that of the file.
+    /// True if the order is that of the file.
     is_open: bool,
     is_stroked: bool,
 }
@@ -325,7 +325,7 @@ impl CalendarClock {
         }
     }
 
-    /// Whether the time, or its date, is in the field at `position`.
+    /// True if the time, or its date, is in the field at `position`.
     pub(crate) fn is_at(&self, position: usize) -> bool {
         !matches!(self.columns, CalendarColumns::Parts(_)) && self.columns.position() == position
     }

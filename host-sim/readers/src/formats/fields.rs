@@ -50,7 +50,7 @@ pub(crate) struct Fields<'a> {
     rest: Option<&'a str>,
     /// An ASCII character; blanks where there is none.
     separator: Option<u8>,
-    /// Whether there may be a time of a serial monitor before the row.
+    /// True if there may be a time of a serial monitor before the row.
     has_arrow: bool,
     /// What follows in a list.
     list: Option<&'a str>,

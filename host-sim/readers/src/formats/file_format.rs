@@ -454,7 +454,7 @@ fn copied_pipe(input: impl Read + Send + 'static, monitor: &ReadMonitor) -> io::
     Ok(copy)
 }
 
-/// Whether the first bytes are those of HDF5, whose signature may come behind 512 bytes, or 1024, and so on.
+/// True if the first bytes are those of HDF5, whose signature may come behind 512 bytes, or 1024, and so on.
 fn is_hdf5(head: &[u8]) -> bool {
     let mut starts =
         std::iter::once(0).chain((9..).map(|power| 1usize << power).take_while(|start| *start < head.len()));

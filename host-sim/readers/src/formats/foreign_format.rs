@@ -48,7 +48,7 @@ const MOST_CONTROLS: usize = 64;
 /// Bytes that an error shows.
 const SHOWN: usize = 16;
 
-/// Whether the first bytes of a file are no text.
+/// True if the first bytes of a file are no text.
 pub(crate) fn is_binary(head: &[u8]) -> bool {
     let is_foreign = FOREIGN.iter().any(|(magic, ..)| head.starts_with(magic));
     let is_control = |byte: &&u8| byte.is_ascii_control() && !byte.is_ascii_whitespace() && **byte != 0x1B;
@@ -69,13 +69,13 @@ pub(crate) const REPORT: Reason = Reason::Foreign {
     how: "`compare` and `export` take it; `analyze` takes the recording that it was made of",
 };
 
-/// Whether a text begins as the JSON of a report does.
+/// True if a text begins as the JSON of a report does.
 pub(crate) fn is_report(head: &[u8]) -> bool {
     let mut signs = head.iter().filter(|byte| !byte.is_ascii_whitespace());
     br#"{"schema":"#.iter().all(|sign| signs.next() == Some(sign))
 }
 
-/// Whether a text begins a JSON object of several lines, or of one that is longer than `head`, or a list of objects or lists.
+/// True if a text begins a JSON object of several lines, or of one that is longer than `head`, or a list of objects or lists.
 pub(crate) fn is_json_document(head: &[u8]) -> bool {
     let text = head.trim_ascii_start();
     let mut signs = text.iter().filter(|byte| !byte.is_ascii_whitespace());
@@ -99,7 +99,7 @@ pub(crate) fn refusal(head: &[u8]) -> Reason {
     }
 }
 
-/// Whether each message comes after a time of 8 bytes, in µs since 1970: two of version 1 or 2, one after the other.
+/// True if each message comes after a time of 8 bytes, in µs since 1970: two of version 1 or 2, one after the other.
 fn is_mavlink(head: &[u8]) -> bool {
     const TIME: usize = 8;
     let length = |at: usize| {

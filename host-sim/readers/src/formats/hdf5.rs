@@ -49,7 +49,7 @@ struct Layout {
     columns: Vec<Encoded>,
     /// Bytes of a row of the file.
     stride: usize,
-    /// Whether each column is a row of the file.
+    /// True if each column is a row of the file.
     is_by_column: bool,
     /// What the numbers are multiplied by, and what is added.
     scale: Option<[f64; 2]>,

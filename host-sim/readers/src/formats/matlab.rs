@@ -173,12 +173,12 @@ impl Walk<'_> {
         }
     }
 
-    /// Whether all that is wanted has been read.
+    /// True if all that is wanted has been read.
     fn is_done(&self) -> bool {
         self.wanted.is_some_and(|(parts, _)| self.taken == parts.count())
     }
 
-    /// Whether the matrix that comes is to be read.
+    /// True if the matrix that comes is to be read.
     fn takes_next(&self) -> bool {
         self.wanted.is_some_and(|(parts, _)| parts.contain(self.walked))
     }

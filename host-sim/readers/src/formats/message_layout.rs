@@ -121,7 +121,7 @@ enum Step {
 pub(crate) struct MessageColumn {
     /// Names of the fields from the outermost on, with `.` between them.
     pub(crate) name: String,
-    /// Whether it is a time in ns.
+    /// True if it is a time in ns.
     pub(crate) is_time: bool,
     pub(crate) is_float: bool,
 }

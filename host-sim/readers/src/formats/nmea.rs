@@ -10,7 +10,7 @@ pub(crate) struct Sentence<'a> {
     pub(crate) name: &'a str,
     /// What comes after the name, and before the checksum.
     pub(crate) fields: Vec<&'a str>,
-    /// Whether its checksum is right; a sentence without one is taken as it is.
+    /// True if its checksum is right; a sentence without one is taken as it is.
     pub(crate) is_intact: bool,
 }
 

@@ -194,7 +194,7 @@ struct ArrayLayout {
     fields: Vec<FieldLayout>,
     /// Bytes of a row; of an element where columns are contiguous.
     stride: usize,
-    /// Whether each column lies in one piece.
+    /// True if each column lies in one piece.
     by_column: bool,
     unit: Option<Unit>,
 }

@@ -35,7 +35,7 @@ pub(crate) struct Encoding {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Header {
     pub(crate) element: ElementType,
-    /// Whether the first index changes fastest.
+    /// True if the first index changes fastest.
     pub(crate) is_fortran_order: bool,
     pub(crate) shape: Vec<u64>,
 }
@@ -141,7 +141,7 @@ impl Encoding {
         self.text.split_once('[').and_then(|(_, unit)| unit.strip_suffix(']'))
     }
 
-    /// Whether it is a number, or a time, of a size that is read.
+    /// True if it is a number, or a time, of a size that is read.
     pub(crate) fn is_number(&self) -> bool {
         match self.kind {
             'i' | 'u' | 'b' => matches!(self.bytes, 1 | 2 | 4 | 8),
@@ -204,7 +204,7 @@ impl Parser<'_> {
         if self.depth > MOST_BRACKETS { Err(Reason::TooDeep { most: MOST_BRACKETS }) } else { Ok(()) }
     }
 
-    /// Whether the bracket ends here; goes out of it.
+    /// True if the bracket ends here; goes out of it.
     fn leave(&mut self, end: char) -> bool {
         self.rest = self.rest.trim_start();
         let Some(rest) = self.rest.strip_prefix(end) else { return false };

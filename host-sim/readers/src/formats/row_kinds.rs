@@ -43,7 +43,7 @@ impl RowKind {
         }
     }
 
-    /// Whether these are the fields of a row of this kind.
+    /// True if these are the fields of a row of this kind.
     pub(crate) fn has(&self, row: &[&str]) -> bool {
         match self {
             Self::Labelled { at, name } => row.get(*at) == Some(&name.as_str()),
@@ -167,7 +167,7 @@ impl RowKinds {
     }
 }
 
-/// Whether a field is a name, and no number, time or missing value.
+/// True if a field is a name, and no number, time or missing value.
 fn is_label(field: &str) -> bool {
     let starts = field.chars().next().is_some_and(char::is_alphabetic);
     let is_time = || calendar::date_time(field).or_else(|| calendar::date(field)).is_some();

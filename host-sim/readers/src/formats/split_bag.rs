@@ -52,7 +52,7 @@ impl<'a> SplitBag<'a> {
     }
 }
 
-/// Whether the rows of one topic go on in the other.
+/// True if the rows of one topic go on in the other.
 fn is_same(one: &Topic, other: &Topic) -> bool {
     one.name == other.name && one.kind == other.kind && one.columns == other.columns
 }

@@ -256,7 +256,7 @@ enum FieldKind {
 }
 
 impl FieldKind {
-    /// Whether both may be in one column.
+    /// True if both may be in one column.
     fn is_like(self, other: Self) -> bool {
         self == other || self == Self::Missing || other == Self::Missing
     }
@@ -287,7 +287,7 @@ fn is_comment(preamble: &[Line], line: u64) -> bool {
     preamble.iter().any(|(own, text)| *own == line && text.starts_with(['#', '%']) && text.contains(['\'', ':']))
 }
 
-/// Whether these are names of the first of `width` columns, or of more, of which the last have no rows: names of channels are among them.
+/// True if these are names of the first of `width` columns, or of more, of which the last have no rows: names of channels are among them.
 fn is_part_of_heading(names: &[String], width: usize) -> bool {
     let is_known = |name: &String| {
         let column = AvailableColumn::from_heading(name);
@@ -402,7 +402,7 @@ pub(crate) fn named_columns(names: &[String], units: Option<&[Option<Unit>]>) ->
     columns
 }
 
-/// Whether a line is a row and no heading or comment: at least half of its fields are numbers or calendar times, or all are missing. The
+/// True if a line is a row and no heading or comment: at least half of its fields are numbers or calendar times, or all are missing. The
 /// others may be texts, such as the name of a frame.
 pub(crate) fn is_row(text: &str) -> bool {
     let separator = separator_of(text);

@@ -145,7 +145,7 @@ pub(crate) struct TextTable {
     /// What the user should know of the columns.
     columns_notes: Vec<String>,
     damaged: DamagedRows,
-    /// Whether a field that is no number is a missing one.
+    /// True if a field that is no number is a missing one.
     is_lenient: bool,
     fields: RowFields,
     /// The first rows, which were read to tell the columns.
@@ -527,7 +527,7 @@ fn values_of(names: &[String], row: Vec<(String, String)>) -> Vec<String> {
 #[derive(Debug)]
 struct RowFields {
     width: usize,
-    /// Whether empty fields at the end may be absent.
+    /// True if empty fields at the end may be absent.
     may_be_short: bool,
     /// Position of each field that is read, in ascending order, and which of the chosen columns it is.
     read: Vec<(usize, usize)>,
@@ -634,7 +634,7 @@ impl RowFields {
     }
 }
 
-/// Whether a row has a number, but none of the `chosen` columns of its sensor: it is of another one.
+/// True if a row has a number, but none of the `chosen` columns of its sensor: it is of another one.
 fn is_of_other_sensor<'a>(
     fields: impl Iterator<Item = &'a str>,
     chosen: &[ChosenColumn],

@@ -43,7 +43,7 @@ pub(crate) struct TopicSensor {
 }
 
 impl TopicSensor {
-    /// Whether it has such a channel.
+    /// True if it has such a channel.
     pub(crate) fn has(&self, channel: &str) -> bool {
         self.columns.iter().any(|(name, ..)| *name == channel)
     }

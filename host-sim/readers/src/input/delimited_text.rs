@@ -29,7 +29,7 @@ pub struct Lines {
     /// The line, where it is no UTF-8.
     latin: String,
     is_latin: bool,
-    /// Whether the line in `bytes` is read once more.
+    /// True if the line in `bytes` is read once more.
     again: bool,
     /// Bytes that are zero, as where a disk was full or a device lost its power.
     zero_bytes: u64,
@@ -165,7 +165,7 @@ impl Lines {
     }
 }
 
-/// Whether a file begins as text in UTF-16, in either order of the bytes.
+/// True if a file begins as text in UTF-16, in either order of the bytes.
 pub(crate) fn is_utf16(start: &[u8]) -> bool {
     start.starts_with(b"\xFF\xFE") || start.starts_with(b"\xFE\xFF")
 }

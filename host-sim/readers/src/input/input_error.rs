@@ -263,7 +263,7 @@ pub enum Reason {
 }
 
 impl Reason {
-    /// Whether a limit of this program was met: the file need not be damaged.
+    /// True if a limit of this program was met: the file need not be damaged.
     pub(crate) fn is_limit(&self) -> bool {
         matches!(
             self,
@@ -333,7 +333,7 @@ impl std::error::Error for InputError {}
 #[derive(Debug, Clone, Copy)]
 pub struct Printable<'a>(pub &'a str);
 
-/// Whether a character is invisible and changes the direction or the joining of others (Unicode, general category Cf), or ends a line.
+/// True if a character is invisible and changes the direction or the joining of others (Unicode, general category Cf), or ends a line.
 fn is_format(c: char) -> bool {
     matches!(c,
         '\u{ad}' | '\u{600}'..='\u{605}' | '\u{61c}' | '\u{6dd}' | '\u{70f}' | '\u{180e}' | '\u{200b}'..='\u{200f}'

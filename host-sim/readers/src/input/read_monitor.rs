@@ -80,7 +80,7 @@ impl ReadMonitor {
         self.0.pass.store(pass as u8, Relaxed);
     }
 
-    /// Whether a file is being read that can be stopped.
+    /// True if a file is being read that can be stopped.
     #[must_use]
     pub fn is_reading(&self) -> bool {
         self.0.is_reading.load(Relaxed)
@@ -91,7 +91,7 @@ impl ReadMonitor {
         self.0.stop.store(true, Relaxed);
     }
 
-    /// Whether the reading was ended by [`stop`](Self::stop).
+    /// True if the reading was ended by [`stop`](Self::stop).
     #[must_use]
     pub fn is_interrupted(&self) -> bool {
         self.0.is_interrupted.load(Relaxed)
@@ -108,7 +108,7 @@ impl ReadMonitor {
         self.0.is_reading.store(false, Relaxed);
     }
 
-    /// Whether the reading has to end here. The request is served by this: the next file is read to its end.
+    /// True if the reading has to end here. The request is served by this: the next file is read to its end.
     pub(crate) fn take_stop(&self) -> bool {
         let is_stopped = self.0.stop.load(Relaxed) && self.0.stop.swap(false, Relaxed);
         if is_stopped {

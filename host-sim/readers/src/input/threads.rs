@@ -19,7 +19,7 @@ pub fn read_on_one_thread<R>(task: impl FnOnce() -> R) -> R {
     task()
 }
 
-/// Whether a reader may begin a thread.
+/// True if a reader may begin a thread.
 #[must_use]
 pub fn may_begin_threads() -> bool {
     !cfg!(target_family = "wasm") && !IS_ALONE.get()

@@ -63,12 +63,12 @@ impl<'a> ColumnFacts<'a> {
         }
     }
 
-    /// Whether all values are whole numbers, and not all the same.
+    /// True if all values are whole numbers, and not all the same.
     pub(crate) fn is_whole(&self) -> bool {
         self.noise > 0.0 && self.values.iter().all(|value| value.is_nan() || value.fract() == 0.0)
     }
 
-    /// Whether the values are a running number: whole, and nearly each is larger than the one before by one.
+    /// True if the values are a running number: whole, and nearly each is larger than the one before by one.
     pub(crate) fn is_counter(&self) -> bool {
         let by_one = self.values.windows(2).filter(|pair| pair[1] - pair[0] == 1.0).count();
         let is_most = by_one as f64 >= COUNTS_BY_ONE * (self.values.len().max(1) - 1) as f64;
@@ -76,7 +76,7 @@ impl<'a> ColumnFacts<'a> {
         self.values.len() > 2 && is_most && is_growing && self.values.iter().all(|value| value.fract() == 0.0)
     }
 
-    /// Whether the values may be times: they grow evenly, and hardly one is smaller than the one before.
+    /// True if the values may be times: they grow evenly, and hardly one is smaller than the one before.
     pub(crate) fn is_clock(&self) -> bool {
         let rows = self.values.len();
         let back = self.values.windows(2).filter(|pair| pair[1] < pair[0] || pair[1].is_nan()).count();

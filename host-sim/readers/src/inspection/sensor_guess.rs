@@ -34,11 +34,11 @@ pub struct Proposal {
     pub units: Vec<String>,
     /// `--from` and `--to`: the part at rest, where the sensor was moved before or after it.
     pub part: Option<TimeRange>,
-    /// Whether `--rate` is needed.
+    /// True if `--rate` is needed.
     pub lacks_rate: bool,
-    /// Whether the sensor is found without its topic, if it is the only one.
+    /// True if the sensor is found without its topic, if it is the only one.
     pub is_found: bool,
-    /// Whether a column or a unit is guessed.
+    /// True if a column or a unit is guessed.
     pub is_guessed: bool,
     /// `--sensor`, where the names of the columns are those of its registers.
     pub sensor: Option<&'static str>,
@@ -47,13 +47,13 @@ pub struct Proposal {
 }
 
 impl Proposal {
-    /// Whether nothing is guessed: the file or the user says it.
+    /// True if nothing is guessed: the file or the user says it.
     #[must_use]
     pub fn is_complete(&self) -> bool {
         !self.is_guessed && !self.lacks_rate
     }
 
-    /// Whether nothing is missing in it, and no guess is in doubt.
+    /// True if nothing is missing in it, and no guess is in doubt.
     #[must_use]
     pub fn is_safe(&self) -> bool {
         !self.lacks_rate && self.doubts.is_empty()
@@ -89,7 +89,7 @@ pub(crate) struct SensorGuess {
     force: Option<UnitGuess>,
     rate: Option<UnitGuess>,
     time: Option<(Unit, String)>,
-    /// Whether a temperature without a unit is taken to be in °C.
+    /// True if a temperature without a unit is taken to be in °C.
     is_celsius: bool,
 }
 
@@ -287,7 +287,7 @@ impl SensorGuess {
         Self { force: force_guess, rate: rate_guess, time: time_guess, is_celsius, ..self }
     }
 
-    /// Whether it has a channel of an inertial sensor, or of a magnetometer.
+    /// True if it has a channel of an inertial sensor, or of a magnetometer.
     fn is_inertial(&self) -> bool {
         let is_axis = |channel: &str| GYROSCOPE.contains(&channel) || ACCELEROMETER.contains(&channel);
         self.columns.iter().any(|(channel, ..)| is_axis(channel) || channel.starts_with("magn_"))
@@ -298,7 +298,7 @@ impl SensorGuess {
         self.columns.iter().find(|(own, ..)| *own == channel).map(|(_, at, ..)| *at)
     }
 
-    /// Whether the column at `at` is one of the accelerometer.
+    /// True if the column at `at` is one of the accelerometer.
     pub(crate) fn is_force(&self, at: usize) -> bool {
         self.columns.iter().any(|(channel, own, ..)| *own == at && ACCELEROMETER.contains(channel))
     }
@@ -418,7 +418,7 @@ const OTHER_NAMES: [&str; 22] = [
     "temp",
 ];
 
-/// Whether the name and the unit of a column leave it to be a rate or a specific force.
+/// True if the name and the unit of a column leave it to be a rate or a specific force.
 fn may_be_inertial(column: &AvailableColumn) -> bool {
     let name = column.name.to_lowercase();
     let unit = column.unit.is_none_or(|unit| ["deg/s", "g", COUNT].contains(&unit.base));

@@ -23,7 +23,7 @@ const REST_G: f64 = 0.05;
 pub struct SteadyPart {
     /// Rows from 0, the end excluded.
     pub rows: Range<usize>,
-    /// Whether the units tell that the sensor was at rest; without units its values are steady, and nothing else is known.
+    /// True if the units tell that the sensor was at rest; without units its values are steady, and nothing else is known.
     pub is_rest: bool,
 }
 

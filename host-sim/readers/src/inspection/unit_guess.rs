@@ -37,7 +37,7 @@ pub(crate) struct UnitGuess {
     /// As `--units` takes it.
     pub(crate) unit: &'static str,
     pub(crate) reason: String,
-    /// Whether nothing else is plausible.
+    /// True if nothing else is plausible.
     pub(crate) is_safe: bool,
 }
 

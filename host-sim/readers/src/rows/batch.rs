@@ -209,7 +209,7 @@ pub(crate) struct BatchBuilder {
     backwards: u64,
     /// The first row whose time went back: number of the row, and by how much.
     first_backwards: Option<(u64, f64)>,
-    /// Whether the first row is not judged yet.
+    /// True if the first row is not judged yet.
     is_first_open: bool,
     /// The numbers of the row that is added.
     row: Vec<f64>,

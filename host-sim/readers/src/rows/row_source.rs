@@ -83,7 +83,7 @@ pub struct RowsRead {
     pub outside: u64,
     /// Rows at either end that are all equal, which are padding.
     pub padding: u64,
-    /// Whether the user stopped the reading before the end.
+    /// True if the user stopped the reading before the end.
     pub is_stopped: bool,
     /// Why the file was not read to its end, where it is damaged.
     pub damage: Option<String>,
@@ -92,7 +92,7 @@ pub struct RowsRead {
 }
 
 impl RowsRead {
-    /// Whether the file was read to its end, or to that of the part that is wanted.
+    /// True if the file was read to its end, or to that of the part that is wanted.
     #[must_use]
     pub fn is_complete(&self) -> bool {
         self.damage.is_none() && !self.is_stopped

@@ -45,11 +45,11 @@ pub(crate) struct WholeTable {
     pub(crate) columns: Vec<WholeColumn>,
     /// Sensors that the format knows.
     pub(crate) sensors: Vec<WholeSensor>,
-    /// Whether its columns are arrays, which may lie in several groups.
+    /// True if its columns are arrays, which may lie in several groups.
     pub(crate) is_of_arrays: bool,
     /// The rate that the file states beside its rows, Hz.
     pub(crate) rate_hz: Option<f64>,
-    /// Whether there are more rows than are held.
+    /// True if there are more rows than are held.
     pub(crate) is_cut: bool,
     /// What the user should know, one sentence each.
     pub(crate) notes: Vec<String>,

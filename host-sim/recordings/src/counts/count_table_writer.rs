@@ -12,7 +12,7 @@ use std::path::Path;
 /// Suffix of every column that holds counts.
 const COUNTS: &str = "_counts";
 
-/// Whether a first line names a channel of register counts.
+/// True if a first line names a channel of register counts.
 pub(crate) fn is_header(header: &str) -> bool {
     let is_channel = |name: &str| {
         let channel = delimited_text::field(name).strip_suffix(COUNTS);

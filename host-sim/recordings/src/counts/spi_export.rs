@@ -54,7 +54,7 @@ impl Layout {
     }
 }
 
-/// Whether a first line is that of an export.
+/// True if a first line is that of an export.
 pub(crate) fn is_header(header: &str) -> bool {
     Layout::of_header(header).is_some()
 }

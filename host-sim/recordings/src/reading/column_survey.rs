@@ -62,7 +62,7 @@ pub(crate) struct ColumnSurvey {
     /// Numbers seen, and how many runs there are for one that is kept.
     seen: usize,
     stride: usize,
-    /// Whether a number can be used, and whether one is not zero.
+    /// True if a number can be used, and whether one is not zero.
     is_usable: bool,
     has_other_than_zero: bool,
     /// Numbers that are refused, by cause.
@@ -112,12 +112,12 @@ impl ColumnSurvey {
         self.seen
     }
 
-    /// Whether all numbers that can be used are zero.
+    /// True if all numbers that can be used are zero.
     pub(crate) fn is_zero(&self) -> bool {
         self.is_usable && !self.has_other_than_zero
     }
 
-    /// Whether the next number is in a run that is kept. The stride is a power of two.
+    /// True if the next number is in a run that is kept. The stride is a power of two.
     fn is_kept(&self) -> bool {
         (self.seen / RUN) & (self.stride - 1) == 0
     }

@@ -118,7 +118,7 @@ impl FullScale {
     }
 }
 
-/// Whether a column may be at full scale: a supply or a temperature without a range is often constant.
+/// True if a column may be at full scale: a supply or a temperature without a range is often constant.
 fn is_watched(column: &ValueColumn) -> bool {
     column.profile.range.is_some() || column.profile.quantity.is_inertial()
 }

@@ -41,7 +41,7 @@ pub struct WrittenRows {
     pub columns: Vec<String>,
     /// What the user should know, one sentence each.
     pub notes: Vec<String>,
-    /// Whether the file was read to its end.
+    /// True if the file was read to its end.
     pub is_complete: bool,
 }
 

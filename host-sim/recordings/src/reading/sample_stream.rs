@@ -56,7 +56,7 @@ impl KeptInMemory {
         self.rows_with_losses.max(self.rows)
     }
 
-    /// Whether so many samples in so many sample periods are one measurement.
+    /// True if so many samples in so many sample periods are one measurement.
     fn has_room(self, samples: u64, periods: u64) -> bool {
         samples <= if lost_part(samples, periods) > self.most_lost { self.rows_with_losses } else { self.rows }
     }
@@ -108,7 +108,7 @@ struct SurveyedSamples {
     beginning: Measurement,
     description: RecordingDescription,
     notes: Vec<String>,
-    /// Whether `beginning` is all of it.
+    /// True if `beginning` is all of it.
     is_in_memory: bool,
 }
 
@@ -214,7 +214,7 @@ impl SampleStream {
         self.survey.stamps.as_ref()
     }
 
-    /// Whether the recording is one measurement in memory: its [beginning](Self::beginning) is all of it.
+    /// True if the recording is one measurement in memory: its [beginning](Self::beginning) is all of it.
     #[must_use]
     pub fn is_in_memory(&self) -> bool {
         self.samples.is_in_memory
@@ -766,7 +766,7 @@ struct Kept {
     batches: VecDeque<Batch>,
     rows: u64,
     has_all_rows: bool,
-    /// Whether they are dropped as soon as more are expected than can be kept.
+    /// True if they are dropped as soon as more are expected than can be kept.
     is_by_expectation: bool,
 }
 

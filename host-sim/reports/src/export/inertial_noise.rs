@@ -26,7 +26,7 @@ pub(super) enum Sensor {
 pub(super) struct Coefficient {
     /// The estimate, or its upper 95 % bound where nothing else is known, in SI units.
     pub value: f64,
-    /// Whether it is the bound, by the rule of the screen.
+    /// True if it is the bound, by the rule of the screen.
     pub is_bound: bool,
     /// The estimate in SI units.
     pub estimate: f64,

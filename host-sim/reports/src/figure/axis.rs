@@ -21,7 +21,7 @@ pub(super) struct Tick {
     pub label: Option<String>,
 }
 
-/// Whether a logarithmic axis can show `value`.
+/// True if a logarithmic axis can show `value`.
 pub(super) fn has_logarithm(value: f64) -> bool {
     value.is_finite() && value > 0.0
 }

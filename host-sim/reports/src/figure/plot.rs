@@ -62,11 +62,11 @@ pub(super) struct Line {
     pub points: Vec<(f64, f64)>,
     /// Bounds of each value; empty without.
     pub bounds: Vec<(f64, f64)>,
-    /// Whether each value has a dot.
+    /// True if each value has a dot.
     pub has_dots: bool,
-    /// Whether the values are joined.
+    /// True if the values are joined.
     pub is_joined: bool,
-    /// Whether it is in the legend.
+    /// True if it is in the legend.
     pub in_legend: bool,
     /// Text beside an end of the line; empty without.
     pub mark: String,

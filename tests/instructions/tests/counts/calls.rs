@@ -98,7 +98,7 @@ fn cell(count: Option<f64>) -> String {
     figure((count / unit).round() * unit)
 }
 
-/// Whether a cell has this count. The compiler may change it by a tenth; the least that can be told apart are some instructions or words.
+/// True if a cell has this count. The compiler may change it by a tenth; the least that can be told apart are some instructions or words.
 fn is_stated(count: Option<f64>, stated: &str) -> bool {
     let is_near = |count: f64| (count - number(stated)).abs() <= TOLERANCE * number(stated) + 16.0;
     count.map_or(stated == "—", is_near)

@@ -19,7 +19,7 @@ pub(crate) struct Sensor {
     deselected_at: Option<u64>,
     frame: Vec<(u8, u8)>,
     last_byte: Option<u64>,
-    /// Whether a frame is under way.
+    /// True if a frame is under way.
     pub(crate) selected: bool,
 }
 

@@ -24,7 +24,7 @@ pub(super) enum HiddenEffect {
 }
 
 impl HiddenEffect {
-    /// Whether it is in `channel`; an effect without channels concerns the samples of all.
+    /// True if it is in `channel`; an effect without channels concerns the samples of all.
     pub(super) fn shows_in(&self, channel: OutputRegister) -> bool {
         match self {
             Self::Known(_, effect) => effect.channels().is_empty() || effect.channels().contains(&channel),
@@ -78,7 +78,7 @@ fn read_again(stretch: &Measurement, quantity: Quantity) -> Vec<bool> {
     if are_read_again { equal } else { vec![false; equal.len()] }
 }
 
-/// Whether samples of gyros or of accelerometers were read twice.
+/// True if samples of gyros or of accelerometers were read twice.
 pub(super) fn has_samples_read_again(stretch: &Measurement) -> bool {
     [Quantity::AngularRate, Quantity::SpecificForce].into_iter().any(|of| read_again(stretch, of).contains(&true))
 }

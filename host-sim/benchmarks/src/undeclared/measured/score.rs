@@ -44,7 +44,7 @@ pub struct MeasuredScore {
     pub channels: Vec<&'static str>,
     /// Size over the detection limit.
     pub strength: f64,
-    /// Whether it was named; of an effect that the analysis was not made for, whether it is reported as unexplained or by a name that
+    /// True if it was named; of an effect that the analysis was not made for, whether it is reported as unexplained or by a name that
     /// describes it.
     pub named: bool,
     /// What the report says in the channels of the effect, as `channel: kind`.
@@ -118,7 +118,7 @@ fn answer(
     }
 }
 
-/// Whether none of `others` is of the same kind with the parameters of `effect`: with two estimates of each of which one at least is within
+/// True if none of `others` is of the same kind with the parameters of `effect`: with two estimates of each of which one at least is within
 /// the interval of the other.
 fn is_new(effect: &Effect, others: &[ChannelEffect]) -> bool {
     let parameters = effect.parameters();
@@ -191,7 +191,7 @@ impl MeasuredErrors {
         }
     }
 
-    /// Whether the model with the added terms is farther from the unseen half, as it was recorded, than N, B and K, and fails there.
+    /// True if the model with the added terms is farther from the unseen half, as it was recorded, than N, B and K, and fails there.
     #[must_use]
     pub fn grew(&self) -> bool {
         self.before.zip(self.after).is_some_and(|(before, after)| after > before.max(FAILS))

@@ -124,7 +124,7 @@ impl Stretch<'_> {
     }
 }
 
-/// Whether the second of the codes that `effect` takes away from `counts` has so many samples that its absence is seen at `strength`: a
+/// True if the second of the codes that `effect` takes away from `counts` has so many samples that its absence is seen at `strength`: a
 /// code of which `n` samples are expected is empty by chance with the probability exp(−n).
 fn are_seen_to_be_missing(counts: &[i32], effect: &OutsideEffect, strength: f64) -> bool {
     let mut samples: BTreeMap<i32, u32> = BTreeMap::new();
