@@ -133,7 +133,7 @@ impl Channel {
         }
     }
 
-    /// Width of the data field in bits: 12 for temperature and auxiliary input, else 14 (data sheet Rev. B, Table 9). Of the
+    /// Width of the data field in bits: 12 for temperature and auxiliary input, else 14 (data sheet Rev. B, Table 9). For the
     /// supply 12 are enough for any value that the part can measure: 5 V is count 2068.
     pub const fn bits(self) -> u32 {
         match self {

@@ -104,7 +104,7 @@ pub(crate) fn resume<T>(procedure: Pin<&mut impl Future<Output = T>>) -> Poll<T>
 /// The error of a procedure, which has no bus that could fail.
 pub(crate) type ProtocolError = Error<Infallible>;
 
-/// What the driver keeps between procedures.
+/// State of the driver between procedures.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DriverState {
     pub(crate) config: Config,

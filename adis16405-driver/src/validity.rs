@@ -68,7 +68,7 @@ impl Faults {
     /// [`WARNINGS`](Self::WARNINGS).
     pub const REFUSED: Faults = Faults::all().difference(Faults::WARNINGS);
 
-    /// Every fault with its name in reports. Where several are present, the one nearest to the root cause comes first, and
+    /// Every fault with its name in reports. If several are present, the one nearest to the root cause comes first, and
     /// the [`WARNINGS`](Self::WARNINGS) last.
     pub const CAUSES: [(Faults, &'static str); 12] = [
         (Faults::STUCK_LOW, "stuck_low"),
@@ -176,8 +176,8 @@ fn supply_in_range(word: OutputWord) -> bool {
 }
 
 /// Searches for a shift by which the inertial words get a set new-data flag, and eleven words equal error/alarm flags,
-/// since the part sets that flag in all words or in none. Where the words came up to a byte late, the first shifted word
-/// is the supply and must be in range. Where they came early, it is the x rate, of which any value is accepted; the
+/// since the part sets that flag in all words or in none. If the words came up to a byte late, the first shifted word
+/// is the supply and must be in range. If they came early, it is the x rate, of which any value is accepted; the
 /// supply, partly lost, is not checked.
 fn is_shifted(words: &[OutputWord; 12]) -> bool {
     let new = |words: &[OutputWord]| words.iter().all(|word| word.new_data());

@@ -41,7 +41,7 @@ use core::ops::Sub;
 /// For samples within ±2²³, `d² ≤ 2⁴⁸·n²`, and 2⁴⁰ samples have at most `2⁴⁴/n` differences with `n ≥ 16`, one every
 /// `n/OVERLAP` samples, so for `n ≤ 2²³` no sum of squares exceeds `2¹¹⁵` and nothing is rounded. If wider samples fill the 127 bits
 /// of a sum, it stays at its maximum and [`is_saturated`](Self::is_saturated) returns true. The fourth powers are summed in 127 bits
-/// too, with differences at `n > 2¹⁰` rounded to `√(n/512)` counts. Where such a sum is full the kurtosis is `None`;
+/// too, with differences at `n > 2¹⁰` rounded to `√(n/512)` counts. If such a sum is full the kurtosis is `None`;
 /// within 2⁴⁰ samples that takes white noise above 2¹⁷ counts rms, or averages over `n = 2²³` samples that differ by
 /// more than 2¹⁰ counts throughout.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -420,7 +420,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         (self.elapsed, self.pending)
     }
 
-    /// Where the sum of a step of a level is kept in its line.
+    /// Place of the sum of a step of a level in its line.
     #[inline]
     const fn slot(step: u64) -> usize {
         step as usize & (OVERLAP - 1)

@@ -187,7 +187,7 @@ pub(crate) fn chi_square_quantile(p: f64, dof: f64) -> f64 {
         return guess;
     }
     let shape = dof / 2.0;
-    // Where the cube is near or below 0, P(a, x) ≈ x^a / Γ(a+1) gives a positive start.
+    // If the cube is near or below 0, P(a, x) ≈ x^a / Γ(a+1) gives a positive start.
     let small = 2.0 * exp((ln(p) + ln_gamma(shape + 1.0)) / shape);
     let mut x = if cube > 0.1 { guess } else { small };
     for _ in 0..60 {

@@ -44,9 +44,9 @@ pub struct Covariance {
 ///
 /// Each channel has gaps of its own: products are taken after samples that both have, at the octaves at which neither leaves
 /// out its difference. Both estimators must have started together and go through the same time, missing samples included.
-/// Where they do not, nothing is added and [`out_of_step`](Self::out_of_step) counts the sample. Slices are not supported.
+/// If they do not, nothing is added and [`out_of_step`](Self::out_of_step) counts the sample. Slices are not supported.
 ///
-/// Where a sample is missing in both channels, both are interpolated, and noise that they share gains up to 1.5 times the
+/// If a sample is missing in both channels, both are interpolated, and noise that they share gains up to 1.5 times the
 /// share of the missing samples. This is not subtracted.
 ///
 /// # Range

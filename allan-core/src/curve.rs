@@ -23,7 +23,7 @@ pub struct AllanPoint {
     /// Variance that was subtracted from the measured one because replacing missing samples had added it, at most nine
     /// tenths of the measured variance; on a host also that of rounding errors that are correlated.
     pub interpolation: f64,
-    /// Share of the samples that was replaced because it was missing, 0 to 1. Where differences with missing samples are
+    /// Share of the samples that was replaced because it was missing, 0 to 1. If differences with missing samples are
     /// left out it is 0.
     pub replaced: f64,
     /// Squared differences that `avar` is the mean of.

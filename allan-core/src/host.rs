@@ -1,4 +1,4 @@
-//! What an analysis of whole recordings on a host needs beside the calls above (feature `host`): curves that are put together
+//! Additions for an analysis of whole recordings on a host to the calls above (feature `host`): curves that are put together
 //! or changed, covariances of many channels, and fits with shapes that were estimated elsewhere.
 
 use crate::cascade::Cascade;
@@ -57,7 +57,7 @@ pub struct NewestDifferences<const OCTAVES: usize> {
 }
 
 impl<const OCTAVES: usize> NewestDifferences<OCTAVES> {
-    /// Of this channel, until its next sample.
+    /// The state of this channel, until its next sample.
     #[must_use]
     pub fn of<const OVERLAP: usize>(channel: &Cascade<OCTAVES, OVERLAP>) -> Self {
         let due = channel.octaves_due();

@@ -1,4 +1,4 @@
-//! What the interpolation of missing samples adds to an Allan or Hadamard variance.
+//! The contribution of interpolated samples to an Allan or Hadamard variance.
 
 use crate::confidence::Difference;
 use crate::math::Real;
@@ -114,7 +114,7 @@ pub(crate) struct AddedVariance<F = f64> {
 const LARGEST_SUBTRACTION: f64 = 0.9;
 
 impl<F: Real> AddedVariance<F> {
-    /// What is subtracted from a measured variance.
+    /// The part that is subtracted from a measured variance.
     pub(crate) fn subtracted(&self, measured: F) -> F {
         let largest = F::constant(LARGEST_SUBTRACTION) * measured;
         if self.variance < largest { self.variance } else { largest }
@@ -168,11 +168,11 @@ impl<F: Real> BridgedGaps<F> {
         self.tested_error += error;
     }
 
-    /// What the gaps add to the variance at the averaging factor `n` of a record of `samples` samples, beside which those
+    /// The contribution of the gaps to the variance at the averaging factor `n` of a record of `samples` samples, beside which those
     /// of the gaps are replaced.
     ///
     /// A gap of `m` samples whose sum is off by `e` lies in the second differences that end within `2n` periods after it
-    /// and adds `e²` to their squares. Where it lies at an edge or in the middle of a difference the replaced samples
+    /// and adds `e²` to their squares. If it lies at an edge or in the middle of a difference the replaced samples
     /// vary with neighbours of other signs, which for white noise takes away `4m·e²`. The squares have a mean of `2n²σ²`,
     /// so `⟨e²⟩(1 − 2m/n)/n` times the number of gaps per sample period remains. For third differences, which reach over `3n` periods and have a
     /// mean square of `6n²σ²`, it is `⟨e²⟩(1 − 20m/9n)/n`.
@@ -220,7 +220,7 @@ mod tests {
         assert_close(replaced, 0.1);
     }
 
-    /// Of the gaps that the octave of 64 samples bridges first, with more than 4 and at most 8 samples, 6 in the middle, each sum adds
+    /// For the gaps that the octave of 64 samples bridges first, with more than 4 and at most 8 samples, 6 in the middle, each sum adds
     /// its squared error less `2·6/64` of it; of single ones, in the octave of 8, `2/8`.
     #[test]
     fn what_a_gap_adds_becomes_less_with_its_length() {

@@ -68,7 +68,7 @@ impl VarianceFractions {
     pub const QUANTIZATION: Self = Self { quantization: 1.0, white: 0.0, flicker: 0.0, random_walk: 0.0 };
 }
 
-/// What the classification needs of one octave of a curve.
+/// One octave of a curve, as the classification needs it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct OctaveVariance {
     /// `log2 n`.

@@ -252,7 +252,7 @@ impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, 
         curve.set_variances(|point| {
             let change = |a: &Sensitivity| {
                 let with_channel = self.with_channel(a.covariate, point.n);
-                // Where its own variance is not known, the channel's covariance with it has the share: `cov(y, c) = β·σ²(c)`.
+                // If its own variance is not known, the channel's covariance with it has the share: `cov(y, c) = β·σ²(c)`.
                 if self.covariates[a.covariate].signal(point.n).is_none() {
                     return -a.value * with_channel;
                 }

@@ -32,9 +32,9 @@ impl KurtosisRatio {
     }
 }
 
-/// Estimates the kurtosis ratio of the Markov term of `model`, which was fitted to `curve`. What passed the [filter](Model::filter) of the
-/// model has no sudden jumps any more: two averages over L values and a second difference over `n` change places without a change of the
-/// result, so that either makes it as much smoother, and together they do as `√(n² + L²)` would.
+/// Estimates the kurtosis ratio of the Markov term of `model`, which was fitted to `curve`. The output of the
+/// [filter](Model::filter) of the model has no sudden jumps any more: two averages over L values and a second difference over `n`
+/// change places without a change of the result, so that either makes it as much smoother, and together they do as `√(n² + L²)` would.
 ///
 /// `None` if the model does not have this term or the curve has no kurtosis.
 #[must_use]

@@ -111,7 +111,7 @@ impl Trace {
 ///
 /// The candidates are quantization, a rate ramp, Markov processes, the lines of `lines`, and the digital low-pass filters
 /// that the sensor may have: `filters` lists their starting shapes, with a decimation of 1 where every value of the filter
-/// is read. The decimation of the others is adjusted. Of each of the two kinds the first 64 are used.
+/// is read. The decimation of the others is adjusted. The first 64 of each of the two kinds are used.
 ///
 /// # Cost
 /// | `trace::trace` | Cortex-M4F | Cortex-M0+ |
@@ -234,8 +234,8 @@ impl Search<'_> {
         let families = self.families;
         let mut kinds = model.kinds();
         let known = kinds.len();
-        // As many terms as points fit every curve: one more explains nothing. Of a point half of whose samples were replaced from
-        // their neighbours the interpolation has made the greater part.
+        // As many terms as points fit every curve: one more explains nothing. Points that are
+        // mostly interpolated are skipped.
         let is_measured = |point: &&AllanPoint| point.avar > 0.0 && point.replaced < 0.5;
         if curve.points().iter().filter(is_measured).count() <= known {
             return Ok(());

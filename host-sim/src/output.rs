@@ -1,4 +1,4 @@
-//! Where results go: standard output, files, notes and progress on standard error.
+//! Destinations of results: standard output, files, notes and progress on standard error.
 
 use crate::cli::{ExportTarget, JsonArgument, OutputArguments};
 use crate::output_files::{OutputFiles, is_standard_stream};
@@ -74,7 +74,7 @@ impl Analysed {
 pub(crate) struct Incomplete(pub(crate) String);
 
 impl Incomplete {
-    /// Of one recording.
+    /// An error if the recording was not read to its end.
     pub(crate) fn check(is_complete: bool) -> Result<()> {
         if is_complete { Ok(()) } else { Err(Self("the recording was not read to its end".to_owned()).into()) }
     }

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 pub use crate::output::Analysed;
 
-/// Where a recording is.
+/// Source of a recording.
 #[derive(Debug, Clone)]
 pub enum RecordingSource {
     /// In a file of any format.

@@ -17,7 +17,7 @@ pub fn generated(page: &str, name: &str, text: &str) {
 }
 
 /// [`generated`] for measured figures: a part is as it should be if its words are those of `text`, and each number differs by at most
-/// this part of the page's. What is within the tolerance is never written.
+/// this part of the page's. A text within the tolerance is never written.
 ///
 /// # Panics
 /// As [`generated`].
@@ -150,7 +150,7 @@ mod tests {
             std::fs::read_to_string(self.0.join("page.md")).expect("the page")
         }
 
-        /// What is said of a part that is not this text.
+        /// Refusal of a part that is not this text.
         fn refusal(&self, name: &str, text: &str) -> String {
             let check = || self.part(name).check(text, |old, new| old == new, false);
             let panic = catch_unwind(AssertUnwindSafe(check)).expect_err("the part is refused");

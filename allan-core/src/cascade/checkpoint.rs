@@ -211,18 +211,18 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     ///
     /// # Errors
-    /// What is wrong with the state.
+    /// The reason why the state is refused.
     pub fn read_serialized<'de, D: serde::Deserializer<'de>>(&mut self, deserializer: D) -> Result<(), D::Error> {
         crate::serialized::deserialize_in_place(deserializer, self)
     }
 
     /// Whether a serialised state has the version and the size of this type and a correct checksum. It is not kept.
     ///
-    /// What passes is refused by [`read_serialized`](Self::read_serialized) only if no samples lead to it, that is, if it was
+    /// [`read_serialized`](Self::read_serialized) refuses a state that passes only if no samples lead to it, that is, if it was
     /// made on purpose.
     ///
     /// # Errors
-    /// What is wrong with the state.
+    /// The reason why the state is refused.
     pub fn check_serialized<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
         crate::serialized::check::<Self, D>(deserializer)
     }

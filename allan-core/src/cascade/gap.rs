@@ -19,7 +19,7 @@ struct Bridge {
     sum: i64,
     /// Sum of the replaced samples.
     replaced: i64,
-    /// What each of them adds to the running sum, rounded down; the last one adds the rest.
+    /// Each one's contribution to the running sum, rounded down; the last one adds the rest.
     each: i64,
 }
 
@@ -91,7 +91,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.settling = self.settling_time();
     }
 
-    /// What [`settling`](Cascade::settling) is by the gaps of the octaves below [`ROUNDED`](crate::moments::ROUNDED).
+    /// [`settling`](Cascade::settling) by the gaps of the octaves below [`ROUNDED`](crate::moments::ROUNDED).
     pub(super) fn settling_time(&self) -> u32 {
         let complete = |(k, octave): (usize, &Octave<OVERLAP>)| octave.resumed + (2 << k);
         let settled = self.octaves[..Self::FINE + Self::SHORT].iter().enumerate().map(complete).max();

@@ -18,7 +18,7 @@ use core::f32::consts::LN_2;
 use core::marker::PhantomData;
 use heapless::Vec;
 
-/// Largest number of points that a fit uses: one more than a cascade can have octaves. Of a curve with more points it uses
+/// Largest number of points that a fit uses: one more than a cascade can have octaves. From a curve with more points it uses
 /// those at octaves, as its bounds do not hold for the strongly correlated points between them.
 pub const MAX_POINTS: usize = 32;
 

@@ -154,7 +154,7 @@ impl<T: TermSet> Problem<T> {
         let mut parameters: Vec<_, MAX_PARAMETERS> = (0..self.kinds.len()).map(Parameter::Amount).collect();
         let is_free = |(term, kind): &(usize, &NoiseTerm)| self.amounts[*term] > 0.0 && free.has::<T>(kind);
         for (term, kind) in self.kinds.iter().enumerate().filter(is_free) {
-            // What passes a filter hardly changes with its decimation.
+            // The output of a filter hardly changes with its decimation.
             let (square, filter) = (self.square(term), filter_of(&self.kinds));
             for index in T::free_parameters(kind) {
                 let Some(column) = self.columns.get_mut(parameters.len()) else { return parameters };
@@ -290,7 +290,7 @@ mod tests {
         }
     }
 
-    /// Of three terms, one of them absent: the derivative to the logarithm of the time constant, against that of the sums over all
+    /// For three terms, one of them absent: the derivative to the logarithm of the time constant, against that of the sums over all
     /// pairs of samples.
     #[test]
     fn the_derivatives_are_those_of_the_variance_to_the_amounts_and_to_the_free_shapes_of_present_terms() {

@@ -136,7 +136,7 @@ impl MovingAverageFilter {
     /// Allan variance at averaging factor `n` of noise that has passed the filter, by the `sum_variance` of what comes to it: the mean
     /// of the covariances of two second differences, a lag apart, by the autocorrelation of the impulse response.
     ///
-    /// Of a filter that is read slowly, samples are not averages of the values between them: to first order (Euler and Maclaurin) the
+    /// If a filter is read slowly, samples are not averages of the values between them: to first order (Euler and Maclaurin) the
     /// variance of their sum is lower by a twelfth of its second difference, which `sum_variance` has to contain. At `n = 1` and a
     /// decimation of the number of taps, a thirtieth of the result is missing.
     ///

@@ -7,7 +7,7 @@ use crate::noise_type::VarianceFractions;
 use core::f64::consts::{LN_2, PI};
 use core::ops::Range;
 
-/// What a fit asks of its terms. A term outside the set contributes nothing.
+/// The terms of a fit. A term outside the set contributes nothing.
 pub(crate) trait TermSet {
     /// The numbers of the normal equations and of the correlations.
     type Real: Real;

@@ -10,31 +10,31 @@ pub(crate) const MAX_SHAPE: usize = 2;
 pub enum Shape<T = f64> {
     /// A power law has none.
     PowerLaw,
-    /// Of [`NoiseTerm::Filtered`](crate::NoiseTerm::Filtered).
+    /// Shape of [`NoiseTerm::Filtered`](crate::NoiseTerm::Filtered).
     Filtered {
         /// Taps of each of its averages.
         taps: T,
         /// Values of the filter for each sample.
         decimation: T,
     },
-    /// Of [`NoiseTerm::Markov`](crate::NoiseTerm::Markov).
+    /// Shape of [`NoiseTerm::Markov`](crate::NoiseTerm::Markov).
     Markov {
         /// s
         time_constant: T,
     },
-    /// Of [`NoiseTerm::Resonance`](crate::NoiseTerm::Resonance).
+    /// Shape of [`NoiseTerm::Resonance`](crate::NoiseTerm::Resonance).
     Resonance {
         /// Hz
         frequency: T,
         /// Hz
         bandwidth: T,
     },
-    /// Of [`NoiseTerm::Sinusoid`](crate::NoiseTerm::Sinusoid).
+    /// Shape of [`NoiseTerm::Sinusoid`](crate::NoiseTerm::Sinusoid).
     Sinusoid {
         /// Hz
         frequency: T,
     },
-    /// Of [`NoiseTerm::LowPass`](crate::NoiseTerm::LowPass).
+    /// Shape of [`NoiseTerm::LowPass`](crate::NoiseTerm::LowPass).
     LowPass {
         /// Hz
         frequency: T,

@@ -7,7 +7,7 @@ use crate::term::{Markov, MovingAverageFilter, NoiseTerm, Resonance, Sinusoid};
 /// Largest number of starting shapes of a family; the search reaches the shapes between them.
 const MAX_SHAPES: usize = 64;
 
-/// Where candidate spectral lines come from.
+/// Source of candidate spectral lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum LineCandidates<'a> {

@@ -10,7 +10,7 @@ use serde::Serialize;
 use std::io::{self, Write};
 use virtual_sensor::SensorScenario;
 
-/// What each sentence has that no other one has, with its row in the table.
+/// Words of each sentence that no other one has, with its row in the table.
 const SENTENCES: [(&str, &str); 3] = [
     ("standard errors", "… at τ = …: σ is … the model (… standard errors)"),
     ("the spectrum gives N", "…: the spectrum gives N … than the fit"),
@@ -30,7 +30,7 @@ pub struct ContradictionPlan {
     pub jobs: usize,
 }
 
-/// What the report of one record says.
+/// Sentences of the report of one record.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ContradictedRecord {
     /// Seed of the record.

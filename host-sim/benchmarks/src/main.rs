@@ -212,7 +212,7 @@ fn main() -> ExitCode {
         // The reader of standard output has closed it, as `head` does.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            // Where standard error is closed too, the exit code alone shows the error.
+            // If standard error is closed too, the exit code alone shows the error.
             let _ = writeln!(io::stderr(), "error: {error:#}");
             ExitCode::FAILURE
         }

@@ -11,7 +11,7 @@ pub(crate) fn flicker_density(b: f64, frequency: f64) -> f64 {
 }
 
 /// Noise with the one-sided `density` (a function of the frequency in Hz) at `rate_hz`: the first half or less of a periodic
-/// record, so that its ends do not meet. What lies below one period of that record, at least twice the length that is
+/// record, so that its ends do not meet. Frequencies below one period of that record, at least twice the length that is
 /// returned, is not in it.
 pub(crate) fn gaussian_noise(
     density: impl Fn(f64) -> f64,

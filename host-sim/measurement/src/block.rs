@@ -4,10 +4,10 @@ use crate::{ChannelProfile, MeasuredChannel, Measurement, SensorProfile};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// What is known of a recording before its samples are used.
+/// Description of a recording before its samples are used.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordingDescription {
-    /// What is known of the sensor.
+    /// Profile of the sensor.
     pub profile: SensorProfile,
     /// Sample rate in Hz, as the user states it or as the time stamps show it.
     pub sample_rate_hz: f64,

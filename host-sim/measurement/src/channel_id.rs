@@ -52,7 +52,7 @@ impl<T> PerChannel<T> {
         self.0
     }
 
-    /// What `of` makes of each value.
+    /// Applies `of` to each value.
     #[must_use]
     pub fn map<U>(&self, of: impl FnMut(&T) -> U) -> PerChannel<U> {
         self.0.iter().map(of).collect()

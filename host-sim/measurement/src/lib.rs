@@ -1,4 +1,4 @@
-//! What flows from a recording into its analysis: the samples of a sensor on a uniform time base, and the profile of the
+//! The measurement that a recording hands to its analysis: the samples of a sensor on a uniform time base, and the profile of the
 //! sensor.
 //!
 //! A reader of recordings produces a [`Measurement`], the noise analysis consumes it; neither knows the other. Everything
@@ -27,7 +27,7 @@ use std::ops::Range;
 /// The samples of a sensor, all channels taken at the same times.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurement {
-    /// What is known of the sensor.
+    /// Profile of the sensor.
     pub profile: SensorProfile,
     /// Sample rate in Hz, as the user states it or as the time stamps show it.
     pub sample_rate_hz: f64,
@@ -142,7 +142,7 @@ impl Measurement {
         self.periods() / 2
     }
 
-    /// The recording as it would be had it ended before the sample period `slot`. Of the samples that never arrived, it has
+    /// The recording as it would be had it ended before the sample period `slot`. Instead of the samples that never arrived it has
     /// the share of the sample periods without a sample; the other causes of `dropped` and `flagged`, whose times are not
     /// known, are left out.
     #[must_use]

@@ -1,4 +1,4 @@
-//! What is known of a sensor before it is measured.
+//! The description of a sensor before it is measured.
 
 use allan_core::term::MovingAverageFilter;
 use serde::{Deserialize, Serialize};
@@ -91,7 +91,7 @@ impl Quantity {
 pub struct ChannelProfile {
     /// Name in reports and file headers, such as `gyro_x`.
     pub name: &'static str,
-    /// What it measures.
+    /// The measured quantity.
     pub quantity: Quantity,
     /// Axis, `x`, `y` or `z`; empty for a quantity without one.
     pub axis: &'static str,
@@ -162,7 +162,7 @@ pub struct DataSheetSensitivities {
     pub temperature: Option<f64>,
     /// To the supply voltage, in the channel's unit per V.
     pub supply: Option<f64>,
-    /// Of a gyroscope to specific force, in the channel's unit per g.
+    /// Sensitivity of a gyroscope to specific force, in the channel's unit per g.
     pub specific_force: Option<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! What is in a file without an analysis: columns, rates, gaps, what its columns are taken for, and the options with which it is analysed.
+//! Content of a file without an analysis: columns, rates, gaps, what its columns are taken for, and the options with which it is analysed.
 
 mod column_facts;
 mod sensor_guess;
@@ -37,7 +37,7 @@ pub struct InspectedColumn {
     pub noise: f64,
     /// Step that all values are multiples of, where there is one.
     pub step: Option<f64>,
-    /// What it is taken for.
+    /// Guess of its meaning.
     pub guess: Option<ColumnGuess>,
 }
 
@@ -89,7 +89,7 @@ pub struct InspectedTable {
     pub steady_s: Option<TimeRange>,
     /// How each sensor in it is analysed.
     pub proposals: Vec<Proposal>,
-    /// What the user should know, one sentence each.
+    /// Notes for the user, one sentence each.
     pub notes: Vec<String>,
 }
 

@@ -2,7 +2,7 @@
 //!
 //! [`InputFile`] recognises a format by its content, of a file, of a pipe or of bytes in memory. Every format becomes batches of columns
 //! ([`FileRows`]), with the names and units that the file says, or what the user says ([`ReadOptions`]), and notes on what was left out.
-//! What a file may cost is bounded. A row that cannot be used is an [`InputError`] with the file, the line and the reason, or is left out and
+//! The cost of a file is bounded. A row that cannot be used is an [`InputError`] with the file, the line and the reason, or is left out and
 //! counted.
 
 mod columns;

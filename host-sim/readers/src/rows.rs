@@ -1,4 +1,4 @@
-//! What every format becomes: rows, batches of columns, and all columns of a file as they are.
+//! The result of every format: rows, batches of columns, and all columns of a file as they are.
 
 pub(crate) mod any_sensor;
 pub(crate) mod batch;

@@ -31,7 +31,7 @@ pub(crate) enum BatchSource<'a> {
 }
 
 impl<'a> BatchSource<'a> {
-    /// Of numbers of any sensor, or of register counts of an ADIS16405 whose rates were taken in `range`.
+    /// Source of numbers of any sensor, or of register counts of an ADIS16405 whose rates were taken in `range`.
     pub(crate) fn file(rows: FileRows<'a>, range: Option<GyroRange>) -> Self {
         let channels: Option<Vec<Channel>> = rows.columns().iter().map(channel).collect();
         let validator = range.zip(channels).map(|(range, channels)| Recorder::new(channels, range));
@@ -106,7 +106,7 @@ pub(crate) fn for_each_batch<B: Send>(
     })
 }
 
-/// What the burst validator says of register counts, which fit their fields; one that is missing is as if it had not been recorded.
+/// Verdicts of the burst validator on register counts, which fit their fields; one that is missing is as if it had not been recorded.
 fn verdicts(validator: &mut Recorder, batch: &Batch) -> Vec<Verdict> {
     let verdict = |row: usize| {
         let mut counts = NOT_RECORDED;

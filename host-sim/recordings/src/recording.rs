@@ -30,7 +30,7 @@ impl TimeStamp {
     }
 }
 
-/// What the burst validator says of a row of register counts.
+/// Verdict of the burst validator on a row of register counts.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Verdict {
     /// Why no channel of the row is used; `None` if one is.
@@ -62,7 +62,7 @@ pub struct RecordedSample {
 }
 
 impl RecordedSample {
-    /// What the faults say of the sample.
+    /// Verdict by the faults of the sample.
     pub(crate) fn verdict(&self) -> Verdict {
         Verdict::new(self.faults, self.refused)
     }
@@ -125,7 +125,7 @@ impl Recorder {
         self.recording.samples.push(RecordedSample { time_stamp, counts: burst.counts(), faults, refused });
     }
 
-    /// What the burst validator says of the next burst, which is not added.
+    /// Verdict of the burst validator on the next burst, which is not added.
     pub(crate) fn judge(&mut self, burst: &Burst) -> Verdict {
         let validity = self.validator.validate(burst);
         Verdict::new(validity.faults & self.detectable, validity.refused)

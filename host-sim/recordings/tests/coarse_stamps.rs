@@ -82,7 +82,7 @@ fn record(host: Host, seed: u64) -> (Recording, u64) {
     (recorder.finish(), newest - first.expect("a sample") + 1 - kept)
 }
 
-/// What the time base says of a recording.
+/// Statements of the time base on a recording.
 struct Found {
     rate_hz: f64,
     quality: StampQuality,

@@ -15,7 +15,7 @@ use tempfile::TempDir;
 /// Nothing is one measurement in memory.
 const STREAMED: KeptInMemory = KeptInMemory { rows: 0, rows_with_losses: 0, most_lost: 1.0 };
 
-/// What a reading gives.
+/// Result of a reading.
 #[derive(Debug, PartialEq)]
 struct Result {
     description: RecordingDescription,

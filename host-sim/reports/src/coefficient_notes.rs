@@ -1,4 +1,4 @@
-//! What a reader of N, B and K has to know of how they were estimated, in sentences of the whole report.
+//! Notes on the estimates of N, B and K, in sentences of the whole report.
 
 use crate::finding_text::channel_list;
 use crate::rounding::significant;

@@ -56,9 +56,9 @@ pub struct ComparedCoefficient {
     pub kind: String,
     /// Unit of both.
     pub unit: String,
-    /// What the second is compared with.
+    /// Reference of the comparison.
     pub first: Bounded,
-    /// What is compared.
+    /// Compared value.
     pub second: Bounded,
     /// Whether the second has less noise.
     pub verdict: Verdict,
@@ -140,7 +140,7 @@ fn coefficient(channel: &SavedChannel, kind: &str) -> Option<(BoundedEstimate, S
     Some((BoundedEstimate { value: of.value, low: of.low, high: of.high }, of.unit))
 }
 
-/// The lowest point of the curve. Of many points the lowest is lower than its truth by chance; its interval is that of one.
+/// The lowest point of the curve. The lowest of many points is lower than its truth by chance; its interval is that of one.
 fn lowest(channel: &SavedChannel) -> Option<BoundedEstimate> {
     let positive = channel.curve.iter().filter(|point| point.adev > 0.0);
     let SavedPoint { adev, low, high, .. } = positive.min_by(|a, b| a.adev.total_cmp(&b.adev))?;

@@ -1,4 +1,4 @@
-//! What an effect was told by, in words: what was measured, against which threshold, and the usual causes.
+//! The evidence for an effect, in words: what was measured, against which threshold, and the usual causes.
 
 use crate::formatting::enumerated;
 use crate::rounding::{probability, quantity_digits, significant};
@@ -12,9 +12,9 @@ use noise_analysis::report::Finding;
 /// A sentence on the evidence, in two parts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct EvidenceText {
-    /// What was measured.
+    /// The measurement.
     pub measured: String,
-    /// What else is said of it, with the sign between the two; may be empty.
+    /// Further statements, with the sign between the two; may be empty.
     pub rest: String,
 }
 
@@ -52,7 +52,7 @@ fn seconds(tau: f64) -> String {
     if tau < 0.1 { format!("{tau:.4}") } else { format!("{tau:.3}") }
 }
 
-/// Where the curve departs from the model.
+/// Place where the curve departs from the model.
 fn excess(curve: &CurveEvidence) -> String {
     format!("{:+.1} % at τ = {} s ({:.0} σ)", 100.0 * curve.excess, seconds(curve.tau_s), curve.sigmas.abs())
 }
@@ -71,7 +71,7 @@ fn counted(count: u64, one: &str) -> String {
 /// Names and signs of the sentences below, and those of the screen and the page.
 const DISPLAYED: [(&str, &str); 4] = [("gyro_", "gyro "), ("accl_", "accel "), ("magn_", "magn "), (" -", " −")];
 
-/// What a Markov process usually is.
+/// Usual causes of a Markov process.
 const CORRELATED: &str = "a correlated fluctuation: thermal or electronic";
 
 /// Times as likely from which a sentence says no number.
@@ -527,7 +527,7 @@ fn unexplained(of: &Unexplained) -> EvidenceText {
     }
 }
 
-/// What contradicts a term that fits an octave of the curve.
+/// Evidence against a term that fits an octave of the curve.
 fn refutation(by: &Refutation) -> String {
     let forgets = |time_constant_s: f64| {
         format!("with the spectrum of a process that forgets within {} s", seconds(time_constant_s))

@@ -11,7 +11,7 @@ use noise_analysis::report::{ChannelReport, CommonModeRegression, ModelErrorRepo
 /// Averaging times at which the common mode is told, s: the octave nearest to each.
 const COMMON_MODE_TAU_S: [f64; 3] = [0.01, 40.0, 160.0];
 
-/// What the channels say together: how often the predictions held, and what they have in common. Nothing of a record in which none is
+/// Statements on all channels: how often the predictions held, and what they have in common. Empty for a record in which none is
 /// followed.
 pub(crate) fn all_channels(report: &Report) -> Vec<String> {
     let followed = || report.channels.iter().filter_map(|channel| channel.nonstationarity.as_ref());
@@ -80,7 +80,7 @@ pub(crate) fn model(channel: &ChannelReport) -> String {
     )
 }
 
-/// What the first half says of its own two quarters.
+/// The first half's statement on its own two quarters.
 fn stationarity(changes: &Nonstationarity) -> String {
     let Some(quarters) = changes.quarters else {
         return "The first half is too short to compare its two quarters.".to_owned();
@@ -192,7 +192,7 @@ fn coverage<'a>(channels: impl Iterator<Item = &'a Nonstationarity>, epoch_s: f6
     )
 }
 
-/// What the channels have in common, and what subtracting it gains.
+/// The drift that the channels have in common, and the gain of subtracting it.
 fn common_mode(of: &CommonModeRegression) -> Vec<String> {
     let names = |at: usize| channel_list(std::slice::from_ref(&of.channels[at]));
     let list = |values: &[f64], text: &dyn Fn(f64) -> String| -> String {

@@ -202,7 +202,7 @@ mod tests {
         assert!(text.contains("# m/s^2/sqrt(Hz), worst axis of"), "{text}");
     }
 
-    /// A report may have been changed by hand. What no file can hold as what it is ends in an error of every format.
+    /// A report may have been changed by hand. A number or name that no file can hold is an error of every format.
     #[test]
     fn impossible_numbers_and_names_are_refused_by_every_format() {
         for format in ExportFormat::value_variants() {

@@ -24,18 +24,18 @@ const SLOW_HZ: f64 = 0.2;
 const CYCLING: &str =
     "Look for what cycles at this period, such as a thermostat, an air conditioner or a load on the supply";
 
-/// What is said of a finding.
+/// Text of a finding.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FindingText {
     /// The channels that show it, such as `gyro z` or `accel x y`.
     pub channels: String,
     /// How many these are.
     pub channel_count: usize,
-    /// What it is, with the size in each channel.
+    /// Its nature, with the size in each channel.
     pub physics: String,
     /// The same without intervals and details, for one line of a narrow screen.
     pub brief: String,
-    /// What to do about it, or what to look for.
+    /// Advice: what to do about it, or what to look for.
     pub advice: String,
     /// The first of that, as a sentence; `None` where nothing is left to do.
     pub step: Option<String>,
@@ -43,7 +43,7 @@ pub struct FindingText {
     pub weight: String,
 }
 
-/// What to do about a finding.
+/// Advice for a finding.
 struct Advice {
     /// Without a full stop.
     first: &'static str,
@@ -75,7 +75,7 @@ impl Advice {
         Self { kind: AdviceKind::Compensate, ..Self::new(first, rest) }
     }
 
-    /// What does not make the second half worse, if that contradicts the numbers.
+    /// Advice that does not make the second half worse, if that contradicts the numbers.
     fn checked(self, validated: Validation) -> Self {
         if self.kind == AdviceKind::Compensate && validated == Validation::No {
             return Self::new(
@@ -135,8 +135,8 @@ fn gain(finding: &Finding) -> Option<String> {
 /// Stands on either side of what the brief form of a sentence leaves out.
 const DETAIL: char = '|';
 
-/// The sentence of physics, with its details between two [`DETAIL`]s, and the advice. What the part or its environment has once, such as
-/// a frequency, is that of the clearest channel; sizes are those of each channel.
+/// The sentence of physics, with its details between two [`DETAIL`]s, and the advice. A quantity that the part or its environment
+/// has once, such as a frequency, is that of the clearest channel; sizes are those of each channel.
 fn sentences(finding: &Finding, amounts: &Amounts) -> (String, Advice) {
     let off = || {
         gain(finding)
@@ -538,7 +538,7 @@ fn sentences(finding: &Finding, amounts: &Amounts) -> (String, Advice) {
     }
 }
 
-/// What is not to be subtracted, as nothing more than a bound on it is known; empty where there is nothing of the kind.
+/// Channels that are not to be subtracted, as only a bound is known; empty where there is nothing of the kind.
 fn bounds_alone(amounts: &Amounts, name: &'static str) -> String {
     let bounded = amounts.with_bound_alone(name);
     if bounded.is_empty() {
@@ -614,7 +614,7 @@ mod tests {
         }
     }
 
-    /// What a report says of the examples of a kind, one row for each piece of advice.
+    /// Sentences of a report on the examples of a kind, one row for each piece of advice.
     fn rows_of(kind: &str, examples: &[Effect]) -> String {
         let texts = examples
             .iter()

@@ -37,7 +37,7 @@ pub fn count(value: u64) -> String {
     out
 }
 
-/// What a channel lacks, in one sentence: samples that were lost, refused by cause, and how many of them were replaced. Empty
+/// The missing samples of a channel, in one sentence: samples that were lost, refused by cause, and how many of them were replaced. Empty
 /// where nothing is missing.
 pub fn missing_samples(missing: &MissingSamples) -> String {
     let refused: Vec<String> =
@@ -140,11 +140,11 @@ pub fn filter_consistency(innovations: &Innovations) -> &'static str {
     }
 }
 
-/// Standard deviations from which a model's largest deviation is told in words. Of twenty octaves of a true model one is
+/// Standard deviations from which a model's largest deviation is told in words. One of twenty octaves of a true model is
 /// farther off once in 800 records.
 const FAR_OFF: f64 = 4.0;
 
-/// Where a model is farther off than chance explains, in words; `None` where it is not. `data` is what it was compared with.
+/// Place where a model is farther off than chance explains, in words; `None` if there is none. `data` is what it was compared with.
 pub fn worst_deviation(error: &ModelErrorReport, data: &str) -> Option<String> {
     let (sigma, tau, ratio) = (error.worst_sigma?, error.worst_tau_s?, error.worst_ratio?);
     let times = |factor: f64| match factor {
@@ -159,7 +159,7 @@ pub fn worst_deviation(error: &ModelErrorReport, data: &str) -> Option<String> {
     (sigma.abs() > FAR_OFF).then(|| format!("{text} ({} sigma)", number(sigma)))
 }
 
-/// Where the models of a channel are farther off than chance explains, one text for each half; empty where they are not.
+/// Places where the models of a channel are farther off than chance explains, one text for each half; empty where they are not.
 pub fn worst_deviations(channel: &ChannelReport) -> Vec<String> {
     let (before, after) = (&channel.before, &channel.after);
     let same = before == after;

@@ -236,7 +236,7 @@ fn curve_table(channel: &ChannelReport) -> TextTable {
     table(&headings.iter().map(String::as_str).collect::<Vec<_>>(), 0, rows)
 }
 
-/// What the model is good for: other units, drift, a filter's innovations, longer records.
+/// The use of the model: other units, drift, a filter's innovations, longer records.
 fn write_assessment(assessment: &Assessment, out: &mut impl Write) -> io::Result<()> {
     if !assessment.coefficients.is_empty() {
         writeln!(out, "{}", unit_table(&assessment.coefficients))?;

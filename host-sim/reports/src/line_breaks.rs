@@ -7,7 +7,7 @@ const SIMPLE_UNITS: [&str; 11] = ["s", "ms", "min", "h", "d", "Hz", "kHz", "g", 
 /// and between words are kept, a number stays with its unit and its bound, and a longer word is broken.
 pub(crate) fn broken(text: &str, width: usize, indent: &str) -> Vec<String> {
     let width = width.max(1);
-    // What is narrower than the indent has none.
+    // A text narrower than the indent has none.
     let indent = if indent.chars().count() < width { indent } else { "" };
     let mut lines: Vec<String> = Vec::new();
     let mut line: String = text.chars().take_while(|letter| *letter == ' ').collect();
@@ -35,7 +35,7 @@ pub(crate) fn broken(text: &str, width: usize, indent: &str) -> Vec<String> {
     lines
 }
 
-/// What stays on one line: a word, or a number with its bound and its unit.
+/// Pieces that stay on one line: a word, or a number with its bound and its unit.
 fn pieces(text: &str) -> Vec<String> {
     let mut pieces: Vec<String> = Vec::new();
     for word in text.split(' ') {

@@ -56,7 +56,7 @@ impl CurveGroup {
     }
 }
 
-/// What is shown of a growing record.
+/// View of a growing record.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LiveView {
     /// Part, source, samples, length.
@@ -67,20 +67,20 @@ pub struct LiveView {
     pub tables: Vec<CoefficientTable>,
     /// The curves.
     pub curves: Vec<LiveCurve>,
-    /// What was found.
+    /// The findings.
     pub findings: Vec<FindingText>,
-    /// What nothing explains.
+    /// Places that nothing explains.
     pub unexplained: Vec<String>,
-    /// Where the record departs from the model, and what to do.
+    /// Departures of the record from the model, and advice.
     pub advice: Vec<String>,
     /// Counters of the source.
     pub health: String,
-    /// What the source does now.
+    /// Present state of the source.
     pub status: String,
 }
 
 impl LiveView {
-    /// What a report says; `health` and `status` are those of its source.
+    /// View of a report; `health` and `status` are those of its source.
     #[must_use]
     pub fn from_report(report: &Report, source: Option<&str>, health: String, status: String) -> Self {
         let curve = |channel: &noise_analysis::report::ChannelReport| LiveCurve {

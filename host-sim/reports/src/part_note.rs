@@ -1,4 +1,4 @@
-//! What a record does not tell of the part's clock and filter, in sentences.
+//! The facts of the part's clock and filter that a record does not tell, in sentences.
 
 use crate::finding_text::channel_list;
 use crate::formatting::{capital, enumerated};
@@ -8,10 +8,10 @@ use noise_analysis::report::PartNote;
 /// Beginning of the sentence where no filter was found.
 const NOT_CORRELATED: &str =
     "No low-pass filter found: consecutive samples are uncorrelated, so N is valid from one sample on.";
-/// What a wrong sample rate makes.
+/// Effect of a wrong sample rate.
 const SCALES: &str = "Every τ and N scale with it.";
 
-/// What the record does not tell, and why: for the page, `--full` and the JSON.
+/// A fact that the record does not tell, and why: for the page, `--full` and the JSON.
 pub(crate) fn sentence(note: &PartNote) -> String {
     match note {
         PartNote::NotSought => "A quick report does not look for the part's clock and filter.".to_owned(),
@@ -40,7 +40,7 @@ pub(crate) fn sentence(note: &PartNote) -> String {
              it is the stated {} Hz. {SCALES}",
             plain(*sample_rate_hz, 6)
         ),
-        // Of a part without a data sheet no clock is known.
+        // A part without a data sheet has no nominal clock.
         PartNote::NoTimeStamps { nominal_hz, stated_hz, .. } if *nominal_hz <= 0.0 => {
             format!("Without time stamps the sample rate is the stated {} Hz. {SCALES}", plain(*stated_hz, 6))
         }

@@ -1,16 +1,16 @@
-//! What was read for a report, and what was not: in the JSON, on the screen and on the page.
+//! The input of a report, read and not read: in the JSON, on the screen and on the page.
 
 use crate::formatting::count;
 use crate::formatting::words;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What was read of a recording.
+/// Reading of a recording.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ReadingRecord {
     /// Name of the file, without its folder.
     pub file: String,
-    /// Of its bytes, in hexadecimal digits; absent where it could not be made.
+    /// Hash of its bytes, in hexadecimal digits; absent if it could not be made.
     pub sha256: Option<String>,
     /// The program that read it, and its version.
     pub program: String,
@@ -26,7 +26,7 @@ pub struct ReadingRecord {
     pub complete: bool,
     /// Why it was not, where it is damaged.
     pub damage: Option<String>,
-    /// What a reader of the report should know of the file, one sentence each.
+    /// Notes on the file for a reader of the report, one sentence each.
     pub notes: Vec<String>,
 }
 

@@ -216,7 +216,7 @@ pub fn bounded_quantity(parameter: &Parameter) -> String {
     format!("{} {}", scale.estimate(parameter), scale.unit).trim_end().to_owned()
 }
 
-/// What of a parameter is printed: its value, or its upper bound where that is all that is known.
+/// The printed part of a parameter: its value, or its upper bound if only that is known.
 #[must_use]
 pub fn parameter_magnitude(parameter: &Parameter) -> f64 {
     let &Parameter { value, low, high, .. } = parameter;

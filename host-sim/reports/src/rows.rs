@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 pub struct ReportRow {
     /// How the recording is called: its path, or its name.
     pub recording: String,
-    /// Of its bytes, in hexadecimal digits.
+    /// Hash of its bytes, in hexadecimal digits.
     pub sha256: Option<String>,
     /// Version of the program.
     pub version: Option<String>,
@@ -21,7 +21,7 @@ pub struct ReportRow {
     pub status: String,
     /// Why it is not complete.
     pub reason: Option<String>,
-    /// What a reader should know of the recording, one sentence a line.
+    /// Notes on the recording, one sentence a line.
     pub notes: Option<String>,
     /// Name of the sensor's profile.
     pub sensor: Option<String>,
@@ -33,9 +33,9 @@ pub struct ReportRow {
     pub row: String,
     /// Such as `gyro_z`.
     pub channel: Option<String>,
-    /// Of a coefficient such as `angle_random_walk`, of a finding such as `sinusoid`.
+    /// Kind of a coefficient such as `angle_random_walk`, of a finding such as `sinusoid`.
     pub kind: Option<String>,
-    /// Of a finding such as `frequency`.
+    /// Name of a finding's parameter such as `frequency`.
     pub parameter: Option<String>,
     /// In `unit`.
     pub value: Option<f64>,
@@ -45,9 +45,9 @@ pub struct ReportRow {
     pub high: Option<f64>,
     /// Such as `deg/sqrt(s)`.
     pub unit: Option<String>,
-    /// Of a finding: `yes`, `no` or `untestable` on the second half of the recording.
+    /// Validation of a finding: `yes`, `no` or `untestable` on the second half of the recording.
     pub validated: Option<String>,
-    /// Of a finding its number in the report, from 0.
+    /// Number of the finding in the report, from 0.
     pub finding: Option<u64>,
 }
 

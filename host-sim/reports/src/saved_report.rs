@@ -10,14 +10,14 @@ use std::collections::BTreeMap;
 /// N below the corner of a process that stands in the place of white noise, as a parameter of its term.
 const BELOW_CORNER: &str = "white_noise";
 
-/// What a report says of the noise of a sensor.
+/// The noise of a sensor by a report.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct SavedReport {
     /// Hz.
     pub sample_rate_hz: f64,
     /// In the order of the burst.
     pub channels: Vec<SavedChannel>,
-    /// Of a sensor whose parts were analysed one by one, the rates of the others that differ from it, Hz.
+    /// Rates of the other parts of a sensor, analysed one by one, that differ from it, Hz.
     #[serde(skip)]
     pub other_rates_hz: Vec<f64>,
 }
@@ -104,9 +104,9 @@ pub enum SavedReportError {
     /// A field is missing or has another type.
     #[error("{path}: {reason}")]
     Field {
-        /// Where, such as `channels[3].final`.
+        /// Place, such as `channels[3].final`.
         path: String,
-        /// What was expected.
+        /// Reason, by the parser.
         reason: serde_json::Error,
     },
     /// It says two things that cannot both be true, or a number that is none.

@@ -156,7 +156,7 @@ impl Screen<'_> {
             .collect()
     }
 
-    /// What no effect explains and where data and model disagree, in a line each, and what to do in `most` lines.
+    /// Unexplained places and disagreements of data and model, in a line each, and advice in `most` lines.
     fn below(&self, most: usize) -> Vec<String> {
         let columns = self.text_columns() - CHANNELS;
         let mut lines = Vec::new();
@@ -247,7 +247,7 @@ pub(crate) fn table_lines(table: &CoefficientTable, is_first: bool, columns: usi
         let error = format!(" {error}");
         let mut line = row(&of.label, of.coefficients.each_ref().map(String::as_str), &error);
         if line.chars().count() > total {
-            // Of numbers as large as those of raw counts the values alone.
+            // Numbers as large as raw counts have values alone.
             line = row(&of.label, of.coefficients.each_ref().map(|of| of.split(" (").next().unwrap_or(of)), &error);
         }
         lines.push(match (of.is_high, of.channel.is_empty()) {

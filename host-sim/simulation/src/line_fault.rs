@@ -4,7 +4,7 @@ use adis16405_driver::BURST_BYTES;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// What happens on the lines. Bits are inverted in every frame, each with the same probability; the others meet bursts.
+/// Faults of the lines. Bits are inverted in every frame, each with the same probability; the others meet bursts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LineFault {
     /// Bits of the sensor's answers are inverted.

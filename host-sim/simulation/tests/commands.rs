@@ -1,4 +1,4 @@
-//! What a port can do to the device: seeded sequences of commands, whole, wrong and damaged, at every rate and in any order. None of
+//! Attacks of a port on the device: seeded sequences of commands, whole, wrong and damaged, at every rate and in any order. None of
 //! them stops it, none writes the sensor's flash without being armed, and it takes the settings that it is given afterwards.
 
 use link::{BootCause, Decoder, Health, Hello, Message, Received};

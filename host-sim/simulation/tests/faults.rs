@@ -20,7 +20,7 @@ fn device() -> Device {
     device
 }
 
-/// What a device has sent.
+/// Messages of a device.
 #[derive(Default)]
 struct Heard {
     logs: Vec<String>,

@@ -1,4 +1,4 @@
-//! What time stamps show: the period of each sample, the losses and the rate.
+//! Facts from time stamps: the period of each sample, the losses and the rate.
 
 use crate::lateness_track::LostStretch;
 

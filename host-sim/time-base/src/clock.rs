@@ -48,7 +48,7 @@ pub struct RowStamp {
     pub is_equal: bool,
 }
 
-/// Where a row lies in time.
+/// Place of a row in time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
     /// In this sample period.
@@ -81,12 +81,12 @@ struct Stream {
     clock: StreamClock,
     repeats: RepeatRule,
     before_s: Option<f64>,
-    /// Of each row that is not placed yet, whether it is a repeat.
+    /// For each row that is not placed yet, true if it is a repeat.
     waiting: VecDeque<bool>,
     has_index: bool,
-    /// What the stamps of the first rows show.
+    /// Quality of the stamps of the first rows.
     first_rows: Option<StampQuality>,
-    /// What all stamps show, where all of them are known.
+    /// Quality of all stamps, if all of them are known.
     all_rows: Option<StampQuality>,
 }
 
@@ -105,7 +105,7 @@ struct Known {
 }
 
 struct KnownPlaces {
-    /// Of each row that is no repeat.
+    /// Period of each row that is no repeat.
     periods: Vec<u64>,
     /// Numbers of the rows that are repeats, in ascending order.
     repeated: Vec<usize>,
@@ -150,7 +150,7 @@ struct EqualPairs {
 }
 
 impl Clock {
-    /// Of a recording of this rate, if it is stated, which overrides the rate that its time stamps show.
+    /// Clock of a recording of this rate, if it is stated, which overrides the rate that its time stamps show.
     ///
     /// # Errors
     /// The rate is not positive and finite.
@@ -241,7 +241,7 @@ impl Clock {
         self.ignored.as_deref()
     }
 
-    /// What the stamps of the rows that were placed show; `None` where there are none.
+    /// Quality of the stamps of the rows that were placed; `None` where there are none.
     pub fn stamps(&self) -> Option<StampQuality> {
         match &self.state {
             State::Stream(stream) => {
@@ -279,7 +279,7 @@ impl Clock {
 }
 
 impl KnownPlaces {
-    /// Of so many rows one after the other.
+    /// Places of so many rows one after the other.
     fn of_rows(rows: usize) -> Self {
         Self { periods: (0..rows as u64).collect(), repeated: Vec::new(), stamps: StampQuality::default() }
     }

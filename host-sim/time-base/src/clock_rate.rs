@@ -1,7 +1,7 @@
 //! The rate of a clock that changes in the course of a record, and the stamps as a steady clock would have written them.
 //!
 //! The lower envelope of the lateness is followed over hundreds of samples: a period that is wrong by a hundredth moves it by periods,
-//! which would be losses or late deliveries. Where stamps are fine and regular, their intervals show the period at every time.
+//! which would be losses or late deliveries. If stamps are fine and regular, their intervals show the period at every time.
 
 use crate::lateness_track::quantile;
 
@@ -157,12 +157,12 @@ pub(crate) struct SteadyStream {
     before: usize,
     /// Intervals at the end that no window has counted.
     uncounted: usize,
-    /// What is added to a stamp.
+    /// Correction of a stamp.
     correction_s: f64,
 }
 
 impl SteadyStream {
-    /// Of a clock whose usual period is `usual_s`.
+    /// Rate of a clock whose usual period is `usual_s`.
     pub(crate) fn new(usual_s: f64) -> Self {
         Self {
             clock: LocalPeriod { period_s: Some(usual_s), ..LocalPeriod::new(usual_s) },

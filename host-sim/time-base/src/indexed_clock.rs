@@ -27,7 +27,7 @@ pub struct ClockStep {
     pub seconds: f64,
 }
 
-/// What the stamps beside an index tell.
+/// Alignment of the stamps beside an index.
 pub(crate) struct IndexedClock {
     /// The rate; `None` if the samples span no time.
     pub(crate) rate: Option<RateEstimate>,

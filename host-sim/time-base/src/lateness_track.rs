@@ -73,7 +73,7 @@ pub(crate) struct Track {
 }
 
 impl Track {
-    /// Aligns with a period, and again with the period that the alignment shows, until the period stays. Of these alignments
+    /// Aligns with a period, and again with the period that the alignment shows, until the period stays. Returns, of these alignments,
     /// the one with the shortest description; with its cost. The envelope is sought over `queue` samples, and losses of fewer than `least`
     /// samples are none.
     pub(crate) fn refined(
@@ -102,8 +102,8 @@ impl Track {
         Self::of_lateness(lateness(times, period_s), period_s, tick_s, (queue, least))
     }
 
-    /// What would be losses if the samples of this alignment came in the opposite order. A loss lifts the lateness for good and nothing lowers
-    /// it for good, so that these are late deliveries; as many rises of the envelope are late deliveries too.
+    /// Events that would be losses if the samples of this alignment came in the opposite order. A loss lifts the lateness for
+    /// good and nothing lowers it for good, so that these are late deliveries; as many rises of the envelope are late deliveries too.
     pub(crate) fn falls(&self, times: &[f64], queue: usize) -> Vec<LostStretch> {
         let mut opposite = lateness(times, self.period_s);
         for ((at, late), period) in opposite.iter_mut().enumerate().zip(&self.periods) {
@@ -120,7 +120,7 @@ impl Track {
         let least_growth = least_growth(tick_s.map(|tick_s| tick_s / period_s));
         let is_long: Vec<bool> = lateness.windows(2).map(|pair| pair[1] - pair[0] >= least_growth).collect();
         let mut above: Vec<f64> = lateness.iter().zip(&near).map(|(late, least)| late - least).collect();
-        // Of a uniform lateness three quarters are below 3/4 of its width; late deliveries are fewer than the fourth.
+        // Three quarters of a uniform lateness are below 3/4 of its width; late deliveries are fewer than the fourth.
         let quartile = quantile(&mut above, 3, 4) * 4.0 / 3.0;
         drop(above);
         let width = tick_s.map_or(quartile, |tick| quartile.max((tick / period_s).min(quartile * 2.0)));

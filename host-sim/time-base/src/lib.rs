@@ -1,7 +1,7 @@
 //! Time base of a recording: its sample rate, and the sample period in which each sample was taken.
 //!
 //! A sample that was read late is not a lost sample, and stamps that are coarser than the sample period are no losses:
-//! a loss is counted only where nothing else explains the stamps. What they cannot tell is said in [`StampQuality`].
+//! a loss is counted only where nothing else explains the stamps. [`StampQuality`] has the limits.
 //!
 //! [`StampOrder`] takes stamps as a file has them, of counters that wrap and clocks that are set; [`Clock`] finds the sample period of
 //! each row by its stamp and its index.

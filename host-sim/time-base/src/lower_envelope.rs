@@ -29,7 +29,7 @@ pub(crate) struct MinimumBehind {
 }
 
 impl MinimumBehind {
-    /// Of the last `window` values, at least 1.
+    /// Envelope of the last `window` values, at least 1.
     pub(crate) fn new(window: usize) -> Self {
         Self { window, pushed: 0, candidates: VecDeque::new() }
     }

@@ -27,7 +27,7 @@ const WINDOWS: [usize; 6] = [1, 8, 32, 128, 512, 2048];
 const NEAR: f64 = 0.6;
 /// Samples at the start of the record in which the period is sought, before it is improved with all of them.
 const SEARCHED: usize = 100_000;
-/// Of these the samples, and the relative steps, in which it is sought where stamps are coarse and samples are lost.
+/// The samples among these, and the relative steps, in which it is sought where stamps are coarse and samples are lost.
 const SCANNED: usize = 20_000;
 const SCAN_STEP: f64 = 1e-3;
 const SCAN_STEPS: u32 = 80;
@@ -117,7 +117,7 @@ impl AlignedStamps {
                 loss.certain &= loss.missing > 1;
             }
         }
-        // Of single samples no more can have been lost than make the durations as different as they are.
+        // No more single samples can have been lost than make the durations as different as they are.
         let hidden = if least_loss > 1 { persistent / (track.period_s * track.period_s) } else { 0.0 };
         let mut alignment = Self::from_track(track, times, tick_s);
         alignment.rate.iter_mut().for_each(|rate| rate.high_hz *= 1.0 + hidden);
@@ -126,13 +126,13 @@ impl AlignedStamps {
         Some(alignment)
     }
 
-    /// What an alignment shows.
+    /// Result of an alignment.
     fn from_track(track: Track, times: &[f64], tick_s: Option<f64>) -> Self {
         let samples = times.len() as f64;
         // Losses that lie within a tick of each other look like one of several samples: an outage is longer than the tick.
         let single: f64 = track.losses.iter().map(|loss| (loss.missing as f64).min(track.width.ceil())).sum();
         let resolved = track.width < COARSE || samples >= MIN_TICKS_BETWEEN_LOSSES * track.width * single;
-        // Of losses that lie within a tick of each other the stamps show the sum at best; so many do if they are random.
+        // The stamps show at best the sum of losses that lie within a tick of each other; so many do if they are random.
         let events = track.losses.len() as f64;
         let confused = if track.width < COARSE { 0.0 } else { events * events * track.width / samples };
         let surplus = uncertain(&track.losses, resolved) as f64 + confused;

@@ -28,7 +28,7 @@ fn moduli() -> impl Iterator<Item = f64> {
     counters.chain(clocks.filter(|period| *period > 50.0))
 }
 
-/// What a stamp is, after those before it.
+/// Order of a stamp after those before it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Order {
     /// It follows, at this time.
@@ -44,7 +44,7 @@ pub enum Order {
 /// Watches the order of stamps, in the unit of the file.
 #[derive(Debug, Default)]
 pub struct StampOrder {
-    /// What is added to a stamp.
+    /// Offset that is added to a stamp.
     offset: f64,
     before_last: Option<f64>,
     last: Option<f64>,
@@ -178,12 +178,12 @@ impl StampOrder {
         time - offset_before + self.offset
     }
 
-    /// What is added to a stamp.
+    /// Offset that is added to a stamp.
     pub fn offset(&self) -> f64 {
         self.offset
     }
 
-    /// What a reader of the analysis has to know, one sentence each.
+    /// Notes for a reader of the analysis, one sentence each.
     pub fn notes(&self) -> Vec<String> {
         let Self { wraps, modulus, sets, first_set, sets_forward, first_set_forward, wrong, .. } = self;
         let sentences = [

@@ -1,10 +1,10 @@
-//! What the time stamps of a recording show, and what they cannot show.
+//! The facts that the time stamps of a recording show and do not show.
 
 use crate::aligned_stamps::RateEstimate;
 use crate::indexed_clock::{ClockStep, IndexedClock};
 use crate::lateness_track::{COARSE, LostStretch};
 
-/// What the time stamps of a recording show, and what they cannot show.
+/// The facts that the time stamps of a recording show and do not show.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StampQuality {
     /// The rate by the clock that stamped the samples, whatever rate was stated.
@@ -27,11 +27,11 @@ pub struct StampQuality {
     pub is_of_loop: bool,
     /// Samples that were read at least a period later than the others.
     pub late: u64,
-    /// Where the index and the stamps contradict each other.
+    /// Places where the index and the stamps contradict each other.
     pub clock_steps: Vec<ClockStep>,
 }
 
-/// What the user should know of a rate that changes.
+/// Note on a rate that changes.
 fn changing_rate(rate: RateEstimate) -> String {
     format!(
         "the rate of the samples, or of the clock that stamped them, changes from {:.4} to {:.4} Hz; {:.4} Hz is the mean",
@@ -40,7 +40,7 @@ fn changing_rate(rate: RateEstimate) -> String {
 }
 
 impl StampQuality {
-    /// Of samples that have an index and time stamps, s.
+    /// Quality of samples that have an index and time stamps, s.
     pub(crate) fn of_index(indices: &[u64], times: &[f64]) -> Self {
         let IndexedClock { rate, steps } = IndexedClock::new(indices, times);
         Self { rate, clock_steps: steps, resolved: true, least_loss: 1, ..Self::default() }
@@ -56,7 +56,7 @@ impl StampQuality {
         counts.into_iter().filter(|(_, count)| *count > 0)
     }
 
-    /// What a reader of the analysis has to know, one sentence each; none for stamps that leave no doubt.
+    /// Notes for a reader of the analysis, one sentence each; none for stamps that leave no doubt.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         if let (Some(rate), true) = (self.rate, self.width >= COARSE) {

@@ -15,7 +15,7 @@ use crate::stamp_quality::StampQuality;
 use crate::time_base_error::TimeBaseError;
 use std::collections::VecDeque;
 
-/// What tells the sample periods.
+/// Source of the sample periods.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Source {
     /// The number of the row.
@@ -68,13 +68,13 @@ pub(crate) struct StreamClock {
     uncertain: u64,
     /// Smallest step of the index.
     least_step: u64,
-    /// Where the time leaps against the index, and by how much in all, s.
+    /// Leaps of the time against the index, and their sum, s.
     clock_steps: Vec<ClockStep>,
     leapt_s: f64,
 }
 
 impl StreamClock {
-    /// Of rows that have an index and time stamps, if so; `head` is what the stamps of the first rows show.
+    /// Clock of rows that have an index and time stamps, if so; `head` is the quality of the stamps of the first rows.
     ///
     /// # Errors
     /// The stamps are coarser than the sample period, or show none.
@@ -221,7 +221,7 @@ impl StreamClock {
         Some(RateEstimate { hz: period as f64 / time_s, low_hz: longest_s.recip(), high_hz: shortest_s.recip() })
     }
 
-    /// What the stamps of the rows that were placed show; `first_rows` is what those of the first ones show.
+    /// Quality of the stamps of the rows that were placed; `first_rows` is that of the first ones.
     pub(crate) fn quality(&self, first_rows: &StampQuality) -> StampQuality {
         let changing = self.changing_rate();
         let by_line = || {

@@ -178,7 +178,7 @@ impl InjectedEffect {
     }
 }
 
-/// What happens to a part besides its declared noise. Nothing by default.
+/// Effects on a part besides its declared noise. Nothing by default.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SensorScenario {
     /// Shown by the part's own outputs; without an effect no other channel depends on it.

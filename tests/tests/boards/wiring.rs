@@ -1,4 +1,4 @@
-//! What the boards differ in, and what their documents demand: crystal, pins, the 5 V of the sensor, brown-out, log.
+//! Differences of the boards, and demands of their documents: crystal, pins, the 5 V of the sensor, brown-out, log.
 
 use super::bench::{TARGET, feather_image, image, run};
 use super::costs::{Costs, Memory, assert_within_budget, counter};

@@ -17,7 +17,7 @@ pub struct FilteredCoefficient {
     pub high: f64,
 }
 
-/// What a report says of one channel.
+/// Statements of a report on one channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FilteredChannel {
     /// Seed of the record.

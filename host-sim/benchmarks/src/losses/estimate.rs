@@ -1,4 +1,4 @@
-//! What the estimator makes of a record, complete or with samples taken out of it.
+//! The estimates from a record, complete or with samples taken out of it.
 
 use super::noise::{RATE_HZ, TestNoise};
 use allan_core::{Cascade, Curve, Model, fit::fit};

@@ -36,7 +36,7 @@ pub struct MethodCoefficients {
     pub bounds: [Option<(f64, f64)>; 3],
 }
 
-/// What the autocorrelation gives.
+/// Result of the autocorrelation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Autocorrelation {
     /// Variance of the samples, (deg/s)².

@@ -34,7 +34,7 @@ pub(super) struct BlockNoise<'a> {
 }
 
 impl BlockNoises {
-    /// Of a record of `seconds` s.
+    /// Covariance for a record of `seconds` s.
     pub(super) fn new(seconds: f64) -> Self {
         let block_s = seconds / BLOCKS as f64;
         let spacing = 1.0 / (SUBDIVISION as f64 * seconds);
@@ -56,7 +56,7 @@ impl BlockNoises {
         let block_s = self.block_s;
         let entry = |i: usize, j: usize| {
             let white = if i == j { noise.white / block_s } else { 0.0 };
-            // Of the mean of a walk over a block with that over a later one: the variance at the middle of the first.
+            // The mean of a walk over a block with that over a later one: the variance at the middle of the first.
             let walk = match i == j {
                 true => i as f64 + 1.0 / 3.0,
                 false => i.min(j) as f64 + 0.5,
@@ -112,7 +112,7 @@ impl WaveformTest {
         Self { cosines, densities, squares }
     }
 
-    /// Of the block means `values`.
+    /// Ratio for the block means `values`.
     pub(super) fn ratio(&self, values: &[f64]) -> f64 {
         let shares = self.cosines.tr_mul(&DVector::from_column_slice(values));
         let with = |(of, share): (&Densities, &f64)| Densities { truth: of.truth + share * share, ..*of };

@@ -31,7 +31,7 @@ pub(super) struct RecordLength {
 }
 
 impl RecordLength {
-    /// Of a recording.
+    /// Length of a recording.
     pub(super) fn new(recording: &TrueRecording) -> Self {
         Self { seconds: recording.seconds, period_s: recording.sampling.period_s() }
     }
@@ -89,7 +89,7 @@ pub(super) struct Densities {
     pub(super) baseline: [f64; 3],
     /// Modelled without a free parameter.
     pub(super) known: f64,
-    /// Of the output.
+    /// Density of the output.
     pub(super) truth: f64,
 }
 
@@ -228,7 +228,7 @@ pub(super) struct ChannelUnderTest<'a> {
     channel: OutputRegister,
     /// Size of a count, in the unit of the channel.
     resolution: f64,
-    /// Of the filter of its noise, Hz.
+    /// Corner of the filter of its noise, Hz.
     corner_hz: f64,
     pub(super) noise: &'a ChannelNoise,
     pub(super) record: RecordLength,

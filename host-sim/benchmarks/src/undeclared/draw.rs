@@ -64,7 +64,7 @@ pub struct DrawnRecording {
     pub kinds: Vec<EffectKind>,
     /// Size of each effect over its detection limit; of the one outside the vocabulary, where there is one.
     pub strengths: Vec<f64>,
-    /// What the recording is made of.
+    /// Parts of the recording.
     pub simulation: TrueRecording,
 }
 

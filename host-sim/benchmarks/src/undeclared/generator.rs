@@ -43,7 +43,7 @@ pub struct Sampling {
 }
 
 impl Sampling {
-    /// Of the virtual sensor.
+    /// Generator of the virtual sensor's noise.
     #[must_use]
     pub fn adis16405() -> Self {
         let resolutions = Channel::ALL.map(|channel| channel.lsb(GyroRange::Dps300));

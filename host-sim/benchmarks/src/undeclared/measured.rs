@@ -7,7 +7,7 @@
 //!                       └──────────────────────────────┴► counts ─► analysis ─► report ─────────────┘
 //! ```
 //!
-//! What is in the noise itself is not known. So an effect is named if a finding of its kind is there that the untouched stretch does
+//! The effects in the noise itself are not known. So an effect is named if a finding of its kind is there that the untouched stretch does
 //! not have, and a wrong name is one that the untouched stretch does not have. An effect that needs a quantity beside the noise
 //! (temperature, supply, acceleration, a clock) or that would change the noise itself (another filter) is not hidden.
 

@@ -128,15 +128,15 @@ pub struct OutsideEffect {
     /// The outputs that it is in, each with a factor on its size; none of an effect of the sample clock.
     pub(super) shares: Vec<(OutputRegister, f64)>,
     /// In the unit of the channel: the amplitude, the height of a jump, the distance of two levels, or the standard deviation at its
-    /// highest. Of a held value and of a dead time the length in s, of a clock step the relative change of the rate.
+    /// highest. For a held value and a dead time the length in s, for a clock step the relative change of the rate.
     pub(super) size: f64,
-    /// Of the sweep its first and its last frequency, of the others the frequency at which they repeat and that of the
+    /// For the sweep its first and its last frequency, for the others the frequency at which they repeat and that of the
     /// modulation, Hz; of what comes at random times one over the mean time between them and one over their time constant; of a
     /// band its centre and its width. One over the modulus of missing codes.
     pub(super) frequencies_hz: [f64; 2],
     /// When it begins, s from the first sample, and the time constant of it or of its decay or the length of a part of it, s.
     pub(super) times_s: [f64; 2],
-    /// Of the random numbers that the effect itself has.
+    /// Seed of the random numbers that the effect itself has.
     pub(super) seed: u64,
 }
 
@@ -219,7 +219,7 @@ impl OutsideEffect {
         Self { kind, shares, size: 1.0, frequencies_hz, times_s, seed: random.random() }
     }
 
-    /// What it adds to each sample of a channel in which it is with the factor 1; nothing of an effect on the counts or on the clock.
+    /// Contribution to each sample of a channel with the factor 1; zero for an effect on the counts or on the clock.
     pub(super) fn signal(&self, environment: &EnvironmentCourse, samples: usize, period_s: f64) -> Vec<f64> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         let (size, [first, second], [begin_s, part_s]) = (self.size, self.frequencies_hz, self.times_s);
@@ -280,7 +280,7 @@ impl OutsideEffect {
         }
     }
 
-    /// What it makes of the counts of a channel that it is in.
+    /// Changes the counts of a channel that it is in.
     pub(super) fn change_counts(&self, counts: &mut [i32], period_s: f64) {
         let at = |time_s: f64| (time_s / period_s).round() as usize;
         match self.kind {

@@ -80,13 +80,13 @@ pub struct EffectScore {
 /// Deviance per point on the half of the recording that the fit has not seen, in the first channel with an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct UnseenErrors {
-    /// Of the baseline model.
+    /// Error of the baseline model.
     pub before: f64,
-    /// Of the model with the added terms.
+    /// Error of the model with the added terms.
     pub after: f64,
-    /// Of the true model.
+    /// Error of the true model.
     pub truth: f64,
-    /// Of the true terms, fitted to the other half: the difference to `truth` is due to the fit.
+    /// Error of the true terms, fitted to the other half: the difference to `truth` is due to the fit.
     pub refitted: f64,
 }
 
@@ -103,7 +103,7 @@ pub struct RecordingScore {
     pub estimates: Vec<ParameterScore>,
     /// Absent where nothing is hidden, or where an error is not finite.
     pub unseen: Option<UnseenErrors>,
-    /// Of the effect outside the vocabulary that is hidden, if any.
+    /// Score of the hidden effect outside the vocabulary, if any.
     pub outside: Option<OutsideScore>,
 }
 
@@ -189,7 +189,7 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, loss: f64) -> Rec
     let is_true = |channel: Channel, found: &Effect| {
         let kind = found.name();
         let is_lost = loss > 0.0 && kind == EffectKind::DroppedSamples.name();
-        // Where something is hidden, a part of it that is said to be unexplained is no wrong name.
+        // If something is hidden, a part of it that is said to be unexplained is no wrong name.
         let output = simulation::output_register(channel);
         let is_outside = outside.is_some_and(|effect| {
             let describes =
@@ -266,7 +266,7 @@ pub(super) fn score_parameters(
     let score = |&(name, truth): &(&'static str, f64)| {
         let estimate = estimates.get(name)?;
         let truth = match kind {
-            // What is dropped cannot be lost once more.
+            // A dropped sample cannot be lost once more.
             EffectKind::DroppedSamples => truth + (1.0 - truth) * loss,
             _ => truth,
         };

@@ -113,7 +113,7 @@ fn likelihood_ratios_in_white_noise_equal_their_closed_forms() {
     assert!((matched / (0.5 * 0.01 * 1800.0 / PERIOD_S / (0.25 / PERIOD_S)) - 1.0).abs() < 0.01, "{matched}");
 }
 
-/// What neither a random walk nor flicker noise resembles has the ratio in known noise: a bias that changes its sign from block to
+/// A drift unlike a random walk and flicker noise has the ratio in known noise: a bias that changes its sign from block to
 /// block, by `s` in `M` samples of white noise of standard deviation σ, `½·s²·M/σ²`. White noise of a free N takes up its part in
 /// one of 127 cosines: `N² + s²·M/127` in place of `N²` changes the ratio of 2 by `2²/127`, a few hundredths. A ramp of the ratio
 /// 30 in known noise is mostly a walk.
@@ -145,9 +145,9 @@ fn the_strength_is_that_of_the_size_or_of_its_significance() {
     let of = |effect: &InjectedEffect| strength(effect, &recording, &[]);
     let markov = |time_constant_s: f64, deviation: f64| InjectedEffect::Markov { channel, time_constant_s, deviation };
     let limit = |time_s: f64| smallest_size(&markov(time_s, 1.0), &recording, &[]);
-    // Of 1,800 correlation times: the size decides.
+    // With 1,800 correlation times the size decides.
     assert!((of(&markov(1.0, 2.0 * limit(1.0))) - 2.0).abs() < 1e-6);
-    // Of fewer than four: the lowest three frequencies alone tell it from a walk.
+    // With fewer than four the lowest three frequencies alone tell it from a walk.
     assert!(of(&markov(500.0, 1e3)) < 2.0, "{}", of(&markov(500.0, 1e3)));
     // The number of events at the limit is ln 2, and their scatter the root of the number.
     let dropped = |number: f64| InjectedEffect::DroppedSamples { fraction: number * PERIOD_S / RECORD.seconds };

@@ -38,9 +38,9 @@ fn is_removable(effect: &InjectedEffect) -> bool {
 /// the other channels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct TrueModelErrors {
-    /// Of the true model.
+    /// Error of the true model.
     pub(super) model: f64,
-    /// Of the true terms with coefficients and shapes that are fitted to the first half.
+    /// Error of the true terms with coefficients and shapes that are fitted to the first half.
     pub(super) fitted: f64,
 }
 

@@ -4,7 +4,7 @@
 use crate::columns::unit::{COUNT, SECOND, Unit};
 use measurement::{ChannelProfile, Quantity, SensorProfile};
 
-/// What a column is.
+/// Kind of a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(
     clippy::large_enum_variant,
@@ -126,7 +126,7 @@ pub enum SelectionError {
     CountsOfAny(String),
 }
 
-/// What the user says of the columns.
+/// The user's statements about the columns.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ColumnSelection {
     /// Channel and column.
@@ -398,7 +398,7 @@ impl AvailableColumn {
             .unwrap_or_else(|| Self { name: heading.to_owned(), unit: None })
     }
 
-    /// What stands before the usual name of a channel, and the channel, `time` or `sample` that it names.
+    /// The text before the usual name of a channel, and the channel, `time` or `sample` that it names.
     pub(crate) fn prefix_and_channel(&self) -> Option<(&str, &'static str)> {
         let channel = match role_of(&self.name)? {
             NamedRole::Time => return Some(("", "time")),
@@ -545,7 +545,7 @@ fn rate_of_body(available: &[AvailableColumn], position: usize) -> Option<&'stat
     Some(AXES[0].1[axis])
 }
 
-/// What the name of a column says.
+/// Role that the name of a column tells.
 enum NamedRole {
     Time,
     Index,

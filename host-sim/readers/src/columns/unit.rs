@@ -7,7 +7,7 @@ const GRAVITY: f64 = 9.806_65;
 /// deg/s per rad/s.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
-/// What a number in a column counts.
+/// Unit of a number in a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Unit {
     /// As it is written in messages.

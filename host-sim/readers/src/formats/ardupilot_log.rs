@@ -35,7 +35,7 @@ const TIMES: [(&str, &str); 4] = [("SampleUS", "us"), ("TimeUS", "us"), ("TimeMS
 /// Label of the number of a sensor among several.
 const INSTANCE: &str = "I";
 
-/// What the rows of a topic are made of. Of topics whose sensor is known the least is read where the user names none.
+/// Content of the rows of a topic. If the user names none, the least topic whose sensor is known is read.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 enum Rows {
     GyroscopeBatches(i64),
@@ -168,7 +168,7 @@ impl Batch {
     }
 }
 
-/// What a way through a log leaves.
+/// Result of a way through a log.
 struct Log {
     formats: BTreeMap<u8, MessageFormat>,
     /// Bytes that are no message.
@@ -184,7 +184,7 @@ fn for_each_sample(file: &FileBytes, budget: Budget, each: &mut EachSample) -> R
     let input = BufReader::new(file.open().map_err(fail)?);
     let mut messages = Messages::new(Metered::new(input, budget.meter()));
     let mut batch: Option<Batch> = None;
-    // Of each type of message: its name with the instance that was seen last.
+    // For each type of message its name with the instance that was seen last.
     let mut known: BTreeMap<u8, Rows> = BTreeMap::new();
     while let Some(message) = messages.next().map_err(fail)? {
         match message.format.name.as_str() {

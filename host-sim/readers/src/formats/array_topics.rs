@@ -43,7 +43,7 @@ pub(crate) fn stated_rate(name: &str, number: f64) -> Option<f64> {
 /// An array of a file: a vector, or a matrix whose longer side is the time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct NamedArray {
-    /// Where it lies, with the sign that comes before its own name: `imu1.` or `/run/`; empty for the outermost.
+    /// Its group, with the sign that comes before its own name: `imu1.` or `/run/`; empty for the outermost.
     pub(crate) group: String,
     /// Its name; empty where the file has one array without a name.
     pub(crate) name: String,

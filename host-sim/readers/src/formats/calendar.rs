@@ -28,7 +28,7 @@ fn date_time_with(text: &str, date: impl FnOnce(&str) -> Option<i64>) -> Option<
     date(first)?.checked_mul(DAY_NS)?.checked_add(time_of_day(rest)?)
 }
 
-/// Days from 1970 to a date: 2018-04-25, 2018/04/25, 25.04.2018, 25-Apr-2018, 04/25/2018 and 25/04/2018. Where day and month cannot be told
+/// Days from 1970 to a date: 2018-04-25, 2018/04/25, 25.04.2018, 25-Apr-2018, 04/25/2018 and 25/04/2018. If day and month cannot be told
 /// apart, the month is first between strokes and the day elsewhere.
 pub(crate) fn date(text: &str) -> Option<i64> {
     let date = WrittenDate::parse(text)?;
@@ -183,7 +183,7 @@ fn offset(text: &str) -> Option<i64> {
     minutes.map(|(hours, minutes): (i64, i64)| (60 * hours + minutes) * if text.starts_with('-') { -1 } else { 1 })
 }
 
-/// Where the calendar times of a row are.
+/// Columns of the calendar times of a row.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum CalendarColumns {
     /// Date and time of day in one field.
@@ -231,7 +231,7 @@ const SECONDS: usize = 2;
 
 /// A column whose name is that of a part of a time.
 struct NamedPart {
-    /// What comes before it in the name.
+    /// Text before it in the name.
     prefix: String,
     /// Its place among the [`PARTS`].
     part: usize,

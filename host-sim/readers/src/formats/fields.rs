@@ -12,7 +12,7 @@ const MISSING: [&str; 22] = [
     "#div/0!", "1.#qnan", "-1.#ind", "1.#inf", "ovf", "missing",
 ];
 
-/// What the serial monitor of the Arduino IDE writes between the time of a line and the line.
+/// Text of the serial monitor of the Arduino IDE between the time of a line and the line.
 pub(crate) const ARROW: &str = " -> ";
 
 /// The sign between the fields of a row, without the time that a serial monitor writes before it.
@@ -52,7 +52,7 @@ pub(crate) struct Fields<'a> {
     separator: Option<u8>,
     /// True if there may be a time of a serial monitor before the row.
     has_arrow: bool,
-    /// What follows in a list.
+    /// Following fields of a list.
     list: Option<&'a str>,
 }
 

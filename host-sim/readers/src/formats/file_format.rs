@@ -72,7 +72,7 @@ pub enum FileFormat {
 }
 
 impl FileFormat {
-    /// What it is called in a sentence.
+    /// Its name in a sentence.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -130,7 +130,7 @@ struct InputPart {
 
 impl InputFile {
     /// Opens `name`, `-` for standard input, and recognises its format. A pipe is copied to a temporary file, and so is a
-    /// compressed file of a binary format. Of a folder the bag of ROS 2 in it is opened. `monitor` counts the bytes that are read of the
+    /// compressed file of a binary format. In a folder the bag of ROS 2 is opened. `monitor` counts the bytes that are read of the
     /// recording, and may stop the reading of a pipe, of text and of an array.
     ///
     /// # Errors
@@ -203,7 +203,7 @@ impl InputFile {
         Ok(Self { name: name.to_owned(), parts, arrays: None, format, monitor: monitor.clone(), budget })
     }
 
-    /// What was recognised.
+    /// The recognised format.
     pub fn format(&self) -> FileFormat {
         self.format
     }
@@ -267,7 +267,7 @@ impl InputFile {
         Ok(FileRows::new(name, rows, &self.monitor, register))
     }
 
-    /// What is in the file without an analysis, of the topic that is named or of all that have an inertial sensor; `selection` is what the
+    /// Content of the file without an analysis, of the named topic or of all that have an inertial sensor; `selection` is what the
     /// user says of the columns, and `sensor` tells, by the names of the columns of a table, how large its counts are.
     ///
     /// # Errors
@@ -313,7 +313,7 @@ impl InputFile {
         Ok(topics::names_of_several(source.as_ref()))
     }
 
-    /// What is in the file: topics of messages, groups of arrays or the only array, with their columns; nothing of text.
+    /// Content of the file: topics of messages, groups of arrays or the only array, with their columns; nothing of text.
     ///
     /// # Errors
     /// The file is damaged.
@@ -371,7 +371,7 @@ impl InputPart {
                 .map_err(|error| origin.error(Reason::from_io(error)))
         };
         let mut bytes = origin.clone();
-        // Of compressed text, what is in it.
+        // The content of compressed text.
         let mut text = None;
         let mut head = bytes.head(HEAD_BYTES).map_err(fail)?;
         if head.starts_with(&GZIP_MAGIC) {

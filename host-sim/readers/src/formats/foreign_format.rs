@@ -56,14 +56,14 @@ pub(crate) fn is_binary(head: &[u8]) -> bool {
     is_foreign || head.contains(&0) || controls * MOST_CONTROLS > head.len()
 }
 
-/// What is said of [a JSON document](is_json_document).
+/// Refusal of [a JSON document](is_json_document).
 pub(crate) const JSON_DOCUMENT: Reason = Reason::Foreign {
     what: "a JSON document",
     how: "objects are read that stand one in each line; in Python, of a list of them: \
           pandas.read_json(\"FILE\").to_json(\"FILE.jsonl\", orient=\"records\", lines=True)",
 };
 
-/// What is said of [a report](is_report).
+/// Refusal of [a report](is_report).
 pub(crate) const REPORT: Reason = Reason::Foreign {
     what: "a report of this program",
     how: "`compare` and `export` take it; `analyze` takes the recording that it was made of",
@@ -87,7 +87,7 @@ pub(crate) fn is_json_document(head: &[u8]) -> bool {
     }
 }
 
-/// What a binary file looks like, and how to convert it.
+/// Probable format of a binary file, and how to convert it.
 pub(crate) fn refusal(head: &[u8]) -> Reason {
     match FOREIGN.iter().find(|(magic, ..)| head.starts_with(magic)) {
         Some((_, what, how)) => Reason::Foreign { what, how },

@@ -1,6 +1,6 @@
 //! Datasets of HDF5, which is also what MATLAB 7.3 and `h5py` write: matrices of numbers and tables of records, by their paths.
 //!
-//! Of the crates without a C library `hdf5-pure` reads windows of rows, all of the files that the tests write with `h5py`, and says how
+//! `hdf5-pure`, a crate without a C library, reads windows of rows, all of the files that the tests write with `h5py`, and says how
 //! large a dataset is before it is read.
 
 use crate::columns::unit::Unit;
@@ -45,13 +45,13 @@ struct Encoded {
 struct Layout {
     path: String,
     rows: usize,
-    /// Of each column; all at the start of an element where each column is a row of the file.
+    /// Encoding of each column; all at the start of an element where each column is a row of the file.
     columns: Vec<Encoded>,
     /// Bytes of a row of the file.
     stride: usize,
     /// True if each column is a row of the file.
     is_by_column: bool,
-    /// What the numbers are multiplied by, and what is added.
+    /// Factor of the numbers, and what is added.
     scale: Option<[f64; 2]>,
 }
 
@@ -62,7 +62,7 @@ pub(crate) struct Hdf5Reader {
     meter: Meter,
 }
 
-/// What the groups around a dataset state.
+/// Attributes of the groups around a dataset.
 #[derive(Clone, Default)]
 struct Stated {
     rate: Option<(f64, String)>,

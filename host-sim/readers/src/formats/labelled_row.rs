@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-/// What comes between a number and the next name.
+/// Characters between a number and the next name.
 const SEPARATORS: [char; 4] = [',', ';', '\t', '|'];
 
 /// The names and the texts of the numbers of a line; `None` for another line.

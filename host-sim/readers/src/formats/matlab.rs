@@ -1,5 +1,5 @@
 //! Arrays of MATLAB: `.mat` files of level 5, which `save` writes without `-v7.3`, with those in structures and cells (MAT-File Format,
-//! chapter 1). Of the crates that read them, `matfile` knows no structure, and prints to the terminal.
+//! chapter 1). The crate `matfile` knows no structure, and prints to the terminal.
 
 use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray};
 use crate::formats::message_layout::Scalar;
@@ -80,10 +80,10 @@ impl ListedArray {
     }
 }
 
-/// What writes the columns of an object that is no table as plain arrays.
+/// Commands that write the columns of an object that is no table as plain arrays.
 const OTHER_COMMANDS: &str = "copy its numbers into matrices and save these";
 
-/// What writes a table of MATLAB as text.
+/// Commands that write a table of MATLAB as text.
 fn table_commands(name: &str, class: &str) -> String {
     let table = if class == "timetable" { format!("timetable2table({name})") } else { name.to_owned() };
     format!("writetable({table}, \"{name}.csv\")")
@@ -145,7 +145,7 @@ impl ArrayReader for MatReader {
 
 /// A way through all data elements of a file: to list its arrays, or to read one of them.
 struct Walk<'a> {
-    /// What is read, and its columns.
+    /// The wanted parts, and their columns.
     wanted: Option<(Parts, &'a [usize])>,
     arrays: Vec<ListedArray>,
     /// Names and classes of objects.
@@ -462,7 +462,7 @@ fn ended(error: io::Error) -> Reason {
     }
 }
 
-/// Type and length of a data element. Of up to 4 bytes the content may lie in the tag.
+/// Type and length of a data element. A content of up to 4 bytes may lie in the tag.
 #[derive(Clone, Copy)]
 struct Tag {
     kind: u32,

@@ -14,7 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub(crate) struct McapSource<'a> {
     file: &'a FileBytes,
     offer: Offer,
-    /// Of each topic; `None` where its messages cannot be decoded.
+    /// Layout of each topic; `None` where its messages cannot be decoded.
     layouts: Vec<Option<(MessageLayout, Encoding)>>,
     channels: Vec<BTreeSet<u16>>,
     budget: Budget,
@@ -31,7 +31,7 @@ struct Channel {
 /// A schema: name, encoding, definition.
 type Schema = (String, String, Vec<u8>);
 
-/// What a file has.
+/// Content of a file.
 #[derive(Default)]
 struct Contents {
     schemas: BTreeMap<u16, Schema>,

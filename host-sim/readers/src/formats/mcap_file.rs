@@ -299,7 +299,7 @@ mod tests {
         [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat()
     }
 
-    /// What is read of a file of these records, and whether it is called damaged.
+    /// Rows that are read of a file of these records, and whether it is called damaged.
     fn read(records: &[Vec<u8>]) -> (Vec<String>, Option<String>) {
         let file = FileBytes::in_memory(Path::new("x.mcap"), [b"\x89MCAP0\r\n".to_vec(), records.concat()].concat());
         let mut found = Vec::new();

@@ -1,7 +1,7 @@
 //! Messages of which a definition says the fields: names, types, arrays and nesting, as ROS and PX4 write them.
 //!
 //! A [`MessageLayout`] lists every number of a message as a column, such as `imu.angular_velocity.x` or `gyro[2]`, and decodes messages
-//! to a number for each column. Of a sequence of floats, whose length a message says,
+//! to a number for each column. In a sequence of floats, whose length a message says,
 //! the first 16 are columns; other numbers in sequences, and in arrays of more than 64 elements, are none and are skipped.
 
 use crate::input::budget::Budget;
@@ -58,7 +58,7 @@ fn half(bits: u16) -> f64 {
     if bits >> 15 == 1 { -magnitude } else { magnitude }
 }
 
-/// What a field holds.
+/// Type of a field.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum FieldType {
     Scalar(Scalar),
@@ -68,7 +68,7 @@ pub(crate) enum FieldType {
     Text,
     /// Fields of another definition, by its name.
     Nested(String),
-    /// What is not decoded, by its name: the message cannot be read beyond it.
+    /// Type that is not decoded, by its name: the message cannot be read beyond it.
     Unknown(String),
 }
 
@@ -333,7 +333,7 @@ fn run(steps: &[Step], cursor: &mut Cursor, row: &mut [Number]) -> Option<()> {
 struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// Where alignment counts from, and its largest step.
+    /// Origin of the alignment, and its largest step.
     origin: usize,
     most: usize,
     is_big: bool,

@@ -8,7 +8,7 @@ use crate::columns::column_selection::AvailableColumn;
 pub(crate) struct Sentence<'a> {
     /// Such as `VNYMR`.
     pub(crate) name: &'a str,
-    /// What comes after the name, and before the checksum.
+    /// Fields after the name and before the checksum.
     pub(crate) fields: Vec<&'a str>,
     /// True if its checksum is right; a sentence without one is taken as it is.
     pub(crate) is_intact: bool,

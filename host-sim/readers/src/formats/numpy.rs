@@ -15,7 +15,7 @@ use zip::ZipArchive;
 
 /// Columns of a matrix beyond which it is no recording.
 const MAX_COLUMNS: u64 = 1024;
-/// What is said of an array of Python objects.
+/// Refusal of an array of Python objects.
 const OBJECTS: &str = "holds Python objects, which are not read; of a dict of arrays, in Python: \
                        numpy.savez(\"FILE.npz\", **numpy.load(\"FILE\", allow_pickle=True).item())";
 
@@ -26,7 +26,7 @@ const ROWS_AT_ONCE: usize = 4096;
 pub(crate) struct NpyReader {
     input: BufReader<Counted<OpenBytes>>,
     layout: ArrayLayout,
-    /// Where the numbers begin, bytes.
+    /// Start of the numbers, bytes.
     start: u64,
 }
 
@@ -79,7 +79,7 @@ impl ArrayReader for NpyReader {
     fn for_each_row(&mut self, places: &[(usize, usize)], each: &mut EachArrayRow) -> Option<Result<(), InputError>> {
         let columns: Vec<usize> = places.iter().map(|(_, column)| *column).collect();
         let mut buffers = vec![Vec::new(); if self.layout.by_column { columns.len() } else { 1 }];
-        // Of each column: the buffer with its numbers, where they begin in it, and how they are encoded.
+        // For each column the buffer with its numbers, their start in it, and their encoding.
         let place = |(number, &column): (usize, &usize)| {
             let FieldLayout { offset, encoding, .. } = &self.layout.fields[column];
             if self.layout.by_column { (number, 0, encoding.clone()) } else { (0, *offset, encoding.clone()) }

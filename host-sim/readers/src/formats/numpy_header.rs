@@ -31,7 +31,7 @@ pub(crate) struct Encoding {
     pub(crate) bytes: usize,
 }
 
-/// What the header says.
+/// Content of the header.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Header {
     pub(crate) element: ElementType,

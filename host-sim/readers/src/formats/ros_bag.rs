@@ -1,7 +1,7 @@
 //! Bags of ROS 1 (`.bag`, format 2.0): the definition of each type of message is in the connection of its topic.
 //!
-//! A bag is a row of records, each a header of named fields and its data; messages lie in chunks, which may be compressed. What a record says of
-//! its own length is believed as far as the bytes come. The index at the end is used where there is one: a bag of a recording that was
+//! A bag is a row of records, each a header of named fields and its data; messages lie in chunks, which may be compressed. The
+//! length that a record states is believed as far as the bytes come. The index at the end is used where there is one: a bag of a recording that was
 //! interrupted has none, and is read from its start.
 
 use crate::formats::message_layout::{Encoding, MessageLayout};
@@ -36,9 +36,9 @@ const CONNECTION: u8 = 7;
 
 /// A record that is used.
 enum Record<'a> {
-    /// What is published on a topic, and by which definition.
+    /// Type and definition of the messages of a topic.
     Connection(Connection),
-    /// Of how many messages of each connection a chunk is.
+    /// Number of messages of each connection in a chunk.
     ChunkInfo(&'a [u8]),
     /// A message of a connection, and when it was recorded, ns.
     Message { connection: u32, recorded_ns: i64, data: &'a [u8] },
@@ -51,7 +51,7 @@ struct Connection {
     definition: String,
 }
 
-/// What ends the reading.
+/// Reason for the end of the reading.
 enum Stop {
     /// The consumer's refusal.
     Refusal(InputError),
@@ -72,7 +72,7 @@ type EachRecord<'a> = dyn FnMut(Record) -> Result<(), InputError> + 'a;
 pub(crate) struct RosBagSource<'a> {
     file: &'a FileBytes,
     offer: Offer,
-    /// Of each topic.
+    /// Layout of each topic.
     layouts: Vec<MessageLayout>,
     connections: Vec<BTreeSet<u32>>,
     budget: Budget,
@@ -320,7 +320,7 @@ fn fill(input: &mut dyn BufRead, bytes: &mut [u8]) -> Result<(), Reason> {
     input.read_exact(bytes).map_err(refused)
 }
 
-/// What a decompressor or the budget refuses.
+/// Refusal by a decompressor or the budget.
 fn refused(error: io::Error) -> Reason {
     match error.kind() {
         ErrorKind::UnexpectedEof => Reason::Truncated { format: FORMAT },

@@ -126,7 +126,7 @@ impl<'a> RosRows<'a> {
         Self { layout, encoding, columns, guards, is_unset: None, decoded: Vec::new(), row: Vec::new() }
     }
 
-    /// The row of a message that was recorded at `record_ns`. What it does not have is NaN.
+    /// The row of a message that was recorded at `record_ns`. Missing fields are NaN.
     pub(crate) fn row(&mut self, message: &[u8], record_ns: Option<i64>) -> &[Number] {
         let Self { layout, encoding, columns, guards, is_unset, decoded, row } = self;
         // The columns before a damage are used; a time that is missing ends the reading with an error that names the row.
@@ -147,7 +147,7 @@ impl<'a> RosRows<'a> {
         row
     }
 
-    /// What the user should know of the rows.
+    /// Notes for the user about the rows.
     pub(crate) fn notes(&self) -> Vec<String> {
         let unset = "the stamps of the messages are not set; the times at which they were recorded stand for them";
         self.is_unset.filter(|unset| *unset).map(|_| unset.to_owned()).into_iter().collect()

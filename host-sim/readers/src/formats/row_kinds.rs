@@ -72,20 +72,20 @@ pub(crate) struct RowKinds(
 );
 
 impl RowKinds {
-    /// Of the first rows of a file; `None` where all are of one kind.
+    /// Kinds of the first rows of a file; `None` where all are of one kind.
     pub(crate) fn find(rows: &[Vec<&str>]) -> Option<Self> {
         let width = rows.iter().map(Vec::len).min()?;
         (0..width).find_map(|at| Self::of_labels(rows, at, is_label))
     }
 
-    /// Of the first rows of a file below a heading, in which a column of whole numbers is called as one that tells devices from each other.
+    /// Kinds of the first rows of a file below a heading with a column of whole numbers that tells devices from each other.
     pub(crate) fn find_by_number(rows: &[Vec<&str>], heading: &[&str]) -> Option<Self> {
         let is_named = |name: &&str| NUMBERED.contains(&name.to_lowercase().trim_start_matches(['#', '%', ' ']));
         let at = heading.iter().position(is_named).filter(|at| rows.iter().all(|row| row.len() > *at))?;
         Self::of_labels(rows, at, |field| field.parse::<u32>().is_ok())
     }
 
-    /// Of the first rows of a table that was merged of several: each row has the numbers of one of them, and blanks for the others.
+    /// Kinds of the first rows of a table that was merged of several: each row has the numbers of one of them, and blanks for the others.
     pub(crate) fn find_by_blanks(rows: &[Vec<&str>], columns: &[AvailableColumn]) -> Option<Self> {
         let has_number = |row: &[&str], at: usize| {
             row.get(at).is_some_and(|field| !field.is_empty() && number(field).is_some_and(|it| !it.value().is_nan()))

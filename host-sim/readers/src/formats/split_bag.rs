@@ -34,12 +34,12 @@ pub fn files_of_bag(folder: &Path) -> io::Result<Vec<PathBuf>> {
 /// The files of a bag, one after the other.
 pub(crate) struct SplitBag<'a> {
     files: Vec<Box<dyn Source + 'a>>,
-    /// Of all files.
+    /// Offer of all files.
     offer: Offer,
 }
 
 impl<'a> SplitBag<'a> {
-    /// Of at least one file.
+    /// Source of at least one file.
     pub(crate) fn new(files: Vec<Box<dyn Source + 'a>>) -> Self {
         let mut topics: Vec<Topic> = Vec::new();
         for topic in files.iter().flat_map(|file| file.topics()) {

@@ -25,7 +25,7 @@ pub(crate) struct SqliteSource<'a> {
     _copy: Option<FileBytes>,
     database: Connection,
     offer: Offer,
-    /// Of each topic: its number in the database, and its layout where that is known.
+    /// For each topic its number in the database, and its layout where that is known.
     layouts: Vec<(i64, Option<MessageLayout>)>,
     budget: Budget,
 }

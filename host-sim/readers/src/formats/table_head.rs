@@ -247,7 +247,7 @@ fn name_of_list(heading: &str) -> (String, Option<Unit>) {
     }
 }
 
-/// What a field holds.
+/// Kind of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum FieldKind {
     Number,
@@ -386,7 +386,7 @@ fn units_of(fields: &[String]) -> Option<Vec<Option<Unit>>> {
     (2 * known > trimmed_width(fields)).then_some(units)
 }
 
-/// The columns of a heading. Of several with the same name each is known by its number, from 0.
+/// The columns of a heading. Columns with the same name are known by their numbers, from 0.
 pub(crate) fn named_columns(names: &[String], units: Option<&[Option<Unit>]>) -> Vec<AvailableColumn> {
     let mut columns: Vec<AvailableColumn> = names.iter().map(|name| AvailableColumn::from_heading(name)).collect();
     for (column, unit) in columns.iter_mut().zip(units.unwrap_or_default()) {

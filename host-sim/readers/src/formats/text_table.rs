@@ -142,7 +142,7 @@ pub(crate) struct TextTable {
     layout: Layout,
     /// The rate that a line before the rows states, Hz.
     rate_hz: Option<f64>,
-    /// What the user should know of the columns.
+    /// Notes for the user about the columns.
     columns_notes: Vec<String>,
     damaged: DamagedRows,
     /// True if a field that is no number is a missing one.
@@ -209,7 +209,7 @@ struct Opened<'a> {
 }
 
 impl Opened<'_> {
-    /// Of rows of columns.
+    /// Table of rows of columns.
     fn columns(self, topic: Option<&str>, mut head: TableHead) -> Result<TextTable, InputError> {
         let fail = |reason| self.file.error(reason);
         let kinds = RowKinds::find(&head.fields());
@@ -285,7 +285,7 @@ impl Opened<'_> {
         (self.choose)(available).map_err(|error| self.file.error(Reason::Selection(Box::new(error))))
     }
 
-    /// Of sentences of one kind, that which the options name, else the most frequent one with numbers among the first.
+    /// Table of sentences of one kind, that which the options name, else the most frequent one with numbers among the first.
     fn sentences(self, topic: Option<&str>, first: VecDeque<Line>) -> Result<TextTable, InputError> {
         let file = self.file;
         // Name and number of fields of each kind, and how many there are.
@@ -323,7 +323,7 @@ impl Opened<'_> {
         Ok(self.table(available, chosen, Layout::Sentences { name, damaged: 0, others: 0 }, fields, first))
     }
 
-    /// Of lines that name each of their numbers; `first` are the lines that were read.
+    /// Table of lines that name each of their numbers; `first` are the lines that were read.
     fn labelled(self, names: Vec<String>, first: Vec<Line>) -> Result<TextTable, InputError> {
         let rows = first.iter().filter_map(|(_, text)| labelled_row::parse(text));
         let row = rows.map(|row| values_of(&names, row)).next().unwrap_or_default();
@@ -370,7 +370,7 @@ impl RowSource for TextTable {
 }
 
 impl TextTable {
-    /// What the user should know of the rows that were read, one sentence each.
+    /// Notes for the user about the rows that were read, one sentence each.
     fn notes(&self) -> Vec<String> {
         let of_rate = self.rate_hz.map(|hz| format!("the file states a rate of {hz} Hz before its rows"));
         let zeros = self.lines.zero_bytes();

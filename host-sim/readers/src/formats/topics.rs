@@ -1,4 +1,4 @@
-//! What a file of several sources offers, and the table of one of them: topics of messages, groups of arrays, a log's sensors.
+//! The sources that a file offers, and the table of one of them: topics of messages, groups of arrays, a log's sensors.
 //!
 //! A format implements [`Source`]: it lists its topics with all their columns, marks those that it knows to be of an inertial sensor, and
 //! gives the rows of a topic one after the other. Which topic and which columns are read is decided here, for every format alike.
@@ -27,14 +27,14 @@ pub(crate) struct Topic {
     pub(crate) rows: Option<u64>,
     /// All that can be read of it.
     pub(crate) columns: Vec<AvailableColumn>,
-    /// What is known to be an inertial sensor in it.
+    /// Inertial sensors that are known in it.
     pub(crate) sensors: Vec<TopicSensor>,
 }
 
 /// An inertial sensor whose columns are known without the user.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct TopicSensor {
-    /// What tells it from the others of its topic; empty where there is one.
+    /// Name among the others of its topic; empty if there is no other.
     pub(crate) name: String,
     /// Channel of the sensor, or `time` or `sample`; position of the column; and the unit, where the column does not say it.
     pub(crate) columns: Vec<(&'static str, usize, Option<Unit>)>,
@@ -83,7 +83,7 @@ impl From<&Topic> for TopicDescription {
     }
 }
 
-/// What a file has to be read.
+/// Content of a file that can be read.
 #[derive(Debug, Default)]
 pub(crate) struct Offer {
     /// Name of the format.
@@ -97,7 +97,7 @@ pub(crate) struct Offer {
 }
 
 impl Offer {
-    /// Of topics of which the user chooses one.
+    /// Offer of topics of which the user chooses one.
     pub(crate) fn new(format: &'static str, topics: Vec<Topic>) -> Self {
         Self { format, topics, ..Self::default() }
     }
@@ -108,7 +108,7 @@ impl Offer {
 pub(crate) struct Ending {
     /// Why there are no more rows, where the file is damaged or ends early.
     pub(crate) damage: Option<Reason>,
-    /// What the user should know, one sentence each.
+    /// Notes for the user, one sentence each.
     pub(crate) notes: Vec<String>,
 }
 
@@ -117,7 +117,7 @@ pub(crate) type EachRow<'a> = dyn FnMut(&[Number]) -> Result<(), InputError> + '
 
 /// A file with several sources of rows.
 pub(crate) trait Source: Send {
-    /// What there is.
+    /// The offer of the file.
     fn offer(&self) -> &Offer;
 
     /// All topics.
@@ -173,7 +173,7 @@ pub(crate) fn names_of_several(source: &dyn Source) -> Vec<String> {
     let first =
         all.iter().find(|(name, _)| source.offer().preferred.as_deref().is_none_or(|preferred| preferred == name));
     let Some(first) = first.map(|(_, choice)| kind(choice)) else { return Vec::new() };
-    // Where the user would have to choose, all are offered; where one is preferred, those of its kind.
+    // If the user would have to choose, all are offered; if one is preferred, those of its kind.
     let is_offered = |choice: &Choice| source.offer().preferred.as_deref().is_none() || kind(choice) == first;
     let names: Vec<String> = all.into_iter().filter(|(_, choice)| is_offered(choice)).map(|(name, _)| name).collect();
     if names.len() > 1 { names } else { Vec::new() }
@@ -420,7 +420,7 @@ pub(crate) fn read_whole<'a>(
     Ok(tables)
 }
 
-/// What is known of these columns of a topic before they are read.
+/// Description of these columns of a topic before they are read.
 fn described(source: &dyn Source, topic: usize, chosen: &[AvailableColumn]) -> WholeTable {
     let Topic { name, kind, .. } = &source.topics()[topic];
     let is_of_arrays = source.offer().whole.is_some();

@@ -50,7 +50,7 @@ const MOST_WAITING: usize = 1024;
 /// Share of the samples that must have the time of one of the other sensor if both are to be read as one.
 const MIN_PAIRED: f64 = 0.9;
 
-/// What a vector measures.
+/// Measured quantity of a vector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Vector {
     Rate,
@@ -69,7 +69,7 @@ impl Vector {
 /// A message and the number of its publisher.
 type Key = (String, u8);
 
-/// What the rows of a topic are made of.
+/// Content of the rows of a topic.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Rows {
     /// Messages, with all their columns.
@@ -349,7 +349,7 @@ fn for_each_message(
 ) -> Result<Option<Reason>, InputError> {
     let fail = |error| file.error(Reason::Io(error));
     let mut input = MessageBytes { input: BufReader::new(file.open().map_err(fail)?), at: 0 };
-    // Where data were appended, as after a crash: the message before it may have no end.
+    // Starts of appended data, as after a crash: the message before it may have no end.
     let mut appended: Vec<u64> = Vec::new();
     let mut meter = budget.meter();
     let mut formats: Definitions = HashMap::new();
@@ -440,8 +440,8 @@ impl MessageBytes {
     }
 }
 
-/// Where data were appended to a log, by its message of flag bits: 8 compatible ones, 8 incompatible ones, of which the first bit says that data
-/// were appended, and three offsets.
+/// Starts of data that were appended to a log, by its message of flag bits: 8 compatible ones, 8 incompatible ones, of which
+/// the first bit says that data were appended, and three offsets.
 ///
 /// # Errors
 /// It has incompatible flags that are not known.

@@ -1,4 +1,4 @@
-//! What the reading of one file may cost: bytes once they are decompressed, numbers, and levels of nesting.
+//! Bounds on the cost of reading one file: bytes once they are decompressed, numbers, and levels of nesting.
 //!
 //! A file of a few kilobytes can ask for gigabytes (compressed constants) or for a stack of any depth (definitions within definitions).
 //! Every reader draws from one budget, whose amounts grow with the size of the file, so that no recording that a sensor made meets it: the
@@ -95,7 +95,7 @@ impl Budget {
     }
 }
 
-/// What one reading has cost.
+/// Cost of one reading.
 #[derive(Debug)]
 pub(crate) struct Meter {
     budget: Budget,
@@ -127,7 +127,7 @@ impl Meter {
     }
 }
 
-/// Counts what comes out of a decompressor. What the budget refuses is an error that [`Reason::from_io`] gives back.
+/// Counts the bytes that come out of a decompressor. A refusal by the budget is an error that [`Reason::from_io`] gives back.
 pub(crate) struct Metered<R, M = Meter> {
     input: R,
     meter: M,
@@ -138,7 +138,7 @@ impl<R, M> Metered<R, M> {
         Self { input, meter }
     }
 
-    /// What the reading has cost until now.
+    /// Cost of the reading until now.
     pub(crate) fn into_meter(self) -> M {
         self.meter
     }

@@ -41,7 +41,7 @@ impl FileBytes {
         Self { name: name.to_owned(), copy: Some(BytesCopy::Memory(bytes.into())) }
     }
 
-    /// What is in a temporary file.
+    /// The bytes of a temporary file.
     pub fn in_temporary_file(name: &Path, file: NamedTempFile) -> Self {
         Self { name: name.to_owned(), copy: Some(BytesCopy::File(Arc::new(file))) }
     }

@@ -80,7 +80,7 @@ pub enum Reason {
     /// A binary format that is known and not read.
     #[error("{what}, which is not read; {how}")]
     Foreign {
-        /// What it is.
+        /// Name of the format.
         what: &'static str,
         /// How to convert it.
         how: &'static str,
@@ -139,17 +139,17 @@ pub enum Reason {
     /// A time that decreases.
     #[error("time {now} s is before {before} s of the row above")]
     TimeBackwards {
-        /// Of the row above, s.
+        /// Time of the row above, s.
         before: f64,
-        /// Of this row, s.
+        /// Time of this row, s.
         now: f64,
     },
     /// An index that repeats or decreases.
     #[error("sample {now} does not follow {before}")]
     IndexBackwards {
-        /// Of the row above.
+        /// Number of the row above.
         before: u64,
-        /// Of this row.
+        /// Number of this row.
         now: u64,
     },
     /// A byte that is not written as two hexadecimal digits.
@@ -175,9 +175,9 @@ pub enum Reason {
     /// A burst that was taken in another range of the gyroscopes than those before it.
     #[error("the gyro range changes from {before} to {now} deg/s between bursts; give each range its own log")]
     MixedRange {
-        /// Of the bursts above, deg/s.
+        /// Range of the bursts above, deg/s.
         before: u16,
-        /// Of this burst, deg/s.
+        /// Range of this burst, deg/s.
         now: u16,
     },
     /// No row of numbers near the beginning.
@@ -248,7 +248,7 @@ pub enum Reason {
     Format {
         /// Name of the format.
         format: &'static str,
-        /// What its reader says.
+        /// Message of its reader.
         error: Box<str>,
     },
     /// A file that ends early.

@@ -5,7 +5,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering::Relaxed};
 
-/// What a recording is read for.
+/// Purpose of a reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReadPass {
     /// The first rows, which tell the clock of the time stamps: all of a recording that is held in memory.
@@ -67,7 +67,7 @@ impl ReadMonitor {
         self.0.bytes.load(Relaxed)
     }
 
-    /// What the file is read for.
+    /// Purpose of the reading of the file.
     #[must_use]
     pub fn pass(&self) -> ReadPass {
         let passes = [ReadPass::FirstRows, ReadPass::Survey, ReadPass::Samples];

@@ -9,7 +9,7 @@ pub(crate) const ZSTD_MAGIC: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
 const SKIPPABLE: [u8; 3] = [0x2A, 0x4D, 0x18];
 const SKIPPABLE_HEADER: usize = 8;
 
-/// What the frames of `R` hold.
+/// Content of the frames of `R`.
 pub(crate) struct ZstdFrames<R: BufRead> {
     frame: Option<StreamingDecoder<R, FrameDecoder>>,
     input: Option<R>,

@@ -1,4 +1,4 @@
-//! What the numbers of a column show.
+//! Facts of the numbers of a column.
 
 use crate::columns::column_selection::AvailableColumn;
 use crate::columns::unit::Unit;
@@ -21,7 +21,7 @@ const COUNTS_BY_ONE: f64 = 0.9;
 pub(crate) struct ColumnFacts<'a> {
     pub(crate) column: &'a AvailableColumn,
     pub(crate) values: &'a [f64],
-    /// Of the finite values.
+    /// Mean of the finite values.
     pub(crate) mean: f64,
     /// The means of blocks of rows.
     pub(crate) blocks: Vec<f64>,

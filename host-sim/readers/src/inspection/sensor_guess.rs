@@ -12,7 +12,7 @@ use measurement::SensorProfile;
 use std::collections::BTreeMap;
 use time_base::TimeRange;
 
-/// What a column is taken for.
+/// Meaning that is guessed for a column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColumnGuess {
     /// Name of the channel, or `time` or `sample`.
@@ -109,7 +109,7 @@ impl SensorGuess {
         if found.is_empty() {
             let by_format: Vec<Self> = table.sensors.iter().map(|sensor| Self::of_format(sensor, facts)).collect();
             let by_names = Self::by_names(facts);
-            // What lies in several groups of arrays is not seen as a whole by the format.
+            // The format does not see several groups of arrays as a whole.
             let channels = |of: &[Self]| of.iter().map(|sensor| sensor.inertial().count()).max().unwrap_or(0);
             let is_more = table.is_of_arrays && channels(&by_names) > channels(&by_format);
             found = if by_format.is_empty() || is_more { by_names } else { by_format };
@@ -126,7 +126,7 @@ impl SensorGuess {
         Self { name: name.to_owned(), evidence, columns, force: None, rate: None, time: None, is_celsius: false }
     }
 
-    /// What the user says, and the time, which is seldom named.
+    /// The user's statements, and the time, which is seldom named.
     fn by_user(facts: &[ColumnFacts], selection: &ColumnSelection) -> Option<Self> {
         let available: Vec<AvailableColumn> = facts.iter().map(|of| of.column.clone()).collect();
         let mut assigned = selection.assignments(&available);
@@ -273,7 +273,7 @@ impl SensorGuess {
         let own_force = own_force.and_then(|(_, _, unit, _)| unit.map(|unit| unit.name));
         let known_force = force_guess.as_ref().filter(|of| of.is_safe).map(|of| of.unit).or(own_force);
         let rate_guess = lacks_unit(GYROSCOPE).then(|| unit_guess::rate_unit(&rate, known_force));
-        // What the analysis takes without being told is no guess.
+        // A default of the analysis is no guess.
         let time_guess = self.columns.iter().find(|(channel, ..)| *channel == "time").and_then(|&(_, at, unit, _)| {
             let values = facts[at].values;
             let origin = values.first().copied().unwrap_or(0.0);
@@ -320,7 +320,7 @@ impl SensorGuess {
         ACCELEROMETER.contains(&channel).then_some(self.force.as_ref())
     }
 
-    /// What the column at `at` is taken for.
+    /// The guess for the column at `at`.
     pub(crate) fn guess(&self, at: usize) -> Option<ColumnGuess> {
         let &(channel, _, unit, why) = self.columns.iter().find(|(_, own, ..)| *own == at)?;
         let (guessed, reason) = match (self.unit_guess(channel).flatten(), &self.time) {
@@ -372,7 +372,7 @@ impl SensorGuess {
     }
 }
 
-/// What the name of a kind of rows says of their numbers.
+/// Meaning of the name of a kind of rows for their numbers.
 enum RowLabel {
     Force,
     Rate,
@@ -461,7 +461,7 @@ impl Triples {
         let gravity: Vec<usize> = runs.iter().flat_map(all).filter(is_gravity).collect();
         // The longest of several: 9.8 is no bias, 1 may be.
         let longest = gravity.iter().map(|at| length(*at)).fold(0.0, f64::max);
-        // Of those that share a column the one that leaves the most threes of axes beside it, and those the most alike.
+        // Among those that share a column the one that leaves the most threes of axes beside it, and those the most alike.
         let division = |at: usize| {
             let run = runs.iter().find(|run| run.contains(&at)).cloned().unwrap_or_default();
             let threes: Vec<usize> =

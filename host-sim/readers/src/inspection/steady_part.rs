@@ -1,4 +1,4 @@
-//! Where a sensor was steady: the longest run of blocks of rows whose noise is that of the quietest ones.
+//! The part in which a sensor was steady: the longest run of blocks of rows whose noise is that of the quietest ones.
 
 use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::sensor_guess::SensorGuess;

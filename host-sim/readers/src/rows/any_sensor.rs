@@ -3,7 +3,7 @@
 use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ColumnSelection, SelectionError};
 use measurement::SensorProfile;
 
-/// What the user says of a recording.
+/// The user's statements about a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadOptions {
     /// The sensor that was recorded.
@@ -15,7 +15,7 @@ pub struct ReadOptions {
 }
 
 impl ReadOptions {
-    /// Of a recording of `sensor` of which nothing else is said.
+    /// Options for a recording of `sensor` without further statements.
     #[must_use]
     pub fn of_sensor(sensor: SensorProfile) -> Self {
         Self { sensor, selection: ColumnSelection::default(), topic: None }

@@ -181,7 +181,7 @@ const COUNTERS: [u64; 3] = [1 << 8, 1 << 16, 1 << 32];
 /// Part of a counter that may be missing where it begins anew.
 const MOST_MISSING: u64 = 8;
 
-/// What the number of a column is for.
+/// Purpose of the number of a column.
 #[derive(Debug, Clone, Copy)]
 enum Use {
     Time,
@@ -193,7 +193,7 @@ enum Use {
 /// Makes batches of the rows of a file.
 #[derive(Debug)]
 pub(crate) struct BatchBuilder {
-    /// Of each chosen column.
+    /// Use of each chosen column.
     uses: Vec<Use>,
     batch: Batch,
     /// The first time stamp.
@@ -204,7 +204,7 @@ pub(crate) struct BatchBuilder {
     last_index: Option<u64>,
     index_offset: u64,
     rows: u64,
-    /// What the file may cost.
+    /// Budget of the file.
     meter: Option<Meter>,
     backwards: u64,
     /// The first row whose time went back: number of the row, and by how much.
@@ -216,7 +216,7 @@ pub(crate) struct BatchBuilder {
 }
 
 impl BatchBuilder {
-    /// Of rows with these columns; those with a register are checked against their field.
+    /// Batch of rows with these columns; those with a register are checked against their field.
     pub(crate) fn new(chosen: &[ChosenColumn], columns: &[ValueColumn], budget: Option<Budget>) -> Self {
         let mut registers = columns.iter().map(|column| column.register.map(|register| register.limits));
         let uses = chosen.iter().map(|column| match column.role {

@@ -17,7 +17,7 @@ impl Unpadded {
     /// All rows.
     pub const ALL: Self = Self { first: 0, end: u64::MAX };
 
-    /// What is said of `rows` rows, of which only these are used.
+    /// Note on `rows` rows, of which only these are used.
     pub fn note(self, rows: u64) -> String {
         let (before, after) = (self.first, rows - self.end);
         format!(

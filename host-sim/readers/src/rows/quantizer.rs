@@ -1,6 +1,6 @@
 //! Numbers of a file as integer counts, because the analysis sums counts exactly.
 //!
-//! Where the numbers are multiples of a step, that step is the LSB and nothing is lost. Elsewhere the LSB is a power of two far
+//! If the numbers are multiples of a step, that step is the LSB and nothing is lost. Elsewhere the LSB is a power of two far
 //! below the noise: rounding to it adds LSB²/12 to the variance of a sample, at most [`MAX_COST`] of that of the noise.
 
 /// Largest part of the variance of the noise that rounding adds.
@@ -80,7 +80,7 @@ impl ColumnQuantizer {
 
 /// The step that all `values` are multiples of, but for an offset below one step, and the offset; `None` where there is none.
 ///
-/// Of the numbers of a converter the smallest distance of two is one, two or three steps, of others the step is the greatest common divisor
+/// Two numbers of a converter are at least one, two or three steps apart; for others the step is the greatest common divisor
 /// of the distances between neighbours in the order of size. It is refined at growing distances from the median, like a vernier, as long as
 /// every number lies on it.
 pub(crate) fn step(values: &[f64]) -> Option<(f64, f64)> {

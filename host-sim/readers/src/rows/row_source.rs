@@ -32,7 +32,7 @@ pub(crate) enum Refusal {
 pub(crate) struct Ending {
     /// Why there are no more rows, where the file is damaged or ends early.
     pub(crate) damage: Option<String>,
-    /// What the user should know, one sentence each.
+    /// Notes for the user, one sentence each.
     pub(crate) notes: Vec<String>,
 }
 
@@ -44,7 +44,7 @@ pub(crate) trait RowSource: Send {
     /// The rate that the file states beside its rows, Hz.
     fn rate_hz(&self) -> Option<f64>;
 
-    /// What the file may cost, where its rows can be many more than its bytes.
+    /// Budget of the file, where its rows can be many more than its bytes.
     fn budget(&self) -> Option<Budget>;
 
     /// Gives all rows, until one is not taken.
@@ -74,7 +74,7 @@ impl WantedRows {
     }
 }
 
-/// What was read, beside the batches.
+/// Result of the reading, beside the batches.
 #[derive(Debug, Default, Clone, PartialEq)]
 pub struct RowsRead {
     /// Rows of the file.
@@ -87,7 +87,7 @@ pub struct RowsRead {
     pub is_stopped: bool,
     /// Why the file was not read to its end, where it is damaged.
     pub damage: Option<String>,
-    /// What the user should know, one sentence each.
+    /// Notes for the user, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -111,7 +111,7 @@ pub struct PartFilter {
 }
 
 impl PartFilter {
-    /// Of what is wanted of a file that states this rate, Hz.
+    /// Wanted rows of a file that states this rate, Hz.
     #[must_use]
     pub fn new(wanted: WantedRows, file_hz: Option<f64>) -> Self {
         let period_s = wanted.stated_hz.or(file_hz).map(f64::recip);
@@ -172,10 +172,10 @@ pub struct FileRows<'a> {
     monitor: ReadMonitor,
 }
 
-/// What a reading has to give to, and what it has given.
+/// Consumer of a reading, and the rows that it has got.
 struct Delivery<'a> {
     builder: BatchBuilder,
-    /// Of times without a unit, batches that wait for it.
+    /// Batches that wait for the unit of their times.
     waiting: Vec<Batch>,
     waiting_rows: usize,
     time_unit_s: Option<f64>,
@@ -188,7 +188,7 @@ struct Delivery<'a> {
 }
 
 impl<'a> FileRows<'a> {
-    /// Of rows whose channels may be words of registers.
+    /// Layout of rows whose channels may be words of registers.
     pub(crate) fn new(
         file: &'a Path,
         source: Box<dyn RowSource + 'a>,
@@ -263,7 +263,7 @@ impl<'a> FileRows<'a> {
             Ok(())
         });
         monitor.end();
-        // What the consumer refuses comes first: it ended the reading.
+        // The error of the consumer comes first: it ended the reading.
         if let Some(error) = delivery.error.take() {
             return Err(error);
         }

@@ -51,7 +51,7 @@ pub(crate) struct WholeTable {
     pub(crate) rate_hz: Option<f64>,
     /// True if there are more rows than are held.
     pub(crate) is_cut: bool,
-    /// What the user should know, one sentence each.
+    /// Notes for the user, one sentence each.
     pub(crate) notes: Vec<String>,
 }
 

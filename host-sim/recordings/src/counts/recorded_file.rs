@@ -1,4 +1,4 @@
-//! What was on the SPI bus, by this program or by a logic analyzer.
+//! Recordings of the SPI bus, by this program or by a logic analyzer.
 
 use crate::counts::frame_log::{FrameLogReader, HEADER};
 use crate::counts::spi_export::{self, CapturedFrame, SpiExportReader};

@@ -1,4 +1,4 @@
-//! What the numbers of a column show before they become counts.
+//! Survey of the numbers of a column before they become counts.
 
 use crate::batch_source::channel;
 use crate::recording::Verdict;
@@ -150,7 +150,7 @@ impl ColumnSurvey {
     }
 }
 
-/// What the user should know of the counts that stand for the numbers of some channels; `None` where rounding to them costs nothing that
+/// Note on the counts that stand for the numbers of some channels; `None` where rounding to them costs nothing that
 /// counts.
 pub(crate) fn rounding_note<'a>(
     channels: impl Iterator<Item = (&'a ChannelProfile, &'a ColumnQuantizer)>,

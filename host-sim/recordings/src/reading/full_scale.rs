@@ -25,7 +25,7 @@ struct Extreme {
 
 /// Counts the rows at full scale.
 pub(crate) struct FullScale {
-    /// Of each column: its largest number and its smallest one.
+    /// Largest and smallest number of each column.
     extremes: Vec<[Extreme; 2]>,
     /// Rows by the extremes that they have.
     rows: BTreeMap<u128, u64>,

@@ -34,12 +34,12 @@ pub enum WriteError {
     Write(#[from] io::Error),
 }
 
-/// What was written.
+/// The written rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WrittenRows {
     /// Names of the columns.
     pub columns: Vec<String>,
-    /// What the user should know, one sentence each.
+    /// Notes for the user, one sentence each.
     pub notes: Vec<String>,
     /// True if the file was read to its end.
     pub is_complete: bool,

@@ -62,7 +62,7 @@ impl KeptInMemory {
     }
 }
 
-/// What is read of a recording.
+/// Part of a recording that is read.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
     /// The sample rate, Hz, if it is stated: it overrides the one that the time stamps show.
@@ -102,7 +102,7 @@ pub struct SampleStream {
     monitor: ReadMonitor,
 }
 
-/// What is known of the samples before they are used.
+/// Facts of the samples before they are used.
 struct SurveyedSamples {
     /// The samples at the start, or all of a recording that is held in memory.
     beginning: Measurement,
@@ -112,7 +112,7 @@ struct SurveyedSamples {
     is_in_memory: bool,
 }
 
-/// Where the rows are.
+/// Origin of the rows.
 enum Origin<'a> {
     File { input: RecordedInput, options: Box<ReadOptions>, range: Option<GyroRange> },
     Recording(Cow<'a, Recording>),
@@ -143,7 +143,7 @@ impl Origin<'_> {
 }
 
 impl SampleStream {
-    /// What a simulation or a log of the bus recorded.
+    /// The stream of a simulation or of a log of the bus.
     ///
     /// # Errors
     /// It has no time base.
@@ -190,25 +190,25 @@ impl SampleStream {
         self.samples.beginning
     }
 
-    /// What is known of the recording before its samples are used.
+    /// Description of the recording before its samples are used.
     #[must_use]
     pub fn description(&self) -> &RecordingDescription {
         &self.samples.description
     }
 
-    /// What the user should know, one sentence each.
+    /// Notes for the user, one sentence each.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.samples.notes
     }
 
-    /// What was read of the file.
+    /// Rows that were read of the file.
     #[must_use]
     pub fn rows_read(&self) -> &RowsRead {
         &self.survey.read
     }
 
-    /// What the time stamps show; `None` where there are none.
+    /// Quality of the time stamps; `None` where there are none.
     #[must_use]
     pub fn stamps(&self) -> Option<&StampQuality> {
         self.survey.stamps.as_ref()
@@ -278,7 +278,7 @@ fn without_file(error: StreamError) -> TimeBaseError {
     }
 }
 
-/// What was counted of the rows that are placed.
+/// Counts of the rows that are placed.
 #[derive(Debug, Clone, Default)]
 struct Totals {
     /// Place of the first usable sample, and of the last one.
@@ -418,7 +418,7 @@ impl Placer {
         Some(batch)
     }
 
-    /// What the clock has to know of the rows.
+    /// Facts of the rows for the clock.
     fn stamps(&mut self, batch: &Batch) -> Vec<RowStamp> {
         // Without times no row is a repeat.
         let can_repeat = self.can_repeat && !batch.times.is_empty();
@@ -440,7 +440,7 @@ struct StreamedColumn {
     quantizer: Option<ColumnQuantizer>,
 }
 
-/// What the first reading of a recording has found.
+/// Findings of the first reading of a recording.
 struct Survey {
     sensor: SensorProfile,
     unpadded: Unpadded,
@@ -805,7 +805,7 @@ impl Kept {
 pub struct EstimatedTimeBase {
     /// The usable samples.
     pub measurement: Measurement,
-    /// What the time stamps show; `None` where the samples have none.
+    /// Quality of the time stamps; `None` where the samples have none.
     pub stamps: Option<StampQuality>,
 }
 

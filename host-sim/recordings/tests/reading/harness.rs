@@ -202,7 +202,7 @@ fn unwritten(error: WriteError) -> StreamError {
     }
 }
 
-/// What is in a file.
+/// Content of a file.
 pub(crate) fn inspect(file: &Path) -> Vec<InspectedTable> {
     let input = RecordedInput::open(file).unwrap_or_else(|error| panic!("{error}"));
     input.inspect(None, &ColumnSelection::parse(&[], &[]).expect("nothing")).unwrap_or_else(|error| panic!("{error}"))

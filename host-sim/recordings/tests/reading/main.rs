@@ -1,4 +1,4 @@
-//! What is read of a file: its samples, rate and losses, the notes beside them, or the words with which it is refused.
+//! The result of reading a file: its samples, rate and losses, the notes beside them, or the words with which it is refused.
 //!
 //! Every test goes through [`harness::read`], so that a change of the crate's interface changes that one function.
 

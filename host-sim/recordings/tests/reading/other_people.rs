@@ -20,7 +20,7 @@ fn refusal(file: &Path, options: &[&str]) -> String {
     read_file(file, options).err().expect("refused").to_string()
 }
 
-/// What `reference_curves.py` finds with a reader and its argument.
+/// Findings of `reference_curves.py` with a reader and its argument.
 fn reference(test: &str, reader: &str, file: &Path, argument: &str) -> Option<Value> {
     let arguments = [reader, file.to_str().expect("UTF-8"), argument];
     let output = python(test, "host-sim/recordings/tests/reference_curves.py", &arguments)?;
@@ -187,7 +187,7 @@ fn any_column_is_read_by_its_path() {
     }
 }
 
-/// What files are found to hold; their source says the units.
+/// The content of files; their source says the units.
 #[test]
 fn other_peoples_files_are_described() {
     let test = "other_peoples_files_are_described";

@@ -11,7 +11,7 @@ use recordings::sample_stream::{KeptInMemory, Reading, SampleStream};
 use recordings::{Reason, count_table_writer};
 use std::path::Path;
 
-/// What was recorded in memory and the table that is written of it are read in the same blocks.
+/// A recording in memory and the table that is written of it are read in the same blocks.
 #[test]
 fn a_recording_has_the_blocks_of_its_table() {
     const KEPT: KeptInMemory = KeptInMemory { rows: 1 << 14, rows_with_losses: 1 << 14, most_lost: 1.0 };

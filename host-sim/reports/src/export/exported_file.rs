@@ -1,4 +1,4 @@
-//! What an exported file is, which axis it takes, and how it writes numbers.
+//! Form of an exported file, its axis, and how it writes numbers.
 
 /// The number that stands for three axes, where a format has one number a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]

@@ -42,7 +42,7 @@ pub(super) fn allan_deviation_plot(report: &Report, channel: &ChannelReport) -> 
     }
 }
 
-/// What was measured, the baseline model and the model with its effects, both fitted to the first half, and the error of each on the
+/// The measured curve, the baseline model and the model with its effects, both fitted to the first half, and the error of each on the
 /// second; the baseline model alone where the effects do not lower its error.
 pub(super) fn story_plot(report: &Report, channel: &ChannelReport, [before, after]: [f64; 2]) -> Plot {
     let is_lowered = after < before;
@@ -198,7 +198,7 @@ fn is_flat(line: &Line) -> bool {
     line.points.first().map(|of| of.1) == line.points.last().map(|of| of.1)
 }
 
-/// What the models leave, in standard deviations of each point.
+/// Residuals of the models, in standard deviations of each point.
 fn residual_panel(channel: &ChannelReport, has_terms: bool, across: Axis, frame: [f64; 2]) -> Panel {
     let of = |model: &ModelReport| -> Vec<(f64, f64)> {
         let pairs = channel.curve.iter().zip(&model.adev);

@@ -15,7 +15,7 @@ use noise_analysis::report::{ChannelReport, Finding, Report};
 
 /// A line is shown with the frequencies from this part of its own to its inverse.
 const AROUND: f64 = 0.5;
-/// Of the channels of one unit.
+/// Looks of the channels of one unit.
 const LOOKS: [Look; 3] = [Look::Measured, Look::SecondAxis, Look::ThirdAxis];
 /// Bars of a histogram.
 const BARS: usize = 40;
@@ -158,7 +158,7 @@ fn in_time(report: &Report, channel: &ChannelReport, finding: &Finding, at: Opti
     })
 }
 
-/// What a bias follows.
+/// Covariate of a bias.
 struct Covariate<'a> {
     /// Name of its channel.
     name: &'a str,

@@ -34,7 +34,7 @@ pub(super) enum Look {
     Term,
     /// A data sheet, a limit, zero.
     Reference,
-    /// What the channel follows.
+    /// Course that the channel follows.
     Followed,
 }
 
@@ -58,7 +58,7 @@ impl Look {
 pub(super) struct Line {
     pub name: String,
     pub look: Look,
-    /// Where the line is, and its values.
+    /// Points of the line.
     pub points: Vec<(f64, f64)>,
     /// Bounds of each value; empty without.
     pub bounds: Vec<(f64, f64)>,
@@ -148,7 +148,7 @@ pub(crate) struct Plot {
     /// Name of its file and of its element in the page.
     pub id: String,
     pub title: String,
-    /// What is to be seen, in words with numbers.
+    /// Description of the figure, in words with numbers.
     pub description: String,
     pub(super) panels: Vec<Panel>,
 }

@@ -13,13 +13,13 @@ const BRIEF_DIGITS: i32 = 2;
 pub(super) struct Amounts<'a> {
     /// One of every channel.
     pub shown: &'a [ShownEffect<'a>],
-    /// What stands before the number of a channel.
+    /// Text before the number of a channel.
     pub label: Label,
     /// Without intervals.
     pub is_brief: bool,
 }
 
-/// What stands before the number of a channel.
+/// Text before the number of a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Label {
     /// Nothing: there is no other channel.

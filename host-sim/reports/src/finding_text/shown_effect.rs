@@ -1,4 +1,4 @@
-//! What each channel shows of a finding.
+//! Parameters of a finding by channel.
 
 use noise_analysis::effects::Effect;
 use noise_analysis::report::Report;
@@ -12,7 +12,7 @@ pub struct ShownEffect<'a> {
     pub effect: &'a Effect,
 }
 
-/// What every channel shows of the finding at `index`, in the order of the finding's channels.
+/// The effect that every channel shows of the finding at `index`, in the order of the finding's channels.
 #[must_use]
 pub fn shown_effects(report: &Report, index: usize) -> Vec<ShownEffect<'_>> {
     let of_channel = |name: &String| {

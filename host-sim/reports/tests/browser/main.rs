@@ -1,5 +1,5 @@
 //! The page in headless Chromium: what is drawn against the report, both colour schemes, two widths, the keyboard, and that nothing
-//! is requested. Where there is no Chromium the tests say so and pass.
+//! is requested. Without Chromium the tests say so and pass.
 
 use crate::fixture;
 use noise_analysis::bounds::BoundedEstimate;
@@ -83,7 +83,7 @@ fn report() -> Report {
     report
 }
 
-/// What Chromium shows of the page of `report` at each of the widths.
+/// Facts that Chromium shows of the page of `report` at each of the widths.
 fn facts(program: &str, report: &Report, is_dark: bool, widths: &[u32]) -> Vec<Value> {
     let dir = tempfile::tempdir().expect("a folder");
     let page = reports::page::write(report, Some("fan.csv"), dir.path()).expect("a page");
@@ -154,7 +154,7 @@ fn what_is_drawn_is_what_was_measured() {
     };
     let check = |id: &str, name: &str, expected: &[(f64, f64)]| {
         let (panel, values, drawn) = line(id, name);
-        // What was measured octave by octave is points that are not joined.
+        // Points measured octave by octave are not joined.
         let points = [list(&drawn, "points"), list(&drawn, "dots")].concat();
         assert_eq!(points.len(), expected.len(), "{id} {name}");
         assert_eq!(drawn["visible"], true, "{id} {name}");

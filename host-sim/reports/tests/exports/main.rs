@@ -208,7 +208,7 @@ fn formats_with_a_number_for_each_axis_have_their_units() {
     assert_eq!(csv.lines().count(), 1 + 6 * 3);
 }
 
-/// Of a sensor whose slow noise *is* a Gauss-Markov process, KF-GINS and Gazebo get that process: its deviation in deg/h and
+/// From a sensor whose slow noise *is* a Gauss-Markov process, KF-GINS and Gazebo get that process: its deviation in deg/h and
 /// mGal, and the density `s·√(2/T)` of the noise that drives it.
 #[test]
 fn a_gauss_markov_process_is_exported_as_it_is() {

@@ -24,7 +24,7 @@ fn rate(value: f64) -> ChannelEstimate {
     about(value).in_unit("deg/s")
 }
 
-/// What may have a sign, and what is never negative.
+/// Kinds that may have a sign, without those that are never negative.
 fn signed_kinds() -> Vec<fn(f64) -> Effect> {
     vec![
         |size| TemperatureSensitivity { sensitivity: rate(1e-3 * size), sigmas: 9.0 }.into(),

@@ -147,7 +147,7 @@ fn spikes_and_knocks_are_told_with_their_rate_and_the_errors_without_them() {
     }
 }
 
-/// What the analysis knows of the course of a record is in every form of the report.
+/// The course of a record is in every form of the report.
 #[test]
 fn every_report_tells_how_the_noise_changes() {
     let mut report = report();

@@ -165,7 +165,7 @@ fn the_terminal_stays_within_a_hundred_columns() {
     }
 }
 
-/// What a browser shows of a page: the text of its elements, without scripts and styles.
+/// The visible part of a page: the text of its elements, without scripts and styles.
 fn visible(page: &str) -> String {
     let mut text = String::new();
     let mut hidden = None;

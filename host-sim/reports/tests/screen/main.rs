@@ -178,7 +178,7 @@ fn a_condition_has_moved_where_rounding_and_noise_do_not_explain_it() {
     let residue = [1.243e-14, 1.243e-14, 0.0, 1.243e-14];
     assert_eq!(told(0.0, residue, 0.0), "temperature did not change");
     assert_eq!(told(0.01, [0.0; 4], 0.01), "temperature did not change");
-    // Means of 16 s with N = 0.04 °C/√Hz scatter by 0.01 °C. Of four, the highest is above 3.02 of these in half a per cent.
+    // Means of 16 s with N = 0.04 °C/√Hz scatter by 0.01 °C. The highest of four is above 3.02 of these in half a per cent.
     let half = 0.0302;
     assert_eq!(told(0.01, [0.0, 0.99 * half, -0.99 * half, 0.0], 0.04), "temperature constant within its noise");
     assert_eq!(told(0.01, [0.0, 1.01 * half, -1.01 * half, 0.0], 0.04), "temperature moved by 0.061 °C");
@@ -300,7 +300,7 @@ fn departures_at_one_place_are_told_together() {
     assert_eq!(reports::summary::unexplained(&report).len(), 1);
 }
 
-/// What a record may not tell of the part's clock and filter.
+/// Each fact that a record may not tell of the part's clock and filter.
 fn every_note() -> Vec<PartNote> {
     let sample_rate_hz = BoundedEstimate { value: 90.8, low: 90.7, high: 90.9 };
     vec![
@@ -418,7 +418,7 @@ fn a_record_too_short_for_a_model_says_what_it_is_good_for() {
     );
     assert!(told(&short([[0.0; 3]; 2])).ends_with("5.0 s: too short for N, B, K and a filter."));
     assert!(reports::summary::nothing_found(&rough).contains("strong effects only"));
-    // What a model contradicts is not nothing.
+    // A contradicted model is not nothing.
     let mut contradicted = rough.clone();
     let error = &mut contradicted.channels[0].after.unseen;
     (error.worst_sigma, error.worst_tau_s, error.worst_ratio) = (Some(46.0), Some(0.01), Some(1.3));

@@ -74,7 +74,7 @@ fn measured(core: Core, call: &str, metric: &str) -> Option<f64> {
         return is_m4f.then(|| f64::from(driver_footprint::call_bytes(driver_footprint::M4F, call)));
     }
     let name = match (call, metric) {
-        // Of the image that counts records of sensor noise, on the Cortex-M4F alone.
+        // The image that counts records of sensor noise, on the Cortex-M4F alone.
         ("trace::trace", "average") => "trace_nothing".into(),
         ("trace::trace", "most") => "trace_tone".into(),
         ("trace::trace", "stack") => "trace_tone_stack".into(),

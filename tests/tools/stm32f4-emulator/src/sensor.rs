@@ -48,7 +48,7 @@ impl Sensor {
         }
     }
 
-    /// What the sensor has seen until now.
+    /// Record of the sensor until now.
     pub(crate) fn record(&self) -> BusRecord {
         let violations = self.part.violations().iter().map(ToString::to_string).collect();
         BusRecord { samples: self.part.samples(), violations, ..self.record.clone() }

@@ -65,7 +65,7 @@ pub(super) fn hide(stretch: &Measurement, effect: &HiddenEffect, seed: u64) -> M
     changed
 }
 
-/// Of each sample whether it is the one before, read again: the channels of `quantity` all equal those of the sample before, and at
+/// For each sample, true if it is the one before, read again: the channels of `quantity` all equal those of the sample before, and at
 /// least twice as many samples do so as by chance, as those do that are [`BY_CHANCE`] apart.
 fn read_again(stretch: &Measurement, quantity: Quantity) -> Vec<bool> {
     let of_quantity = || stretch.channels.iter().filter(|channel| channel.profile.quantity == quantity);

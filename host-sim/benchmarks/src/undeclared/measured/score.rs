@@ -17,17 +17,17 @@ pub(super) const FAILS: f64 = 3.0;
 /// samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MeasuredErrors {
-    /// Of N, B and K, with the effect.
+    /// Deviance of N, B and K, with the effect.
     pub before: Option<f64>,
-    /// Of the model with the added terms, with the effect.
+    /// Deviance of the model with the added terms, with the effect.
     pub after: Option<f64>,
     /// The same two without what the rules of the first half exclude.
     pub excluding: [Option<f64>; 2],
-    /// Of the curve of the first half taken for a model, with the effect.
+    /// Deviance of the curve of the first half taken for a model, with the effect.
     pub first_half_curve: Option<f64>,
-    /// Of N, B and K, untouched.
+    /// Deviance of N, B and K, untouched.
     pub untouched_before: Option<f64>,
-    /// Of the model with the added terms, untouched.
+    /// Deviance of the model with the added terms, untouched.
     pub untouched_after: Option<f64>,
 }
 
@@ -38,7 +38,7 @@ pub struct MeasuredScore {
     pub recording: String,
     /// Start of the stretch, s from the first sample of the recording.
     pub from_s: f64,
-    /// What was hidden.
+    /// Kind of the hidden effect.
     pub kind: HiddenKind,
     /// Names of the channels that it is in.
     pub channels: Vec<&'static str>,
@@ -47,7 +47,7 @@ pub struct MeasuredScore {
     /// True if it was named; of an effect that the analysis was not made for, whether it is reported as unexplained or by a name that
     /// describes it.
     pub named: bool,
-    /// What the report says in the channels of the effect, as `channel: kind`.
+    /// Findings of the report in the channels of the effect, as `channel: kind`.
     pub found: Vec<String>,
     /// Names that the report gives and the report of the untouched stretch does not, other than the right one, as `channel: kind`.
     pub wrong_names: Vec<String>,

@@ -38,7 +38,7 @@ pub(super) struct Stretch<'a> {
     pub(super) seed: u64,
     pub(super) from_s: f64,
     pub(super) samples: Measurement,
-    /// Of its gyros and accelerometers.
+    /// Noise of its gyros and accelerometers.
     pub(super) noise: NoiseEstimate,
     pub(super) report: Report,
 }

@@ -13,7 +13,7 @@ use std::io::{self, Write};
 pub struct MeasuredNoiseTable {
     /// Kinds that no channel of a stretch could have at the strength that was asked for, one entry a stretch.
     pub not_hidden: Vec<HiddenKind>,
-    /// Of those that were hidden.
+    /// Scores of the hidden effects.
     pub scores: Vec<MeasuredScore>,
 }
 

@@ -94,7 +94,7 @@ fn every_kind_is_hidden_in_every_stretch_or_counted() {
     assert_eq!(table.scores.len() + table.not_hidden.len(), HiddenKind::ALL.len());
     assert!(table.not_hidden.len() <= 3, "{:?}", table.not_hidden);
     assert!(table.scores.iter().all(|score| score.strength >= 0.95 * 3.0));
-    // Of eleven effects of three times the limit the analysis names at least half.
+    // The analysis names at least half of eleven effects of three times the limit.
     assert!(2 * table.named().yes >= table.named().all, "{:?}", table.named());
     let mut text = Vec::new();
     table.write(&mut text).expect("text");
