@@ -3,6 +3,7 @@
 use crate::samples::series::Series;
 use nalgebra::DVector;
 
+/// Number of blocks in a record.
 pub const BLOCKS: usize = 128;
 const LEAST_FILL: f64 = 0.25;
 const FEWEST_SLOTS: u64 = 16;
@@ -20,6 +21,7 @@ pub struct BlockMeans {
 }
 
 impl BlockMeans {
+    /// `None` with fewer than 16 sample periods a block, with too many gaps, or if the means never change.
     pub fn from_series(series: &Series) -> Option<Self> {
         let width = (series.slots.last()? + 1) / BLOCKS as u64;
         if width < FEWEST_SLOTS {
@@ -46,6 +48,7 @@ impl BlockMeans {
         })
     }
 
+    /// Regressor of a ramp: means of a bias that rises by 1 from one block to the next.
     pub fn ramp(&self) -> DVector<f64> {
         DVector::from_iterator(self.numbers.len(), self.numbers.iter().map(|&number| number as f64))
     }

@@ -14,6 +14,7 @@ const COLLINEAR: f64 = 1e-6;
 
 const HALVINGS: usize = 16;
 
+/// Coefficient of a regressor that is fitted together with others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RegressionEstimate {
     /// In the unit of the means over that of the regressor.

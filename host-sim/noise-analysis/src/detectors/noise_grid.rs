@@ -15,8 +15,10 @@ const FLICKER: (f64, usize) = (1e-2, 8);
 const WALK: (f64, usize) = (1e-5, 16);
 const FILL_STEP: f64 = 1.0 / 64.0;
 
+/// The covariances of all mixtures for one set of blocks.
 pub type NoiseGrid = Arc<Vec<NoiseFamily>>;
 
+/// The mixtures with one ratio of flicker to white noise.
 pub struct NoiseFamily {
     /// Column `b`: coordinates of a 1 in block `b`.
     basis: DMatrix<f64>,
@@ -150,6 +152,7 @@ impl StepInformation {
     }
 }
 
+/// The grids of a recording's channels: one per set of blocks, computed once.
 #[derive(Default)]
 pub struct NoiseGrids {
     known: Mutex<Vec<(Layout, NoiseGrid)>>,
@@ -159,6 +162,7 @@ pub struct NoiseGrids {
 type Layout = (Vec<usize>, Vec<u32>);
 
 impl NoiseGrids {
+    /// The grid for these blocks.
     pub fn get(&self, blocks: &BlockMeans) -> NoiseGrid {
         static WITHOUT_GAPS: OnceLock<NoiseGrid> = OnceLock::new();
         let fills: Vec<u32> = blocks.fills.iter().map(|fill| (fill / FILL_STEP).round() as u32).collect();
