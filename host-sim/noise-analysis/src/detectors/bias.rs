@@ -202,7 +202,7 @@ fn linear_part(
     Some(Accepted { candidate: Candidate::Regressor(*index), regressor: regressor.clone(), p_value })
 }
 
-/// Whether the block means of a regressor span at least one count; smaller changes are rounding.
+/// True if the block means of a regressor span at least one count; smaller changes are rounding.
 fn varies(means: &DVector<f64>, regressor: &Series) -> bool {
     means.max() - means.min() >= regressor.resolution
 }

@@ -109,7 +109,7 @@ impl<'a> GlsRegression<'a> {
         (0..self.blocks.means.len()).map(step).collect()
     }
 
-    /// Whether any of these may have a p-value below `limit`.
+    /// True if any of these may have a p-value below `limit`.
     pub(super) fn any_step_may_be_below(&self, limit: f64) -> bool {
         let least_part = self.least_part(limit);
         self.families.iter().any(|family| family.any_step_explains(least_part))
@@ -129,7 +129,7 @@ impl<'a> GlsRegression<'a> {
         self.sizes(regressors).into_iter().map(estimate).collect()
     }
 
-    /// Whether a regressor explains more than this part of the weighted sum of squares under any mixture.
+    /// True if a regressor explains more than this part of the weighted sum of squares under any mixture.
     fn reaches(&self, part: f64, sizes: &[SizeAndInformation]) -> bool {
         self.fits().zip(sizes).any(|(fit, at)| fit.is_explained(part, *at))
     }

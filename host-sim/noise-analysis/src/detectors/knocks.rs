@@ -75,7 +75,7 @@ struct Scale {
 struct Blocks {
     size: usize,
     freedoms: Vec<BlockFreedom>,
-    /// Whether levels of one length wander, also without the loudest stretch, which may be a knock.
+    /// True if levels of one length wander, also without the loudest stretch, which may be a knock.
     moves: bool,
 }
 
@@ -182,7 +182,7 @@ impl KnockRule {
         Self { scales, floor }
     }
 
-    /// Whether [`Moving::OwnLength`] and [`Moving::AnyLength`] differ.
+    /// True if [`Moving::OwnLength`] and [`Moving::AnyLength`] differ.
     fn moves_at_other_lengths(&self) -> bool {
         self.scales.iter().any(|scale| scale.moving.is_some())
     }
@@ -293,7 +293,7 @@ impl KnockRule {
         (loud, tested)
     }
 
-    /// Whether the smaller half of the squares is too large as well, unlike at jumps of the bias.
+    /// True if the smaller half of the squares is too large as well, unlike at jumps of the bias.
     fn is_loud_throughout(&self, block: &LoudBlock, differences: &SquaredDifferences) -> bool {
         let size = block.differences.len();
         let (at, from) = (block.differences.start / size, block.differences.start % size);
@@ -308,7 +308,7 @@ impl KnockRule {
         exceedance(level / quiet.max(self.floor), freedom, others) < SIGNIFICANCE_THROUGHOUT
     }
 
-    /// Whether a wandering level explains the loudness in these sample periods.
+    /// True if a wandering level explains the loudness in these sample periods.
     pub(crate) fn moves_by_itself(&self, series: &Series, slots: &Range<u64>) -> bool {
         let of_scale = |scale: &Scale| {
             let Blocks { size, freedoms, .. } = &scale.blocks[0];
@@ -515,7 +515,7 @@ impl Knock {
         knocks.sort_by_key(|knock| knock.slots.start);
     }
 
-    /// Whether the gap is less than the length of the shorter.
+    /// True if the gap is less than the length of the shorter.
     fn is_near(&self, other: &Self) -> bool {
         let length = |knock: &Self| knock.slots.end - knock.slots.start;
         let reach = length(self).min(length(other));

@@ -57,7 +57,7 @@ pub(crate) fn find(series: &UniformSeries, unit: &'static str, correlation_times
     found
 }
 
-/// Whether a Gaussian process is [`TOLD_APART`] times as likely; correlation time in s.
+/// True if a Gaussian process is [`TOLD_APART`] times as likely; correlation time in s.
 #[must_use]
 pub(crate) fn is_gaussian(series: &UniformSeries, deviation: f64, time_constant: f64) -> bool {
     let size = ((time_constant / RESOLVED / series.sample_period()) as usize).max(1);
@@ -68,7 +68,7 @@ pub(crate) fn is_gaussian(series: &UniformSeries, deviation: f64, time_constant:
     gauss_markov_log_likelihood(&means) - levels.log_likelihood > TOLD_APART.ln()
 }
 
-/// Whether changes up and down over `time_constant`/4 s are alike, unlike those of decaying disturbances. Σd³ over √Σd⁶
+/// True if changes up and down over `time_constant`/4 s are alike, unlike those of decaying disturbances. Σd³ over √Σd⁶
 /// is then about standard normal.
 #[must_use]
 pub(crate) fn is_reversible(series: &UniformSeries, time_constant: f64) -> bool {
@@ -82,7 +82,7 @@ pub(crate) fn is_reversible(series: &UniformSeries, time_constant: f64) -> bool 
     sixths <= 0.0 || cubes.abs() < quantile(0.5 * REFUTED) * sixths.sqrt()
 }
 
-/// Whether visits of at most one sample explain `spikes`: `ab`·(sample period) a second, for the jump rates `a`, `b`.
+/// True if visits of at most one sample explain `spikes`: `ab`·(sample period) a second, for the jump rates `a`, `b`.
 #[must_use]
 pub(crate) fn explains_spikes(telegraph: &TelegraphNoise, spikes: &Spikes, sample_period: f64) -> bool {
     let visits_per_hour =
@@ -142,7 +142,7 @@ fn largest_variance(chain: &TwoStateChain, parts: &PartMeans) -> f64 {
     WHITE_FACTOR * parts.white + SLOW_FRACTION * chain.distance().powi(2)
 }
 
-/// Whether the means stay constant between jumps, unlike those of decaying disturbances.
+/// True if the means stay constant between jumps, unlike those of decaying disturbances.
 fn stays_at_levels(chain: &TwoStateChain, parts: &PartMeans) -> bool {
     let variance = largest_variance(chain, parts);
     let is_up: Vec<bool> = parts.means.iter().map(|mean| chain.is_upper(*mean)).collect();

@@ -70,9 +70,9 @@ struct FoundSpike {
     size: f64,
     /// In standard deviations.
     sigmas: f64,
-    /// Whether it is a filter's response to an earlier spike.
+    /// True if it is a filter's response to an earlier spike.
     is_response: bool,
-    /// Whether it stands out of the noise around it.
+    /// True if it stands out of the noise around it.
     stands_out: bool,
 }
 
@@ -81,7 +81,7 @@ struct FilteredSpike {
     /// In the channel's unit.
     size: f64,
     sigmas: f64,
-    /// Whether it is a remainder of the response to a larger one.
+    /// True if it is a remainder of the response to a larger one.
     is_response: bool,
 }
 
@@ -282,7 +282,7 @@ impl SpikeRule {
         known.iter().filter_map(part).collect()
     }
 
-    /// Whether chance finds as many, or one as large, in `samples` samples with less than [`SIGNIFICANCE`].
+    /// True if chance finds as many, or one as large, in `samples` samples with less than [`SIGNIFICANCE`].
     fn is_beyond_chance(&self, found: &FoundSpikes, samples: u64) -> bool {
         let large = quantile(0.5 * SIGNIFICANCE / samples as f64);
         found.independent() > 1 || found.spikes.iter().any(|spike| spike.sigmas > large)

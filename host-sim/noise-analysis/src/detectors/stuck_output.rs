@@ -212,7 +212,7 @@ impl StuckRuns {
 struct Change {
     position: usize,
     count: i32,
-    /// Whether the sample a lag after it is equal to it.
+    /// True if the sample a lag after it is equal to it.
     is_kept: bool,
     is_by_one: bool,
 }

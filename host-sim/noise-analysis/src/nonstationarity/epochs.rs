@@ -227,7 +227,7 @@ impl Stationarity {
         Some(Self { p_value: (clearest.p_value * octaves.len() as f64).min(1.0), ..*clearest })
     }
 
-    /// Whether the stretches have different noise.
+    /// True if the stretches have different noise.
     #[must_use]
     pub fn is_nonstationary(&self) -> bool {
         self.p_value < SIGNIFICANCE

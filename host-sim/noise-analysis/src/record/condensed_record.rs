@@ -35,7 +35,7 @@ pub(crate) type FasterLines = Arc<LazyLock<Vec<MergedLine>, Box<dyn FnOnce() -> 
 pub(crate) struct CondensedChannel {
     pub samples: SampleCurves,
     pub counts_per_step: u32,
-    /// Whether spikes can be sought: not in means, and not in values that are cut off.
+    /// True if spikes can be sought: not in means, and not in values that are cut off.
     pub can_show_spikes: bool,
     pub faster_lines: FasterLines,
     /// Lines of the first half alone.

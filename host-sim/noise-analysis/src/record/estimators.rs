@@ -371,7 +371,7 @@ struct RecordedSamples<'a> {
     channel: &'a MeasuredChannel,
     origin: i32,
     is_excluded: Vec<bool>,
-    /// Whether an offset is subtracted from any sample.
+    /// True if an offset is subtracted from any sample.
     is_corrected: bool,
 }
 

@@ -109,7 +109,7 @@ impl FastFindings {
     }
 }
 
-/// Whether only the samples themselves show an effect, the first ones as well as all.
+/// True if only the samples themselves show an effect, the first ones as well as all.
 fn is_fast(effect: &Effect) -> bool {
     matches!(
         effect,

@@ -95,7 +95,7 @@ impl Preprocessing {
         if exclusion == Exclusion::Nothing { None } else { Some(&self.shown(exclusion)?.channels[channel].bias) }
     }
 
-    /// Whether `exclusion` drops samples of a channel beyond repeated ones.
+    /// True if `exclusion` drops samples of a channel beyond repeated ones.
     pub(crate) fn excludes(&self, channel: ChannelId, exclusion: Exclusion) -> bool {
         !self.events(channel, exclusion).is_empty()
     }
@@ -105,7 +105,7 @@ impl Preprocessing {
         shown.map(|shown| shown.channels[channel].events()).unwrap_or_default()
     }
 
-    /// Whether two exclusions leave a channel the same series.
+    /// True if two exclusions leave a channel the same series.
     pub(crate) fn leaves_the_same(&self, channel: ChannelId, one: Exclusion, other: Exclusion) -> bool {
         let subtracted = |exclusion| {
             let bias = self.bias(channel, exclusion);
@@ -137,7 +137,7 @@ impl Preprocessing {
         causes.map(|(cause, slots)| (cause, slots.len() as u64)).into_iter().filter(|(_, count)| *count > 0)
     }
 
-    /// Whether samples of a channel are corrected.
+    /// True if samples of a channel are corrected.
     pub(crate) fn corrects(&self, channel: ChannelId, exclusion: Exclusion) -> bool {
         self.bias(channel, exclusion).is_some_and(|bias| bias.offset.is_some() || !bias.responses.is_empty())
     }
@@ -402,7 +402,7 @@ fn merged(lists: [&[u64]; 2]) -> Vec<u64> {
     all
 }
 
-/// Whether the bias of `channel` may depend on `regressor`: temperature, supply, and for a gyroscope the specific
+/// True if the bias of `channel` may depend on `regressor`: temperature, supply, and for a gyroscope the specific
 /// force.
 fn may_depend(measurement: &Measurement, channel: ChannelId, regressor: ChannelId) -> bool {
     let [channel, regressor] = [channel, regressor].map(|of| measurement[of].profile.quantity);

@@ -29,7 +29,7 @@ pub(crate) struct SampleCurves {
     pub screened: Parts,
     pub middle: u64,
     pub spectra: PartSpectra,
-    /// Whether the screen drops a sample of the whole record, and of its first half.
+    /// True if the screen drops a sample of the whole record, and of its first half.
     pub is_screened: bool,
     pub is_first_half_screened: bool,
     pub period_s: f64,

@@ -45,7 +45,7 @@ impl SampleEffects {
         all.filter(|_| *is_inertial).map(|detection| &detection.effect)
     }
 
-    /// Whether values are cut off: then spikes cannot be told from noise.
+    /// True if values are cut off: then spikes cannot be told from noise.
     pub(crate) fn is_saturated(&self, channel: ChannelId) -> bool {
         self.of(channel).any(|effect| matches!(effect, Effect::Saturation(_)))
     }

@@ -115,7 +115,7 @@ pub(crate) fn dithered_avar(of_samples: f64, n: u64) -> f64 {
     of_samples - ROUNDING * (1.0 - 1.0 / n as f64)
 }
 
-/// Whether the noise of the first `octaves` dithers counts of `resolution`; `of_samples` as in [`dithered_avar`].
+/// True if the noise of the first `octaves` dithers counts of `resolution`; `of_samples` as in [`dithered_avar`].
 pub(crate) fn is_dithered(curve: &Curve<OCTAVES>, resolution: f64, of_samples: f64, octaves: usize) -> bool {
     let exceeds = |at: &AllanPoint| at.avar > dithered_avar(of_samples, at.n) * resolution * resolution;
     curve.points().iter().take(octaves).any(exceeds)

@@ -145,13 +145,13 @@ impl Series {
         }
     }
 
-    /// Whether no sample is missing from `first` to `last`.
+    /// True if no sample is missing from `first` to `last`.
     pub fn is_gapless(&self, first: usize, last: usize) -> bool {
         self.slots[last] - self.slots[first] == (last - first) as u64
     }
 }
 
-/// Whether each of ascending sample periods is in `slots`, also ascending.
+/// True if each of ascending sample periods is in `slots`, also ascending.
 fn membership(slots: &[u64]) -> impl FnMut(u64) -> bool {
     let mut rest = slots;
     move |slot| {
