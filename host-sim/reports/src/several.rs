@@ -1,4 +1,4 @@
-//! Several recordings of one sensor in the terminal: whether they show the same noise, and the inflation while a machine runs.
+//! Several recordings of one sensor: agreement, and inflation while a machine runs.
 
 use crate::formatting::number;
 use crate::rounding::probability;
@@ -6,7 +6,7 @@ use comfy_table::{Table, presets};
 use noise_analysis::report::several::{NoiseAgreement, NoiseInflation};
 use std::io::{self, Write};
 
-/// Writes one row a channel: the verdict, its p-value, where the recordings differ most, and the joint coefficients.
+/// One row per channel: verdict, p-value, largest difference, joint coefficients.
 ///
 /// # Errors
 /// As `out` does.
@@ -51,7 +51,7 @@ pub fn write_agreement(agreement: &NoiseAgreement, out: &mut impl Write) -> io::
     writeln!(out, "{table}")
 }
 
-/// Writes one row a channel and octave.
+/// One row per channel and octave.
 ///
 /// # Errors
 /// As `out` does.
