@@ -22,7 +22,7 @@ const SLOW_HZ: f64 = 0.2;
 const CYCLING: &str =
     "Look for what cycles at this period, such as a thermostat, an air conditioner or a load on the supply";
 
-/// What is said of a finding.
+/// A finding in words.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FindingText {
     /// The channels that show it, such as `gyro z` or `accel x y`.

@@ -39,7 +39,7 @@ pub fn rows_left_out(dropped: &BTreeMap<&'static str, u64>, outside_part: u64, p
 /// Options of the reading.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ReadingOptions<'a> {
-    /// Of a file with several.
+    /// For a file with several.
     pub topic: Option<&'a str>,
     /// Each as in `gyro_x=wx`.
     pub columns: &'a [String],

@@ -44,7 +44,7 @@ pub struct ReportRow {
     pub high: Option<f64>,
     /// Such as `deg/sqrt(s)`.
     pub unit: Option<String>,
-    /// Of a finding on the second half: `yes`, `no` or `untestable`.
+    /// For a finding on the second half: `yes`, `no` or `untestable`.
     pub validated: Option<String>,
     /// Number of the finding in the report, from 0.
     pub finding: Option<u64>,

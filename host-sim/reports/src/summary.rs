@@ -223,7 +223,7 @@ pub fn coefficient(channel: &ChannelReport, kind: &str) -> Option<Parameter> {
     Some(Parameter::new(value, low, high, unit))
 }
 
-/// Of the models `before` and `after` on the unseen half as recorded.
+/// For the models `before` and `after` on the unseen half as recorded.
 pub(crate) fn unseen_errors(channel: &ChannelReport) -> [Option<f64>; 2] {
     [&channel.before, &channel.after].map(|model| model.unseen.deviance_per_point)
 }

@@ -1,4 +1,4 @@
-//! The results as text for the terminal.
+//! The results as text.
 
 use super::bias_and_scatter::{OctaveScatter, ReproductionResult};
 use super::four_methods::FourMethods;

@@ -283,7 +283,7 @@ fn assert_knocks_are_found(lost: f64) {
         assert!(share > 0.9, "{length_s} s at {level}: {share}");
         assert!(outside < 0.5 + 0.3 * length_s, "{length_s} s at {level}: {outside} s too many");
     }
-    // Of 15 intervals of 95 %, more than three miss once in 200 times.
+    // In 15 intervals of 95 %, more than three miss once in 200 times.
     assert!(covered >= all - 3, "{covered} of {all}");
 }
 

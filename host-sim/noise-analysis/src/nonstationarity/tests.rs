@@ -284,7 +284,7 @@ fn coverage(level: impl Fn(&mut ChaCha8Rng, usize) -> f64) -> f64 {
 
 #[test]
 fn prediction_intervals_hold_in_95_percent_of_octaves() {
-    // Of 3,840 octaves, correlated within an epoch, the share has a standard deviation of at most √6·0.35 % = 0.9 %. ±2
+    // In 3,840 octaves, correlated within an epoch, the share has a standard deviation of at most √6·0.35 % = 0.9 %. ±2
     // % are two of these.
     let still = coverage(|_, _| 1.0);
     assert!((0.93..0.97).contains(&still), "constant: {still}");

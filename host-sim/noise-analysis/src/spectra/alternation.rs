@@ -117,7 +117,7 @@ mod tests {
         assert!(sum < 45.3, "{sum}");
     }
 
-    /// Of 2,000 records, two or more have a probability of 8·10⁻⁴.
+    /// For 2,000 records, two or more have a probability of 8·10⁻⁴.
     #[test]
     fn noise_has_none() {
         let found = (0..2000).filter(|seed| line(*seed, 0.0).is_some()).count();

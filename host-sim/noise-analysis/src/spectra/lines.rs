@@ -192,7 +192,7 @@ struct SlowSine {
     level: UniformSeries,
     /// Sum of the slow ordinates.
     slow: f64,
-    /// Of padded ordinates, Hz.
+    /// For padded ordinates, Hz.
     spacing: f64,
     sine: Sine,
 }

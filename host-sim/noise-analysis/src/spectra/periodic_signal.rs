@@ -46,7 +46,7 @@ const LEAST_FUNDAMENTAL: f64 = 4.0;
 pub(crate) struct PeriodicSignal {
     /// Fundamental, Hz.
     pub frequency: BoundedEstimate,
-    /// Of the fundamental, in the unit of the series.
+    /// For the fundamental, in the unit of the series.
     pub amplitude: BoundedEstimate,
     /// From the second to the last significant one; 0 below the noise.
     pub harmonics: Vec<f64>,

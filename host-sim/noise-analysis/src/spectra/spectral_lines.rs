@@ -46,9 +46,9 @@ pub(crate) struct MergedLine {
     pub deviation: MeasuredValue,
     /// Full width at half maximum, Hz; 0 or the scatter of the peaks if unresolved.
     pub width: MeasuredValue,
-    /// Of the strongest peak: −2 log-likelihood ratio.
+    /// For the strongest peak: −2 log-likelihood ratio.
     pub statistic: f64,
-    /// Of the strongest peak at any frequency, without lines.
+    /// For the strongest peak at any frequency, without lines.
     pub p_value: f64,
     /// p-value of the strongest peak as a resonance.
     pub shape_p_value: f64,

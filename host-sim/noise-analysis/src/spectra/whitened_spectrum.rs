@@ -78,7 +78,7 @@ impl Spectrum {
 pub struct SpectralLine {
     /// Hz.
     pub frequency: MeasuredValue,
-    /// Of the line's signal, in the unit of the series: 1/√2 of a sinusoid's amplitude.
+    /// For the line's signal, in the unit of the series: 1/√2 of a sinusoid's amplitude.
     pub deviation: MeasuredValue,
     /// Full width at half maximum, Hz; `None` for a sinusoid.
     pub width: Option<MeasuredValue>,
