@@ -24,7 +24,6 @@ pub struct ContradictionPlan {
     pub records: u64,
     /// Length of a record, s.
     pub seconds: f64,
-    /// Seed of the first record.
     pub first_seed: u64,
     pub jobs: usize,
 }

@@ -21,7 +21,6 @@ use std::convert::Infallible;
 /// How many records to simulate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LossPlan {
-    /// Per noise.
     pub records: u64,
     /// Samples of each record; a power of two.
     pub samples: usize,

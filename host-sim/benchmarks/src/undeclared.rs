@@ -47,7 +47,6 @@ pub const SEEDS_PER_GROUP: u64 = 1 << 20;
 #[derive(Debug, Clone, PartialEq)]
 pub struct UndeclaredPlan {
     pub kinds: Vec<EffectKind>,
-    /// Recordings per kind.
     pub per_kind: u64,
     pub empty: u64,
     pub pairs: u64,
@@ -60,7 +59,6 @@ pub struct UndeclaredPlan {
     pub loss_percent: f64,
     /// First seed of each group; all seeds stay below [`SEEDS_PER_GROUP`].
     pub seed: u64,
-    /// True for sealed seeds.
     pub sealed: bool,
     pub jobs: usize,
 }

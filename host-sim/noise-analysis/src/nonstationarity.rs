@@ -73,7 +73,6 @@ pub struct EpochParameters {
     pub from_s: f64,
     /// Variance of the white noise over that of `after`.
     pub white_noise_ratio: f64,
-    /// Standard deviation of it.
     pub white_noise_error: f64,
     /// Frequency of the moving line, Hz; absent without one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -109,7 +108,6 @@ impl ChannelEpochs {
         Self { part: FittedPart::select(quarters), quarters, curves }
     }
 
-    /// The earlier first.
     pub(crate) fn quarter_curves(&self) -> &[Curve<OCTAVES>; 2] {
         &self.curves.quarters
     }

@@ -20,7 +20,6 @@ pub const SLOPES: [(&str, &str, &str); 3] = [
 /// A coefficient by both methods.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoefficientRow<'a> {
-    /// Name in the JSON schema.
     pub kind: &'static str,
     /// Letter in formulas; empty for a term that is not of the baseline model.
     pub symbol: &'static str,

@@ -40,7 +40,6 @@ pub enum ComparisonError {
 /// A comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// One row a coefficient.
     pub coefficients: Vec<ComparedCoefficient>,
 }
 
@@ -49,11 +48,8 @@ pub struct Comparison {
 pub struct ComparedCoefficient {
     pub channel: String,
     pub kind: String,
-    /// Unit of both.
     pub unit: String,
-    /// Reference.
     pub first: Bounded,
-    /// Compared value.
     pub second: Bounded,
     /// Sign of the difference, if significant.
     pub verdict: Verdict,
@@ -64,11 +60,8 @@ pub struct ComparedCoefficient {
 /// An estimate with its 95 % bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Bounded {
-    /// Estimate.
     pub value: f64,
-    /// Lower bound.
     pub low: f64,
-    /// Upper bound.
     pub high: f64,
 }
 

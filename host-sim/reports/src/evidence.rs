@@ -12,7 +12,6 @@ use noise_analysis::report::Finding;
 /// A sentence on the evidence, in two parts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct EvidenceText {
-    /// Measured values.
     pub measured: String,
     /// The rest with the sign between; may be empty.
     pub rest: String,

@@ -27,7 +27,6 @@ const CYCLING: &str =
 pub struct FindingText {
     /// The channels that show it, such as `gyro z` or `accel x y`.
     pub channels: String,
-    /// Number of these channels.
     pub channel_count: usize,
     /// The cause, with the size in each channel.
     pub physics: String,
@@ -42,7 +41,6 @@ pub struct FindingText {
 }
 
 struct Advice {
-    /// Without a full stop.
     first: &'static str,
     /// With the sign that ends the first.
     rest: String,

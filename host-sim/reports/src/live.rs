@@ -11,7 +11,6 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Borders, Chart, Dataset, GraphType, Paragraph, Wrap};
 
-/// Columns of the tables.
 const TABLE_COLUMNS: usize = 80;
 /// Least rows of a screen with the data sheet's row.
 const ROWS_FOR_SHEET: u16 = 30;
@@ -20,7 +19,6 @@ const ROWS_FOR_SHEET: u16 = 30;
 #[derive(Debug, Clone, PartialEq)]
 pub struct LiveCurve {
     pub channel: String,
-    /// Unit of the deviation.
     pub unit: String,
     /// Averaging time, s, and deviation.
     pub points: Vec<(f64, f64)>,
@@ -57,7 +55,6 @@ impl CurveGroup {
 pub struct LiveView {
     /// Part, source, samples, length.
     pub headline: String,
-    /// The record in sentences.
     pub sentences: String,
     /// Coefficients of the gyros and of the accelerometers.
     pub tables: Vec<CoefficientTable>,
@@ -67,9 +64,7 @@ pub struct LiveView {
     pub unexplained: Vec<String>,
     /// Departures from the model, and advice.
     pub advice: Vec<String>,
-    /// Counters of the source.
     pub health: String,
-    /// State of the source.
     pub status: String,
 }
 

@@ -47,7 +47,6 @@ pub fn first_screen(report: &Report, source: Option<&str>, reading: Option<&Read
     render(report, source, reading, Extent::FirstScreen).into_string()
 }
 
-/// Extent of the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Extent {
     Whole,
@@ -58,7 +57,6 @@ enum Extent {
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write the page {}: {reason}", path.display())]
 pub struct PageError {
-    /// The file.
     pub path: PathBuf,
     pub reason: std::io::Error,
 }
@@ -271,7 +269,6 @@ fn finding_card(report: &Report, index: usize, number: usize) -> Markup {
     }
 }
 
-/// By channel.
 fn parameters(report: &Report, index: usize) -> Markup {
     let shown = finding_text::shown_effects(report, index);
     html! {
@@ -298,7 +295,6 @@ fn curves(report: &Report) -> Markup {
     }
 }
 
-/// Folded.
 fn channels(report: &Report) -> Markup {
     html! {
         section.channels aria-label="Channels" {

@@ -11,12 +11,9 @@ pub struct ReadingRecord {
     pub file: String,
     /// Hexadecimal; absent if unknown.
     pub sha256: Option<String>,
-    /// The reading program.
     pub program: String,
     pub version: String,
-    /// Options of the reading.
     pub options: Vec<String>,
-    /// Rows that were read.
     pub rows: u64,
     /// Rows that are no samples, by cause.
     pub left_out: BTreeMap<String, u64>,
@@ -39,7 +36,6 @@ pub fn rows_left_out(dropped: &BTreeMap<&'static str, u64>, outside_part: u64, p
 /// Options of the reading.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ReadingOptions<'a> {
-    /// For a file with several.
     pub topic: Option<&'a str>,
     /// Each as in `gyro_x=wx`.
     pub columns: &'a [String],

@@ -10,15 +10,11 @@ use serde::{Deserialize, Serialize};
 /// Absent fields do not apply.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ReportRow {
-    /// Path or name.
     pub recording: String,
-    /// Hexadecimal.
     pub sha256: Option<String>,
-    /// Version of the program.
     pub version: Option<String>,
     /// `complete`, `incomplete` (ended early) or `failed` (no report).
     pub status: String,
-    /// Reason, unless complete.
     pub reason: Option<String>,
     /// Remarks, one sentence a line.
     pub notes: Option<String>,
@@ -26,7 +22,6 @@ pub struct ReportRow {
     pub sensor: Option<String>,
     /// Hz.
     pub rate_hz: Option<f64>,
-    /// Length of the recording.
     pub hours: Option<f64>,
     /// `recording`, `coefficient` or `finding`.
     pub row: String,

@@ -14,7 +14,6 @@ const BELOW_CORNER: &str = "white_noise";
 pub struct SavedReport {
     /// Hz.
     pub sample_rate_hz: f64,
-    /// In the order of the burst.
     pub channels: Vec<SavedChannel>,
     /// Different rates, Hz, of joined reports.
     #[serde(skip)]
@@ -79,7 +78,6 @@ pub struct SavedTerm {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct SavedParameter {
     pub value: f64,
-    /// Lower bound.
     pub low: f64,
     /// Upper bound; infinite if unknown.
     #[serde(deserialize_with = "unbounded")]
@@ -94,7 +92,6 @@ pub enum SavedReportError {
     /// It is no JSON object, or has no field `schema`.
     #[error("no JSON report of this program: {0}")]
     NoReport(serde_json::Error),
-    /// Another schema.
     #[error("schema {0}, where this program reads schema {SCHEMA}")]
     Schema(u64),
     /// A field is missing or has another type.
@@ -102,7 +99,6 @@ pub enum SavedReportError {
     Field {
         /// Such as `channels[3].final`.
         path: String,
-        /// Expected content.
         reason: serde_json::Error,
     },
     /// A contradiction, or no number.

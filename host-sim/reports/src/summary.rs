@@ -249,7 +249,6 @@ pub(crate) fn off_percent(rms_percent: f64) -> String {
     }
 }
 
-/// With its usual digits.
 pub(crate) fn deviance_per_point(of: f64) -> String {
     match of {
         of if of < 9.95 => format!("{of:.1}"),
@@ -588,13 +587,11 @@ const KNOWN: f64 = 0.205;
 /// Largest extrapolation, in record lengths.
 const FARTHEST: f64 = 10.0;
 
-/// Accuracy of a coefficient.
 enum Knowledge {
     /// Within ±20 %.
     Known,
     /// Wider; the additional recording time, s, may be infinite.
     Wide(f64),
-    /// An upper limit only.
     Bounded,
 }
 

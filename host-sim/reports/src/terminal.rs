@@ -13,7 +13,6 @@ pub const MOST_LINES: usize = 30;
 /// Columns of the narrowest and the widest screen; text is at most [`TEXT`] wide.
 const NARROWEST: usize = 80;
 const WIDEST: usize = 200;
-/// Most columns of text.
 const TEXT: usize = 110;
 /// Columns of label and error.
 const LABEL: usize = 7;
@@ -36,7 +35,6 @@ pub struct Screen<'a> {
     pub report: &'a Report,
     /// Name of the recording, if it has one.
     pub source: Option<&'a str>,
-    /// Columns of the terminal.
     pub columns: usize,
 }
 
@@ -213,7 +211,6 @@ fn capped(items: &[String], separator: &str, last: &str, (columns, most): (usize
     lines
 }
 
-/// The first words that fit.
 fn within(text: &str, columns: usize) -> String {
     if text.chars().count() <= columns { text.to_owned() } else { format!("{} …", broken(text, columns - 2, "")[0]) }
 }

@@ -32,7 +32,6 @@ enum Mixture {
     Walk,
 }
 
-/// In counts and seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Coefficients {
     n: f64,

@@ -13,7 +13,6 @@ use std::io::{self, Write};
 pub struct LossTable {
     pub records: u64,
     pub samples: usize,
-    /// Per noise and loss.
     pub comparisons: Vec<LossComparison>,
 }
 
@@ -28,7 +27,6 @@ pub struct LossComparison {
     pub lost: f64,
     /// Records that keep the longest averaging time.
     pub same_longest: usize,
-    /// By averaging factor.
     pub octaves: Vec<OctaveRatio>,
     /// N, B and K, if the noise has them.
     pub coefficients: Vec<CoefficientComparison>,
@@ -37,7 +35,6 @@ pub struct LossComparison {
 /// One averaging factor with losses, relative to the complete records.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct OctaveRatio {
-    /// Samples.
     pub n: u64,
     /// Ratio of mean variances, less 1.
     pub bias: f64,

@@ -54,7 +54,6 @@ pub struct ReproductionResult {
     pub fitted: [RelativeError; 3],
     /// Fraction of seeds with the truth in the 95 % bounds of the fit.
     pub covered: [f64; 3],
-    /// Per octave.
     pub scatter: Vec<OctaveScatter>,
     pub four_methods: FourMethods,
 }

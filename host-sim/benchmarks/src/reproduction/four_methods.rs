@@ -41,7 +41,6 @@ pub struct Autocorrelation {
     pub white_variance: f64,
     /// Lag, s, at which the autocovariance of 1 s means is 1/e of that at 1 s.
     pub decay_s: Option<f64>,
-    /// Mean of the four quarters.
     pub decay_in_quarters_s: Option<f64>,
     /// Markov time constant by the report's estimator, s; `None` with fewer than 160 time constants.
     pub markov_time_s: Option<f64>,
@@ -66,7 +65,6 @@ pub struct SpectrumOctave {
 /// Kalman innovations on the second half.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InnovationTest {
-    /// Fitted to the first half.
     pub model: &'static str,
     /// Mean squared innovations over expectation.
     pub normalised: f64,
@@ -82,7 +80,6 @@ pub struct InnovationTest {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FourMethods {
     pub seed: u64,
-    /// Per method.
     pub coefficients: Vec<MethodCoefficients>,
     pub autocorrelation: Autocorrelation,
     pub segment_s: f64,

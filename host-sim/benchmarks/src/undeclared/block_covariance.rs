@@ -83,9 +83,7 @@ fn exponential(length: f64, lag: usize) -> f64 {
 /// s²)/m − 1 + ln(m/c))`. A random walk takes up most of a slow drift.
 pub(super) struct WaveformTest {
     cosines: DMatrix<f64>,
-    /// True noise.
     densities: Vec<Densities>,
-    /// N², B² and K².
     squares: [f64; 3],
 }
 
@@ -126,7 +124,6 @@ fn cosines() -> DMatrix<f64> {
     })
 }
 
-/// Variance per cosine.
 fn cosine_variances(cosines: &DMatrix<f64>, covariance: &DMatrix<f64>) -> Vec<f64> {
     let weighted = covariance * cosines;
     (0..cosines.ncols()).map(|k| cosines.column(k).dot(&weighted.column(k))).collect()

@@ -9,9 +9,7 @@ use virtual_sensor::{ChannelNoise, InjectedEffect, OutputRegister};
 const ITERATIONS: usize = 100;
 const HALVINGS: i32 = 12;
 const STEP: f64 = 3.0;
-/// Last fall of the deviance.
 const CONVERGED: f64 = 1e-3;
-/// Initial part of a density.
 const START: f64 = 0.01;
 /// Regularisation, as a part of all information.
 const LEAST_INFORMATION: f64 = 1e-9;
@@ -81,9 +79,7 @@ pub(super) fn low_pass_gain(corner_hz: f64, frequency: f64) -> f64 {
 pub(super) struct Densities {
     /// Per unit of N², B² and K², behind the filter.
     pub(super) baseline: [f64; 3],
-    /// Without free parameters.
     pub(super) known: f64,
-    /// True output.
     pub(super) truth: f64,
 }
 
@@ -275,7 +271,6 @@ impl<'a> ChannelUnderTest<'a> {
         self.others().map(spikes).sum()
     }
 
-    /// Before the filter.
     pub(super) fn white_density(&self) -> f64 {
         self.noise.angle_random_walk.powi(2) + self.spike_density()
     }
@@ -305,7 +300,6 @@ impl<'a> ChannelUnderTest<'a> {
         self.resolution().powi(2) / 12.0 * period_s + self.others().map(angle).sum::<f64>()
     }
 
-    /// Output without N, B and K.
     pub(super) fn known_density(&self, frequency: f64) -> f64 {
         self.gain(frequency) * self.added_density(frequency) + self.rounding_density(frequency)
     }

@@ -34,7 +34,6 @@ use virtual_sensor::{InjectedEffect, OutputRegister};
 /// Crystal of ±50 ppm, uniformly.
 pub(super) const HOST_CLOCK_TOLERANCE: f64 = 50e-6;
 const FALSE_ALARM: f64 = 0.01;
-/// Octaves in half an hour.
 const TIME_CONSTANTS: f64 = 12.0;
 pub(super) const TIMES: f64 = 40.0;
 const AXES: f64 = 3.0;

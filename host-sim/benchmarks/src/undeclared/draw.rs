@@ -16,7 +16,6 @@ use serde::Serialize;
 use virtual_sensor::{Environment, InjectedEffect, NoiseModel, OutputRegister, SensorScenario};
 use virtual_sensor::{Motion, SupplyProfile, TemperatureProfile};
 
-/// For a single effect.
 const STRENGTH: (f64, f64) = (0.3, 30.0);
 /// For pairs, triples and effects outside the vocabulary.
 const STRENGTH_OF_PAIR: (f64, f64) = (2.0, 30.0);
@@ -42,7 +41,6 @@ pub enum RecordingGroup {
     Single(EffectKind),
     Pair,
     Triple,
-    /// Not known to the analysis.
     Outside(OutsideKind),
 }
 

@@ -11,7 +11,6 @@ use virtual_sensor::Environment;
 pub(super) struct EnvironmentCourse {
     pub(super) temperature_c: Vec<f64>,
     pub(super) supply_v: Vec<f64>,
-    /// Along x, y and z.
     pub(super) force_g: [Vec<f64>; 3],
 }
 
@@ -41,7 +40,6 @@ impl EnvironmentCourse {
     }
 }
 
-/// Uniform in the logarithm.
 pub(super) fn log_uniform(random: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
     low * (random.random::<f64>() * (high / low).ln()).exp()
 }

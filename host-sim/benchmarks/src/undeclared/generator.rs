@@ -34,7 +34,6 @@ pub struct Sampling {
     pub rate_hz: f64,
     /// Count of each channel, in its unit, in the order of the burst.
     pub resolutions: [f64; 12],
-    /// Largest values, likewise.
     pub full_scales: [f64; 12],
     /// Half-power corners of the noise's first-order filters, Hz, for measured noise; infinite without one.
     pub corners_hz: [f64; 12],
@@ -127,7 +126,6 @@ impl TrueRecording {
         recorder.finish()
     }
 
-    /// In the order of the burst.
     fn counts(&self, samples: usize) -> Vec<Vec<i32>> {
         let period_s = self.sampling.period_s();
         let taps = self.scenario.effects.iter().find_map(|effect| match effect {

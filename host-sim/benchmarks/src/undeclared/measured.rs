@@ -44,7 +44,6 @@ pub enum StretchLength {
 /// Which effects to hide in which recordings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredNoisePlan {
-    /// At rest, used in turn.
     pub recordings: Vec<NoiseRecording>,
     /// Each with every kind alone.
     pub stretches: u64,

@@ -15,7 +15,6 @@ use virtual_sensor::OutputRegister;
 const LEVEL_DEVIATION: f64 = std::f64::consts::LN_2;
 /// Below a hundredth after half a second.
 const KNOCK_DECAY_S: f64 = 0.1;
-/// Per record.
 const FEWEST_DROOPS: f64 = 6.0;
 
 /// Kinds that the analysis was not made for.
@@ -44,7 +43,6 @@ pub enum OutsideKind {
     DeadTime,
     /// Regular short drops, not measured.
     SupplyDroop,
-    /// On for half of the time.
     SwitchedLine,
     /// At carries (IEEE Std 1241).
     MissingCodes,

@@ -31,7 +31,6 @@ pub(super) const UNEXPLAINED: &str = "unexplained";
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScoreError {
-    /// It has no timeline.
     #[error("seed {seed}: {reason}")]
     Timeline {
         /// Seed of the recording.
@@ -59,7 +58,6 @@ pub struct EffectScore {
     pub kind: EffectKind,
     /// Size over detection limit.
     pub strength: f64,
-    /// In its channels.
     pub named: bool,
     /// Detected by a test with channel and waveform but unknown noise; absent in pairs and for other effects.
     pub shape_known: Option<bool>,
@@ -99,7 +97,6 @@ pub struct OutsideScore {
     pub strength: f64,
     /// `unexplained` in its channel.
     pub unexplained: bool,
-    /// Described in its channel.
     pub named: bool,
 }
 

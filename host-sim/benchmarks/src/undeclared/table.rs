@@ -10,7 +10,6 @@ use std::io::{self, Write};
 
 /// Smallest required strength.
 pub const STRONG: f64 = 2.0;
-/// Upper limits.
 const CLASSES: [f64; 5] = [0.5, 1.0, 2.0, 5.0, f64::INFINITY];
 const CLASS_NAMES: [&str; 5] = ["< 0.5", "0.5…1", "1…2", "2…5", "≥ 5"];
 

@@ -149,7 +149,6 @@ fn the_strength_is_that_of_the_size_or_of_its_significance() {
     assert!((of(&spikes) - 2.0).abs() < 1e-9, "{}", of(&spikes));
 }
 
-/// Closed forms.
 #[test]
 fn a_detection_limit_includes_the_other_effect() {
     let mut noise = NoiseModel::paper();
@@ -358,7 +357,6 @@ fn an_effect_is_named_in_its_channel_and_a_false_alarm_in_another() {
     assert_eq!(compare(&case, &report(&[(Channel::AcclX, markov())]), 0.0).false_alarms, [""; 0]);
 }
 
-/// In its channels.
 #[test]
 fn an_effect_outside_the_vocabulary_is_told_by_its_own_name_or_as_unexplained() {
     let quiet = |kind: OutsideKind| {

@@ -43,7 +43,6 @@ const STRETCH: usize = 1024;
 const MOST_FREEDOM: f64 = 1e6;
 /// Relative standard deviation times √n of a scatter by the 90 % quantile's distance from the median.
 const SCATTER_ERROR: f64 = 1.37;
-/// Bisections within an octave.
 const RATIO_STEPS: usize = 20;
 const NORMAL_90: f64 = 1.2816;
 

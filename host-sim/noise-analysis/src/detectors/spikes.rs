@@ -68,7 +68,6 @@ struct FoundSpike {
     slot: u64,
     /// Magnitude of the error, in the channel's unit.
     size: f64,
-    /// In standard deviations.
     sigmas: f64,
     /// True if it is a filter's response to an earlier spike.
     is_response: bool,

@@ -24,7 +24,6 @@ pub(crate) const MIN_AVERAGES: u64 = 64;
 #[derive(Debug, Clone)]
 pub(crate) struct EpochCurves {
     pub quarters: [Curve<OCTAVES>; 2],
-    /// Second half.
     pub unseen: Curve<OCTAVES>,
     /// Samples in an epoch, a power of 2.
     pub epoch: u64,

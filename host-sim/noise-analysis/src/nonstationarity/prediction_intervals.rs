@@ -19,7 +19,6 @@ const TAIL: f64 = 0.025;
 pub struct IntervalCoverage {
     /// Octaves that were predicted, in all epochs of the second half.
     pub octaves: usize,
-    /// Octaves within the interval.
     pub within: usize,
 }
 

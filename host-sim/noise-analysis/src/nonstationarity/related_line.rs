@@ -38,7 +38,6 @@ pub(crate) struct LineSource<'a> {
 /// A line of another channel that moves with this channel's.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RelatedLine {
-    /// Name of the other channel.
     pub channel: String,
     /// Frequency over the line's, as a fraction.
     pub ratio: (u8, u8),
@@ -48,7 +47,6 @@ pub struct RelatedLine {
     pub p_value: f64,
     /// Mean over the epochs of the first half.
     pub measured_ratio: f64,
-    /// Standard deviation of it.
     pub measured_ratio_deviation: f64,
     /// Frequency of the line, Hz, in the epochs of the first half.
     pub line_hz: Vec<f64>,

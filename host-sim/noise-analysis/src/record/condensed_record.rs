@@ -42,7 +42,6 @@ pub(crate) struct CondensedChannel {
     pub faster_lines_of_first_half: FasterLines,
     /// Effects that only the samples themselves show, in an inertial channel.
     pub effects: Vec<Effect>,
-    /// Those of the first half.
     pub effects_of_first_half: Vec<Effect>,
     /// Spikes and knocks of the first half that are left out of the means: sample period and distance from its
     /// neighbours, in the channel's unit.

@@ -149,7 +149,6 @@ pub(crate) struct RecordEstimators {
 
 /// Estimators of the two halves, without influence of the second half on exclusions.
 pub(crate) struct HalfEstimators {
-    /// As recorded.
     pub recorded: [RecordPart; 2],
     /// Less the bias that the first half predicts.
     pub foretold: [RecordPart; 2],

@@ -54,11 +54,9 @@ const STRETCH_PERIODS: u64 = 1 << 16;
 /// the samples.
 const MEAN_STEPS_LOG2: u32 = 8;
 const LARGEST_MEAN: f64 = i32::MAX as f64;
-/// Least fill of a mean.
 const LEAST_FILL: f64 = 0.5;
 /// Least rate of the means over the highest frequency of a line sought in them.
 const MEANS_PER_PERIOD: f64 = 2.5;
-/// Marks a missing mean.
 const MISSING: i32 = i32::MIN;
 
 /// Reads a long recording block by block.
@@ -82,7 +80,6 @@ pub struct LongRecordReader {
 #[derive(Default)]
 struct FirstHalfFindings {
     stuck: Vec<StuckRuns>,
-    /// For the inertial channels.
     stacked: Vec<Option<StackedSpectrum>>,
     is_screened: Vec<bool>,
 }

@@ -20,7 +20,6 @@ pub(crate) struct SampleScreen {
     leaves_out_repeated: bool,
     /// Samples not yet passed on, behind a few that were.
     held: SampleBlock,
-    /// Number of those that were.
     settled: usize,
 }
 

@@ -20,7 +20,6 @@ impl GappedCascade {
         &self.cascade
     }
 
-    /// Its curve, in counts.
     pub(crate) fn curve(&self, period_s: f64) -> Curve<OCTAVES> {
         let mut curve = self.cascade.curve(period_s);
         self.gaps.take_off(&mut curve, self.cascade.len() + self.cascade.missing());

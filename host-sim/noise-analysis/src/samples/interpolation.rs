@@ -6,7 +6,6 @@ use nalgebra::{DMatrix, DVector};
 const WHITE: [f64; 5] = [LEAST_WHITE, 1e-7, 1e-5, 1e-3, 1e-1];
 pub(crate) const LEAST_WHITE: f64 = 1e-9;
 
-/// Neighbours on each side.
 pub(crate) const REACH: usize = 6;
 
 /// Autocovariance at lags 0 to 2·[`REACH`].
@@ -18,7 +17,6 @@ pub(crate) type Neighbours = u16;
 pub(crate) const ALL_NEIGHBOURS: Neighbours = (1 << (2 * REACH)) - 1;
 #[derive(Debug, Clone)]
 pub(crate) struct PartialInterpolation {
-    /// In the order of the bits.
     pub weights: [f64; 2 * REACH],
     /// Standard deviation of the error over that with all neighbours.
     pub scale: f64,
@@ -41,7 +39,6 @@ impl PartialInterpolation {
         scale.is_finite().then_some(Self { weights, scale })
     }
 
-    /// Weights and error variance.
     fn solve(covariance: &Autocovariance, present: Neighbours) -> Option<([f64; 2 * REACH], f64)> {
         let bits: Vec<usize> = (0..2 * REACH).filter(|bit| present >> bit & 1 == 1).collect();
         let offset = |bit: usize| if bit < REACH { -(bit as i64) - 1 } else { (bit - REACH) as i64 + 1 };

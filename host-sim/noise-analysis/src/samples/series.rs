@@ -17,7 +17,6 @@ pub struct Series {
     pub period_s: f64,
     /// Smallest distance of two values, in [`unit`](Self::unit): one count, or several.
     pub resolution: f64,
-    /// Unit of the values.
     pub unit: &'static str,
 }
 

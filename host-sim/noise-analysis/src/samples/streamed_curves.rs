@@ -40,7 +40,6 @@ impl StreamedCurves {
         }
     }
 
-    /// In counts.
     pub(crate) const fn whole(&self) -> &GappedCascade {
         &self.whole
     }

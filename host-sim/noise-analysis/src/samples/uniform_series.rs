@@ -14,7 +14,6 @@ pub struct UniformSeries {
     values: Vec<f64>,
     /// Rounding of the samples behind the values.
     rounding: Rounding,
-    /// Sensor values per sample.
     read_every: u32,
 }
 

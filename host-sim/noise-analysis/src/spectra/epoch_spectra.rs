@@ -37,7 +37,6 @@ impl EpochSpectra {
         }
     }
 
-    /// Takes the next sample.
     pub(crate) fn push(&mut self, slot: u64, value: f64) {
         while let Some(next) = self.later.pop_if(|next| *next <= slot) {
             self.end_part(next);

@@ -14,7 +14,6 @@ use std::ops::Range;
 
 /// Most values of a transform; a longer record has means of samples.
 const MOST_VALUES: usize = 1 << 16;
-/// Fewest values.
 const FEWEST_VALUES: usize = 256;
 /// Fewest orders of equal share of motion along an axis; fewer are drift.
 const FEWEST_ORDERS: f64 = 20.0;
@@ -59,7 +58,6 @@ struct Equations {
 
 struct Solution {
     sensitivities: DVector<f64>,
-    /// Inverse of the covariance.
     information: DMatrix<f64>,
 }
 

@@ -10,7 +10,6 @@ use crate::distributions::{NORMAL_975, chi_squared_tail, exponential_sum_tail};
 use crate::effects::findings::SIGNIFICANCE;
 use crate::samples::uniform_series::UniformSeries;
 
-/// Numbers of segments.
 const SEGMENTS: [usize; 4] = [32, 64, 128, 256];
 /// Fewest samples of a segment.
 const FEWEST_SAMPLES: usize = 256;
@@ -121,7 +120,6 @@ struct Spectrogram {
     rows: Vec<Vec<f32>>,
     /// Mean over the segments, from the lowest frequency on.
     means: Vec<f32>,
-    /// Samples per segment.
     size: usize,
     /// Hz between ordinates.
     spacing: f64,

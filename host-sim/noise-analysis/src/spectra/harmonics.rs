@@ -20,7 +20,6 @@ const STEPS: f64 = 8.0;
 /// Variance of a frequency by the taper: Σt²·Σw²t²/(Σwt²)² from the middle.
 const TAPERED: f64 = 1.12;
 
-/// From the first one on.
 pub(super) struct Harmonics {
     fundamental: f64,
     harmonics: Vec<Harmonic>,

@@ -94,7 +94,6 @@ pub(super) struct PhaseSums {
 
 /// Sums over a block's samples y under the taper w.
 struct BlockSums {
-    /// Σw.
     weight: f64,
     /// Σwe^(−2iωt).
     double: Complex<f64>,
@@ -219,7 +218,6 @@ pub(super) struct Lorentz {
 }
 
 struct Group {
-    /// Mean position, resolutions.
     position: f64,
     density: f64,
     ordinates: f64,

@@ -15,7 +15,6 @@ use crate::effects::findings::SIGNIFICANCE;
 use crate::samples::uniform_series::UniformSeries;
 use std::f64::consts::{LN_2, PI};
 
-/// Most lines.
 pub(super) const MOST: usize = 6;
 /// Most resonances refitted when one is added: each fits the background again.
 const REFITTED: usize = 2;
@@ -188,9 +187,7 @@ fn slow_sines(mut series: UniformSeries) -> Vec<(Sine, SpectralLine)> {
 
 /// A candidate for nearly all of the slow variation.
 struct SlowSine {
-    /// Without the straight line.
     level: UniformSeries,
-    /// Sum of the slow ordinates.
     slow: f64,
     /// For padded ordinates, Hz.
     spacing: f64,

@@ -209,7 +209,6 @@ struct PaddedSpectrum {
     /// Ordinates, `spacing` padded ones apart, from 0 on.
     power: Vec<f64>,
     spacing: usize,
-    /// Others, with their numbers.
     between: Vec<(usize, f64)>,
 }
 

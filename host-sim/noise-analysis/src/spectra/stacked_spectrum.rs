@@ -15,7 +15,6 @@ pub(crate) struct StackedSpectrum {
     sample_period: f64,
     /// Smallest distance of two values, in the channel's unit.
     resolution: f64,
-    /// Sensor values per sample.
     read_every: u32,
     /// Samples of the current stretch, `NaN` if missing.
     stretch: Vec<f64>,

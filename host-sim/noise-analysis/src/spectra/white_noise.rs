@@ -39,11 +39,9 @@ const SAMPLED: u32 = 512;
 /// White noise behind the sensor's filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FilterSpectrum {
-    /// White.
     Unfiltered,
     /// Two cascaded averages, and white noise behind them.
     Bartlett {
-        /// Samples of each average.
         taps: u32,
     },
     /// A second-order low-pass filter, and white noise behind it.
@@ -60,7 +58,6 @@ pub enum FilterSpectrum {
 pub struct WhiteNoiseFit {
     /// N in unit·√s, with 95 % bounds, rounding included.
     pub angle_random_walk: BoundedEstimate,
-    /// The filter in the data.
     pub filter: FilterSpectrum,
     /// Standard deviation of a sample by this white noise, behind the filter.
     pub sample_deviation: f64,

@@ -37,7 +37,6 @@ const EXCEEDS: f64 = 3.0;
 const MOST_REACHED: usize = 32 * PADDING;
 /// Frequency error by three padded ordinates, resolutions.
 const INTERPOLATION: f64 = 0.01;
-/// Most rounds of refits.
 const REFITS: usize = 6;
 /// Samples per noise level; each squared level is known to 15 %.
 const LEVEL_BLOCK: usize = 128;
@@ -101,7 +100,6 @@ impl SpectralLine {
     }
 }
 
-/// A line with its model.
 pub(super) enum Candidate {
     Sine(SpectralLine, Sine),
     Resonance(Resonance),

@@ -1,11 +1,11 @@
-//! Errors of an input file: which file, line and column, and the reason.
+//! Errors of an input file: place and reason.
 
 use crate::columns::column_selection::SelectionError;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A file that cannot be used. Its `Display` is one line: file, line, column, reason.
+/// A file that cannot be used; `Display` is one line.
 #[derive(Debug)]
 pub struct InputError {
     /// As the user named it.
@@ -24,10 +24,8 @@ pub struct InputError {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Reason {
-    /// The file cannot be read.
     #[error("{0}")]
     Io(io::Error),
-    /// A folder where a file is expected.
     #[error("is a directory, not a file, and not that of one bag of ROS 2 in .mcap or .db3 files")]
     Directory,
     /// No byte, or only blank lines.
@@ -36,10 +34,8 @@ pub enum Reason {
     /// A header without a row after it.
     #[error("no data after the header")]
     NoData,
-    /// The gzip stream ends before its trailer.
     #[error("truncated gzip: the compressed data end early")]
     TruncatedGzip,
-    /// The gzip stream is damaged.
     #[error("damaged gzip: {0}")]
     DamagedGzip(io::Error),
     /// Bytes after a gzip stream that are none.
@@ -80,7 +76,7 @@ pub enum Reason {
     /// A binary format that is known and not read.
     #[error("{what}, which is not read; {how}")]
     Foreign {
-        /// What it is.
+        /// Description of the format.
         what: &'static str,
         /// How to convert it.
         how: &'static str,
@@ -139,17 +135,17 @@ pub enum Reason {
     /// A time that decreases.
     #[error("time {now} s is before {before} s of the row above")]
     TimeBackwards {
-        /// Of the row above, s.
+        /// Time of the row above, s.
         before: f64,
-        /// Of this row, s.
+        /// Time of this row, s.
         now: f64,
     },
     /// An index that repeats or decreases.
     #[error("sample {now} does not follow {before}")]
     IndexBackwards {
-        /// Of the row above.
+        /// Index of the row above.
         before: u64,
-        /// Of this row.
+        /// Index of this row.
         now: u64,
     },
     /// A byte that is not written as two hexadecimal digits.
@@ -175,9 +171,9 @@ pub enum Reason {
     /// A burst that was taken in another range of the gyroscopes than those before it.
     #[error("the gyro range changes from {before} to {now} deg/s between bursts; give each range its own log")]
     MixedRange {
-        /// Of the bursts above, deg/s.
+        /// Range of the bursts above, deg/s.
         before: u16,
-        /// Of this burst, deg/s.
+        /// Range of this burst, deg/s.
         now: u16,
     },
     /// No row of numbers near the beginning.
@@ -248,7 +244,7 @@ pub enum Reason {
     Format {
         /// Name of the format.
         format: &'static str,
-        /// What its reader says.
+        /// Message of its reader.
         error: Box<str>,
     },
     /// A file that ends early.
@@ -263,7 +259,7 @@ pub enum Reason {
 }
 
 impl Reason {
-    /// Whether a limit of this program was met: the file need not be damaged.
+    /// A limit of this program: the file may be intact.
     pub(crate) fn is_limit(&self) -> bool {
         matches!(
             self,
@@ -275,7 +271,7 @@ impl Reason {
         )
     }
 
-    /// Why reading failed: what a [`Metered`](crate::input::budget::Metered) input refused, or the error itself.
+    /// A [`Metered`](crate::input::budget::Metered) refusal, or the error itself.
     pub(crate) fn from_io(error: io::Error) -> Self {
         match error.downcast::<Self>() {
             Ok(reason) => reason,
@@ -320,7 +316,7 @@ impl fmt::Display for InputError {
         if let Some(column) = &self.column {
             write!(f, ": column {}", Printable(column))?;
         }
-        // Some readers of formats describe a fault in several lines.
+        // Some describe a fault in several lines.
         let reason = self.reason.to_string();
         let lines: Vec<&str> = reason.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
         write!(f, ": {}", lines.join(" "))
@@ -329,11 +325,11 @@ impl fmt::Display for InputError {
 
 impl std::error::Error for InputError {}
 
-/// Text from outside, with the characters escaped that a terminal obeys or that reorder or hide others.
+/// Escapes characters that a terminal obeys or that hide others.
 #[derive(Debug, Clone, Copy)]
 pub struct Printable<'a>(pub &'a str);
 
-/// Whether a character is invisible and changes the direction or the joining of others (Unicode, general category Cf), or ends a line.
+/// Invisible characters (Unicode Cf), and line ends.
 fn is_format(c: char) -> bool {
     matches!(c,
         '\u{ad}' | '\u{600}'..='\u{605}' | '\u{61c}' | '\u{6dd}' | '\u{70f}' | '\u{180e}' | '\u{200b}'..='\u{200f}'

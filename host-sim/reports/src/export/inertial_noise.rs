@@ -24,7 +24,6 @@ pub(super) enum Sensor {
 pub(super) struct Coefficient {
     /// In SI units; the upper 95 % bound if only that is known.
     pub value: f64,
-    /// True for the bound.
     pub is_bound: bool,
     /// The estimate in SI units.
     pub estimate: f64,
@@ -82,7 +81,6 @@ impl Sensor {
         Some(AxisNoise { channel, to_si, white, bias_instability, walk })
     }
 
-    /// The axes x, y and z.
     pub(super) fn three_axes(self, report: &SavedReport) -> Result<[AxisNoise<'_>; 3], ExportError> {
         let axes = self.axes(report);
         let axis = |letter: &str| {

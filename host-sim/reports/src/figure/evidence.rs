@@ -16,7 +16,6 @@ use noise_analysis::report::{ChannelReport, Finding, Report};
 const AROUND: f64 = 0.5;
 /// Looks of the channels of one unit.
 const LOOKS: [Look; 3] = [Look::Measured, Look::SecondAxis, Look::ThirdAxis];
-/// Bars of a histogram.
 const BARS: usize = 40;
 
 /// The picture of the finding at `index`, called `number`; `None` if the report has no data for it.

@@ -21,12 +21,10 @@ const ABOVE: f64 = 10.0;
 /// How the style sheet draws a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Look {
-    /// The measured data.
     Measured,
     /// Second and third axis of an overview.
     SecondAxis,
     ThirdAxis,
-    /// The model to use.
     Model,
     /// The baseline model of the first half.
     Before,
@@ -55,7 +53,6 @@ impl Look {
 pub(super) struct Line {
     pub name: String,
     pub look: Look,
-    /// Place and value.
     pub points: Vec<(f64, f64)>,
     /// Bounds of each value; empty without.
     pub bounds: Vec<(f64, f64)>,

@@ -13,18 +13,15 @@ pub(super) struct Amounts<'a> {
     /// The effect in every channel.
     pub shown: &'a [ShownEffect<'a>],
     pub label: Label,
-    /// Without intervals.
     pub is_brief: bool,
 }
 
 /// Text before a channel's number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Label {
-    /// A single channel.
     Nothing,
     /// All gyros, or all accelerometers: the axis.
     Axis,
-    /// Sensor and axis.
     Channel,
 }
 

@@ -6,7 +6,6 @@ use measurement::{MeasuredChannel, Measurement};
 use std::f64::consts::PI;
 use virtual_sensor::{NoiseModel, OutputRegister};
 
-/// Bands per octave.
 const BANDS_PER_OCTAVE: f64 = 6.0;
 /// Fewest ordinates of a band.
 const FEWEST: usize = 5;
@@ -14,16 +13,13 @@ const FEWEST: usize = 5;
 const HIGHEST_CORNER: f64 = 1.5;
 const CORNERS: usize = 24;
 const CORNER_RATIO: f64 = 1.15;
-/// For a filter.
 const LEAST_GAIN: f64 = 10.0;
 
 /// For gyros and accelerometers.
 pub(super) struct NoiseEstimate {
-    /// N before its filter.
     pub(super) model: NoiseModel,
     /// By channel, Hz; infinite without a filter.
     pub(super) corners_hz: [f64; 12],
-    /// Channels that change.
     pub(super) channels: Vec<OutputRegister>,
 }
 
@@ -79,7 +75,6 @@ fn coefficients(values: &[f64], period_s: f64, resolution: f64) -> Option<([f64;
     Some((coefficients, corner_hz))
 }
 
-/// A band of the periodogram.
 struct Band {
     frequency_hz: f64,
     /// Two-sided, unit²/Hz.

@@ -23,16 +23,13 @@ pub struct NoiseRecording {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeasuredNoiseError {
-    /// It cannot be read.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// Its sensor always moves.
     #[error("{0}: the sensor is never at rest")]
     Moving(String),
-    /// It has no time base.
     #[error("{file}: {reason}")]
     TimeBase {
-        /// As it was named.
+        /// The file, as it was named.
         file: String,
         reason: TimeBaseError,
     },

@@ -16,15 +16,12 @@ pub(super) const FAILS: f64 = 3.0;
 /// Deviances per point on the unseen half, in the effect's first channel; absent for too few samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MeasuredErrors {
-    /// N, B and K.
     pub before: Option<f64>,
-    /// With added terms.
     pub after: Option<f64>,
     /// The same without what the first half's rules exclude.
     pub excluding: [Option<f64>; 2],
     /// Curve of the first half as a model.
     pub first_half_curve: Option<f64>,
-    /// N, B and K, untouched.
     pub untouched_before: Option<f64>,
     /// With added terms, untouched.
     pub untouched_after: Option<f64>,
@@ -46,7 +43,6 @@ pub struct MeasuredScore {
     pub found: Vec<String>,
     /// Names beyond those of the untouched stretch and the right one, `channel: kind`.
     pub wrong_names: Vec<String>,
-    /// For a named effect.
     pub estimates: Vec<ParameterScore>,
     pub errors: MeasuredErrors,
 }

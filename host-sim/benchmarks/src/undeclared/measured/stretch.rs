@@ -96,7 +96,6 @@ impl Stretch<'_> {
         self.samples.channels.iter().find(|of| of.profile.name == channel.name())
     }
 
-    /// For the detection limit.
     fn described(&self) -> TrueRecording {
         let size = |channel: Channel| self.measured(channel).map_or(1.0, |of| of.profile.lsb);
         let full_scale = |channel: Channel| {

@@ -11,7 +11,6 @@ use std::io::{self, Write};
 /// In the order of the stretches.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct MeasuredNoiseTable {
-    /// One entry per stretch.
     pub not_hidden: Vec<HiddenKind>,
     pub scores: Vec<MeasuredScore>,
 }

@@ -14,7 +14,6 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 /// Filters from 1/4 to 4 times the detecting filter's time constant, four an octave.
 const OCTAVES: i32 = 2;
 const STEPS: i32 = 4;
-/// Onsets within a block.
 const ONSETS: usize = 4;
 /// Quantile of the upper end of a 95 % interval.
 const UPPER: f64 = 0.975;
