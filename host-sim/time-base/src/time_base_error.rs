@@ -1,8 +1,8 @@
-//! Why a recording has no time base.
+//! Reasons against a time base.
 
 use std::collections::BTreeMap;
 
-/// Fewest samples that give one octave of the Allan deviation: two adjacent windows of one sample in each half of the record.
+/// One octave: two windows of one sample per half.
 pub(crate) const MIN_SAMPLES: u64 = 4;
 
 /// Why a recording has no time base.
@@ -25,13 +25,13 @@ pub enum TimeBaseError {
         /// By the time stamps, Hz.
         measured_hz: f64,
     },
-    /// Stamps that need all of them to be understood, of too many rows.
+    /// Many rows whose stamps need all of them.
     #[error("the time stamps are too irregular for a recording of this length ({0}): give it in parts")]
     Irregular(String),
     /// No sample follows another one by one sample period.
     #[error("no two neighbouring samples: a step of the column sample is at least {0}")]
     NoNeighbours(u64),
-    /// The gaps are so long that their periods do not fit into memory.
+    /// Periods beyond memory.
     #[error(
         "{samples} samples in {periods} sample periods: the gaps are longer than this analysis holds; give each stretch its \
          own file"
@@ -62,13 +62,13 @@ pub enum TimeBaseError {
     },
 }
 
-/// The causes for which samples were left out, as the end of a sentence.
+/// As the end of a sentence.
 fn list(dropped: &BTreeMap<&'static str, u64>) -> String {
     let causes: Vec<String> = dropped.iter().map(|(cause, count)| format!("{cause} {count}")).collect();
     if causes.is_empty() { String::new() } else { format!("; left out: {}", causes.join(", ")) }
 }
 
-/// A time in a message: one of many digits with a power of ten.
+/// Many digits as a power of ten.
 fn short(time: f64) -> String {
     if time.abs() < 1e15 || time.is_infinite() { time.to_string() } else { format!("{time:e}") }
 }
