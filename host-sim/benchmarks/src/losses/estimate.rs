@@ -1,3 +1,5 @@
+//! Estimates from a record, complete or with losses.
+
 use super::noise::{RATE_HZ, TestNoise};
 use allan_core::{Cascade, Curve, Model, fit::fit};
 use std::ops::Range;

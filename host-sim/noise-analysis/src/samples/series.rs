@@ -1,3 +1,5 @@
+//! The samples of one channel on the recording's time base.
+
 use crate::effects::findings::Correction;
 use measurement::{ChannelId, MeasuredChannel, Measurement};
 use std::ops::Range;

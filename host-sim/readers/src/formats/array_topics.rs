@@ -1,3 +1,5 @@
+//! Named arrays of NumPy, MATLAB and HDF5, and the tables that they form.
+
 use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::{AvailableColumn, known_by_name};
 use crate::columns::unit::Unit;

@@ -1,3 +1,5 @@
+//! Calendar times of loggers: dates, times of day, both in one text, or parts in several columns.
+
 use crate::columns::column_selection::AvailableColumn;
 use crate::formats::fields::number;
 use crate::rows::batch::Number;

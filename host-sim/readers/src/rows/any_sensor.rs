@@ -1,3 +1,5 @@
+//! Options for reading a recording of any inertial sensor.
+
 use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ColumnSelection, SelectionError};
 use measurement::SensorProfile;
 
