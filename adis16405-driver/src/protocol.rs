@@ -1,9 +1,7 @@
-//! The SPI protocol without I/O: register reads and writes as `async` sequences of bus requests.
+//! The SPI protocol without I/O.
 //!
-//! A procedure of the part (self-test, configuration, …) is an `async fn` on [`Protocol`], in one of the modules
-//! `commands`, `calibration`, `self_test`, `pins` and `alarms`. It awaits nothing but the response to a [`BusRequest`].
-//! The blocking or the asynchronous driver polls the procedure, carries out each request on its bus, and resumes the
-//! procedure with the response. Every sequence of frames therefore exists once.
+//! A procedure is an `async fn` on [`Protocol`] that awaits only responses to [`BusRequest`]s, which either driver
+//! carries out: every sequence of frames exists once.
 
 use core::convert::Infallible;
 use core::future::poll_fn;
@@ -28,10 +26,8 @@ pub(crate) enum BusRequest {
     Pause { us: u32 },
 }
 
-/// Passes requests from a procedure to the driver, and responses back.
-///
-/// The fields are atomic so that the futures of the driver are `Send`. Both sides run in the same future, one after the
-/// other, so loads and stores need no order among threads.
+/// Passes requests from a procedure to the driver, and responses back. Atomic fields make the futures `Send`; both
+/// sides run in one future, so order does not matter.
 #[derive(Debug)]
 pub(crate) struct RequestSlot {
     /// The two bytes of a frame, or [`PAUSE`](Self::PAUSE), or [`CHIP_SELECT_PULSE`](Self::CHIP_SELECT_PULSE).
@@ -104,12 +100,12 @@ pub(crate) fn resume<T>(procedure: Pin<&mut impl Future<Output = T>>) -> Poll<T>
 /// The error of a procedure, which has no bus that could fail.
 pub(crate) type ProtocolError = Error<Infallible>;
 
-/// What the driver keeps between procedures.
+/// State of the driver between procedures.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DriverState {
     pub(crate) config: Config,
     pub(crate) timing: Timing,
-    /// Whether changed registers are read back and compared.
+    /// True if changed registers are read back and compared.
     pub(crate) verify: bool,
     /// The power mode of the part. While it is unknown or changes, low-power mode, which has the longer stall.
     pub(crate) mode: ClockMode,
@@ -148,8 +144,7 @@ impl DriverState {
         self.mode = ClockMode::LowPower;
     }
 
-    /// Unless the driver has configured the part, its power mode is not known: the part may have it from its flash, or from
-    /// before a restart of the microcontroller alone.
+    /// Low-power mode unless configured: by flash, or from before a restart.
     pub(crate) const fn assume_low_power_until_read(&mut self) {
         if !self.configured {
             self.mode = ClockMode::LowPower;
@@ -204,8 +199,7 @@ impl<'a> Protocol<'a> {
         self.slot.request(BusRequest::ChipSelectPulse { pauses }).await;
     }
 
-    /// Reads a register in two frames. The answer comes in the second, which itself requests FLASH_CNT, a register that
-    /// can be read without side effects.
+    /// Reads a register in two frames; the second requests FLASH_CNT, which has no side effects.
     pub(crate) async fn read(&self, register: Register) -> u16 {
         self.frame(register.read_frame()).await;
         self.frame(Register::FlashCnt.read_frame()).await
@@ -263,8 +257,7 @@ impl<'a> Protocol<'a> {
         Ok(())
     }
 
-    /// Sets the bits of `mask` to their value in `value`: reads the register, writes the bytes that change, and reads
-    /// back if verification is on.
+    /// Sets the bits of `mask`: reads, writes changed bytes, and reads back if verification is on.
     pub(crate) async fn update_register(&self, register: Register, mask: u16, value: u16) -> Result<(), ProtocolError> {
         match register.access() {
             Access::Read => return Err(Error::ReadOnly(register)),
@@ -313,8 +306,7 @@ impl<'a> Protocol<'a> {
         self.update_register(register, u16::MAX, value).await
     }
 
-    /// Polls a register until the bits of `mask` are clear, for at most `most_us`. Returns whether they were set in any
-    /// poll.
+    /// Polls until the bits of `mask` are clear, at most `most_us`; true if they were set in any poll.
     ///
     /// # Errors
     /// [`Error::Deadline`] if they are still set after `most_us`.
