@@ -159,8 +159,7 @@ fn measurement(filtered: &[Vec<f64>], every: usize) -> Measurement {
     }
 }
 
-/// N, B and K of the values read: N² times `d·Σ r(jd)` with the autocorrelation `r` of the impulse response and
-/// decimation `d`.
+/// N, B and K of the values read: N² times `d·Σ r(jd)`, with the impulse response's autocorrelation `r`.
 fn truth(taps: usize, every: usize) -> [f64; 3] {
     let [n, b, k] = COEFFICIENTS;
     let box_response = vec![1.0 / taps as f64; taps];
@@ -186,8 +185,7 @@ fn convolution(a: &[f64], b: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Unfiltered, every `d`-th sample has `d` times the density. 8 taps have nulls at multiples of 102.4 Hz: 204.8 Hz
-    /// folds nothing. 4 taps at every 9th value: 9·Σh² = 9·(2·4² + 1)/(3·4³).
+    /// Unfiltered, every `d`-th sample has `d` times the density; 8 taps fold nothing at 204.8 Hz; 9·Σh² of 4 taps.
     #[test]
     fn the_white_noise_that_is_read_has_its_closed_form() {
         let ratio = |taps: usize, every: usize| (truth(taps, every)[0] / COEFFICIENTS[0]).powi(2);

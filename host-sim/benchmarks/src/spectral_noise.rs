@@ -10,8 +10,7 @@ pub(crate) fn flicker_density(b: f64, frequency: f64) -> f64 {
     b * b / (PI * frequency)
 }
 
-/// Noise of the one-sided `density` (Hz) at `rate_hz`: at most half of a periodic record, so that the ends do not meet.
-/// No power below one period, twice the returned length.
+/// Noise of the one-sided `density` (Hz) at `rate_hz`, at most half of a periodic record.
 pub(crate) fn gaussian_noise(
     density: impl Fn(f64) -> f64,
     rate_hz: f64,

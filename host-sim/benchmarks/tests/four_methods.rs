@@ -3,8 +3,7 @@
 use benchmarks::reproduction::{FourMethods, RATE_HZ, SpectrumOctave, TRUTH, allan_weight};
 use std::f64::consts::{LN_2, PI};
 
-/// Upper limit of the variance that the spectrum lacks, below 2.5/T: sin⁴(πfτ)/(πfτ)² < (πfτ)², integrated over N, B
-/// and K.
+/// Upper limit of the variance that the spectrum lacks below 2.5/T: sin⁴(πfτ)/(πfτ)² < (πfτ)², over N, B and K.
 fn low_frequencies(octave: &SpectrumOctave, segment_s: f64) -> f64 {
     let [n, b, k] = TRUTH;
     let (tau, f) = (octave.tau_s, 2.5 / segment_s);

@@ -9,8 +9,7 @@ pub const HOST_CLOCK_ERROR: f64 = 20e-6;
 pub(crate) const SAMPLE_RATE_ERROR: f64 = 5e-5;
 /// Largest factor on a typical sensitivity: single parts reach 10, and none is known at √10·10.
 pub(crate) const LARGEST_SENSITIVITY_MULTIPLE: f64 = 31.622_776_601_683_79;
-/// Largest variance of rounded noise of 0.45 counts, halfway between two counts (0.27 at a count). Larger noise is
-/// rounded as by white noise of 1/12 count², to 3 % of its deviation.
+/// Largest variance of rounded noise of 0.45 counts, halfway between two counts; larger noise is rounded as if white.
 pub(crate) const DITHERED_AVAR_COUNTS2: f64 = 0.3;
 /// Ratio of nominal clock to sample rate up to which both may be one clock: oscillators are off by percents.
 const SAME_CLOCK: f64 = 1.1;

@@ -15,33 +15,24 @@ const INCLUDED: [(&str, &str); 3] = [
 /// Why a profile cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ProfileError {
-    /// No TOML, or a field is missing, unknown or of another type.
     #[error("{0}")]
     Syntax(String),
-    /// A value without a meaning.
     #[error("channel {channel}: {field} is {value}; it must be positive and finite")]
     NotPositive {
         /// Name of the channel; empty for the sensor.
         channel: String,
-        /// Name of the field.
         field: &'static str,
-        /// Rejected value.
         value: f64,
     },
-    /// A unit other than that of the quantity.
     #[error("channel {channel}: the unit is {unit:?}; that of its quantity is {expected}")]
     Unit {
         /// Name of the channel.
         channel: String,
-        /// Rejected unit.
         unit: String,
-        /// Unit of the quantity.
         expected: &'static str,
     },
-    /// Two channels of one name.
     #[error("two channels are named {0}")]
     DuplicateChannel(String),
-    /// No channel at all.
     #[error("no channel")]
     NoChannel,
 }

@@ -118,8 +118,7 @@ impl ChannelEpochs {
     }
 }
 
-/// Describes the noise of the channel at position `of`; `None` if the record is too short for epochs, or the channel is
-/// constant for a whole epoch.
+/// Describes the noise of channel `of`; `None` if the record is too short, or the channel constant for an epoch.
 pub(crate) fn describe<'a>(channels: &[TracedChannel<'a>], of: usize) -> Option<Nonstationarity> {
     let TracedChannel { series, epochs, baseline, model, .. } = channels[of];
     let ChannelEpochs { curves, quarters, part } = epochs.filter(|of| of.curves.changes_in_second_half())?;

@@ -252,7 +252,6 @@ fn the_measured_long_recording_is_complete() {
     assert_eq!(measured.gaps(), 0);
 }
 
-/// Samples that the sensor refused arrived at their times: however many they are, they are no losses, and the rate is seen.
 #[test]
 fn many_refused_samples_hide_neither_the_rate_nor_the_losses() {
     let mut recorder = Recorder::new(Channel::ALL.to_vec(), GyroRange::Dps300);

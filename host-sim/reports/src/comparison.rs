@@ -19,7 +19,6 @@ const LOWEST: &str = "lowest_allan_deviation";
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ComparisonError {
-    /// A channel has other units.
     #[error("{channel} is in {first} in one report and in {second} in the other")]
     Units {
         /// Such as `gyro_x`.
@@ -27,10 +26,8 @@ pub enum ComparisonError {
         first: String,
         second: String,
     },
-    /// There is no coefficient that both have.
     #[error("no coefficient of a channel is in both")]
     Nothing,
-    /// The report has no sensor profile, or the profile states no noise.
     #[error(
         "the report has no values of a data sheet: analyse the recording with --sensor, and the name or the profile of the sensor"
     )]
@@ -126,7 +123,6 @@ fn coefficient(channel: &SavedChannel, kind: &str) -> Option<(BoundedEstimate, S
     Some((BoundedEstimate { value: of.value, low: of.low, high: of.high }, of.unit))
 }
 
-/// The lowest point of the curve, with the interval of a single point.
 fn lowest(channel: &SavedChannel) -> Option<BoundedEstimate> {
     let positive = channel.curve.iter().filter(|point| point.adev > 0.0);
     let SavedPoint { adev, low, high, .. } = positive.min_by(|a, b| a.adev.total_cmp(&b.adev))?;

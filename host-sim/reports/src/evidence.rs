@@ -48,7 +48,6 @@ fn seconds(tau: f64) -> String {
     if tau < 0.1 { format!("{tau:.4}") } else { format!("{tau:.3}") }
 }
 
-/// Departure of the curve from the model.
 fn excess(curve: &CurveEvidence) -> String {
     format!("{:+.1} % at τ = {} s ({:.0} σ)", 100.0 * curve.excess, seconds(curve.tau_s), curve.sigmas.abs())
 }

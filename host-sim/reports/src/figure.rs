@@ -100,8 +100,7 @@ pub fn allan_deviation(report: &Report, channel: &ChannelReport) -> String {
     standalone(&allan_deviation_plot(report, channel)).svg
 }
 
-/// The channel whose effects lower its error on the unseen half most: measured, model before, model after. Without an
-/// improvement, the largest error of the baseline model; `None` without errors.
+/// The channel whose effects lower its error on the unseen half most, else that of the largest error; or `None`.
 pub(crate) fn story(report: &Report) -> Option<Plot> {
     let errors: Vec<(&ChannelReport, [f64; 2])> = summary::inertial(report)
         .filter_map(|channel| match summary::unseen_errors(channel) {

@@ -130,8 +130,7 @@ fn gain(finding: &Finding) -> Option<String> {
 /// Encloses what the brief form leaves out.
 const DETAIL: char = '|';
 
-/// The sentence of physics, with details between two [`DETAIL`]s, and the advice. Common values such as a frequency are
-/// the clearest channel's; sizes are each channel's own.
+/// The sentence of physics, with details between two [`DETAIL`]s, and the advice; common values are the clearest's.
 fn sentences(finding: &Finding, amounts: &Amounts) -> (String, Advice) {
     let off = || {
         gain(finding)

@@ -3,8 +3,7 @@
 /// Units that are letters alone.
 const SIMPLE_UNITS: [&str; 11] = ["s", "ms", "min", "h", "d", "Hz", "kHz", "g", "mg", "V", "mV"];
 
-/// `text` in lines of at most `width` columns, all but the first with `indent`. Numbers stay with unit and bound;
-/// longer words are broken.
+/// `text` in lines of at most `width` columns, all but the first with `indent`; longer words are broken.
 pub(crate) fn broken(text: &str, width: usize, indent: &str) -> Vec<String> {
     let width = width.max(1);
     let indent = if indent.chars().count() < width { indent } else { "" };

@@ -249,7 +249,6 @@ fn findings(report: &Report) -> Markup {
     }
 }
 
-/// The finding at `index`, called `number`.
 fn finding_card(report: &Report, index: usize, number: usize) -> Markup {
     let finding = &report.findings[index];
     let text = summary::finding_text(report, index);
@@ -283,7 +282,6 @@ fn parameters(report: &Report, index: usize) -> Markup {
     }
 }
 
-/// Beside the data sheet.
 fn curves(report: &Report) -> Markup {
     let plots = figure::overviews(report);
     html! {
@@ -362,7 +360,6 @@ fn channel_section(report: &Report, channel: &ChannelReport) -> Markup {
     }
 }
 
-/// The assessment of a channel's model.
 fn assessment(assessment: &Assessment) -> Markup {
     html! {
         @if !assessment.coefficients.is_empty() { (tables::units(&assessment.coefficients)) }
@@ -389,7 +386,6 @@ fn assessment(assessment: &Assessment) -> Markup {
     }
 }
 
-/// Definitions of the page's words and numbers.
 fn definitions() -> Markup {
     html! {
         section.definitions id="reading" {

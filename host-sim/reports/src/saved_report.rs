@@ -89,22 +89,18 @@ pub struct SavedParameter {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SavedReportError {
-    /// It is no JSON object, or has no field `schema`.
     #[error("no JSON report of this program: {0}")]
     NoReport(serde_json::Error),
     #[error("schema {0}, where this program reads schema {SCHEMA}")]
     Schema(u64),
-    /// A field is missing or has another type.
     #[error("{path}: {reason}")]
     Field {
         /// Such as `channels[3].final`.
         path: String,
         reason: serde_json::Error,
     },
-    /// A contradiction, or no number.
     #[error("{0}: the report contradicts itself; make it anew with `analyze --json`")]
     Contradiction(String),
-    /// Reports that are no parts of one sensor.
     #[error("{0} is in both reports; those of one sensor's parts have different channels")]
     SameChannel(String),
 }
@@ -232,7 +228,6 @@ impl SavedTerm {
         self.parameters.get(if is_white { "value" } else { BELOW_CORNER })
     }
 
-    /// True for a process that replaces white noise.
     pub(crate) fn is_in_place_of_white_noise(&self) -> bool {
         self.parameters.contains_key(BELOW_CORNER)
     }

@@ -19,8 +19,7 @@ use noise_analysis::report::{
 use noise_analysis::report::{DataSheetReport, TermReport};
 use noise_analysis::units::conversions;
 
-/// Deviance per point on the unseen half above which a model is marked; a true model has about 1, changes leave up
-/// to 3.
+/// Deviance per point on the unseen half above which a model is marked; a true model has about 1.
 pub(crate) const HIGH_DEVIANCE: f64 = 3.0;
 /// Largest part of records with true models that are told to be contradicted.
 const CHANCE: f64 = 0.01;
@@ -806,8 +805,7 @@ fn magnetometers(report: &Report) -> Vec<String> {
     told
 }
 
-/// Order of the findings: motion, causes in inertial channels, in conditions, unexplained; the largest share of the
-/// variance first.
+/// Order of the findings: motion, causes in inertial channels, in conditions, unexplained; then by share of variance.
 pub(crate) fn finding_order(report: &Report) -> Vec<usize> {
     let is_inertial = |name: &String| name.starts_with("gyro_") || name.starts_with("accl_");
     let rank = |&index: &usize| {
@@ -824,7 +822,6 @@ pub(crate) fn finding_order(report: &Report) -> Vec<usize> {
     order
 }
 
-/// Explained findings, in order.
 fn named_findings(report: &Report) -> Vec<usize> {
     let is_named = |&index: &usize| !matches!(report.findings[index].effect, Effect::Unexplained(_));
     finding_order(report).into_iter().filter(is_named).collect()

@@ -65,8 +65,8 @@ pub(crate) struct Track {
 }
 
 impl Track {
-    /// Aligns until the period stays; returns the shortest description with its cost. The envelope spans `queue`
-    /// samples; shorter losses than `least` do not count.
+    /// Aligns until the period stays; returns the shortest description with its cost, by an envelope over `queue`
+    /// samples.
     pub(crate) fn refined(
         times: &[f64],
         period_s: f64,
@@ -168,8 +168,7 @@ impl Track {
         track
     }
 
-    /// True if losses are as independent as the durations, with `persistent` s² per sample, allow. Bursts and beats
-    /// look like compensating losses.
+    /// True if losses are as independent as the durations, with `persistent` s² per sample, allow.
     pub(crate) fn are_losses_independent(&self, persistent: f64) -> bool {
         let samples = self.periods.len() as f64;
         let (sum, squares) = self.losses.iter().fold((0.0, 0.0), |(sum, squares): (f64, f64), loss| {
@@ -203,8 +202,7 @@ impl Track {
         slope(&self.periods, times, |at| !self.is_late(at))
     }
 
-    /// Description length, nats, over that without a clock, to 1 s; by the first sample of each tick. Scatter is
-    /// measured around blocks: the envelope follows a wrong period.
+    /// Description length, nats, over that without a clock, to 1 s; by the first sample of each tick.
     pub(crate) fn cost(&self, times: &[f64], tick_s: Option<f64>) -> f64 {
         let mut residuals = lateness(times, self.period_s);
         for ((at, residual), period) in residuals.iter_mut().enumerate().zip(&self.periods) {

@@ -209,8 +209,7 @@ fn are_unlike_or_ticks(times: &[f64], tick_s: f64) -> bool {
     long > UNLIKE * short || short < FEW_TICKS * tick_s
 }
 
-/// Shortest loss told from late delivery in bursts: at least eight rises, eight times the falls; or beyond the longest
-/// of `n` exponential rises at 10⁻³, scaled by the longest fall.
+/// Shortest loss told from late delivery in bursts, by its rises against the falls.
 fn least_telling(times: &[f64], track: &Track) -> u64 {
     let complete = Track::complete(times, track);
     let rises = Track::new(times, complete.period_s, None, (MAX_QUEUE, 1)).losses;
@@ -226,8 +225,7 @@ fn least_telling(times: &[f64], track: &Track) -> u64 {
     (1..by_length.max(2)).find(is_telling).unwrap_or(by_length.max(2))
 }
 
-/// Estimates of the period, s, the best one for fine stamps first: mean of windows near the median, or the lower
-/// quartile with losses.
+/// Estimates of the period, s, the best one for fine stamps first.
 fn period_estimates(times: &[f64], tick_s: Option<f64>) -> Vec<f64> {
     let mut estimates = Vec::new();
     // Too few long windows to compare.

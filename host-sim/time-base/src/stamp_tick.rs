@@ -13,8 +13,7 @@ const OUTAGE: f64 = 1e3;
 const TOLERANCE_OF_STAMPS: f64 = 4.0 * TOLERANCE;
 const TELLING: f64 = 100.0;
 
-/// Common divisor of the intervals of `times`, s; `None` below a twentieth of the mean interval. Euclid's, to a
-/// thousandth; stamps between outages must be multiples, unlike those of a wandering clock.
+/// Common divisor of the intervals of `times`, s, to a thousandth (Euclid); `None` below a twentieth of the mean.
 pub(crate) fn tick(times: &[f64]) -> Option<f64> {
     let examined = &times[..times.len().min(EXAMINED)];
     let intervals = || examined.windows(2).map(|pair| pair[1] - pair[0]);

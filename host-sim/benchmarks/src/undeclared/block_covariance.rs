@@ -137,8 +137,7 @@ fn energy(factor: &Cholesky<f64, Dyn>, values: &DVector<f64>) -> f64 {
     values.dot(&factor.solve(values)) - along * along / weighted.dot(&ones)
 }
 
-/// p-value of `shape` in block `means` by the likelihood ratio with free noises (χ² of one degree of freedom); `white`
-/// is known.
+/// p-value of `shape` in block `means` by the likelihood ratio with free noises (χ²); `white` is known.
 pub(super) fn p_value(means: &[f64], shape: &[f64], noises: &BlockNoises, white: f64) -> f64 {
     let (means, shape) = (DVector::from_column_slice(means), DVector::from_column_slice(shape));
     let ones = DVector::from_element(means.len(), 1.0);

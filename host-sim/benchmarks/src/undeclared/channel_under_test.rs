@@ -89,8 +89,7 @@ impl Densities {
     }
 }
 
-/// N², B² and K² of the best fit to `densities` (Whittle, weights `counts`), from `squares` on, by Fisher scoring of
-/// the logarithms. Small values start at a hundredth of a density, for a slope.
+/// N², B² and K² of the best fit to `densities` (Whittle, weights `counts`) from `squares` on, by Fisher scoring.
 pub(super) fn fit_baseline(densities: &[Densities], counts: &[f64], squares: [f64; 3]) -> [f64; 3] {
     let deviance = |squares: &[f64; 3]| -> f64 {
         let of = |(densities, count): (&Densities, &f64)| {
@@ -136,8 +135,7 @@ pub(super) fn squares(noise: &ChannelNoise) -> [f64; 3] {
 }
 
 impl RecordLength {
-    /// Frequencies, Hz, and the Fourier frequencies that each represents: logarithmic, denser around a `peak` (centre,
-    /// width).
+    /// Frequencies, Hz, and the Fourier frequencies that each represents, denser around a `peak` (centre, width).
     fn grid(self, peak: Option<(f64, f64)>) -> Vec<(f64, f64)> {
         let (lowest, highest) = (1.0 / self.seconds, 0.5 / self.period_s);
         let step = (highest / lowest).ln() / GRID as f64;
@@ -151,8 +149,7 @@ impl RecordLength {
         edges.windows(2).map(interval).filter(|(_, count)| *count > 0.0).collect()
     }
 
-    /// Expected log likelihood ratio of `truth` against the best N, B and K behind `gains`, with `known` added. From
-    /// the coefficients of `noise` on.
+    /// Expected log likelihood ratio of `truth` against the best N, B and K behind `gains`, with `known` added.
     pub(super) fn ratio_against_baseline(
         self,
         noise: &ChannelNoise,
@@ -310,8 +307,7 @@ impl<'a> ChannelUnderTest<'a> {
         self.gain(frequency) * baseline + self.known_density(frequency)
     }
 
-    /// True if the filtered white noise stays below half a count, or half a quantum, up to the longest filter: rounding
-    /// is then not white.
+    /// True if the filtered white noise stays below half a count or quantum: rounding is then not white.
     pub(super) fn is_below_a_count(&self) -> bool {
         let quantum = |effect: &InjectedEffect| match *effect {
             // The angle has steps of √12 times the coefficient.

@@ -209,8 +209,7 @@ pub(super) fn solve_size(required: f64, ratio: impl Fn(f64) -> f64) -> f64 {
     (low * high).sqrt()
 }
 
-/// Expected log likelihood ratio of two levels `amplitude` apart (hidden Markov chain) against a Gauss-Markov process
-/// of the same covariance (Kalman filter), in white noise.
+/// Expected log likelihood ratio of two levels `amplitude` apart against a Gauss-Markov process of equal covariance.
 pub(super) fn ratio_of_telegraph(
     amplitude: f64,
     time_constant_s: f64,
@@ -266,8 +265,7 @@ pub(super) fn ratio_of_spikes(samples: f64, probability: f64, size: f64) -> f64 
     samples * ((1.0 - probability) * mean(0.0) + probability * mean(size))
 }
 
-/// Mean number of events at the limit beside a mean of `by_chance`: its median is the smallest count of at most 1 % by
-/// chance.
+/// Mean number of events at the limit beside a mean of `by_chance`.
 pub(super) fn smallest_count(by_chance: f64) -> f64 {
     // More than none, one, two …
     let exceeds = |count: u64| Poisson::new(by_chance).map_or(0.0, |distribution| distribution.sf(count));

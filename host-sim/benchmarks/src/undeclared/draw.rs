@@ -103,7 +103,6 @@ impl DrawnRecording {
         let sampling = Sampling::adis16405();
         let outside = Vec::new();
         let mut simulation = TrueRecording { sampling, seconds, seed, noise, scenario, outside, host_clock_ratio };
-        // In a moving accelerometer the motion hides any other effect.
         let channels = if environment.motion.deviation_g > 0.0 {
             &OutputRegister::INERTIAL[..3]
         } else {

@@ -48,8 +48,7 @@ pub(super) fn log_uniform(random: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
 const USUAL_RATE_HZ: f64 = 100.0;
 const USUAL_S: f64 = 120.0;
 
-/// Factor on drawn frequencies: below 1 for rates below [`USUAL_RATE_HZ`], above 1 for records shorter than [`USUAL_S`]
-/// if the rate allows.
+/// Factor on drawn frequencies: below 1 for rates below [`USUAL_RATE_HZ`], above 1 for records below [`USUAL_S`].
 pub(super) fn frequency_factor(seconds: f64, period_s: f64) -> f64 {
     (USUAL_S / seconds).max(1.0).min(1.0 / (USUAL_RATE_HZ * period_s))
 }

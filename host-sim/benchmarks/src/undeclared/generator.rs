@@ -154,7 +154,6 @@ impl TrueRecording {
                 Channel::AcclZ => Some(&environment.force_g[2]),
                 _ => None,
             };
-            // The filter has run before the first sample, in a constant environment.
             let of = |course: &[f64], at: usize| course[at.saturating_sub(lead)];
             for (at, value) in values.iter_mut().enumerate() {
                 *value += level + own.map_or(0.0, |own| of(own, at));

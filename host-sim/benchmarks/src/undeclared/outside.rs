@@ -121,8 +121,7 @@ pub struct OutsideEffect {
     pub(super) kind: OutsideKind,
     /// Outputs with factors on the size; none for the sample clock.
     pub(super) shares: Vec<(OutputRegister, f64)>,
-    /// In the channel's unit: amplitude, height, distance of levels, or highest deviation. Length in s of held value
-    /// and dead time; relative change of a clock step.
+    /// In the channel's unit, s of a held value and of dead time, or relative change of a clock step.
     pub(super) size: f64,
     /// Hz: first and last frequency of a sweep; else repetition and modulation; 1/interval and 1/time constant of
     /// random events; centre and width of a band. 1/modulus of missing codes.
@@ -142,8 +141,7 @@ impl OutsideEffect {
         self.shares.iter().map(|(channel, _)| *channel)
     }
 
-    /// True for a part that is found without the rest: the carrier of a changing line, whose sidebands have 1/16 of its
-    /// power.
+    /// True for a part that is found without the rest, as the carrier of a changing line.
     pub(super) fn has_part(&self, found: &Effect) -> bool {
         let [carrier_hz, change_hz] = self.frequencies_hz;
         let changes = matches!(self.kind, OutsideKind::ModulatedLine | OutsideKind::SwitchedLine);

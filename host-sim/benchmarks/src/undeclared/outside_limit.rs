@@ -8,8 +8,7 @@ use super::detection_limit::{
 use super::environment::EnvironmentCourse;
 use super::outside::{OutsideEffect, OutsideKind, relative};
 
-/// Size at `strength` times the limit, and the strength obtained; missing codes have no size. Samples, clocks and
-/// levels grow with the root, as dropped samples do.
+/// Size at `strength` times the limit, and the strength obtained; missing codes have no size.
 pub(super) fn with_strength(
     unit: OutsideEffect,
     strength: f64,

@@ -206,7 +206,6 @@ fn score_outside(effect: &OutsideEffect, strength: f64, scored: &[(Channel, &Cha
     OutsideScore { kind: effect.kind(), strength, unexplained: names.contains(&UNEXPLAINED), named }
 }
 
-/// Effects without channels are in all.
 fn shows_in(effect: &InjectedEffect, channel: Channel) -> bool {
     effect.channels().is_empty() || effect.channels().contains(&simulation::output_register(channel))
 }

@@ -109,8 +109,7 @@ fn likelihood_ratios_in_white_noise_equal_their_closed_forms() {
     assert!((matched / (0.5 * 0.01 * 1800.0 / PERIOD_S / (0.25 / PERIOD_S)) - 1.0).abs() < 0.01, "{matched}");
 }
 
-/// A bias that alternates by block: `½·s²·M/σ²`, less a few hundredths by a free N. A ramp of ratio 30 is mostly a
-/// walk.
+/// `½·s²·M/σ²` of a bias that alternates by block, less some hundredths by a free N; a ramp of 30 is mostly a walk.
 #[test]
 fn a_free_walk_takes_up_a_slow_drift_and_nothing_else() {
     let mut model = NoiseModel::paper();

@@ -113,8 +113,7 @@ fn curve(samples: &[RecordedSample], channel: Channel, range: GyroRange) -> alla
     cascade.curve(1.0 / SAMPLE_RATE_HZ).scaled(channel.lsb(range))
 }
 
-/// Known channel and waveform, estimated noise, at the analysis' significance; `None` for other effects. An upper limit
-/// for methods that have to find both.
+/// Known channel and waveform, estimated noise, at the analysis' significance; `None` for other effects.
 pub(super) fn detects_known_waveform(
     effect: &InjectedEffect,
     truth: &TrueRecording,

@@ -36,8 +36,7 @@ struct StandingOut<'a> {
     samples: u64,
 }
 
-/// The loud stretches of each channel, for each part. Noise with a first Allan variance of at least
-/// `dithered_avar_counts2` dithers the rounding. Samples in the sample periods `repeated` are never spikes.
+/// The loud stretches of each channel, for each part; a first Allan variance of `dithered_avar_counts2` dithers.
 pub(crate) fn find(
     channels: &[SearchedChannel],
     repeated: &[u64],

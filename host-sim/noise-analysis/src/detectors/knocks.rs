@@ -430,8 +430,7 @@ pub(super) fn join(knocks: &mut Vec<Knock>, mut knock: Knock) {
     knocks.push(knock);
 }
 
-/// The likeliest stretch of a raised level around a block. It is tried at the root of the block's ratio, to include
-/// rise and decay.
+/// The likeliest stretch of a raised level around a block, tried at the root of the block's ratio.
 fn knock_around(block: &LoudBlock, differences: &SquaredDifferences, p_value: f64) -> Knock {
     let quiet = block.quiet / TRIMMED_MEAN;
     let tried = block.ratio.sqrt();
@@ -544,7 +543,6 @@ impl Knock {
         Detection { effect, correction: Some(Correction::Exclude(excluded)) }
     }
 
-    /// The interval for the sample period `period_s`, s.
     pub(crate) fn interval(&self, period_s: f64, channels: &[&'static str]) -> NoisyInterval {
         let time = |slot: u64| slot as f64 * period_s;
         let bounded = |of: BoundedSlot| BoundedEstimate::new(time(of.value), time(of.low), time(of.high));

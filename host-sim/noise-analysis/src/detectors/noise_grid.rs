@@ -42,8 +42,7 @@ struct StepInformation {
 }
 
 impl NoiseFamily {
-    /// White variance 1 in a whole block, B² = `flicker`, a random walk of variance `walks` per block. `None` if not
-    /// positive definite.
+    /// White variance 1 in a whole block, B² = `flicker`, a walk of variance `walks` per block; `None` if not definite.
     fn new(numbers: &[usize], fills: &[f64], flicker: f64, walks: impl Iterator<Item = f64>) -> Option<Self> {
         let coloured = flicker_covariance();
         let count = numbers.len();
@@ -191,8 +190,7 @@ fn noise_grid((numbers, fills): &Layout) -> NoiseGrid {
     Arc::new(families.into_iter().flatten().collect())
 }
 
-/// Covariance of the means of two blocks in flicker noise with B = 1, by their distance. Sum of Gauss-Markov processes
-/// an octave apart, each of variance ln 2/π.
+/// Covariance of the means of two blocks in flicker noise with B = 1, a sum of Gauss-Markov processes, by distance.
 fn flicker_covariance() -> Vec<f64> {
     let mut covariance = vec![0.0; BLOCKS];
     let mut time = 0.125;

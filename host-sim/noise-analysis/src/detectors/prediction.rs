@@ -73,8 +73,7 @@ impl Prediction {
         values[position] - mean - before.map(|(weight, value)| weight * (value - mean)).sum::<f64>()
     }
 
-    /// True if one innovation explains the error at `position`: a spike in front of the filter. A jump, or a spike
-    /// behind the filter, explains more of the squared errors.
+    /// True if one innovation explains the error at `position`: a spike in front of the filter.
     pub(super) fn is_in_front(&self, series: &Series, values: &[f64], mean: f64, position: usize) -> bool {
         let behind: Vec<f64> = std::iter::once(1.0).chain(self.weights.map(|weight| -weight)).collect();
         let sums = behind.iter().scan(0.0, |sum, of| {

@@ -68,8 +68,7 @@ pub(crate) fn is_gaussian(series: &UniformSeries, deviation: f64, time_constant:
     gauss_markov_log_likelihood(&means) - levels.log_likelihood > TOLD_APART.ln()
 }
 
-/// True if changes up and down over `time_constant`/4 s are alike, unlike those of decaying disturbances. Σd³ over √Σd⁶
-/// is then about standard normal.
+/// True if changes up and down over `time_constant`/4 s are alike: Σd³ over √Σd⁶ is then about standard normal.
 #[must_use]
 pub(crate) fn is_reversible(series: &UniformSeries, time_constant: f64) -> bool {
     let size = ((time_constant / PER_CHANGE / series.sample_period()) as usize).max(1);

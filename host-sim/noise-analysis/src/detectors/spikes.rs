@@ -126,8 +126,7 @@ impl FoundSpikes {
         Self { jumps: 0, ..self.kept(|spike| spike.slot < slot) }
     }
 
-    /// Those that are no part of louder noise: all, if most stand out locally. Streaming cannot use this rule: a
-    /// block's exclusions must be final before the next one.
+    /// Those that are no part of louder noise: all, if most stand out locally.
     pub(crate) fn out_of_noise(&self) -> Self {
         let stands_out = self.spikes.iter().filter(|spike| spike.stands_out).count();
         let wanders = 2 * stands_out < self.spikes.len();
@@ -471,8 +470,8 @@ impl Interpolation {
         })
     }
 
-    /// How many times louder than in the channel the noise around a sample is, by the mean square of its `errors`; 1 if
-    /// chance explains it.
+    /// How many times louder than in the channel the noise around a sample is, by its `errors`; 1 if chance explains
+    /// it.
     fn louder_around(&self, errors: &[(usize, f64)]) -> f64 {
         let louder = |reach: usize| {
             let near = errors.iter().filter(|(distance, error)| *distance <= reach && *error != 0.0);
@@ -574,8 +573,7 @@ impl Interpolation {
     }
 }
 
-/// A size that separates at most `many` of the largest `sizes`, in descending order, from the rest. For a power law,
-/// `i·ln(sᵢ/sᵢ₊₁)` are independent exponential variables (A. Rényi, 1953).
+/// A size that separates at most `many` of the largest `sizes` from the rest (A. Rényi, 1953: exponential spacings).
 fn standing_apart(sizes: &[f64], many: usize) -> Option<f64> {
     let distance = |at: usize| (at + 1) as f64 * (sizes[at] / sizes[at + 1]).ln();
     let count = sizes.len().checked_sub(1)?;
@@ -632,8 +630,7 @@ fn typical_difference(series: &Series) -> f64 {
     (distances[..smaller].iter().sum::<f64>() / smaller as f64).max(0.5 * series.resolution)
 }
 
-/// Limits the values to [`CLIP`] typical deviations from the median of their block, so that a long disturbance is not
-/// interpolated from its own samples.
+/// Limits the values to [`CLIP`] typical deviations from the median of their block.
 fn clip(values: &mut [f64], resolution: f64) {
     let (middles, mut deviations): (Vec<f64>, Vec<f64>) =
         values.chunks(CLIPPED_BLOCK).map(median_and_deviation).unzip();
@@ -675,8 +672,7 @@ struct SpikeSize {
 }
 
 impl SpikeSize {
-    /// Size from the `sizes` above `threshold`. Noise selects the detected ones of size `s`: their mean is `s +
-    /// σ·φ(a)/Q(a)` with `a = (threshold − s)/σ`. Sizes that scatter by more than 1.5 σ are not corrected.
+    /// Size from the `sizes` above `threshold`, corrected for the selection by noise unless they scatter by 1.5 σ.
     fn estimate(sizes: &[f64], threshold: f64, deviation: f64) -> Self {
         let count = sizes.len() as f64;
         let mean = sizes.iter().sum::<f64>() / count;

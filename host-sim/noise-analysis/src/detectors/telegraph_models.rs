@@ -36,8 +36,8 @@ struct StateStatistics {
 }
 
 impl TwoStateChain {
-    /// The likeliest chain by expectation maximisation (L. Baum et al., Ann. Math. Statist. 41, 1970). `None` of fewer
-    /// than 16 values, if they never change, or if the ln likelihood does not come near `least`.
+    /// The likeliest chain by expectation maximisation (L. Baum et al., Ann. Math. Statist. 41, 1970), if it nears
+    /// `least`.
     pub(super) fn fit(values: &[f64], least: f64) -> Option<Self> {
         let mut present: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
         let half = present.len() / 2;

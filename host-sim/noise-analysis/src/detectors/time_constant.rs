@@ -13,8 +13,7 @@ pub(super) struct TimeConstant {
 }
 
 impl TimeConstant {
-    /// The likeliest of `count` time constants from `shortest` on by the factor `ratio`, refined. The curvature over
-    /// the part `spread` of the ratio gives the error.
+    /// The likeliest of `count` time constants from `shortest` on by the factor `ratio`, refined, with its error.
     pub(super) fn likeliest(
         (shortest, ratio, count): (f64, f64, usize),
         spread: f64,

@@ -37,8 +37,7 @@ pub(crate) struct EpochCurves {
 }
 
 impl EpochCurves {
-    /// Curves of a series whose second half begins with the sample period `middle`. `None` below 24,576 sample periods,
-    /// or if the channel is constant for a whole epoch of the first half.
+    /// Curves of a series, halved at `middle`; `None` below 24,576 sample periods, or if constant for an epoch.
     #[must_use]
     pub(crate) fn from_series(series: &Series, middle: u64) -> Option<Self> {
         let to = series.span.end;
@@ -154,15 +153,13 @@ fn median_avar<const POINTS: usize>(epochs: &[Curve<POINTS>], n: u64) -> Option<
     Some(middle / (1.0 - 2.0 / (9.0 * edf)).powi(3))
 }
 
-/// The octaves of a curve with `n ≤ M/8`, for comparison with models. The degrees of freedom are those of the channel's
-/// model for every model compared.
+/// The octaves of a curve with `n ≤ M/8`, for comparison with models at the degrees of freedom of one.
 pub(crate) struct ComparedCurve {
     points: Vec<(AllanPoint, f64)>,
 }
 
 impl ComparedCurve {
     pub(crate) fn new<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> Self {
-        // A variance of 0 has no logarithm.
         let points = curve.points().iter().filter(|point| point.n <= curve.samples() / 8 && point.avar > 0.0);
         Self { points: points.map(|point| (*point, model.edf(point))).collect() }
     }

@@ -72,7 +72,6 @@ fn predictions<const POINTS: usize>(
     predicted.iter().map(|parameters: &ParameterVector| model.at(*parameters)).collect()
 }
 
-/// Mean Allan variance of models at the averaging factor `n`.
 pub(crate) fn mean_avar(models: &[Model], n: u64) -> f64 {
     models.iter().map(|model| model.avar(n)).sum::<f64>() / models.len() as f64
 }
@@ -84,8 +83,7 @@ fn step_variance(measured: &[(f64, f64)]) -> f64 {
     (squares.sum::<f64>() / (measured.len().max(2) - 1) as f64).max(0.0)
 }
 
-/// Predicts each `(value, error)` from those before it. By a Kalman filter of a random walk (local level model) whose
-/// step variance is that of the first `fitted` values.
+/// Predicts each `(value, error)` by a Kalman filter of a random walk with the steps of the first `fitted` values.
 fn predict_one_step(measured: &[(f64, f64)], fitted: usize) -> Vec<f64> {
     let step = step_variance(&measured[..fitted]);
     let (mut level, mut variance) = measured.first().map_or((0.0, 0.0), |&(value, error)| (value, error * error));
@@ -120,8 +118,7 @@ pub(crate) fn expected_drift<const POINTS: usize>(
     })
 }
 
-/// Deviance per point of a model on `half` whose parameters may differ by `drift` (standard deviations) at the cost
-/// `(x/σ)²`. Without drift the plain deviance per point.
+/// Deviance per point on `half` of a model whose parameters may differ by `drift` σ at the cost `(x/σ)²`.
 #[must_use]
 pub(crate) fn beyond_drift<const POINTS: usize>(
     model: &TrackedModel,

@@ -8,8 +8,7 @@ use allan_core::{AllanPoint, Curve, Model};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-/// Step variances over the variance of an epoch's estimate: 0, and powers of 4 from one that thirty epochs hide to a
-/// change by a factor of two.
+/// Step variances over the variance of an epoch's estimate: 0, and powers of 4.
 const STEPS: [f64; 11] = [0.0, 1.0 / 64.0, 1.0 / 16.0, 0.25, 1.0, 4.0, 16.0, 64.0, 256.0, 1024.0, 4096.0];
 /// Probability on either side of a prediction interval of 95 %.
 const TAIL: f64 = 0.025;
@@ -49,8 +48,7 @@ impl IntervalCoverage {
     }
 }
 
-/// Variance of ln of a variance with `edf` degrees of freedom: trigamma of `edf/2` by its asymptotic series (Abramowitz
-/// and Stegun, 6.4.12), to 10⁻⁴ from ten on.
+/// Variance of ln of a variance with `edf` degrees of freedom: trigamma of `edf/2` (Abramowitz and Stegun, 6.4.12).
 fn log_variance(edf: f64) -> f64 {
     let x = edf / 2.0;
     1.0 / x + 0.5 / (x * x) + 1.0 / (6.0 * x * x * x)

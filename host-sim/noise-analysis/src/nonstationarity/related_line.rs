@@ -162,8 +162,7 @@ fn correlation(a: &[f64], b: &[f64]) -> Option<(f64, f64)> {
     is_known.then(|| (correlation, 2.0 * student_tail(t.abs(), degrees_of_freedom)))
 }
 
-/// Deviance per point on the second half of the model whose line moves with the related line. Frequency ratio, width
-/// without movement, amplitude and white level are fitted to the later quarter of the first half.
+/// Deviance per point on the second half of the model whose line moves with the related one.
 fn predict(tracked: &TrackedModel, curves: &EpochCurves, [fitted, unseen]: [&[f64]; 2]) -> f64 {
     let Some(near) = tracked.line_frequency() else { return f64::NAN };
     let quarter = ComparedCurve::new(&curves.quarters[1], tracked.model());

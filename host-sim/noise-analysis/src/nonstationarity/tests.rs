@@ -152,7 +152,6 @@ fn truth() -> Model {
 
 #[test]
 fn a_line_that_moves_is_tracked() {
-    // From 22 to 18 Hz.
     let falling = |at: usize| 22.0 - 4.0 * at as f64 / SAMPLES as f64;
     let curves = epoch_curves(&oscillating(7, falling)).expect("long enough");
     let start = NoiseTerm::Resonance(Resonance { frequency: 21.0, bandwidth: 1.0 });
@@ -211,11 +210,9 @@ fn a_burst_is_not_in_the_median_curve() {
         quiet.push(shortest(&drifting(seed, |_| 1.0))[1]);
     }
     let average = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
-    // 1,500 of 16,384 samples with 2.25 times the variance add 11.4 %. The average of 20 is known to 0.3 % (quarters)
-    // and 0.4 % (medians): four of these.
+    // 1,500 of 16,384 samples with 2.25 times the variance add 11.4 %, known to 0.3 % or 0.4 %: four of these.
     assert!((average(&means) - 1.114).abs() < 0.013, "{}", average(&means));
     assert!((average(&quiet) - 1.0).abs() < 0.016, "{}", average(&quiet));
-    // One epoch above all others moves the median by 0.3 of an epoch's 3.8 % at most.
     let moved = average(&medians) / average(&quiet);
     assert!((1.0..1.03).contains(&moved), "{moved}");
 }
@@ -261,8 +258,7 @@ fn without_drift_the_plain_deviance_is_left() {
     assert_eq!(beyond_drift(&model, [0.0, 0.0], &curves.unseen), plain);
 }
 
-/// Share of the octaves of 40 second halves within their intervals; `level(random, k)` is the level of epoch `k` over
-/// the one before.
+/// Share of the octaves of 40 second halves within their intervals; `level(random, k)` is over the epoch before.
 fn coverage(level: impl Fn(&mut ChaCha8Rng, usize) -> f64) -> f64 {
     let epoch = 2_048;
     let (mut octaves, mut within) = (0, 0);
@@ -284,8 +280,7 @@ fn coverage(level: impl Fn(&mut ChaCha8Rng, usize) -> f64) -> f64 {
 
 #[test]
 fn prediction_intervals_hold_in_95_percent_of_octaves() {
-    // In 3,840 octaves, correlated within an epoch, the share has a standard deviation of at most √6·0.35 % = 0.9 %. ±2
-    // % are two of these.
+    // The share of 3,840 correlated octaves has a standard deviation of at most 0.9 %: ±2 % are two of these.
     let still = coverage(|_, _| 1.0);
     assert!((0.93..0.97).contains(&still), "constant: {still}");
     let walking = coverage(|random, _| {
@@ -297,7 +292,6 @@ fn prediction_intervals_hold_in_95_percent_of_octaves() {
 
 #[test]
 fn related_epochs_are_those_of_the_same_time() {
-    // 101 samples are missing; the epochs keep their sample periods.
     let mut series = drifting(5, |_| 1.0);
     let missing: Vec<u64> = (1..102).collect();
     series = series.without(&missing);

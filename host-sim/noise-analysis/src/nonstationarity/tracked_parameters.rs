@@ -24,8 +24,7 @@ const MAX_LINE_ERROR: f64 = 0.02;
 /// Spacing in ln f of the starting points of the search.
 const GUESS_STEP: f64 = 0.02;
 
-/// Differences of an epoch from the model, or their standard deviations: ln of the white variance, ln of the line's
-/// frequency.
+/// Differences of an epoch from the model, or their errors: ln of the white variance, ln of the line's frequency.
 pub(crate) type ParameterVector = [f64; PARAMETERS];
 
 #[derive(Debug, Clone, PartialEq)]
@@ -118,7 +117,6 @@ impl TrackedModel {
         if self.line.is_some() { TrackedSet::LevelAndLine } else { TrackedSet::Level }
     }
 
-    /// The model with the parameters of an epoch.
     #[must_use]
     pub(crate) fn at(&self, [level, line]: ParameterVector) -> Model {
         let moved = |(at, term): (usize, &FittedTerm)| {
@@ -150,8 +148,7 @@ impl TrackedModel {
         Model::new(moved.sample_period(), moved.terms().iter().enumerate().map(changed))
     }
 
-    /// Tests whether the epochs need the parameters `more`, one more than `fewer`. Without a change each epoch's
-    /// deviance decreases by χ² of one degree of freedom times its scatter.
+    /// Tests if the epochs need the parameters `more`, one more than `fewer`, by the decrease of each epoch's deviance.
     #[must_use]
     pub(crate) fn test_movement<const POINTS: usize>(
         &self,
@@ -217,8 +214,7 @@ impl TrackedModel {
         EpochEstimate { parameters, error, deviance, scatter }
     }
 
-    /// Sandwich estimator `H⁻¹·S·H⁻¹`: standard deviations, and the factor on the variance of the last parameter by
-    /// correlated points.
+    /// Sandwich estimator `H⁻¹·S·H⁻¹`: standard deviations, and the factor by correlated points on the last variance.
     fn uncertainty(
         &self,
         points: &[(&AllanPoint, f64)],

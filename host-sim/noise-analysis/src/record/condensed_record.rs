@@ -55,7 +55,6 @@ pub(crate) fn faster_lines(find: impl FnOnce() -> Vec<MergedLine> + Send + 'stat
 }
 
 impl<'a> CondensedRecord<'a> {
-    /// A record all of whose samples are kept.
     pub(crate) fn of_samples(measurement: Cow<'a, Measurement>) -> Self {
         let (measurement, stuck) = stuck_output::screened(measurement);
         let shown = SampleEffects::detect(&measurement);
@@ -108,7 +107,6 @@ impl<'a> CondensedRecord<'a> {
         }
     }
 
-    /// The first samples, or all.
     pub(crate) fn first_samples(&self) -> &Measurement {
         self.first.as_ref().unwrap_or(&self.means)
     }

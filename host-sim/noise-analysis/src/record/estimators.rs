@@ -60,7 +60,6 @@ impl CoupledEstimators {
         }
     }
 
-    /// Records `missing` sample periods without a sample in every channel.
     pub(crate) fn gap(&mut self, missing: u32) {
         self.cascades.iter_mut().for_each(|cascade| cascade.miss(missing.into()));
     }
@@ -76,8 +75,7 @@ impl CoupledEstimators {
         &self.cascades[channel]
     }
 
-    /// Covariances of second differences at one octave, up to a common factor, 0 if not coupled; `None` if the octave
-    /// has no differences.
+    /// Covariances of second differences at one octave, up to a common factor, 0 if not coupled; `None` without any.
     pub(crate) fn covariances(&self, octave: usize) -> Option<DMatrix<f64>> {
         let mut covariances = DMatrix::zeros(self.cascades.len(), self.cascades.len());
         for (i, cascade) in self.cascades.iter().enumerate() {
@@ -128,7 +126,6 @@ impl CurveOfSamples {
         Self { curve: Curve::empty(), replaced: 0, means_from: Some(1), events: Vec::new() }
     }
 
-    /// The curve, continued by that of the means.
     fn continued(&self, means: &Curve<OCTAVES>, samples_per_mean: u64) -> Curve<OCTAVES> {
         let Some(means_from) = self.means_from else { return self.curve.clone() };
         let mut curve = self.curve.clone().continued_by_means(means, samples_per_mean, means_from);
@@ -228,8 +225,7 @@ fn of_half(samples: &SampleCurves, half: usize, exclusion: Exclusion, is_correct
 const EXCLUSIONS: [Exclusion; 4] =
     [Exclusion::Nothing, Exclusion::BiasOfFirstHalf, Exclusion::ByFirstHalf, Exclusion::ByWhole];
 
-/// The halves of a record for each exclusion, by its means alone. The resolution is that of the `first_half`, unless it
-/// is by the whole record.
+/// The halves of a record for each exclusion, by its means alone, with the resolution of the `first_half`.
 fn half_parts<const COUNT: usize>(
     record: &CondensedRecord,
     first_half: &CondensedRecord,
@@ -402,7 +398,6 @@ impl RecordPart {
         }
     }
 
-    /// This part, then `later` behind a gap.
     pub(crate) fn followed_by(&self, later: &Self) -> Self {
         Self { estimators: self.estimators.clone().followed_by(&later.estimators), ..self.clone() }
     }
@@ -429,12 +424,10 @@ impl RecordPart {
         self.period_s / self.samples_per_mean as f64
     }
 
-    /// Least averaging factor of the covariances, samples.
     pub(crate) fn coupled_from(&self) -> u64 {
         self.until
     }
 
-    /// Channels whose covariance with `channel` is known.
     pub(crate) fn coupled_with(&self, channel: ChannelId) -> impl Iterator<Item = ChannelId> {
         self.channels.ids().filter(move |&other| other != channel && self.pair(channel, other).is_some())
     }
@@ -471,7 +464,6 @@ impl RecordPart {
         }
     }
 
-    /// Smallest distance of two values of a channel, in its unit.
     pub(crate) fn resolution(&self, channel: ChannelId) -> f64 {
         self.resolutions[channel]
     }

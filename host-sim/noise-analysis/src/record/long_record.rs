@@ -50,8 +50,7 @@ const MOST_MEANS: u64 = 1 << 17;
 const FIRST_PERIODS: u64 = 1 << 16;
 /// Sample periods per averaged spectrum; a line is known to a 2¹⁶th of the sample rate.
 const STRETCH_PERIODS: u64 = 1 << 16;
-/// Steps of a count in a mean, as a power of two: for 256 samples, a 16th of the deviation `1/√(12·256)` by rounding
-/// the samples.
+/// Steps of a count in a mean, as a power of two: a 16th of the deviation `1/√(12·256)` of a mean of 256.
 const MEAN_STEPS_LOG2: u32 = 8;
 const LARGEST_MEAN: f64 = i32::MAX as f64;
 const LEAST_FILL: f64 = 0.5;

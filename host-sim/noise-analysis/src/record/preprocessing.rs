@@ -38,7 +38,6 @@ pub(crate) struct Preprocessing {
 struct Shown {
     /// Counts of the smallest step of each channel.
     counts_per_step: PerChannel<u32>,
-    /// Sample periods that repeat the sample before in all channels.
     repeated: Vec<u64>,
     channels: PerChannel<ShownInChannel>,
 }
@@ -63,8 +62,7 @@ struct ChannelBias {
 }
 
 impl Preprocessing {
-    /// Finds knocks, spikes, steps, ramps and sensitivities in the inertial channels, and in the `first_half` alone,
-    /// independently of the second.
+    /// Finds knocks, spikes, steps, ramps and sensitivities in the inertial channels, and in the `first_half` alone.
     pub(crate) fn detect(
         record: &CondensedRecord,
         first_half: Option<&CondensedRecord>,
@@ -137,7 +135,6 @@ impl Preprocessing {
         causes.map(|(cause, slots)| (cause, slots.len() as u64)).into_iter().filter(|(_, count)| *count > 0)
     }
 
-    /// True if samples of a channel are corrected.
     pub(crate) fn corrects(&self, channel: ChannelId, exclusion: Exclusion) -> bool {
         self.bias(channel, exclusion).is_some_and(|bias| bias.offset.is_some() || !bias.responses.is_empty())
     }
@@ -293,8 +290,7 @@ fn bias_of(
     let accelerations = accelerations(measurement, series, channel);
     let found = bias::find(&without_lines(own.clone()), &others, &accelerations, noise_grids, &least_step);
     let own = offset(&found).into_iter().fold(own, |own, (from, size)| own.lowered_from(from, size));
-    // Differences, or the force at each frequency, determine a sensitivity to motion better; an accelerometer's slow
-    // part is its own drift.
+    // Differences, or the force at each frequency, determine a sensitivity to motion better.
     let is_force = |at: &usize| measurement[regressors[*at]].profile.quantity == Quantity::SpecificForce;
     let is_slow = |regressor: ChannelId| measurement[regressor].profile.quantity.is_environment();
     let forces: Vec<usize> = (0..regressors.len()).filter(is_force).collect();
@@ -342,8 +338,7 @@ fn knock_detections(
     loud[channel].knocks.iter().map(detection).collect()
 }
 
-/// Loud stretches of each of the `parts` of a record, in the order of time, by the rules of the first part; none in
-/// channels that are not inertial.
+/// Loud stretches of each of the `parts` of a record, by the rules of the first part; none in other channels.
 fn loud_stretches<const PARTS: usize>(
     record: &CondensedRecord,
     repeated: &[u64],
@@ -380,8 +375,7 @@ fn accelerations<'s>(
     measurement.of_quantity(Quantity::SpecificForce).map(acceleration).collect()
 }
 
-/// Without sinusoids: to regressions on block means slow ones are ramps and steps, fast ones noise. Unchanged if a long
-/// gap splits the series.
+/// Without sinusoids, to regressions ramps, steps or noise; unchanged if a long gap splits the series.
 fn without_lines(series: Series) -> Series {
     let uniform = UniformSeries::from_series(&series);
     if uniform.values().len() as u64 != series.span.end.saturating_sub(series.span.start) {
@@ -402,8 +396,7 @@ fn merged(lists: [&[u64]; 2]) -> Vec<u64> {
     all
 }
 
-/// True if the bias of `channel` may depend on `regressor`: temperature, supply, and for a gyroscope the specific
-/// force.
+/// True if the bias of `channel` may depend on `regressor`: temperature, supply, force on a gyroscope.
 fn may_depend(measurement: &Measurement, channel: ChannelId, regressor: ChannelId) -> bool {
     let [channel, regressor] = [channel, regressor].map(|of| measurement[of].profile.quantity);
     let motion = regressor == Quantity::SpecificForce && channel == Quantity::AngularRate;

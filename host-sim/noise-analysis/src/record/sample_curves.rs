@@ -10,8 +10,7 @@ use allan_core::Curve;
 use measurement::{ChannelId, Measurement};
 use std::ops::Range;
 
-/// Averaging factor, in means, from which the means' curve has as many differences as that of the samples
-/// ([`OVERLAP`]).
+/// Averaging factor, in means, from which the means' curve has as many differences ([`OVERLAP`]).
 const LEAST_FACTOR: u64 = OVERLAP as u64;
 
 /// Estimators of consecutive parts, each with its first sample period.

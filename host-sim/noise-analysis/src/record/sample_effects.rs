@@ -28,12 +28,10 @@ impl SampleEffects {
         Self { recording: sampling_faults::detect(measurement), channels }
     }
 
-    /// Sample periods that repeat the sample before in all channels.
     pub(crate) fn repeated(&self) -> Vec<u64> {
         self.recording.iter().flat_map(Detection::excluded).copied().collect()
     }
 
-    /// Counts of the smallest step of a channel.
     pub(crate) fn counts_per_step(&self, channel: ChannelId) -> u32 {
         self.channels[channel].counts_per_step
     }

@@ -31,8 +31,8 @@ impl SampleScreen {
         Self { rules, found, leaves_out_repeated, held, settled: 0 }
     }
 
-    /// Takes the next samples; passes on, with spikes, knocks and repeated samples refused, those whose neighbours on
-    /// both sides are known.
+    /// Takes the next samples; passes on those whose neighbours are known, with spikes, knocks and repeated ones
+    /// refused.
     pub(crate) fn push(&mut self, block: &SampleBlock, mut pass: impl FnMut(&SampleBlock)) {
         let mut from = 0;
         while from < block.slots.len() {

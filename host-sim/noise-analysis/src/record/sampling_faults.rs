@@ -97,8 +97,7 @@ pub(crate) fn repeated_samples(measurement: &Measurement) -> Option<Detection> {
     Some(Detection { effect: repeated.into(), correction: Some(Correction::Exclude(positions)) })
 }
 
-/// Compares the rate by the time stamps with the stated rate, or else with the nearest usual one; and its parts with
-/// each other. A sensor without a data sheet has no rate of its own.
+/// Compares the rate by the time stamps with the stated or the nearest usual one; and its parts with each other.
 #[must_use]
 pub(crate) fn sample_clock(measurement: &Measurement) -> Option<Detection> {
     let MeasuredValue { value: measured, error } = rate_by_time_stamps(measurement)?;
@@ -117,8 +116,7 @@ pub(crate) fn sample_clock(measurement: &Measurement) -> Option<Detection> {
     Some(Detection { effect: clock.into(), correction: None })
 }
 
-/// The rate by the time stamps, Hz, with the scatter of the segments and [`SensorProfile::host_clock_error`]. `None`
-/// without time stamps or with fewer than [`MIN_SAMPLES`].
+/// The rate by the time stamps, Hz, with [`SensorProfile::host_clock_error`]; `None` for fewer than [`MIN_SAMPLES`].
 #[must_use]
 pub(crate) fn rate_by_time_stamps(measurement: &Measurement) -> Option<MeasuredValue> {
     let rates = segment_rates(measurement, SEGMENTS)?;

@@ -8,8 +8,7 @@ const LONGEST_EPOCH: u64 = 1 << 15;
 const SHORTEST_EPOCH: u64 = 1 << 10;
 const MIN_EPOCHS: u64 = 12;
 
-/// Sample periods in an epoch, a power of 2, and the epochs up to `middle` and behind it; `None` if the record is too
-/// short.
+/// Sample periods in an epoch, a power of 2, and the epochs of both halves; `None` if the record is too short.
 pub(crate) fn epochs(record: Range<u64>, middle: u64) -> Option<(u64, [Vec<Range<u64>>; 2])> {
     let half = middle.checked_sub(record.start)?.min(record.end.checked_sub(middle)?);
     let epoch = (half / MIN_EPOCHS).min(LONGEST_EPOCH).checked_ilog2().map(|log2| 1 << log2)?;

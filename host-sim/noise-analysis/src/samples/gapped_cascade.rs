@@ -38,7 +38,6 @@ impl GappedCascade {
         self.gaps.push(counts.len() as u64);
     }
 
-    /// Passes the pending gap to the estimator.
     fn close_gap(&mut self) {
         if self.missing > 0 {
             self.gaps.close(self.missing.into());
@@ -94,7 +93,6 @@ impl GappedCascade {
         cascade
     }
 
-    /// Appends those of `later` behind a gap.
     pub(crate) fn merge(&mut self, later: &Self) {
         self.cascade.merge(&later.cascade);
         self.gaps.merge(&later.gaps);

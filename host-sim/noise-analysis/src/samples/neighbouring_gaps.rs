@@ -7,8 +7,7 @@
 use crate::OCTAVES;
 use allan_core::Curve;
 
-/// Averaging factor, as a power of two, at which a gap of one sample is bridged; a gap of `m` samples from `m` times as
-/// much on.
+/// Averaging factor, as a power of two, at which a gap of one sample is bridged; `m` times as much for `m` samples.
 const SHORTEST_BRIDGING: usize = 3;
 
 /// Gaps nearer to each other than the samples that close them reach.

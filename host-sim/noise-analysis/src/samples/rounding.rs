@@ -14,8 +14,7 @@ use crate::distributions::ROUNDING;
 use allan_core::{AllanPoint, Curve};
 use std::f64::consts::PI;
 
-/// First octaves, at any of which the [limit](dithered_avar) may be exceeded in a dithered channel: filters average up
-/// to 64 samples.
+/// First octaves, any of which may exceed the [limit](dithered_avar) in a dithered channel.
 pub(crate) const DITHERED_OCTAVES: usize = 7;
 /// Distance of two levels up to which they are neighbouring counts.
 pub(crate) const NEIGHBOURING_COUNTS: f64 = 1.5;
@@ -55,8 +54,7 @@ impl Rounding {
         Self { resolution, period, correlated: None }
     }
 
-    /// From a curve with counts of `resolution`. White if the errors of neighbours are uncorrelated, or if the noise
-    /// stays below a count.
+    /// White if the errors of neighbours are uncorrelated, or if the noise stays below a count of `resolution`.
     pub(crate) fn of_curve(curve: &Curve<OCTAVES>, resolution: f64) -> Self {
         let white = Self::white(resolution, curve.sample_period());
         let correlated = squares(curve, resolution).map(|squares| {
@@ -109,8 +107,7 @@ impl Rounding {
     }
 }
 
-/// Least Allan variance, counts², of dithered means of `n` samples, if that of samples is `of_samples`: the rounding is
-/// an n-th.
+/// Least Allan variance, counts², of dithered means of `n` samples, if that of samples is `of_samples`.
 pub(crate) fn dithered_avar(of_samples: f64, n: u64) -> f64 {
     of_samples - ROUNDING * (1.0 - 1.0 / n as f64)
 }
@@ -121,8 +118,7 @@ pub(crate) fn is_dithered(curve: &Curve<OCTAVES>, resolution: f64, of_samples: f
     curve.points().iter().take(octaves).any(exceeds)
 }
 
-/// Mean squares of differences at lags of 1, 2, …, counts², as far as errors are correlated. `None` if those of
-/// neighbours are not, or those far apart are.
+/// Mean squares of differences at the lags of correlated errors, counts²; `None` if all lags are, or none.
 fn squares(curve: &Curve<OCTAVES>, resolution: f64) -> Option<Vec<f64>> {
     let mut squares: Vec<f64> = Vec::new();
     let octaves = curve.points().iter().zip(0..DITHERED_OCTAVES);
@@ -240,8 +236,6 @@ mod tests {
         }
     }
 
-    /// At long averaging times, Allan variance times τ is the density at 0; the integral of the density is the
-    /// variance.
     #[test]
     fn the_density_is_that_of_the_allan_variance_and_of_the_variance() {
         let fine = filtered(32, 6.0, 1);

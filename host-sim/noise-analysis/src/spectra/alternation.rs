@@ -54,8 +54,7 @@ impl Alternation {
         self.squares += distance * (sum / f64::from(count) - self.mean);
     }
 
-    /// The line, if the mean is significant by [`SIGNIFICANCE`]. `duration` and `sample_period` in s; samples that
-    /// scatter less than their `rounding` show none.
+    /// The line, if significant by [`SIGNIFICANCE`] and above the `rounding`; `duration` and `sample_period` in s.
     pub(super) fn line(&self, duration: f64, sample_period: f64, rounding: &Rounding) -> Option<SpectralLine> {
         let blocks = self.blocks as f64;
         // White noise: one-sided density 2σ²τ₀, and variance σ²/(2n) of the mean of n differences.

@@ -53,7 +53,6 @@ impl CoherentTrack {
             let mut spectrum_of = |part: fn(&Complex<f64>) -> f64, output: &mut [Complex<f64>]| {
                 input.fill(0.0);
                 input.iter_mut().zip(&turned).for_each(|(slot, value)| *slot = part(value));
-                // Only buffers of the wrong length are an error.
                 transform.process(&mut input, output).ok()
             };
             spectrum_of(|value| value.re, &mut of_real)?;
@@ -93,8 +92,7 @@ impl CoherentTrack {
     }
 }
 
-/// Sums over blocks of `size` values, turned back by a line with `first` turns a record at the beginning and `run` more
-/// at the end.
+/// Sums over blocks of `size` values, turned back by a line with `first` turns a record, and `run` more at the end.
 fn turned_back(values: &[f64], size: usize, first: f64, run: f64) -> Vec<Complex<f64>> {
     let step = 1.0 / values.len() as f64;
     let mut phasor = Complex::cis(-TAU * (0.5 * first * step + 0.125 * run * step * step));

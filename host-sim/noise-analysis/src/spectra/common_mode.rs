@@ -12,8 +12,7 @@ use std::f64::consts::PI;
 
 /// Samples per mean; at [`HIGHEST`] it lowers a density by 2 %.
 const BLOCK: usize = 4;
-/// Highest frequency over the block rate, and over 1/(length of the impulse response): a Bartlett window lowers a
-/// density by a tenth.
+/// Highest frequency over the block rate, and over 1/(length of the impulse response).
 const HIGHEST: f64 = 0.08;
 const HIGHEST_BY_FILTER: f64 = 0.25;
 /// Shortest time constant, in lengths of the impulse response, which correlates neighbours.
@@ -56,8 +55,7 @@ impl CrossSpectra {
         })
     }
 
-    /// The set of channels whose shared process gains most ln likelihood: members, and gain less ln of the number of
-    /// ways over that of three channels. Beyond [`MOST_TOGETHER`] channels, the likeliest pair grows member by member.
+    /// The set of channels whose shared process gains most, with the gain less ln of the ways over those of three.
     #[must_use]
     pub(crate) fn most_likely_set(&self) -> Option<(Vec<usize>, f64)> {
         let count = self.channels.len();
@@ -90,8 +88,7 @@ impl CrossSpectra {
         Some((members, gain - (tried as f64 / WAYS_OF_THREE).max(1.0).ln()))
     }
 
-    /// Gain of `members` under the likeliest signs, with their bands; the first sign is positive. Beyond
-    /// [`MOST_TOGETHER`] members, each sign is chosen by that member and the first one.
+    /// Gain of `members` under the likeliest signs, of which the first is positive, with their bands.
     fn likeliest_signs(&self, members: &[usize]) -> Option<(f64, Vec<SpectralBand>)> {
         let of_pair = |(at, &member): (usize, &usize)| {
             let pair = [members[0], member];
@@ -117,8 +114,7 @@ impl CrossSpectra {
         most_likely(&fits, without.objective)
     }
 
-    /// Bands of the mean, which contains the process, then of the differences; the bits of `negative` are negative
-    /// signs.
+    /// Bands of the mean, which contains the process, then of the differences; bits of `negative` are negative signs.
     fn bands(&self, members: &[usize], negative: usize) -> Option<Vec<SpectralBand>> {
         let resolution = self.channels[0].resolution();
         let highest = (HIGHEST / self.period).min(HIGHEST_BY_FILTER / self.filter_length);
@@ -184,7 +180,6 @@ fn signs(members: &[usize]) -> usize {
     if members.len() <= MOST_TOGETHER { 1 << members.len().saturating_sub(1) } else { 1 }
 }
 
-/// The Markov processes of a fit.
 #[derive(Clone, Copy)]
 struct Processes {
     own: bool,
@@ -275,7 +270,6 @@ mod tests {
         assert!(members == [0, 1, 2] && gain > 20.0, "{members:?} {gain}");
         let (members, gain) = transforms(2, [1.0, 0.0, 1.0]).most_likely_set().unwrap();
         assert!(members == [0, 2] && gain > 15.0, "{members:?} {gain}");
-        // Shared white noise is no drift.
         for seed in 10..20 {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             let mut channels = [const { Vec::new() }; 3];

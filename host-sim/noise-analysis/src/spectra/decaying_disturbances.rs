@@ -29,7 +29,6 @@ const DIRECTION_BY_CHANCE: f64 = 0.05;
 /// Largest ratio of the reversed filter's sum: strong disturbances change the noise that the filters assume.
 const LARGEST_REVERSED: f64 = 0.75;
 
-/// Decaying disturbances of one direction.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct DecayingDisturbances {
     /// s

@@ -68,7 +68,6 @@ impl EpochSpectra {
         self.from += SEGMENT as u64 / 2;
     }
 
-    /// Ends the part before the sample period `next`.
     fn end_part(&mut self, next: u64) {
         if self.from + SEGMENT as u64 <= next {
             self.end_segment();
@@ -89,7 +88,6 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
-    /// Lost samples and a gap of twenty segments.
     #[test]
     fn parts_have_the_spectra_of_their_samples() {
         let boundaries = [10_000_u64, 30_000, 90_000];

@@ -31,8 +31,7 @@ impl FilteredNoise {
         self.sum(2.0 * PI * frequency * self.period, |_, turned, _| turned.0)
     }
 
-    /// Expected square of the coefficient of this order times the period: the density, and leakage from the ends into
-    /// the filter's nulls.
+    /// Expected square of the coefficient of this order times the period: the density, and leakage into its nulls.
     pub(super) fn expected(&self, order: f64, count: usize) -> f64 {
         let of = count as f64;
         self.sum(PI * order / of, |lag, (cosine, sine), first| ((of - lag) * cosine - sine / first) / of)
@@ -55,7 +54,6 @@ impl FilteredNoise {
 mod tests {
     use super::*;
 
-    /// The normalised cosine of an order at a sample.
     fn cosine(order: usize, at: usize, count: usize) -> f64 {
         (2.0 / count as f64).sqrt() * (PI * (order * (2 * at + 1)) as f64 / (2 * count) as f64).cos()
     }

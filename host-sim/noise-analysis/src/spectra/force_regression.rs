@@ -121,7 +121,6 @@ impl ForceRegression {
         self.rate.iter().enumerate().map(|(order, rate)| rate - followed(order)).collect()
     }
 
-    /// Normal equations of `orders` with these residual `variances`.
     fn equations(&self, variances: &[f64], orders: Range<usize>) -> Equations {
         let axes = self.forces.len();
         let mut matrix = DMatrix::zeros(axes, axes);
@@ -191,8 +190,7 @@ impl Equations {
     }
 }
 
-/// Cosine transform of means of `size` samples about their straight line, 0 if missing; `None` with a long gap or too
-/// few samples.
+/// Cosine transform of means of `size` samples about their straight line, 0 if missing; `None` with a long gap.
 fn transformed(series: &Series, size: usize) -> Option<Vec<f64>> {
     let uniform = UniformSeries::from_series(series);
     let is_whole = uniform.values().len() as u64 == series.span.end - series.span.start;
@@ -285,8 +283,7 @@ mod tests {
                 covered += u32::from((of.sensitivity - SENSITIVITY[place]).abs() <= NORMAL_975 * of.error);
             }
         }
-        // Two axes of 20 records, and by chance one of 20 times the third. 34 or fewer of 40 intervals hold with a
-        // probability of 1 %.
+        // Two axes of 20 records, one more by chance; 34 or fewer of 40 intervals hold with a probability of 1 %.
         assert!((40..=44).contains(&shown) && covered >= 35, "{covered} of {shown}");
     }
 

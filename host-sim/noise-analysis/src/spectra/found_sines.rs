@@ -42,8 +42,7 @@ impl FoundSines {
         self.refit_near_the_last(sine.subtracted_from(series))
     }
 
-    /// Takes the two sidebands of a sinusoid out of the `series` if its modulation is likelier than the `resonance`,
-    /// and returns the rest.
+    /// Takes the two sidebands of a sinusoid out of the `series` if its modulation is likelier than the `resonance`.
     pub(super) fn take_sidebands(&mut self, resonance: &SpectralLine, series: &UniformSeries) -> Option<UniformSeries> {
         let duration = series.duration();
         let is_in_band = |found: &&FoundSine| {
@@ -65,8 +64,7 @@ impl FoundSines {
         Some(left)
     }
 
-    /// Refits the last sinusoid and its neighbours, each to the record without the others; `rest` lacks all. Returns
-    /// what is left then.
+    /// Refits the last sinusoid and its neighbours, each to the record without the others; returns the rest.
     fn refit_near_the_last(&mut self, mut rest: UniformSeries) -> UniformSeries {
         let duration = rest.duration();
         let Some((last, others)) = self.found.split_last_mut() else { return rest };
@@ -138,7 +136,6 @@ impl FoundSine {
     }
 }
 
-/// True if a frequency, Hz, is on the skirts of a resonance.
 pub(super) fn is_on_skirts(frequency: f64, resonance: &SpectralLine) -> bool {
     let distance = (resonance.frequency.value - frequency).abs();
     resonance.width.is_some_and(|width| distance < SKIRTS * width.value)

@@ -19,8 +19,7 @@ const PADDING: usize = 2;
 const LOWEST: usize = 4;
 /// Fewest ordinates of the run; a steady line is in the mean over time.
 const FEWEST_ORDINATES: usize = 8;
-/// Ordinates per side whose mean is the noise of a segment, and the nearest, left out. Leakage of drift varies with
-/// frequency and segment.
+/// Ordinates per side whose mean is the noise of a segment, and the nearest, left out.
 const NEIGHBOURS: usize = 32;
 const NEAREST: usize = 4;
 /// p-value above which chance explains the scatter of sums beside a line.
@@ -139,7 +138,6 @@ impl Spectrogram {
             for (slot, value) in input.iter_mut().zip(values) {
                 *slot = if value.is_finite() { *value } else { 0.0 };
             }
-            // Only buffers of the wrong length are an error.
             transform.process(&mut input, &mut output).ok()?;
             rows.push(output[PADDING * LOWEST..output.len() - 1].iter().map(|bin| bin.norm_sqr() as f32).collect());
         }
@@ -161,8 +159,7 @@ impl Spectrogram {
         Some(Self { rows, means: by_column, size, spacing: 1.0 / ((PADDING * size) as f64 * series.sample_period()) })
     }
 
-    /// Variance of the sums along parallel lines, over that of independent ordinates; 1 if chance explains it. On the
-    /// skirt of a wandering band the ordinates of a segment correlate.
+    /// Variance of the sums along parallel lines, over that of independent ordinates; 1 if chance explains it.
     fn scatter_beside(&self, line: &Line, is_rising: bool) -> f64 {
         let last = self.rows.len() - 1;
         let sum = |first: usize| {

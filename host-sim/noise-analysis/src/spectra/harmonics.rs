@@ -80,15 +80,13 @@ impl Harmonics {
         };
         let powers = (-(STEPS as i32)..=STEPS as i32).map(|steps| (f64::from(steps), power(f64::from(steps))));
         let (best, largest) = powers.fold((0.0, 0.0), |best, of| if of.1 > best.1 { of } else { best });
-        // Vertex of a parabola.
         let [left, right] = [power(best - 1.0), power(best + 1.0)];
         let curvature = 2.0 * largest - left - right;
         let shift = if curvature > 0.0 { (0.5 * (right - left) / curvature).clamp(-1.0, 1.0) } else { 0.0 };
         self.fundamental + (best + shift) * step
     }
 
-    /// Frequency of the fundamental, Hz; `None` if the harmonics do not exceed the noise. For strong signals the
-    /// Cramér-Rao bound, 3/(2π²S²T²) of a sinusoid over T.
+    /// Frequency of the fundamental, Hz (Cramér-Rao bound); `None` if the harmonics do not exceed the noise.
     pub(super) fn frequency(&self) -> Option<BoundedEstimate> {
         let of = self.fundamental;
         let (mut whole, mut excess) = (0.0, 0.0);

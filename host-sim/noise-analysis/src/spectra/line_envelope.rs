@@ -29,8 +29,7 @@ const MOST_PEAKS: usize = 8;
 const PADDING: usize = 2;
 /// False-alarm probability per line. Six channels with two lines each have one in a hundred records.
 const FALSE_ALARM: f64 = 0.001;
-/// Largest ratio, in power, of the other kind of change if another line is that far away: a single line is half of
-/// either.
+/// Largest ratio, in power, of the other kind of change; a single line at that distance is half of either.
 const LARGEST_OTHER: f64 = 0.25;
 
 /// Spacings, in ordinates, of successive parabolas around the maximum.
@@ -65,8 +64,7 @@ impl Modulation {
         (distance.abs() - multiple * self.frequency.value).abs() < (SAME / duration).hypot(NORMAL_975 * error)
     }
 
-    /// The clearest change of `sine` in `rest`, the record without it. `None` if noise of the one-sided `density`,
-    /// unit²/Hz, or another line (`has_line`, by distance in Hz) explains it.
+    /// The clearest change of `sine` in `rest`; `None` if noise of `density`, unit²/Hz, or another line explains it.
     pub(super) fn find(
         sine: &Sine,
         rest: &UniformSeries,
@@ -259,7 +257,6 @@ fn highest_multiple(ratio: f64) -> f64 {
     (0.5 * ratio).sqrt().floor().max(1.0)
 }
 
-/// True if two distances from a line, Hz, are equal.
 pub(super) fn is_same(one: f64, other: f64, duration: f64) -> bool {
     (one - other).abs() < SAME / duration
 }

@@ -77,8 +77,7 @@ impl Sine {
     }
 }
 
-/// Fewest blocks of sums. A frequency half a padded ordinate away turns by π/4/1024 within half a block: an error of
-/// 10⁻⁷.
+/// Fewest blocks of sums; the phase of a frequency turns by π/4/1024 within half a block: an error of 10⁻⁷.
 const BLOCKS: usize = 1024;
 
 /// Sums over blocks that give the least-squares sinusoid of any nearby frequency without another pass.
@@ -197,8 +196,7 @@ const ROUNDS: usize = 60;
 /// Narrowest width, resolutions.
 const NARROWEST: f64 = 0.5;
 
-/// `level·(1 + height/(1 + (2(k − centre)/width)²))` over the ordinates `k`, and its mirror at `−centre`; by Whittle's
-/// likelihood.
+/// `level·(1 + height/(1 + (2(k − centre)/width)²))` over the ordinates `k`, and its mirror; by Whittle's likelihood.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lorentz {
     pub level: f64,
@@ -224,8 +222,7 @@ struct Group {
 }
 
 impl Lorentz {
-    /// The likeliest curve near `centre` and `width`, resolutions, over the ordinates `bins` of `spectrum`, means of
-    /// `looks` exponential variables; `None` if the fit fails.
+    /// The likeliest curve near `centre` and `width`, resolutions, over `bins`, means of `looks` exponential variables.
     pub(super) fn fit(
         spectrum: &dyn Fn(Range<usize>) -> Vec<f64>,
         bins: Range<usize>,
@@ -247,7 +244,6 @@ impl Lorentz {
         within(near.centre, near.width, reach).or(Some(near))
     }
 
-    /// [`fit`](Self::fit) to groups within `reach` of the centre.
     fn fit_groups(groups: &[Group], centre: f64, width: f64, reach: f64) -> Option<Self> {
         let weight: f64 = groups.iter().map(|group| group.ordinates).sum();
         let mean = |groups: &mut dyn Iterator<Item = &Group>| {

@@ -25,8 +25,7 @@ const RESIDUE: f64 = 0.02;
 const FEWEST_SLOW_PERIODS: usize = 2;
 /// Least slow variation of such a sinusoid over the rest; a walk has it with a probability below 10⁻⁶.
 const SLOW_GAIN: f64 = 1000.0;
-/// Largest part of the slow variation after the first fit; the straight line takes `6/(πm)²` of `m` periods, 0.15 of
-/// two.
+/// Largest part of the slow variation after the first fit; the straight line takes 0.15 of two periods.
 const SLOW_LEFT: f64 = 0.5;
 /// Most such sinusoids, and rounds of a joint fit with the straight line.
 const MOST_SLOW: usize = 2;
@@ -104,12 +103,10 @@ pub(crate) fn without_slow_sines(mut series: UniformSeries) -> (UniformSeries, V
     (series, found.into_iter().map(|(_, line)| line).collect())
 }
 
-/// Removes the sinusoids that stand out of means of at least [`SLOW_BLOCKS`] blocks: noise to a regression on fewer
-/// means.
+/// Removes the sinusoids that stand out of means of at least [`SLOW_BLOCKS`] blocks.
 pub(crate) fn without_sines(mut series: UniformSeries) -> UniformSeries {
     let size = (series.values().len() / SLOW_BLOCKS).max(1);
     let width = size as f64 * series.sample_period();
-    // A block's mean belongs to its middle.
     let delay = 0.5 * (size as f64 - 1.0) * series.sample_period();
     let mut means = series.averaged(size).detrended();
     for _ in 0..MOST {
@@ -122,8 +119,7 @@ pub(crate) fn without_sines(mut series: UniformSeries) -> UniformSeries {
     series
 }
 
-/// The sinusoid with the largest ordinate over those around, if significant by [`SIGNIFICANCE`]. The noise around is
-/// constant or falls as 1/f².
+/// The sinusoid with the largest ordinate over constant or 1/f² noise around, if significant by [`SIGNIFICANCE`].
 fn sine_that_stands_out(series: &UniformSeries) -> Option<Sine> {
     let spectrum = Periodogram::new(series)?;
     let ordinates: Vec<f64> = spectrum.independent().collect();

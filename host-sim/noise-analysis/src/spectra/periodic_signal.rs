@@ -34,8 +34,7 @@ const TERMS: usize = 12;
 /// Largest p-value of the even harmonics (none in a square wave) and of the odd ones (none at half the frequency).
 const EVEN_BY_CHANCE: f64 = 1e-3;
 const ODD_BY_CHANCE: f64 = 0.05;
-/// Largest p-value of the harmonics of a clear fundamental, which may be a sinusoid. [`HARMONICS`] frequencies are told
-/// apart within a resolution.
+/// Largest p-value of the harmonics of a clear fundamental, which may be a sinusoid.
 const HARMONICS_BY_CHANCE: f64 = 1e-3;
 /// Largest part of one harmonic in the sum; an unrelated line would be all of it.
 const LARGEST_SHARE: f64 = 0.8;
@@ -92,8 +91,7 @@ impl PeriodicSignal {
         examined.min_by(|a, b| a.p_value.total_cmp(&b.p_value))
     }
 
-    /// Examines a fundamental, in resolutions, over the noise up to `highest`, on the record without the fundamental,
-    /// which would leak.
+    /// Examines a fundamental, in resolutions, over the noise up to `highest`, on the record without the fundamental.
     fn examine(
         blocks: &UniformSeries,
         spectrum: &PaddedSpectrum,
@@ -174,7 +172,6 @@ impl PeriodicSignal {
         self
     }
 
-    /// The series without its harmonics.
     pub(crate) fn subtracted_from(&self, series: &UniformSeries) -> UniformSeries {
         let spacing = 0.5 / series.duration();
         let without = |rest: UniformSeries, number: usize| {
@@ -238,7 +235,6 @@ fn power(values: &[f64], length: usize, squares: f64) -> Option<Vec<f64>> {
     let mut input = transform.make_input_vec();
     input.iter_mut().zip(values).for_each(|(slot, value)| *slot = *value);
     let mut output = transform.make_output_vec();
-    // Only buffers of the wrong length are an error.
     transform.process(&mut input, &mut output).ok()?;
     Some(output.iter().map(|bin| bin.norm_sqr() / squares).collect())
 }
@@ -292,7 +288,6 @@ impl PaddedSpectrum {
         for order in self.orders(fundamental, highest) {
             let density = self.density(order as f64);
             match bands.last_mut() {
-                // A band is an eighth of its frequency wide.
                 Some((first, orders, sum, count)) if order < *first + *first / 8 + 1 => {
                     (*orders, *sum, *count) = (*orders + order as f64, *sum + density, *count + 1.0);
                 }
@@ -310,8 +305,7 @@ impl PaddedSpectrum {
         if bands.len() < TERMS { None } else { SlowBackground::fit(&bands) }
     }
 
-    /// Number of ordinates between the harmonics of `fundamental`, and their mean over the noise; at least 1. A
-    /// filter's roll-off above the harmonics would make the fitted noise too small.
+    /// Number of ordinates between the harmonics of `fundamental`, and their mean over the noise, at least 1.
     fn between(&self, noise: &SlowBackground<TERMS>, fundamental: f64) -> (usize, f64) {
         let highest = |harmonics: f64| (harmonics * fundamental).ceil() as usize;
         let near = self.orders(Some(fundamental), highest(HARMONICS as f64 + 0.5)).map(|order| order as f64);
@@ -360,8 +354,7 @@ mod tests {
     #[test]
     fn a_sawtooth_is_found_among_few_periods() {
         for (seed, periods) in [(1, 5.3), (2, 9.0), (3, 17.7)] {
-            // Ordinates 149/k² over the white noise, 79 in the second to the eighth; the walk equals the white noise at
-            // 5 periods.
+            // Ordinates 149/k² over the white noise, 79 in the second to the eighth; the walk equals it at 5 periods.
             let found = PeriodicSignal::find(&series(seed, 0.002, |turn| 0.6 * ((periods * turn).fract() - 0.5)))
                 .expect("some ten times the noise");
             let duration_s = 0.1 * SAMPLES as f64;
@@ -424,8 +417,7 @@ mod tests {
             PeriodicSignal::find(&series(seed, 0.0, |turn| 0.3 * ((periods * turn).fract() - 0.5)))
         });
         let found: Vec<PeriodicSignal> = found.collect();
-        // Ordinates of 37/k²: the harmonics have 20 together, few are clear without the fundamental. Less than half
-        // have even and odd ones each.
+        // Ordinates of 37/k²: the harmonics have 20 together, and less than half of the records have even and odd ones.
         let by_harmonics = found.iter().filter(|found| found.sum > 31.0).count();
         assert!(found.len() >= 5 && by_harmonics + 3 <= found.len(), "{} {by_harmonics}", found.len());
     }

@@ -9,8 +9,7 @@ use std::ops::Range;
 /// Ordinates per resolution `1/T`; a sinusoid between two loses at most 0.9 dB.
 pub(super) const PADDING: usize = 2;
 
-/// Fraction of the record over which the taper rises and falls; it keeps the end's jump out of a filter's nulls, at 0.2
-/// dB.
+/// Fraction of the record over which the taper rises and falls, against the end's jump in a filter's nulls.
 const RISE: f64 = 0.05;
 
 /// `2·dt/Σw²·|X(f)|²` under the taper `w`, at the multiples of half a resolution.
@@ -24,8 +23,7 @@ pub(super) struct Periodogram {
 }
 
 impl Periodogram {
-    /// Transforms samples without their straight line, with short gaps interpolated. Up to 1 % at the end is dropped
-    /// for a length of small prime factors. `None` for a record of fewer than two samples.
+    /// Transforms samples without their straight line, with short gaps interpolated; drops up to 1 % at the end.
     pub(super) fn new(series: &UniformSeries) -> Option<Self> {
         let length = smooth_length(series.values().len());
         let (filled, _) = series.interpolated();
@@ -53,7 +51,6 @@ impl Periodogram {
         })
     }
 
-    /// Averages in another periodogram of the same length.
     pub(super) fn average_with(&mut self, other: &Self) {
         self.looks += other.looks;
         let weight = f64::from(other.looks) / f64::from(self.looks);
@@ -123,8 +120,7 @@ pub(super) fn low_frequency_bands(last: usize) -> impl Iterator<Item = Range<usi
     })
 }
 
-/// Transforms under sine tapers (K. Riedel and A. Sidorenko, IEEE Trans. Signal Process. 43, 1995): little of a random
-/// walk leaks.
+/// Transforms under sine tapers (K. Riedel and A. Sidorenko, IEEE Trans. Signal Process. 43, 1995).
 pub(super) struct SineTapered {
     pub sample_period: f64,
     /// Transformed samples.
@@ -148,7 +144,6 @@ impl SineTapered {
                 }
             }
             let mut output = transform.make_output_vec();
-            // Only buffers of the wrong length are an error.
             transform.process(&mut input, &mut output).ok()?;
             let scale = (2.0 * series.sample_period() / power / TAPERS as f64).sqrt();
             output.iter_mut().for_each(|bin| *bin *= scale);

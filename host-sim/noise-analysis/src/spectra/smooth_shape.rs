@@ -38,8 +38,7 @@ pub struct SpectralShape {
 }
 
 impl SpectralShape {
-    /// The likeliest shape over all filter lengths; unfiltered if `bands` is empty. Slowly read filters are candidates
-    /// if each sample is one of several values.
+    /// The likeliest shape over all filter lengths; slowly read filters if each sample is one of several values.
     #[must_use]
     pub(super) fn fit(bands: &[SpectralBand], sample_period: f64, filters: Filters) -> Self {
         let fit = |taps: u32, decimation: u32| Self::fit_with_filter(bands, sample_period, (taps, decimation));
@@ -161,8 +160,7 @@ pub(super) struct LocalLevel {
 }
 
 impl<'a> Background<'a> {
-    /// Fits the background of `density` at multiples of `resolution` Hz, means of `looks` estimates; `None` for fewer
-    /// than 8 bands, or a band without power.
+    /// Fits the background of `density` at multiples of `resolution` Hz; `None` below 8 bands, or without power.
     pub(super) fn fit(
         density: &[f64],
         looks: f64,
@@ -221,8 +219,7 @@ fn background_bands(ordinates: usize) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
-/// Expected median of `count` means of `looks` exponential variables of mean 1. By order statistics, or 1 − 1/(3g) for
-/// a gamma shape g ≥ 4.
+/// Expected median of `count` means of `looks` exponential variables of mean 1.
 fn expected_median(count: usize, looks: f64) -> f64 {
     if looks > 1.0 {
         return 1.0 - 1.0 / (3.0 * looks);

@@ -37,7 +37,6 @@ const NARROWEST_BAND: f64 = 0.01;
 pub(crate) const FEW_PERIODS: f64 = 8.0;
 /// Full width at half maximum of a normal curve, in standard deviations.
 const FULL_WIDTH: f64 = 2.35;
-/// A line merged from one or several peaks.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct MergedLine {
     /// Weighted by power, Hz.
@@ -82,8 +81,7 @@ pub(crate) fn is_alias(line: &MergedLine, of: &MergedLine, period_s: f64) -> boo
     is_as_wide && (line.frequency.value - alias).abs() < reach
 }
 
-/// The lines of a series, the strongest first, over the background of `known`, or of white, flicker and random-walk
-/// noise. Each sample is one of `read_every` values.
+/// The lines of a series over the background of `known`, the strongest first; a sample is one of `read_every` values.
 pub(crate) fn find(
     series: &Series,
     rounding: &Rounding,
@@ -138,8 +136,7 @@ fn width(peak: &spectra::SpectralLine) -> f64 {
     peak.width.map_or(0.0, |width| width.value)
 }
 
-/// Density of a model's noise without lines over its white, flicker and random-walk part. The difference is Markov
-/// processes and slowly read filters; `rounding` remains in their nulls.
+/// Density of a model's noise without lines over its N, B and K; `rounding` remains in the nulls of filters.
 fn background(model: &Model, frequency: f64, rounding: &Rounding) -> f64 {
     let rounding = 0.5 * rounding.density(frequency);
     let (mut all, mut power_laws) = (0.0, 0.0);
@@ -156,13 +153,11 @@ fn background(model: &Model, frequency: f64, rounding: &Rounding) -> f64 {
     all / power_laws.max(MIN_NOISE * all)
 }
 
-/// True if a term is noise behind a slowly read filter.
 pub(crate) fn is_read_slowly(kind: &NoiseTerm) -> bool {
     matches!(kind, NoiseTerm::Filtered(filter) if filter.decimation > 1.0)
 }
 
-/// The modulation of the strongest of `peaks`, if the sinusoids on either side are equally far, beyond the side lobes,
-/// and equally strong. `deviation` is that of all peaks.
+/// The modulation of the strongest of `peaks`, if the sinusoids on either side are equally far and equally strong.
 fn sidebands(peaks: &[spectra::SpectralLine], deviation: f64, duration_s: f64) -> Option<spectra::Modulation> {
     let [strongest, one, other, ..] = peaks else { return None };
     let distance = |peak: &spectra::SpectralLine| peak.frequency.value - strongest.frequency.value;
@@ -189,7 +184,6 @@ fn sidebands(peaks: &[spectra::SpectralLine], deviation: f64, duration_s: f64) -
 }
 
 impl MergedLine {
-    /// One line with the power of all `peaks`, their mean frequency and their spread.
     fn merge(peaks: &[spectra::SpectralLine], duration_s: f64, rate_error: f64) -> Self {
         let power = |peak: &spectra::SpectralLine| peak.deviation.value * peak.deviation.value;
         let total: f64 = peaks.iter().map(power).sum();
@@ -238,7 +232,6 @@ impl MergedLine {
         self.width.value > BROAD * self.frequency.value
     }
 
-    /// True if its width is at least 1/(record length).
     pub(crate) fn is_wider_than_resolution(&self) -> bool {
         self.width.value * self.duration_s >= 1.0
     }

@@ -29,8 +29,7 @@ pub(crate) struct StackedSpectrum {
 }
 
 impl StackedSpectrum {
-    /// For stretches of `length` samples, `sample_period` in s; values differ by `resolution`, each sample is one of
-    /// `read_every`.
+    /// For stretches of `length` samples, `sample_period` in s; values differ by `resolution`.
     pub(crate) fn new(sample_period: f64, length: usize, resolution: f64, read_every: u32) -> Self {
         Self {
             sample_period,

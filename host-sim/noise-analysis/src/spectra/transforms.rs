@@ -54,8 +54,7 @@ impl Drop for BufferedTransform {
     }
 }
 
-/// DCT-II of `values` by order, not normalised: `Σ x·cos(π·order·(2·at + 1)/2N)`; little of a drift leaks. By one
-/// complex transform (J. Makhoul, IEEE Trans. ASSP 28, 1980).
+/// DCT-II of `values`, `Σ x·cos(π·order·(2·at + 1)/2N)` (J. Makhoul, IEEE Trans. ASSP 28, 1980).
 pub(super) fn cosine_transform(values: impl ExactSizeIterator<Item = f64>) -> Vec<f64> {
     let count = values.len();
     let mut transform = BufferedTransform::new(count);

@@ -63,7 +63,6 @@ impl WelchSum {
         for ((slot, value), weight) in self.input.iter_mut().zip(filled).zip(&self.window) {
             *slot = if value.is_finite() { (value - mean) * weight } else { 0.0 };
         }
-        // Only buffers of the wrong length are an error.
         if self.transform.process(&mut self.input, &mut self.output).is_err() {
             return;
         }
@@ -140,8 +139,7 @@ impl Welch {
         self.sample_period
     }
 
-    /// Averages over bands of up to an eighth of their frequency, without frequencies (Hz) for which `is_line` holds.
-    /// Without the first two points (drift) and the last one (half the degrees of freedom).
+    /// Averages over bands of up to an eighth of their frequency, without the ends and the frequencies (Hz) of lines.
     pub(crate) fn bands(&self, is_line: impl Fn(f64) -> bool) -> Vec<SpectralBand> {
         self.band_points(2, is_line).iter().map(|band| self.average(band)).collect()
     }

@@ -20,11 +20,9 @@ const LOWEST: usize = 3;
 const LINE_WIDTHS: f64 = 4.0;
 /// Settings of the filter: two averages over `2^1 … 2^6` samples.
 const TAPS_LOG2: std::ops::RangeInclusive<u32> = 1..=6;
-/// Independent ordinates in a band over those of [`Welch`], which multiplies the two correlations. The power of
-/// half-overlapping segments has 2.111/n, not 1.944·1.056/n.
+/// Independent ordinates in a band over those of [`Welch`]: half-overlapping segments have 2.111/n.
 const OVERLAPPING_NEIGHBOURS: f64 = 1.944 * 1.056 / 2.111;
-/// Least power gain of bands in the estimate of N: below it the spectrum is that of the rounding. The choice of the
-/// filter uses all bands.
+/// Least power gain of bands in the estimate of N; below it the spectrum is that of the rounding.
 const PASSBAND: f64 = 0.1;
 /// Most lags of correlated samples: 64 taps read every 9th time reach over 14.
 const MOST_LAGS: u32 = 16;
@@ -146,8 +144,7 @@ struct MixtureFit {
     /// Per band, each shape for a coefficient of 1.
     bases: Vec<Vec<f64>>,
     coefficients: DVector<f64>,
-    /// Per shape, the white density at 0 Hz, and the variance of a sample over the Nyquist frequency, for a coefficient
-    /// of 1.
+    /// Per shape, the white density at 0 Hz, and the variance of a sample over the Nyquist frequency.
     at_zero: DVector<f64>,
     in_sample: DVector<f64>,
     /// `−2 ln L + p·ln n`.

@@ -23,8 +23,7 @@ const LARGEST_RISE: f64 = 1.5;
 pub(super) const NARROWEST: f64 = 1.5;
 /// Least −2 log-likelihood ratio for a resonance over a sinusoid.
 const PREFERENCE: f64 = 10.0;
-/// Least −2 log-likelihood ratio for a changing sinusoid over a resonance: 2·ln 256 for the frequency, ln 100 each for
-/// size and phase.
+/// Least −2 log-likelihood ratio for a changing sinusoid over a resonance: 2·ln 256 + 2·ln 100.
 const COST_OF_A_CHANGE: f64 = 20.0;
 /// Least relative excess of a broad peak over its surroundings.
 const LEAST_EXCESS: f64 = 0.1;
@@ -65,7 +64,6 @@ impl Spectrum {
         })
     }
 
-    /// Averages in the `next` record of the same length.
     pub(super) fn average_with(&mut self, next: &Self) {
         self.periodogram.average_with(&next.periodogram);
         self.independent += next.independent;
@@ -174,7 +172,6 @@ impl<'a> WhitenedSpectrum<'a> {
         })
     }
 
-    /// Ordinates over the background's shape.
     fn whitened(&self) -> &[f64] {
         self.whitened.get_or_init(|| std::iter::once(0.0).chain(self.over_shape(1..self.ordinates.len())).collect())
     }
@@ -183,7 +180,6 @@ impl<'a> WhitenedSpectrum<'a> {
         bins.map(|bin| self.ordinates[bin] / self.background.shape_at(bin as f64))
     }
 
-    /// Padded ordinates over the background's shape.
     fn padded(&self) -> &[f64] {
         self.padded.get_or_init(|| {
             let over_shape = |(at, ordinate): (usize, &f64)| {
@@ -206,7 +202,6 @@ impl<'a> WhitenedSpectrum<'a> {
         self.floor.density(bin * self.resolution)
     }
 
-    /// The most significant line, if one is significant.
     pub(super) fn most_significant(&self, series: &UniformSeries) -> Option<Candidate> {
         let sine = self.strongest_sine(series).filter(|(line, _)| line.p_value < SIGNIFICANCE);
         if let Some((line, sine)) = sine {
@@ -292,7 +287,7 @@ impl<'a> WhitenedSpectrum<'a> {
         (one * (1.0 + frequencies * ratio.sqrt())).min(1.0)
     }
 
-    /// Most significant peak in averages of at least `4^least_log4` ordinates: position and width, resolutions, and
+    /// Most significant peak in averages of at least `4^least_log4` ordinates: position and width, resolutions,
     /// p-value.
     pub(super) fn broad_peak(&self, least_log4: u32) -> Option<(f64, f64, f64)> {
         let ordinates = self.ordinates.len();
@@ -352,8 +347,7 @@ impl<'a> WhitenedSpectrum<'a> {
         widths.into_iter().filter_map(fit)
     }
 
-    /// The sinusoid nearest to `bin` within `width`, resolutions, and its padded ordinates with their densities without
-    /// it.
+    /// The sinusoid nearest to `bin` within `width`, resolutions, and its padded ordinates with their densities.
     pub(super) fn sinusoid_near(&self, bin: f64, width: f64, p_value: f64) -> (SpectralLine, Vec<(usize, f64)>) {
         let padded = self.padded();
         let last = padded.len() - PADDING - 1;
@@ -452,7 +446,6 @@ fn neighbourhoods(averages: &[f64], size: usize, looks: f64) -> Vec<LocalLevel> 
 pub(super) fn sine_line(sine: &Sine, duration: f64, ratio: f64, p_value: f64) -> SpectralLine {
     let amplitude = sine.amplitude();
     SpectralLine {
-        // Cramér-Rao bound in white noise.
         frequency: MeasuredValue { value: sine.frequency, error: 1.5f64.sqrt() / (PI * duration * ratio.sqrt()) },
         deviation: MeasuredValue { value: amplitude / 2f64.sqrt(), error: amplitude / (2.0 * ratio.sqrt()) },
         width: None,
@@ -483,8 +476,7 @@ fn independent_part(series: &UniformSeries) -> f64 {
     present / (1.0 + (variance - scatter).max(0.0) / (mean * mean))
 }
 
-/// Refits each resonance over the background without any, until the changes are below its errors. The skirts of the
-/// strongest may pass for filtered noise; it is then refitted to unfiltered noise.
+/// Refits each resonance over the background without any, until the changes are below its errors.
 pub(super) fn refit(spectrum: &Spectrum, known: &dyn Fn(f64) -> f64, resonances: &mut [Resonance]) {
     let mut first = resonances.to_vec();
     refit_behind(spectrum, known, resonances, spectrum.filters);

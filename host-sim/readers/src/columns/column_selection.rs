@@ -57,10 +57,8 @@ pub(crate) struct ChosenColumn {
 /// Why columns cannot be chosen.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SelectionError {
-    /// An argument that is no assignment.
     #[error("--columns {0}: expected CHANNEL=COLUMN, such as gyro_x=wx")]
     NoAssignment(String),
-    /// A channel that the sensor does not have.
     #[error("--columns {name}=…: no such channel; {sensor} has {known}, and there are time and sample")]
     UnknownChannel {
         /// As given.
@@ -68,7 +66,6 @@ pub enum SelectionError {
         sensor: String,
         known: String,
     },
-    /// A channel that is assigned twice, or two columns that look like it.
     #[error("{channel} is both {one} and {other}: say which with --columns")]
     Ambiguous {
         /// The channel.
@@ -76,27 +73,22 @@ pub enum SelectionError {
         one: String,
         other: String,
     },
-    /// A column that the file does not have.
     #[error("no column {wanted}; the file has {available}")]
     NoColumn {
         /// As given.
         wanted: String,
         available: String,
     },
-    /// No column looks like a channel.
     #[error("no column is named like a channel; say which is which, as in --columns gyro_x=NAME; the file has {0}")]
     NoChannel(String),
-    /// A unit that is not known.
     #[error("--units {unit}: not a known unit; known are {known}")]
     UnknownUnit {
         /// As given.
         unit: String,
         known: String,
     },
-    /// Two units for one quantity.
     #[error("--units {0} and {1} are of one quantity")]
     TwoUnits(&'static str, &'static str),
-    /// A column without a stated unit.
     #[error("column {column}: no unit of {channel}; give one, as in --units {example}")]
     NoUnit {
         column: String,
@@ -104,7 +96,6 @@ pub enum SelectionError {
         /// A unit of the channel.
         example: &'static str,
     },
-    /// Counts of a sensor whose scale is not known.
     #[error("column {0}: counts of which sensor? give its profile with --sensor")]
     CountsOfAny(String),
 }

@@ -11,7 +11,6 @@ use std::path::Path;
 
 const COUNTS: &str = "_counts";
 
-/// True for a header of register counts.
 pub(crate) fn is_header(header: &str) -> bool {
     let is_channel = |name: &str| {
         let channel = delimited_text::field(name).strip_suffix(COUNTS);

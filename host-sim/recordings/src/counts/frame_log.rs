@@ -141,7 +141,6 @@ impl FrameLogWriter {
     /// The file cannot be written.
     pub fn write(&mut self, frame: &Frame) -> io::Result<()> {
         let (before, text) = (self.text.len(), &mut self.text);
-        // `{}` of a float reads back to the same value.
         let _ = write!(text, "{},", frame.time_s);
         for byte in &frame.mosi {
             let _ = write!(text, "{byte:02X}");

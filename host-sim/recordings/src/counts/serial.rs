@@ -112,19 +112,15 @@ fn is_hang_up(error: &io::Error) -> bool {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SerialRecordingError {
-    /// The port failed.
     #[error("serial port: {0}")]
     Port(io::Error),
-    /// The log could not be written.
     #[error("recording: {0}")]
     Log(io::Error),
     /// No burst came for 10 s.
     #[error("the device sent no bursts for 10 s, after {0} of them")]
     Silent(u64),
-    /// The device closed the port.
     #[error("the device hung up, after {0} bursts")]
     Disconnected(u64),
-    /// The length of the recording is not positive and finite.
     #[error("a duration of {0} s: it must be positive and finite")]
     Duration(f64),
 }

@@ -53,7 +53,6 @@ impl Layout {
     }
 }
 
-/// True if a first line is that of an export.
 pub(crate) fn is_header(header: &str) -> bool {
     Layout::of_header(header).is_some()
 }

@@ -105,7 +105,6 @@ impl ColumnSurvey {
         self.seen
     }
 
-    /// True if all usable numbers are zero.
     pub(crate) fn is_zero(&self) -> bool {
         self.is_usable && !self.has_other_than_zero
     }
@@ -128,7 +127,6 @@ impl ColumnSurvey {
         self.values.chunks(RUN).flat_map(run).collect()
     }
 
-    /// `None` without usable numbers.
     pub(crate) fn quantizer(&self, column: &ValueColumn) -> Option<ColumnQuantizer> {
         let of_values =
             || if column.register.is_some() { ColumnQuantizer::COUNTS } else { ColumnQuantizer::new(&self.values()) };

@@ -59,7 +59,6 @@ impl SensorRows<'_> {
                 text.clear();
                 for row in 0..batch.rows {
                     let start = text.len();
-                    // `{}` of a float reads back to the same value.
                     if let Some(index) = batch.indices.get(row) {
                         let _ = write!(text, ",{index}");
                     }

@@ -363,8 +363,7 @@ impl Placer {
         }
     }
 
-    /// Takes rows or the end; returns completed batches of used rows, `indices` being sample periods from the first
-    /// usable sample.
+    /// Takes rows or the end; returns completed batches, `indices` being sample periods from the first usable sample.
     fn place(&mut self, batch: Option<Batch>) -> Result<Vec<Batch>, TimeBaseError> {
         let is_last = batch.is_none();
         let batch = batch.unwrap_or_default();
@@ -421,7 +420,6 @@ impl Placer {
 struct StreamedColumn {
     column: ValueColumn,
     survey: ColumnSurvey,
-    /// `None` without usable numbers.
     quantizer: Option<ColumnQuantizer>,
 }
 
@@ -700,7 +698,6 @@ fn append(measurement: &mut Measurement, block: SampleBlock, times_s: &[f64]) {
 }
 
 impl StreamedColumn {
-    /// `None` without usable numbers.
     fn profile(&self) -> Option<ChannelProfile> {
         let lsb = self.quantizer.as_ref()?.lsb * self.column.factor;
         Some(ChannelProfile { lsb, ..self.column.profile })

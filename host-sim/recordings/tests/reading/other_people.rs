@@ -7,7 +7,6 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use system_tests::{python, recording};
 
-/// A file of the folder `others`.
 fn other(test: &str, file: &str) -> Option<PathBuf> {
     recording(test, &format!("others/{file}"))
 }
@@ -42,7 +41,6 @@ fn compare(read: &Reading, reference: &Value) {
     }
 }
 
-/// A recording that is read with these options.
 struct Case {
     file: &'static str,
     options: &'static [&'static str],
@@ -149,7 +147,6 @@ fn recordings_of_other_people_have_the_curves_of_other_programs() {
     }
 }
 
-/// Any field, array and message is read by its path; an error names those that there are.
 #[test]
 fn any_column_is_read_by_its_path() {
     let test = "any_column_is_read_by_its_path";
@@ -187,7 +184,6 @@ fn any_column_is_read_by_its_path() {
     }
 }
 
-/// What files are found to hold; their source says the units.
 #[test]
 fn other_peoples_files_are_described() {
     let test = "other_peoples_files_are_described";

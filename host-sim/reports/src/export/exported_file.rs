@@ -14,16 +14,13 @@ pub enum AxisChoice {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
-    /// The report has no gyroscope and no accelerometer in a unit that is known.
     #[error("no gyroscope and no accelerometer in the report")]
     NoInertialChannel,
-    /// The format needs a number for each axis, and the report lacks one.
     #[error("{channel} is not in the report, and the format has a number for each axis")]
     NoAxis {
         /// Such as `gyro_y`.
         channel: String,
     },
-    /// The format has a Gauss-Markov process for slow noise, and the models have no slow noise.
     #[error(
         "no channel of the {0}s shows bias instability, random walk or a Markov process, from which the Gauss-Markov process \
          of the format is made: the record is too short"
@@ -38,12 +35,10 @@ pub enum ExportError {
         /// As the report has it.
         value: String,
     },
-    /// Parts with different rates, in a format with noise of samples at one rate.
     #[error(
         "parts at {0} Hz: the format has noise of samples at one rate; kalibr, openvins, orbslam3 and csv have densities"
     )]
     SeveralRates(String),
-    /// A name with characters such as a comma, a quotation mark or a control character.
     #[error("{0:?} is no name of a channel, a term or a unit: the report is damaged")]
     NoName(String),
 }

@@ -40,7 +40,6 @@ pub(super) fn gtsam(report: &SavedReport) -> Result<Export, ExportError> {
     Ok(Export { text, missing: Vec::new() })
 }
 
-/// The IMU's noise for Basalt's calibration file, without cameras and biases.
 pub(super) fn basalt(report: &SavedReport) -> Result<Export, ExportError> {
     let [gyroscope, accelerometer] = both(report)?;
     let mut text = String::from("{\n    \"value0\": {\n");

@@ -11,7 +11,6 @@ use noise_analysis::fit::gauss_markov::{self, GaussMarkovFit, SlowNoise, SlowOct
 /// Standard gravity, m/s².
 pub(super) const GRAVITY: f64 = 9.806_65;
 
-/// Kinds of the three coefficients in a report.
 const KINDS: [&str; 3] = ["angle_random_walk", "bias_instability", "rate_random_walk"];
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,7 +43,6 @@ pub(super) struct AxisNoise<'a> {
 }
 
 impl Sensor {
-    /// Prefix of the names of its channels.
     pub(super) fn prefix(self) -> &'static str {
         match self {
             Self::Gyroscope => "gyro_",
@@ -69,7 +67,6 @@ impl Sensor {
         }
     }
 
-    /// The axes that the report has, in its order.
     pub(super) fn axes(self, report: &SavedReport) -> Vec<AxisNoise<'_>> {
         let own = report.channels.iter().filter(|channel| channel.name.starts_with(self.prefix()));
         own.filter_map(|channel| self.axis(channel)).collect()
@@ -101,7 +98,6 @@ fn coefficient(channel: &SavedChannel, kind: &str, to_si: f64) -> Option<Coeffic
     is_number.then_some(Coefficient { value: shown * to_si, is_bound, estimate: value * to_si })
 }
 
-/// Root mean square or largest of the values.
 pub(super) fn combine(values: impl Iterator<Item = f64> + Clone, choice: AxisChoice) -> Option<f64> {
     let count = values.clone().count();
     (count > 0).then(|| match choice {

@@ -95,8 +95,7 @@ pub(super) fn orbslam3(report: &SavedReport, axes: AxisChoice) -> Result<Export,
     Ok(export)
 }
 
-/// `head` and every field, with its axes in comments. Programs divide by every number, so an upper bound stands for an
-/// unknown term.
+/// `head` and every field, with its axes in comments; an upper bound stands for an unknown term.
 fn fields(
     head: &str,
     fields: &[Field],

@@ -42,8 +42,7 @@ pub(super) fn allan_deviation_plot(report: &Report, channel: &ChannelReport) -> 
     }
 }
 
-/// The measured curve, both models fitted to the first half, and their errors on the second; without the effects if
-/// they do not help.
+/// The measured curve, both models fitted to the first half, and their errors on the second.
 pub(super) fn story_plot(report: &Report, channel: &ChannelReport, [before, after]: [f64; 2]) -> Plot {
     let is_lowered = after < before;
     let mut lines = vec![
@@ -94,8 +93,7 @@ pub(super) fn story_plot(report: &Report, channel: &ChannelReport, [before, afte
     Plot { id: "story".to_owned(), title, description, panels: vec![Panel::new(across, up, lines)] }
 }
 
-/// Slopes of N at 1 s, B at the minimum and K at 3 s, over a factor of four to both sides and to their place on the
-/// curve. `None` without such a slope.
+/// Slopes of N at 1 s, B at the minimum and K at 3 s, over a factor of four to both sides and to the curve.
 fn slopes(channel: &ChannelReport) -> [Option<Line>; 3] {
     let SlopeMethodReport { angle_random_walk, bias_instability, rate_random_walk } = &channel.read_off;
     let line = |slope: &str, found: &SlopeMethodValue, at_s: f64, deviation: &dyn Fn(f64) -> f64| {

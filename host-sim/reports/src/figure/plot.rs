@@ -238,7 +238,6 @@ impl Plot {
         }
     }
 
-    /// Above the first panel, in rows.
     fn legend(&self) -> Markup {
         let entries = legend_places(self.panels.iter().flat_map(|panel| &panel.lines), (self.top() - TOP) / LEGEND_ROW);
         html! {

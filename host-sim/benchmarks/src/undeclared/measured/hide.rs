@@ -34,8 +34,7 @@ impl HiddenEffect {
 /// Distance in samples of chance equality.
 const BY_CHANCE: usize = 64;
 
-/// `stretch` with an effect; counts are dithered uniformly and rounded again, so that size 0 changes none. Repeated
-/// samples stay repeated.
+/// `stretch` with an effect, dithered and rounded again, so that size 0 changes none; repeated samples stay repeated.
 pub(super) fn hide(stretch: &Measurement, effect: &HiddenEffect, seed: u64) -> Measurement {
     let mut changed = stretch.clone();
     match effect {

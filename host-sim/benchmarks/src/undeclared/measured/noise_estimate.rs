@@ -126,8 +126,7 @@ mod tests {
     use std::f64::consts::TAU;
     use virtual_sensor::ChannelNoise;
 
-    /// Each of N, B and K governs a decade; the line has ten standard deviations. N to 1 %, B and K to a fifth over 8
-    /// seeds.
+    /// N to 1 %, B and K to a fifth over 8 seeds; the line has ten standard deviations.
     #[test]
     fn the_coefficients_are_those_of_the_noise_in_spite_of_a_line() {
         let truth = [0.02, 0.03, 0.01];

@@ -136,7 +136,6 @@ fn wrong_names(
     named_as(&new)
 }
 
-/// Effects in `channels` that count.
 fn names(report: &Report, channels: &[Channel], counts: impl Fn(&Effect) -> bool) -> BTreeSet<(Channel, &'static str)> {
     let of_channel = |channel: &Channel| {
         let effects = channel_report(report, *channel).map(|of| of.effects.as_slice()).unwrap_or_default();

@@ -31,7 +31,6 @@ const UNKNOWN_FULL_SCALE: f64 = 1000.0;
 /// First kind of effect; `measured` and `hide` have others.
 const DRAWN: u64 = 1;
 
-/// A part of a recording, with its own report.
 pub(super) struct Stretch<'a> {
     pub(super) recording: &'a str,
     pub(super) seed: u64,
@@ -136,8 +135,7 @@ fn are_seen_to_be_missing(counts: &[i32], effect: &OutsideEffect, strength: f64)
 mod tests {
     use super::*;
 
-    /// Every fourth of a hundred codes. z = 3.719: the second needs ½z² = 6.9 samples at strength 1, nine times as many
-    /// at 3.
+    /// Every fourth of a hundred codes; the second needs ½z² = 6.9 samples at strength 1, nine times as many at 3.
     #[test]
     fn missing_codes_are_hidden_where_two_of_them_have_samples() {
         let mut random = ChaCha8Rng::seed_from_u64(1);

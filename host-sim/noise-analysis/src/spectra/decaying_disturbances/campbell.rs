@@ -28,8 +28,7 @@ pub(super) struct CampbellEstimate {
 }
 
 impl CampbellEstimate {
-    /// For disturbances of this `sign`, near the filter for `time` blocks, which are means of `samples_per_block`
-    /// samples. `None` if the cumulants are not those of such disturbances.
+    /// For disturbances of this `sign`, near the filter for `time` blocks; `None` if the cumulants are of others.
     pub(super) fn new(record: &WhitenedRecord, time: f64, sign: f64, samples_per_block: usize) -> Option<Self> {
         let filter = |step: i32| {
             let own = time * (f64::from(step) / f64::from(STEPS)).exp2();
@@ -132,7 +131,6 @@ fn logarithms(filters: &[Moments], left_out: Option<usize>) -> Option<[f64; 4]> 
     let largest = (1..filters.len().checked_sub(1)?).max_by(|a, b| heights[*a].total_cmp(&heights[*b]))?;
     let near = |of: &[f64]| -> Option<[f64; 3]> { of.get(largest - 1..=largest + 1)?.try_into().ok() };
     let [before, at, after] = near(&heights)?;
-    // Vertex of a parabola.
     let curvature = before - 2.0 * at + after;
     let vertex = if curvature < 0.0 { 0.5 * (before - after) / curvature } else { after - before };
     let vertex = vertex.clamp(-1.0, 1.0);

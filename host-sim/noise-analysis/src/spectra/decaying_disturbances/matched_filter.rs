@@ -55,7 +55,6 @@ impl WhitenedRecord {
         let mut tapered: Vec<f64> = values.iter().enumerate().map(|(at, value)| taper(at, length) * value).collect();
         let squares: f64 = (0..length).map(|at| taper(at, length).powi(2)).sum();
         let mut transform = forward.make_output_vec();
-        // Only buffers of the wrong length are an error.
         forward.process(&mut tapered, &mut transform).ok()?;
         let ordinates: Vec<f64> = transform.iter().map(|bin| bin.norm_sqr() / squares).collect();
         forward.process(&mut values, &mut transform).ok()?;

@@ -11,7 +11,6 @@ pub(super) fn variance_of_ratio(response: &[f64], blocks: f64) -> Option<f64> {
     let transform = |power: i32| {
         let (mut powers, mut bins) =
             (response.iter().map(|of| of.powi(power)).collect::<Vec<f64>>(), forward.make_output_vec());
-        // Only buffers of the wrong length are an error.
         forward.process(&mut powers, &mut bins).ok()?;
         Some(bins)
     };
