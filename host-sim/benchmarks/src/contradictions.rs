@@ -1,5 +1,4 @@
-//! Benchmark of the sentences under "Contradicted": their frequency in reports of pure N, B and K in a constant
-//! environment.
+//! Benchmark of the sentences under "Contradicted" in reports of pure N, B and K in a constant environment.
 
 use crate::parallel;
 use crate::undeclared::{DrawnRecording, RecordingGroup, ScoreError};

@@ -19,8 +19,7 @@ fn the_slope_method_is_biased_by_the_other_terms_and_the_fit_is_not() {
         // 11 or fewer of 16: 1/1000.
         assert!(result.covered[term] * SEEDS as f64 > 11.0, "term {term}: {result:#?}");
     }
-    // By the true coefficients: at 40 s and 80 s, in the paper's flat part, N²/τ, 0.441·B² and K²τ/3 add up to
-    // 9.46e-5 and 1.00e-4 (deg/s)², which is 1.60 times 0.664·B; at 160 s to 1.37e-4, 1.23 times K·√(τ/3).
+    // At 40 s and 80 s N²/τ, 0.441·B² and K²τ/3 add up to 1.60 times 0.664·B, at 160 s to 1.23 times K·√(τ/3).
     let [n, b, k] = result.inherent;
     assert!((b - 0.60).abs() < 0.01 && (k - 0.23).abs() < 0.01, "{b} {k}");
     // B and K increase the result for N by 1.6 % at 1 s. The filter of L = 4 taps removes 0.7·2L/τ/204.8 of the variance.

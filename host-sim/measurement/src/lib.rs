@@ -1,7 +1,5 @@
-//! The samples of a sensor on a uniform time base, and the sensor's profile.
-//!
-//! Readers produce a [`Measurement`], the noise analysis consumes it. A [`SensorProfile`] has all that is specific:
-//! [`adis16405`], a [file](profile_file), or [any sensor](SensorProfile::generic).
+//! The samples of a sensor on a uniform time base, and the sensor's profile: [`adis16405`], a [file](profile_file), or
+//! [any sensor](SensorProfile::generic).
 
 pub mod adis16405;
 mod block;
@@ -136,8 +134,7 @@ impl Measurement {
         self.periods() / 2
     }
 
-    /// The recording as if it had ended before the sample period `slot`. It keeps the share of samples that never
-    /// arrived; causes of unknown time are left out.
+    /// The recording as if it had ended before the sample period `slot`, with its share of samples that never arrived.
     #[must_use]
     pub fn before(&self, slot: u64) -> Self {
         let count = self.slots.partition_point(|&of| of < slot);

@@ -187,9 +187,7 @@ pub struct SensorProfile {
 }
 
 impl SensorProfile {
-    /// Any inertial sensor: three gyroscopes, accelerometers and magnetometers, temperature, supply, auxiliary voltage.
-    ///
-    /// Filters are moving averages and Bartlett windows of 2 to 64 taps at the sample rate; no native rate.
+    /// Any inertial sensor: three gyroscopes, accelerometers and magnetometers, temperature, supply and ADC.
     #[must_use]
     pub fn generic() -> Self {
         const CHANNELS: [(&str, Quantity); 12] = [
@@ -229,8 +227,7 @@ impl SensorProfile {
         self.channels.iter().copied().find(|channel| channel.name == name)
     }
 
-    /// The filters in samples at `rate_hz`: every value read or, with a faster sensor clock, one in
-    /// `internal_rate_hz/rate_hz`. The decimation is a start value.
+    /// The filters in samples at `rate_hz`, every value read or one in `internal_rate_hz/rate_hz`.
     #[must_use]
     pub fn filters_read_at(&self, rate_hz: f64) -> Vec<MovingAverageFilter> {
         let decimation = self.internal_rate_hz / rate_hz;

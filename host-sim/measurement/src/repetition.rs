@@ -1,7 +1,6 @@
 //! Repeated samples against chance equality.
 
-/// The fraction f of repeated samples: solves `all = f + (1 − f)·Π (share − f)/(1 − f)` for the equal fractions `all`
-/// (all channels) and `shares` (each).
+/// The fraction f of repeated samples: `all = f + (1 − f)·Π (share − f)/(1 − f)` for fractions of equal ones.
 #[must_use]
 pub fn repeated_fraction(all: f64, shares: &[f64]) -> f64 {
     let (mut low, mut high) = (0.0, all);

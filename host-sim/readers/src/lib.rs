@@ -1,7 +1,7 @@
 //! Readers of recordings of inertial sensors: text, NumPy, MATLAB, HDF5, ROS bags, MCAP, flight logs.
 //!
 //! [`InputFile`] recognises a format by content; every format becomes batches of columns ([`FileRows`]) as the file or
-//! the user ([`ReadOptions`]) says. Costs are bounded. Unusable rows are an [`InputError`], or counted.
+//! the user ([`ReadOptions`]) says.
 
 mod columns;
 mod formats;

@@ -50,9 +50,6 @@ impl<'a> BatchSource<'a> {
     }
 
     /// See [`for_each_batch`].
-    ///
-    /// # Errors
-    /// See [`for_each_batch`].
     pub(crate) fn for_each_batch(
         &mut self,
         wanted: WantedRows,
@@ -76,10 +73,7 @@ impl<'a> BatchSource<'a> {
     }
 }
 
-/// Calls `take` with each batch of `read`, which runs on another thread if possible.
-///
-/// # Errors
-/// The file is damaged, the part has no row, or `take` fails.
+/// Calls `take` with each batch of `read`, on another thread if possible; an error of the file, the part or `take`.
 pub(crate) fn for_each_batch<B: Send>(
     read: impl FnOnce(&mut dyn FnMut(B) -> bool) -> Result<RowsRead, StreamError> + Send,
     mut take: impl FnMut(B) -> Result<(), StreamError>,

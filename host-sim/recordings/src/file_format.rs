@@ -140,19 +140,13 @@ impl RecordedInput {
         }
     }
 
-    /// Rows of any sensor, or an ADIS16405's register counts.
-    ///
-    /// # Errors
-    /// The file is damaged, its topic or columns cannot be chosen, or it is a log of the SPI bus.
+    /// Rows of any sensor, or register counts; an error for damage, a failed choice, or a log of the SPI bus.
     pub(crate) fn rows(&self, options: &ReadOptions, are_registers: bool) -> Result<FileRows<'_>, InputError> {
         self.check_columns()?;
         rows(&self.file, options, are_registers)
     }
 
-    /// With the validator's verdicts, for rates in `range`.
-    ///
-    /// # Errors
-    /// As [`rows`](Self::rows).
+    /// [`rows`](Self::rows) with the validator's verdicts, for rates in `range`.
     pub(crate) fn batches(
         &self,
         options: &ReadOptions,

@@ -1,8 +1,7 @@
 //! Recordings of inertial sensors on their time base: the ADIS16405 as tables, SPI logs and from the serial port,
 //! others in the formats of [`readers`].
 //!
-//! [`sample_stream`] reads files, [`time_base::measurement`] a [`Recording`](recording::Recording) in memory. Unusable
-//! rows are an [`InputError`] with file, line and reason, or counted.
+//! [`sample_stream`] reads files, [`time_base::measurement`] a [`Recording`](recording::Recording) in memory.
 
 mod batch_source;
 mod counts;

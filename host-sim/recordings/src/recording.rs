@@ -1,5 +1,4 @@
-//! Samples in memory with time stamps and faults. [`Recorder`] checks table rows and bus bursts alike with
-//! [`BurstValidator`].
+//! Samples in memory with time stamps and faults, checked by [`BurstValidator`] in a [`Recorder`].
 
 use adis16405_driver::{Burst, BurstValidator, Channel, ChannelMask, Counts, Faults, GyroRange};
 

@@ -1,5 +1,4 @@
-//! Clocks that jump, wander or change their rate, stamps that are whole periods with samples lost between them, and samples that
-//! come in bursts: the rate and the losses that are found, on records whose truth is known.
+//! The rate and the losses found on records whose truth is known: clocks that jump, wander or change, and bursts.
 
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
 use measurement::SensorProfile;

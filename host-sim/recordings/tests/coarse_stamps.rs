@@ -1,5 +1,4 @@
-//! The rate and the losses that time stamps show, where the stamps are coarser than the sample period, jitter, come late, in
-//! bursts, from a clock that drifts, or with rows that repeat. The truth is known: the generator takes the samples.
+//! The rate and the losses that coarse, late, drifting or repeated time stamps show, against a known truth.
 
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
 use rand::{Rng, SeedableRng};
@@ -145,9 +144,7 @@ fn usual_ticks_show_no_loss() {
     }
 }
 
-/// The share of the losses that is found depends on how many ticks of the stamps lie between two of them. With ten or more
-/// it is all but a few in a hundred; with fewer the report says that losses and rounding are not told apart. The rate lies in
-/// its interval in any case.
+/// Ten or more ticks between losses find all but a few in a hundred; fewer are reported as not told apart.
 #[test]
 fn losses_are_found_and_none_is_invented() {
     for rate_hz in [50.0, 819.2] {

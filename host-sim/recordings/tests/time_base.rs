@@ -228,9 +228,7 @@ fn the_measured_burst_recording_lost_15_samples_in_one_gap() {
     assert_eq!(recording.samples.len(), 49_425);
     assert_eq!(recording.channels, Channel::ALL);
     let measured = measurement(&recording, None).expect("a time base");
-    // Counted by another program: 45 rows whose six inertial counts equal those of the row above, each a period apart (about
-    // as many as the rates of equal neighbours in single channels predict); one interval of 16 periods after which no rows
-    // follow faster. Each other long interval (3 to 7 periods) is followed by as many rows in quick succession.
+    // Counted by another program: 45 equal rows a period apart, and one interval of 16 periods without faster rows.
     assert_eq!(measured.dropped, [("gap", 15)].into());
     assert_eq!(measured.flagged["repeated"], 45);
     // 49,425 rows and 15 lost samples in the time between the first and the last row; the ends jitter by under 1 ms.

@@ -1,7 +1,4 @@
-//! The noise of a sensor in the file formats of calibration, navigation and simulation programs.
-//!
-//! Every format says in a comment whether its numbers belong to the continuous process or to samples at the record's
-//! rate. `docs/exports.md` has the sources.
+//! The noise of a sensor in the file formats of other programs; `docs/exports.md` has the sources.
 
 mod exported_file;
 mod filters;

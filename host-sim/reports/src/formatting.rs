@@ -7,8 +7,7 @@ use noise_analysis::report::assessment::{Innovations, RecordLength};
 use noise_analysis::report::{ChannelReport, MissingSamples, ModelErrorReport, ModelReport};
 use std::fmt;
 
-/// Four significant digits; [`NONE`] if not finite. Exponents occur only beyond usual results; values with a unit use a
-/// [`Scale`](crate::rounding::Scale).
+/// Four significant digits; [`NONE`] if not finite.
 pub fn number(value: f64) -> String {
     let is_usual = value == 0.0 || (1e-9..1e15).contains(&value.abs());
     if is_usual || !value.is_finite() { significant(value, 4) } else { format!("{value:.3e}") }

@@ -1,5 +1,4 @@
-//! The summary of a report for screen, first screen of the page, and live view: trust, coefficients, contradictions,
-//! next steps.
+//! The summary of a report: trust, coefficients, contradictions, next steps.
 
 use crate::coefficients;
 use crate::finding_text::{ALL_CHANNELS, FindingText, SENSED, channel_list, departure, describe, shown_effects};

@@ -1,7 +1,5 @@
-//! Sample periods of rows by stamps or index, and repeated rows.
-//!
-//! The first rows decide: fine stamps are placed as they come, coarse ones at the end. Repeated reading gives the same
-//! places.
+//! Sample periods of rows by stamps or index, and repeated rows; fine stamps are placed at once, coarse ones at the
+//! end.
 
 use crate::aligned_stamps::AlignedStamps;
 use crate::irregular_stamps::of_few_digits;

@@ -1,6 +1,4 @@
-//! A clock whose rate changes, and its stamps at a steady rate.
-//!
-//! A period off by a hundredth moves the envelope by periods. Fine, regular stamps show the local period.
+//! A clock whose rate changes, by its local period in fine, regular stamps, and its stamps at a steady rate.
 
 use crate::lateness_track::quantile;
 

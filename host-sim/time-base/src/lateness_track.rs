@@ -65,8 +65,7 @@ pub(crate) struct Track {
 }
 
 impl Track {
-    /// Aligns until the period stays; returns the shortest description with its cost, by an envelope over `queue`
-    /// samples.
+    /// Aligns until the period stays; returns the shortest description with its cost.
     pub(crate) fn refined(
         times: &[f64],
         period_s: f64,

@@ -1,8 +1,7 @@
 //! Time base of a recording: sample rate, and sample period of each sample.
 //!
-//! Late reading and coarse stamps are no losses; [`StampQuality`] states doubts.
-//!
-//! [`StampOrder`] handles counters that wrap and clocks that are set; [`Clock`] places rows.
+//! [`StampOrder`] handles counters that wrap and clocks that are set; [`Clock`] places rows; [`StampQuality`] states
+//! doubts.
 
 mod aligned_stamps;
 mod clock;

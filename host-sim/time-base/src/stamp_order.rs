@@ -1,6 +1,4 @@
-//! Stamps that go back: wrapping counters, single wrong stamps, clocks that are set.
-//!
-//! Rows around decide: they go on from before a wrong stamp, or from a set clock.
+//! Stamps that go back: wrapping counters, single wrong stamps, clocks that are set, told by the rows around.
 
 use crate::lateness_track::quantile;
 use std::collections::VecDeque;

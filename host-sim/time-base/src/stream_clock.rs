@@ -1,7 +1,4 @@
-//! Sample periods of rows read in blocks, in bounded memory.
-//!
-//! By the rule of [`lateness_track`](crate::lateness_track) for fine stamps, with the first rows' period; rows are
-//! placed when the queue behind is known. Changing rates are [followed](crate::clock_rate) first.
+//! Sample periods of rows read in blocks, in bounded memory, by the rule of [`lateness_track`](crate::lateness_track).
 
 use crate::aligned_stamps::RateEstimate;
 use crate::clock_rate::SteadyStream;
@@ -63,10 +60,7 @@ pub(crate) struct StreamClock {
 }
 
 impl StreamClock {
-    /// `head` has the stamps of the first rows.
-    ///
-    /// # Errors
-    /// The stamps are coarser than the sample period, or show none.
+    /// `head` has the stamps of the first rows; an error if they are coarser than the sample period, or show none.
     pub(crate) fn new(has_index: bool, head: Option<&StampQuality>) -> Result<Self, TimeBaseError> {
         let period_s = head.and_then(|head| head.rate).map(|rate| rate.hz.recip());
         let source = match (has_index, head) {

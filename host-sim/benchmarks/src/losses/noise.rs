@@ -76,8 +76,7 @@ impl TestNoise {
         }
     }
 
-    /// Shortest averaging factor of the fit: four filter lengths, because the terms of flicker noise and walk ignore
-    /// the filter.
+    /// Shortest averaging factor of the fit: four filter lengths, as flicker noise and walk ignore the filter.
     #[must_use]
     pub fn shortest_fitted(self) -> u64 {
         if self.filtered { 8 * u64::from(TAPS) } else { 1 }

@@ -1,5 +1,4 @@
-//! The four methods of section 2.2 of the paper on one simulated record: Allan variance, autocorrelation, spectrum by
-//! equation (5), Kalman innovations.
+//! The four methods of section 2.2 of the paper on one simulated record.
 
 use super::published_gyro::{
     LSB, OCTAVES, RATE_HZ, SECONDS, TAPS, allan_curve, deviations, fitted_terms, simulate_counts, slope_coefficients,

@@ -1,5 +1,4 @@
-//! Covariance of block means by the noises' definitions, and the tests of a waveform of the bias: expected log
-//! likelihood ratio, p-value.
+//! Covariance of block means, and the tests of a waveform of the bias: expected log likelihood ratio, p-value.
 
 use super::channel_under_test::{Densities, fit_baseline};
 use super::environment::EnvironmentCourse;
@@ -80,7 +79,7 @@ fn exponential(length: f64, lag: usize) -> f64 {
 /// Expected log likelihood ratio of a waveform in N, B and K against a constant with the best N, B and K.
 ///
 /// Per cosine of the blocks (Whittle), with the variance `c`, the waveform's share `s`, and `m` without it: `½·((c +
-/// s²)/m − 1 + ln(m/c))`. A random walk takes up most of a slow drift.
+/// s²)/m − 1 + ln(m/c))`.
 pub(super) struct WaveformTest {
     cosines: DMatrix<f64>,
     densities: Vec<Densities>,

@@ -1,6 +1,4 @@
-//! Recordings with hidden effects, drawn from a seed.
-//!
-//! Noise, temperature, supply, clock error and sometimes a motion vary; the analysis must not report them as effects.
+//! Recordings with hidden effects, drawn from a seed; noise, temperature, supply, clock and motion vary.
 
 use super::channel_under_test::{ChannelUnderTest, RecordLength};
 use super::detection_limit::{HOST_CLOCK_TOLERANCE, smallest_size, strength};
@@ -142,9 +140,8 @@ pub(super) fn knock_shares(
     OutputRegister::INERTIAL.map(&mut share).to_vec()
 }
 
-/// Effects of `kinds` with their strengths beside each other, from `range`. Drawn again if weaker than `at_least`, in
-/// noise below a count, or larger than [`LARGEST_PART`] of full scale. The last draw is returned, with whether it is as
-/// asked for.
+/// Effects of `kinds` with their strengths from `range`, drawn again if weaker than `at_least`, in noise below a count,
+/// or larger than [`LARGEST_PART`] of full scale; the flag says if the last draw is as asked for.
 pub(super) fn draw_effects(
     kinds: &[EffectKind],
     range: (f64, f64),

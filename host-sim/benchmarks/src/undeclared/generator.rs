@@ -1,5 +1,4 @@
-//! The generator of the recordings: noise by spectrum, effects by definition, filter, rounding, time stamps. It shares
-//! no code with the analysis or the virtual sensor.
+//! The generator of the recordings, which shares no code with the analysis or the virtual sensor.
 
 use super::environment::{EnvironmentCourse, gauss_markov, two_levels};
 use super::outside::OutsideEffect;

@@ -1,5 +1,4 @@
-//! Effects outside the vocabulary: right are `unexplained` and [`OutsideKind::right_names`]. A part of the effect
-//! counts neither way ([`OutsideEffect::has_part`]).
+//! Effects outside the vocabulary; right names are `unexplained` and [`OutsideKind::right_names`].
 
 use super::environment::{EnvironmentCourse, frequency_factor, gauss_markov, log_uniform};
 use crate::spectral_noise::normal;

@@ -333,8 +333,7 @@ impl ColumnSelection {
 }
 
 impl AvailableColumn {
-    /// From a heading that may end in a unit: `ax [m/s^2]`, `wx (rad/s)`, `gyro x, deg/s`, `gyro_x_deg_s`, `time_us`,
-    /// `gyro_x_counts`. ADIS164xx registers such as `XGYRO_OUT` have counts.
+    /// From a heading that may end in a unit: `ax [m/s^2]`, `wx (rad/s)`, `gyro x, deg/s`, `gyro_x_deg_s`, `time_us`.
     pub(crate) fn from_heading(heading: &str) -> Self {
         let heading = heading.trim().trim_start_matches(['#', '%']).trim();
         if let Some((name, unit)) = heading.rsplit_once(',')

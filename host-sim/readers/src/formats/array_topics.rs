@@ -102,8 +102,7 @@ pub(crate) trait ArrayReader: Send {
         add: &mut dyn FnMut(u64) -> Result<(), Reason>,
     ) -> Result<Vec<Vec<Number>>, Reason>;
 
-    /// Streams the rows of columns (array, number), or the reason of an early end; `None` if the format has to hold
-    /// them.
+    /// Streams the rows of columns (array, number); `None` if the format has to hold them.
     fn for_each_row(&mut self, _places: &[(usize, usize)], _each: &mut EachArrayRow) -> Option<Result<(), InputError>> {
         None
     }

@@ -10,8 +10,7 @@ pub(crate) const DAY_NS: i64 = 86_400 * SECOND_NS;
 
 const MONTHS: [&str; 12] = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"];
 
-/// ns since 1970 by ISO 8601 or any [`date`] and [`time_of_day`], blank or T between; or a duration, `0 days
-/// 00:00:01.5`.
+/// ns since 1970 by ISO 8601 or any [`date`] and [`time_of_day`]; or a duration, `0 days 00:00:01.5`.
 pub(crate) fn date_time(text: &str) -> Option<i64> {
     date_time_with(text, date)
 }
@@ -90,8 +89,7 @@ impl WrittenDate {
     }
 }
 
-/// Order of day and month in a file, by a day above 12 or the first change of date. Unimportant until then: times are
-/// differences.
+/// Order of day and month in a file, by a day above 12 or the first change of date.
 #[derive(Debug, Clone, Default)]
 struct DateOrder {
     known: Option<Order>,
@@ -125,8 +123,7 @@ impl DateOrder {
     }
 }
 
-/// ns from midnight, UTC with an offset: 10:00, 10:00:13, 10:00:13.25, 10:00:13Z, 10:00:13+02:00, 10:00:13 PM,
-/// 10:00:13:250 (ms).
+/// ns from midnight, UTC with an offset: 10:00, 10:00:13.25, 10:00:13+02:00, 10:00:13 PM, 10:00:13:250 (ms).
 pub(crate) fn time_of_day(text: &str) -> Option<i64> {
     let text = text.trim();
     let upper = text.to_uppercase();
@@ -240,8 +237,7 @@ impl CalendarColumns {
         })
     }
 
-    /// Columns named as parts of a time, as `secs` and `nsecs`, with fitting whole numbers in `rows`; seconds are
-    /// required.
+    /// Columns named as parts of a time, as `secs` and `nsecs`, with whole numbers in `rows`; seconds are required.
     pub(crate) fn parts(available: &[AvailableColumn], rows: &[Vec<&str>]) -> Option<Self> {
         let mut named: Vec<NamedPart> = Vec::new();
         for (position, column) in available.iter().enumerate() {

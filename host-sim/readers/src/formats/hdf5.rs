@@ -1,6 +1,4 @@
-//! Datasets of HDF5 (MATLAB 7.3, `h5py`): matrices and tables of records, by path.
-//!
-//! `hdf5-pure` reads windows of rows and states sizes first.
+//! Datasets of HDF5 (MATLAB 7.3, `h5py`): matrices and tables of records, by path, in windows of rows.
 
 use crate::columns::unit::Unit;
 use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray, stated_rate};

@@ -1,7 +1,5 @@
-//! Messages with defined fields, as in ROS and PX4.
-//!
-//! A [`MessageLayout`] has a column per number, such as `imu.angular_velocity.x` or `gyro[2]`. The first 16 floats of a
-//! sequence are columns; other sequences, and arrays of more than 64, are skipped.
+//! Messages with defined fields, as in ROS and PX4: a column per number, such as `imu.angular_velocity.x` or `gyro[2]`.
+//! The first 16 floats of a sequence are columns; longer arrays than 64 are skipped.
 
 use crate::input::budget::Budget;
 use crate::input::input_error::Reason;
@@ -120,10 +118,7 @@ pub(crate) struct MessageLayout {
 }
 
 impl MessageLayout {
-    /// Layout of the definition `root`.
-    ///
-    /// # Errors
-    /// A definition that is missing, that contains itself or is nested too deeply, or too many fields.
+    /// Layout of the definition `root`; an error if one is missing, contains itself or is nested too deeply.
     pub(crate) fn new(root: &str, definitions: &Definitions) -> Result<Self, Reason> {
         let mut builder = Builder { definitions, columns: Vec::new(), steps: 0 };
         let steps = builder.steps_of(root, "", true, 0)?;

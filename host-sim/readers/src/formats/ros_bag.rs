@@ -1,7 +1,5 @@
-//! Bags of ROS 1 (`.bag`, 2.0) with definitions in their connections.
-//!
-//! Records have a header of named fields and data; messages lie in chunks. Stated lengths are believed as far as bytes
-//! come. Interrupted recordings lack the index and are read from the start.
+//! Bags of ROS 1 (`.bag`, 2.0) with definitions in their connections; messages lie in chunks. Interrupted recordings
+//! lack the index and are read from the start.
 
 use crate::formats::message_layout::{Encoding, MessageLayout};
 use crate::formats::ros_definition::{self, RosVersion};

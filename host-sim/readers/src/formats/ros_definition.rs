@@ -10,8 +10,7 @@ pub(crate) enum RosVersion {
     Ros2,
 }
 
-/// Layout of `kind`, such as `sensor_msgs/Imu` or `sensor_msgs/msg/Imu`: own fields, then used types, each behind a
-/// line of `=` and `MSG: TYPE`.
+/// Layout of `kind`, such as `sensor_msgs/Imu`, by its definition and those behind lines of `=` and `MSG: TYPE`.
 pub(crate) fn layout(kind: &str, definition: &str, version: RosVersion) -> Result<MessageLayout, Reason> {
     let root = short(kind);
     let mut definitions = known(version);

@@ -101,10 +101,7 @@ struct DamagedRows {
 }
 
 impl DamagedRows {
-    /// Leaves out a row.
-    ///
-    /// # Errors
-    /// Too many.
+    /// Leaves out a row; an error if these are too many.
     fn add(&mut self, error: InputError) -> Result<(), InputError> {
         self.damaged += 1;
         if self.first.is_none() {

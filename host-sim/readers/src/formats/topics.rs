@@ -1,6 +1,4 @@
-//! Files of several sources (topics, groups of arrays, sensors), and the choice of a table.
-//!
-//! A [`Source`] lists topics with columns and known sensors, and gives rows. The choice is made here for all formats.
+//! Files of several sources (topics, groups of arrays, sensors), and the choice of a table for all formats.
 
 use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ColumnSelection, as_they_are};
 use crate::columns::unit::Unit;

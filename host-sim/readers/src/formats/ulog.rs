@@ -416,10 +416,7 @@ impl MessageBytes {
     }
 }
 
-/// Offsets of appended data, by the flag bits.
-///
-/// # Errors
-/// It has incompatible flags that are not known.
+/// Offsets of appended data, by the flag bits; an error for unknown incompatible flags.
 fn flag_bits(message: &[u8]) -> Result<Vec<u64>, Reason> {
     const DATA_APPENDED: u8 = 1;
     let incompatible = message.get(8..16).unwrap_or_default();

@@ -1,7 +1,4 @@
-//! Limits on the reading of a file: bytes, numbers, nesting.
-//!
-//! Small files can ask for gigabytes or any depth; limits grow with the file and no recording meets them. Queries have
-//! a deadline.
+//! Limits on the reading of a file, which grow with its size: bytes, numbers, nesting, time.
 
 use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::Reason;

@@ -17,10 +17,7 @@ pub(crate) struct ReadAhead {
 }
 
 impl ReadAhead {
-    /// Reads `input` until its end, an error, or a drop.
-    ///
-    /// # Errors
-    /// The system has no thread left.
+    /// Reads `input` until its end, an error, or a drop; an error if the system has no thread left.
     pub(crate) fn new(mut input: impl Read + Send + 'static) -> io::Result<Self> {
         let (send, parts) = sync_channel(PARTS_AHEAD);
         let read_all = move || {

@@ -176,8 +176,7 @@ impl SensorGuess {
         }
     }
 
-    /// By numbers: time grows, gravity is the accelerometer, the smallest mean over noise the gyroscope. Labelled rows
-    /// have no other.
+    /// By numbers: time grows, gravity is the accelerometer, the smallest mean over noise the gyroscope.
     fn by_numbers(facts: &[ColumnFacts], topic: &str) -> Option<Self> {
         let mut columns: Columns = Vec::new();
         let unit = |at: usize| facts[at].column.unit;

@@ -398,10 +398,7 @@ impl BatchBuilder {
         self.order.notes()
     }
 
-    /// On rows with earlier times; `None` without any.
-    ///
-    /// # Errors
-    /// There is no row, or the times of many rows go back.
+    /// On rows with earlier times, `None` without any; an error if they are many, or without a row.
     pub(crate) fn backwards(&self) -> Result<Option<String>, Reason> {
         if self.rows == self.backwards {
             return Err(Reason::NoData);

@@ -1,7 +1,5 @@
-//! Numbers as integer counts, summed exactly.
-//!
-//! Multiples of a step keep it as LSB; others get a power of two that adds at most [`MAX_COST`] of the noise's
-//! variance, LSB²/12.
+//! Numbers as integer counts: multiples of a step keep it as LSB, others get a power of two that adds at most
+//! [`MAX_COST`] of the noise's variance, LSB²/12.
 
 /// For the noise's variance.
 const MAX_COST: f64 = 1e-4;
@@ -72,8 +70,7 @@ impl ColumnQuantizer {
     }
 }
 
-/// Common step and offset below it; `None` without one. By the smallest distance, or the common divisor of neighbours,
-/// refined like a vernier.
+/// Common step and offset below it, by the smallest distance or the common divisor; `None` without one.
 pub(crate) fn step(values: &[f64]) -> Option<(f64, f64)> {
     let largest = values.iter().copied().filter(|value| value.is_finite()).map(f64::abs).fold(0.0, f64::max);
     let stride = values.len().div_ceil(EXAMINED).max(1);

@@ -48,10 +48,7 @@ pub(crate) struct WholeTable {
 }
 
 impl WholeTable {
-    /// Columns as they are.
-    ///
-    /// # Errors
-    /// It has no row that can be read.
+    /// Columns as they are; an error if no row can be read.
     pub(crate) fn read(mut self, source: &mut dyn RowSource) -> Result<Self, InputError> {
         let chosen = source.chosen().to_vec();
         let most = most_rows(chosen.len());

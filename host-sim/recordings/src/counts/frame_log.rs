@@ -1,5 +1,4 @@
-//! Logs of the SPI bus: a line per transaction (chip select low), `time_s,mosi,miso`, bytes in hexadecimal. Times read
-//! back exactly.
+//! Logs of the SPI bus: a line per transaction, `time_s,mosi,miso`, bytes in hexadecimal; times read back exactly.
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -114,8 +113,7 @@ pub(crate) fn bytes(text: &str) -> Result<Vec<u8>, Reason> {
         .ok_or_else(|| Reason::NotHex(delimited_text::quote(text)))
 }
 
-/// A log being written; gzip for a name in `.gz`. Complete up to the last second even without [`finish`](Self::finish):
-/// gzip members are written at once.
+/// A log being written, gzip for a name in `.gz`; complete up to the last second without [`finish`](Self::finish).
 #[derive(Debug)]
 pub struct FrameLogWriter {
     file: File,

@@ -222,9 +222,6 @@ pub(crate) fn is_capture(start: &[u8]) -> bool {
 }
 
 /// Writes the bursts of `capture`, bytes of a raw stream, to `file`; restarts take no time.
-///
-/// # Errors
-/// The capture cannot be read or the log cannot be written.
 pub(crate) fn log_of_capture(mut capture: impl Read, file: &Path) -> io::Result<()> {
     let mut recorder = RawStreamRecorder::create(file)?;
     let (mut decoder, received) = (Decoder::new(), Instant::now());

@@ -1,5 +1,4 @@
-//! Counts rows with a channel at full scale. By the data sheet, else 16 bits if reached but not exceeded. Rows with an
-//! extreme are candidates until the count's size is known.
+//! Counts rows with a channel at full scale by the data sheet, else at 16 bits if reached but not exceeded.
 
 use readers::{ColumnQuantizer, ValueColumn};
 use std::collections::BTreeMap;

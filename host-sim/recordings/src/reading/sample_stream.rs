@@ -1,7 +1,4 @@
-//! Samples on their time base, in batches.
-//!
-//! A first reading finds rate, length and counts; short recordings are kept from it, longer ones read again. Memory
-//! does not depend on the length.
+//! Samples on their time base, in batches, in bounded memory: a first reading finds rate, length and counts.
 
 use crate::batch_source::{BatchSource, RecordedRows};
 use crate::file_format::{RecordedInput, options_of_counts};
@@ -171,8 +168,7 @@ impl SampleStream {
         Ok(Self { origin, reading, survey, samples, monitor: monitor.clone() })
     }
 
-    /// The samples at the start with stamps: all if in memory, else 2¹⁶ sample periods, perhaps with counts of their
-    /// own size.
+    /// The samples at the start with stamps: all if in memory, else 2¹⁶ sample periods.
     #[must_use]
     pub fn beginning(&self) -> &Measurement {
         &self.samples.beginning

@@ -1,5 +1,4 @@
-//! Kinds of files that people have, drawn anew: where a table begins in its file, whose rows it has, what its columns are, and what its times
-//! mean.
+//! Kinds of files that people have, drawn anew.
 
 use super::harness::{Reading, inspect, normal, read, read_file};
 use rand::seq::SliceRandom;

@@ -1,5 +1,4 @@
-//! Recordings of other sensors that other people made: they open as the documentation says, and their Allan deviations are those that other
-//! programs find (`reference_curves.py`).
+//! Recordings of other sensors by other people, against the curves of other programs (`reference_curves.py`).
 
 use super::harness::{Reading, inspect, read_file};
 use serde_json::Value;
@@ -26,10 +25,7 @@ fn reference(test: &str, reader: &str, file: &Path, argument: &str) -> Option<Va
     Some(serde_json::from_slice(&output).expect("JSON"))
 }
 
-/// Compares the points of the curves at 1, 2, 4 and 8 samples, or of a recording with gaps the one at 1 sample.
-///
-/// Numbers that are no multiples of a step are rounded to counts that add at most 1e-4 to the variance, 5e-5 to the deviation, and by chance
-/// 1e-2/√n (1 σ): with 12,000 samples 5 σ are 4.6e-4.
+/// Compares the points at 1, 2, 4 and 8 samples, or with gaps the one at 1 sample; 5 σ of the rounding are 4.6e-4.
 fn compare(read: &Reading, reference: &Value) {
     for (channel, expected) in reference["curves"].as_object().expect("channels") {
         for (at, expected) in expected.as_array().expect("a curve").iter().enumerate() {

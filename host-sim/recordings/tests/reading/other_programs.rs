@@ -32,11 +32,8 @@ fn number(value: &Value) -> f64 {
     value.as_f64().expect("a number")
 }
 
-/// Rows and losses to a sample; the rate within 20 ppm, which is the jitter of the stamps (uniform in 2 % of a period, 0.6 % standard
-/// deviation) over √n and the length of the record with room.
-///
-/// The Allan deviation of neighbours is that which numpy computes from the samples as they were written. The counts that
-/// stand for floats add noise of at most a = 10⁻² of its deviation: a²/2 to the deviation, and by chance a/√n (1 σ).
+/// Rows and losses to a sample; the rate within 20 ppm by the jitter of the stamps. Counts for floats add a²/2 to the
+/// deviation, and by chance a/√n (1 σ), with a = 10⁻² of it.
 #[test]
 fn samples_of_other_programs_have_their_rate_losses_and_numbers() {
     let Some(samples) = samples("samples_of_other_programs_have_their_rate_losses_and_numbers") else { return };

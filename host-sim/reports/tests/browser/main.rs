@@ -1,5 +1,4 @@
-//! The page in headless Chromium: drawing, colour schemes, widths, keyboard, and no requests. The tests pass with a
-//! message without Chromium.
+//! The page in headless Chromium: drawing, colour schemes, widths, keyboard, no requests; passes without Chromium.
 
 use crate::fixture;
 use noise_analysis::bounds::BoundedEstimate;

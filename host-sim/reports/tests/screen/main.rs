@@ -1,5 +1,4 @@
-//! The screen against the files beside this one. After a wanted change, delete the file, run the test, and read the new
-//! one.
+//! The screen against the files beside this one: after a wanted change, delete the file, run the test, and read.
 
 use crate::fixture;
 use noise_analysis::bounds::BoundedEstimate;
