@@ -58,7 +58,6 @@ pub struct Alarm {
 const ABOVE: u16 = 1 << 15;
 
 impl AlarmNumber {
-    /// The register of the threshold.
     const fn magnitude(self) -> Register {
         match self {
             AlarmNumber::One => Register::AlmMag1,
@@ -66,7 +65,6 @@ impl AlarmNumber {
         }
     }
 
-    /// The register of the number of samples.
     const fn samples(self) -> Register {
         match self {
             AlarmNumber::One => Register::AlmSmpl1,
@@ -82,7 +80,6 @@ impl AlarmNumber {
         }
     }
 
-    /// The bit of ALM_CTRL that selects the rate of change.
     const fn rate_of_change(self) -> u16 {
         match self {
             AlarmNumber::One => 1 << 6,
@@ -121,7 +118,6 @@ impl Alarm {
         }
     }
 
-    /// The value of ALM_SMPL.
     fn samples(&self) -> u16 {
         match self.watch {
             AlarmWatch::Level => 0,

@@ -144,7 +144,6 @@ macro_rules! methods {
 }
 procedures!(methods);
 
-/// Runs a procedure to its end.
 async fn run<SPI: SpiDevice<u8>, D: DelayNs, T>(
     bus: &mut SensorBus<SPI, D>,
     slot: &RequestSlot,
@@ -186,8 +185,7 @@ async fn perform<SPI: SpiDevice<u8>, D: DelayNs>(
     Ok(())
 }
 
-/// Runs a transaction, then keeps the pause with chip select high, whatever the result; first the rest of an
-/// interrupted pause.
+/// Runs a transaction after the rest of an interrupted pause, then keeps the pause with chip select high.
 async fn transact<SPI: SpiDevice<u8>, D: DelayNs>(
     bus: &mut SensorBus<SPI, D>,
     pauses: FramePauses,
@@ -200,7 +198,6 @@ async fn transact<SPI: SpiDevice<u8>, D: DelayNs>(
     result
 }
 
-/// Waits for the pause that the part still needs.
 async fn pause<SPI, D: DelayNs>(bus: &mut SensorBus<SPI, D>) {
     if bus.pending_pause_ns > 0 {
         bus.delay.delay_ns(bus.pending_pause_ns).await;

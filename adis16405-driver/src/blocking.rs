@@ -123,7 +123,6 @@ macro_rules! methods {
 }
 procedures!(methods);
 
-/// Runs a procedure to its end.
 fn run<SPI: SpiDevice<u8>, D: DelayNs, T>(
     bus: &mut SensorBus<SPI, D>,
     slot: &RequestSlot,
@@ -162,8 +161,7 @@ fn perform<SPI: SpiDevice<u8>, D: DelayNs>(bus: &mut SensorBus<SPI, D>, slot: &R
     Ok(())
 }
 
-/// Runs a transaction, then keeps the pause with chip select high, whatever the result; first the rest of an
-/// interrupted pause.
+/// Runs a transaction after the rest of an interrupted pause, then keeps the pause with chip select high.
 fn transact<SPI: SpiDevice<u8>, D: DelayNs>(
     bus: &mut SensorBus<SPI, D>,
     pauses: FramePauses,
@@ -176,7 +174,6 @@ fn transact<SPI: SpiDevice<u8>, D: DelayNs>(
     result
 }
 
-/// Waits for the pause that the part still needs.
 fn pause<SPI, D: DelayNs>(bus: &mut SensorBus<SPI, D>) {
     if bus.pending_pause_ns > 0 {
         bus.delay.delay_ns(bus.pending_pause_ns);

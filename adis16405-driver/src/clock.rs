@@ -279,8 +279,7 @@ impl PerClockMode {
     }
 }
 
-/// The times that the driver keeps, by the data sheet Rev. B; [`Timing::DEFAULT`] takes the safe side. The reset pulse
-/// and the least time of chip select high are not in it.
+/// The times that the driver keeps, by the data sheet Rev. B; [`Timing::DEFAULT`] takes the safe side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -297,8 +296,7 @@ pub struct Timing {
     pub sck_hz: Option<u32>,
     /// Level of chip select during the stall.
     pub stall_select: SelectDuringStall,
-    /// Least time of chip select high, ns; the ADIS16470 needs 1 µs. [`SelectDuringStall::High`] keeps the stall
-    /// anyway.
+    /// Least time of chip select high, ns; the ADIS16470 needs 1 µs.
     pub select_high_ns: u32,
     /// Pause between the words of a burst, ns. The data sheet asks for one SCK period (Table 2, page 10); the default
     /// is 0, as in Linux and PX4: one transfer instead of 13.

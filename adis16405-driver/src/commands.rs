@@ -138,7 +138,6 @@ impl Protocol<'_> {
         self.configure(config).await
     }
 
-    /// Writes a command bit to GLOB_CMD and leaves the bus silent for `silence_us`.
     async fn command(&self, command: u16, silence_us: u32) {
         self.write_low(Register::GlobCmd, command).await;
         self.pause(silence_us).await;

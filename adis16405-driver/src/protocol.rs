@@ -26,8 +26,7 @@ pub(crate) enum BusRequest {
     Pause { us: u32 },
 }
 
-/// Passes requests from a procedure to the driver, and responses back. Atomic fields make the futures `Send`; both
-/// sides run in one future, so order does not matter.
+/// Passes requests from a procedure to the driver, and responses back; atomic, so that the futures are `Send`.
 #[derive(Debug)]
 pub(crate) struct RequestSlot {
     /// The two bytes of a frame, or [`PAUSE`](Self::PAUSE), or [`CHIP_SELECT_PULSE`](Self::CHIP_SELECT_PULSE).
@@ -151,7 +150,6 @@ impl DriverState {
         }
     }
 
-    /// The pauses after a frame in the present power mode.
     #[inline(never)]
     pub(crate) fn frame_pauses(&self) -> FramePauses {
         let timing = &self.timing;
@@ -188,12 +186,10 @@ impl<'a> Protocol<'a> {
         u16::from_be_bytes(self.slot.request(BusRequest::Frame { bytes, pauses: self.state.frame_pauses() }).await)
     }
 
-    /// Leaves the bus silent for `us`.
     pub(crate) async fn pause(&self, us: u32) {
         self.slot.request(BusRequest::Pause { us }).await;
     }
 
-    /// Holds chip select low for `ns` without clocking.
     pub(crate) async fn chip_select_pulse(&self, ns: u32) {
         let pauses = FramePauses { low_ns: ns, high_ns: self.state.timing.select_high_ns };
         self.slot.request(BusRequest::ChipSelectPulse { pauses }).await;
@@ -218,13 +214,11 @@ impl<'a> Protocol<'a> {
         answers
     }
 
-    /// Reads a register that the caller chose, if it can be read.
     pub(crate) async fn read_register(&self, register: Register) -> Result<u16, ProtocolError> {
         let [answer] = self.read_registers([register]).await?;
         Ok(answer)
     }
 
-    /// Reads registers that the caller chose in N + 1 frames, if all can be read.
     pub(crate) async fn read_registers<const N: usize>(
         &self,
         registers: [Register; N],
@@ -235,12 +229,10 @@ impl<'a> Protocol<'a> {
         }
     }
 
-    /// Writes the lower byte of a register.
     pub(crate) async fn write_low(&self, register: Register, value: u16) {
         self.frame(register.write_low_frame(value)).await;
     }
 
-    /// Writes the upper byte of a register.
     pub(crate) async fn write_high(&self, register: Register, value: u16) {
         self.frame(register.write_high_frame(value)).await;
     }
@@ -301,15 +293,12 @@ impl<'a> Protocol<'a> {
         Ok(())
     }
 
-    /// Sets all bits of a register, as [`update_register`](Self::update_register) does.
     pub(crate) async fn set_register(&self, register: Register, value: u16) -> Result<(), ProtocolError> {
         self.update_register(register, u16::MAX, value).await
     }
 
-    /// Polls until the bits of `mask` are clear, at most `most_us`; true if they were set in any poll.
-    ///
-    /// # Errors
-    /// [`Error::Deadline`] if they are still set after `most_us`.
+    /// Polls until the bits of `mask` are clear; true if they were set in any poll, [`Error::Deadline`] after
+    /// `most_us`.
     pub(crate) async fn wait_until_clear(
         &self,
         register: Register,

@@ -93,8 +93,7 @@ impl Protocol<'_> {
         Ok(FlashTest { before, ran, diagnosis })
     }
 
-    /// Runs the test of an MSC_CTRL bit and restores the rest, without the manual self-test; writes the upper byte
-    /// alone. Returns DIAG_STAT before, whether it ran, DIAG_STAT after.
+    /// Runs the test of an MSC_CTRL bit; returns DIAG_STAT before, whether the test ran, and DIAG_STAT after.
     async fn run_test(&mut self, bit: u16, usual_us: u32) -> Result<(Diagnosis, bool, Diagnosis), ProtocolError> {
         // A part that is absent may read as zeros, which would look like a test that has ended.
         self.identity().await?;

@@ -19,7 +19,6 @@ pub enum SelectDuringStall {
 /// Longest delay that is asked for at once, µs: some HALs compute its cycles in 32 bits, which 25 s at 168 MHz overflow.
 pub(crate) const LONGEST_DELAY_US: u32 = 100_000;
 
-/// The pauses after a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FramePauses {
     /// With chip select low, ns.

@@ -1,5 +1,4 @@
-//! Validity of a burst: faults, refused channels, counts. Without checksum and sample counter, flags, plausibility and
-//! changes decide.
+//! Validity of a burst by flags, plausibility and changes: faults, refused channels, counts.
 
 use crate::burst::{Burst, OutputWord};
 use crate::channel::{Channel, ChannelMask};
@@ -9,8 +8,7 @@ bitflags::bitflags! {
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub struct Faults: u16 {
-        /// The new-data flag of an inertial word is clear: it was read before. No source tells how often the other
-        /// words are refreshed.
+        /// The new-data flag of an inertial word is clear: it was read before.
         const NO_NEW_DATA = 1 << 0;
         /// The error/alarm flag of at least one word is set; DIAG_STAT holds the reason.
         const ERROR_ALARM = 1 << 1;
@@ -19,9 +17,7 @@ bitflags::bitflags! {
         const SUPPLY = 1 << 2;
         /// All words are 0x0000: the data line is held low, or no part is connected.
         const STUCK_LOW = 1 << 3;
-        /// Temperature and auxiliary input are 0xFFFF: line held high, no part, or a burst that ended early. A part
-        /// sends both only one count below 25 °C with the input at full scale and an error flag set, if it sets the two
-        /// unused bits of a word of 12 bits.
+        /// Temperature and auxiliary input are 0xFFFF: line held high, no part, or a burst that ended early.
         const STUCK_HIGH = 1 << 4;
         /// The six inertial words equal the previous ones, a warning: often chance (45 of 49,425 bursts of a real
         /// part). The new-data flags tell whether a sample is new.
@@ -132,8 +128,7 @@ impl Burst {
         (-Faults::LARGEST_RATE..=Faults::LARGEST_RATE).contains(&self.words[gyro as usize].counts(gyro))
     }
 
-    /// Channels refused by `faults`: those of a word's fault, else all. Other channels follow the inertial ones, whose
-    /// words make a new sample.
+    /// Channels refused by `faults`: those of a word's fault, else all.
     fn refused_channels(&self, faults: Faults) -> ChannelMask {
         if faults.is_empty() {
             return ChannelMask::EMPTY;
@@ -161,8 +156,7 @@ fn supply_in_range(word: OutputWord) -> bool {
     SUPPLY_COUNTS.contains(&word.counts(Channel::Supply))
 }
 
-/// Searches a shift that sets the inertial new-data flags and makes eleven error/alarm flags equal. Late words begin
-/// with the supply, which must be in range; early ones with any x rate.
+/// Searches a shift that sets the inertial new-data flags, makes eleven error/alarm flags equal, and the supply valid.
 fn is_shifted(words: &[OutputWord; 12]) -> bool {
     let new = |words: &[OutputWord]| words.iter().all(|word| word.new_data());
     (1..16).any(|bits| {

@@ -1,7 +1,5 @@
-//! Acquisition: bursts at data-ready (DRDY) edges, and conclusions from the times of the edges.
-//!
-//! [`Sampler`] runs in the two sampling interrupts (data-ready edge, end of the DMA transfer) and queues
-//! [`TimedBurst`]s. [`DataReadyMonitor`] runs behind the queue: sample rate, lost and spurious edges, a suspect sensor.
+//! Acquisition: [`Sampler`] queues [`TimedBurst`]s in the two sampling interrupts (data-ready edge, end of the
+//! transfer); behind the queue [`DataReadyMonitor`] finds sample rate, lost and spurious edges, and a suspect sensor.
 
 use adis16405_driver::{BURST_BYTES, Burst, SamplePeriod};
 use heapless::spsc;
@@ -34,8 +32,7 @@ pub struct TimedBurst {
     pub burst: Option<Burst>,
 }
 
-/// Edges in [`OSCILLATION_US`] that mask the data-ready line; a sensor gives at most 1.2 a millisecond. An oscillating
-/// line would leave the processor no time.
+/// Edges in [`OSCILLATION_US`] that mask the data-ready line; a sensor gives at most 1.2 a millisecond.
 const OSCILLATION_EDGES: u32 = 16;
 /// µs.
 const OSCILLATION_US: u64 = 1_000;
@@ -101,9 +98,7 @@ impl<'q> Sampler<'q> {
         self.activity
     }
 
-    /// To be called at every data-ready edge; returns what must be done now.
-    ///
-    /// A sample during a transfer is lost, as [`DataReadyMonitor`] concludes.
+    /// To be called at every data-ready edge; returns what must be done now; a sample during a transfer is lost.
     #[must_use]
     pub fn data_ready(&mut self, at_us: u64) -> EdgeAction {
         let (edges, since_us) = &mut self.edges;

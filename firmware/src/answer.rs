@@ -16,7 +16,6 @@ pub(crate) enum Answer {
 
 pub(crate) enum AnswerLine {
     Text(TextLine),
-    /// No line here, but perhaps at a later index.
     Skip,
     End,
 }

@@ -198,7 +198,6 @@ impl App {
         self.console.has_answers() || self.report.is_active()
     }
 
-    /// Sends waiting text; returns whether there is room for more.
     fn flush(&mut self, board: &mut impl Board) -> bool {
         let has_room = self.console.flush(board);
         if has_room {
@@ -210,8 +209,6 @@ impl App {
     fn print(&mut self, board: &mut impl Board, text: Arguments<'_>) {
         self.console.print(board, text);
     }
-
-    // Commands
 
     fn execute(&mut self, command: Command, board: &mut impl Board) {
         let now_us = board.now_us();
@@ -400,8 +397,6 @@ impl App {
         }
     }
 
-    // Storage without power
-
     /// Keeps settings and models without power; returns the pause of sampling in µs.
     #[inline(never)]
     fn persist(&mut self, board: &mut impl Board) -> Result<u64, StoreError> {
@@ -449,10 +444,7 @@ impl App {
         }
     }
 
-    // Checkpoints and timers
-
-    /// Writes channel by channel, then the epoch's age, once in 0.8 s each: a restart loses no more. Checkpoints that a
-    /// fit delayed are written at once.
+    /// Writes channel by channel, then the epoch's age, once in 0.8 s each, or at once behind a fit.
     fn checkpoint(&mut self, board: &mut impl Board) {
         let now_us = board.now_us();
         for _ in 0..CHANNELS.len() {
@@ -497,9 +489,6 @@ impl App {
         }
     }
 
-    // Epochs
-
-    /// Resets statistics, epoch number and learned models.
     fn reset_statistics(&mut self, board: &mut impl Board) {
         board.estimators(|estimators| estimators.reset());
         self.state.settings.epoch = 0;
@@ -529,7 +518,6 @@ impl App {
         self.retained.write_settings(self.state.settings, true);
     }
 
-    /// Makes and sends the next message, for which there must be room.
     fn send_report_part(&mut self, board: &mut impl Board) {
         let ends_epoch = self.report.ends_epoch();
         let Some(part) = self.report.part() else {

@@ -1,5 +1,4 @@
-//! Requests of a person at a bench: registers, bus and data-ready times, self-test deflections. Sampling pauses
-//! meanwhile: a gap.
+//! Requests of a person at a bench (registers, bus and data-ready times, self-test), during which sampling pauses.
 
 use crate::answer::AnswerLine;
 use crate::board::{Board, FrameTimes};
@@ -113,8 +112,7 @@ pub(crate) fn compare_reads(register: Register, state: &DeviceState, board: &mut
     }
 }
 
-/// Bits of GLOB_CMD that write the sensor's flash: auto-null, factory restore, flash update, precision auto-null (data
-/// sheet Rev. B, pages 10 and 13).
+/// Bits of GLOB_CMD that write the sensor's flash (data sheet Rev. B, pages 10 and 13).
 const FLASH_COMMANDS: u16 = 1 << 0 | 1 << 1 | 1 << 3 | 1 << 4;
 
 /// True if this writes the sensor's flash, one of 10,000 cycles.
@@ -122,8 +120,7 @@ pub(crate) fn writes_flash(register: Register, value: u16) -> bool {
     register == Register::GlobCmd && value & FLASH_COMMANDS != 0
 }
 
-/// Writes a register and reads it back if possible. `check` restores the device's own rate, range, filter and data
-/// ready.
+/// Writes a register and reads it back if possible; `check` restores the device's own settings.
 pub(crate) fn write_register(register: Register, value: u16, state: &DeviceState, board: &mut impl Board) -> TextLine {
     match register.access() {
         Access::Read => text_line(format_args!("{} cannot be written", register.name())),
@@ -198,7 +195,6 @@ pub(crate) fn measurement_line(state: &DeviceState, board: &mut impl Board, inde
     })
 }
 
-/// Often enough for the times of single frames.
 fn register_frames(state: &DeviceState, board: &mut impl Board) -> Option<FrameTimes> {
     board.frame_times()?;
     ask(Request::Read(Register::ProdId), state, board).ok()?;

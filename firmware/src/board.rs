@@ -24,8 +24,7 @@ pub struct BusTiming {
     pub normal: SelectTiming,
     /// With a serial clock of at most 300 kHz, for low-power mode.
     pub low_power: SelectTiming,
-    /// Pause between two words of a burst in ns; 0 for none. With a pause every word is a DMA transfer with an
-    /// interrupt.
+    /// Pause between two words of a burst in ns, each of which is then a DMA transfer; 0 for none.
     pub word_gap_ns: u32,
 }
 
@@ -109,8 +108,7 @@ pub trait Board {
     fn frame_times(&mut self) -> Option<FrameTimes> {
         None
     }
-    /// Width of the next data-ready pulse in µs; `None` if none ends within `limit_us`, or the level is unknown. To be
-    /// used only while sampling is disabled.
+    /// Width of the next data-ready pulse in µs, while sampling is disabled; `None` if none ends within `limit_us`.
     fn data_ready_width_us(&mut self, _limit_us: u32) -> Option<u32> {
         None
     }

@@ -105,8 +105,7 @@ impl<S: OutputPin<Error = Infallible>> ChipSelect<S> {
     }
 }
 
-/// Performs the operations of a frame; a frame of one delay wakes a sleeping sensor. Delays use the microcontroller's
-/// counter.
+/// Performs the operations of a frame; a frame of one delay wakes a sleeping sensor.
 pub(crate) fn transfer<M: MicrosecondCounter, S: OutputPin<Error = Infallible>>(
     bytes: &mut impl ByteExchange,
     select: &mut ChipSelect<S>,

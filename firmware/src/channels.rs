@@ -8,7 +8,6 @@ pub const CHANNELS: [Channel; 8] = {
     let [a, b, c, d, e, f] = Channel::INERTIAL;
     [a, b, c, d, e, f, Channel::Temp, Channel::Supply]
 };
-/// Number of inertial channels, which come first in [`CHANNELS`] and have models.
 pub(crate) const INERTIAL: usize = Channel::INERTIAL.len();
 /// Number of gyros, which come first in [`CHANNELS`].
 pub(crate) const GYROS: usize = 3;

@@ -140,8 +140,7 @@ pub(crate) enum CommandError {
 /// Bytes.
 const MAX_LINE: usize = 32;
 
-/// Parses commands from received bytes. Commands with an effect are whole lines, so noise on an open input does not
-/// trigger them.
+/// Parses commands, which are whole lines, so that noise on an open input triggers none.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct CommandParser {
     line: Vec<u8, MAX_LINE>,

@@ -13,7 +13,6 @@ use link::{ClockSource, Health, TextLine, text_line};
 
 pub(crate) const VERSION_LINE: &str = concat!("ADIS16405 noise observatory ", env!("CARGO_PKG_VERSION"));
 
-/// Message of a start without stored data.
 pub(crate) const SAFE_MODE: &str = "safe mode after three crashes: stored settings and models are not used";
 
 const WAITING_LINES: usize = 4;
@@ -74,7 +73,6 @@ impl Console {
         }
     }
 
-    /// Sends the next line of the first answer.
     pub(crate) fn send_line(&mut self, state: &DeviceState, board: &mut impl Board) {
         let Some(&answer) = self.answers.front() else { return };
         let index = self.next_line;

@@ -22,10 +22,8 @@ pub(crate) const PAIRS: [(usize, usize); 25] = {
     pairs
 };
 
-/// Sums of products of second differences of channel pairs by octave, and of counts; a pair needs both channels' newest
-/// differences.
-///
-/// A difference is within ±2¹⁴·n, and 2⁴⁰ samples have 2⁴³/n: sums stay below 2⁹⁰, stored in 64 + 32 bits.
+/// Sums of products of second differences of channel pairs by octave, and of counts. A sum stays below 2⁹⁰ for 2⁴⁰
+/// samples and is stored in 64 + 32 bits.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct CrossSums {
     low: [[u64; PAIRS.len()]; CROSS_OCTAVES],
@@ -130,8 +128,7 @@ pub(crate) type ChannelMeans = [f64; CHANNELS.len()];
 /// Rounded Allan covariances and means of a finished epoch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllanCovariances {
-    /// By pair and octave, counts²; 0 if not observed, −0 for a covariance of 0: an epoch without samples is zero
-    /// memory.
+    /// By pair and octave, counts²; 0 if not observed, −0 for a covariance of 0.
     pub(crate) pairs: [[f64; CROSS_OCTAVES]; PAIRS.len()],
     /// Mean of every channel; 0 without samples.
     pub means: ChannelMeans,

@@ -250,10 +250,7 @@ impl DeviceState {
         self.request_probe(now_us);
     }
 
-    /// Disables sampling and sets a serial clock for `config`; the next probe sets it again.
-    ///
-    /// # Errors
-    /// The clock in Hz, if none is slow enough; sampling goes on.
+    /// Disables sampling and sets a serial clock for `config`; the error is the clock in Hz if none is slow enough.
     pub(crate) fn prepare_clock(&mut self, config: Config, board: &mut impl Board) -> Result<(), u32> {
         board.set_sampling(false);
         let clock_hz = board.set_clock_limit(clock_limit_hz(config));
@@ -295,7 +292,6 @@ pub(crate) fn clock_limit_hz(config: Config) -> u32 {
     }
 }
 
-/// A log message, also for host programs.
 pub(crate) fn log(board: &mut impl Board, text: Arguments<'_>) {
     let line = text_line(text);
     board.transmit_queue(|queue| queue.send(MessageRef::Log(&line)));

@@ -87,13 +87,10 @@ pub struct Regressor {
 /// The regressors of one channel.
 pub type Regressors = Vec<Regressor, MAX_COVARIATES>;
 
-/// Indices in [`CHANNELS`].
 type Candidates = Vec<usize, MAX_COVARIATES>;
 
-/// Estimates significant sensitivities of [`CHANNELS`]`[index]`; empty without
-/// [covariances](FinishedEpoch::covariances).
-///
-/// Calls `keep_on` before every fit; `None` if that returned false.
+/// Estimates significant sensitivities of [`CHANNELS`]`[index]`, none without
+/// [covariances](FinishedEpoch::covariances); `None` if `keep_on`, called before every fit, returned false.
 #[must_use]
 pub fn estimate_regressors(
     epoch: &FinishedEpoch,
@@ -176,8 +173,7 @@ fn subtract(
     Some(())
 }
 
-/// Change of the mean of stream and compensated stream since the epoch before, in the channel's unit; `before` in
-/// counts.
+/// Change of the mean of stream and compensated stream since the epoch `before` (counts), in the channel's unit.
 #[must_use]
 pub(crate) fn mean_shift(
     epoch: &FinishedEpoch,
@@ -227,10 +223,7 @@ fn lsb(index: usize, scale: ReportScale) -> f64 {
 }
 
 /// True if the subtraction raises the Allan variance of any octave by more than twice the standard error of the rise.
-///
-/// A hardly varying covariate gives large chance sensitivities. For `s = Σ βᵢ·cᵢ` and `u = y − s/2` the rise is
-/// `−2·cov(u, s)`, with the variance `4·σ²(u)·σ²(s)/edf`; `u` halfway does not favour chance cancellation. Without
-/// covariances, the covariates' noise may be twice the stream's standard error.
+/// For `s = Σ βᵢ·cᵢ` and `u = y − s/2` the rise is `−2·cov(u, s)`, with the variance `4·σ²(u)·σ²(s)/edf`.
 fn degrades(
     epoch: &FinishedEpoch,
     candidates: &Candidates,

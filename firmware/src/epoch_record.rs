@@ -8,8 +8,7 @@ use crate::statistics::ChannelSums;
 use allan_core::Interpolation;
 
 const OCTAVE_WORDS: usize = 10;
-/// Samples, missing ones; per octave a sum of 96 and a count of 64 bits, and of bridged gaps two counts and a sum of 96
-/// bits.
+/// Samples, missing ones; per octave a sum of 96 and a count of 64 bits, and the bridged gaps.
 pub(crate) const SUMS_WORDS: usize = 4 + OCTAVES * OCTAVE_WORDS;
 pub(crate) const MAX_SUM: u128 = (1 << 96) - 1;
 /// Number, completeness, rate, sums, means and pairs of 64 bits.

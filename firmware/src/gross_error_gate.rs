@@ -1,14 +1,8 @@
-//! The gate against gross errors, samples that noise does not explain, such as flipped bits: one in a million raises a
-//! gyro's variance by a fifth.
+//! The gate against gross errors, such as flipped bits: one in a million raises a gyro's variance by a fifth.
 //!
 //! A sample is refused beyond seven times the rms difference from the last one used, unless it agrees with two refused
-//! ones (a step). A channel has eight refusals, then one in sixteen samples; what is used beyond the limit counts as
-//! noise.
-//!
-//! The first block, 32 samples, is not used: the 28 smallest of 32 squared normal numbers hold half of their sum
-//! (0.498). Blocks of 64 and 128 replace this estimate, those of 256 have a quarter of the weight each.
-//!
-//! The tests derive false alarms and misses.
+//! ones (a step); after eight refusals only one in sixteen is. The first 32 samples are not used: the 28 smallest of 32
+//! squared normal numbers hold half of their sum (0.498).
 
 use crate::channels::{CHANNELS, ChannelSet};
 
@@ -22,8 +16,7 @@ const NORMAL_SHARE: u32 = 2;
 const WIDTH: u32 = 7;
 /// Rounding of two samples and of the limit, counts.
 const ROUNDING: u32 = 3;
-/// Refused samples that agree before a step. One would let two damaged bursts in a row, 75 an hour at one in a hundred,
-/// confirm each other.
+/// Refused samples that agree before a step; one would let two damaged bursts in a row confirm each other.
 const AGREEING: u32 = 2;
 const SPACING: u64 = 16;
 const REFUSALS: u64 = 8;
@@ -126,7 +119,6 @@ impl<const W: u32> GrossErrorGate<W> {
         }
     }
 
-    /// Not inlined: rare.
     #[inline(never)]
     fn end_block(&mut self) {
         let (is_first, is_known) = (self.is_learning(), self.block == BLOCK);
@@ -155,7 +147,6 @@ impl ChannelGate {
         self.sum = self.sum.saturating_add(square);
     }
 
-    /// Not inlined: rare.
     #[inline(never)]
     fn is_gross(&mut self, count: i32, now: u64) -> bool {
         let (before, number) = core::mem::replace(&mut self.beyond, (count, now));
@@ -176,13 +167,10 @@ impl ChannelGate {
 
 #[cfg(test)]
 mod tests {
-    //! **False alarms.** The rms of 1,792 differences has ν = 1,195 degrees of freedom in white noise; Student's
-    //! probability beyond ±7 is 4·10⁻¹², one sample of eight channels at 819.2 Hz in a year. Filtered noise has ν ≥
-    //! 1,792/N, and rounding widens the limit by three counts. The first estimate has ν = 17 and twice the limit
-    //! (3·10⁻¹²), the second ν = 43 (9·10⁻⁹): one start in 100,000 costs a sample.
-    //!
-    //! **What passes.** Bit flips below the limit: 7 of 14 bits at a noise of 10 counts, 0.005 counts² of 110 at an
-    //! error rate of 10⁻⁶. Larger errors that repeat, or the ninth within 128 samples.
+    //! False alarms: 1,792 differences have ν = 1,195 in white noise, and Student's probability beyond ±7 is 4·10⁻¹²,
+    //! one sample of eight channels at 819.2 Hz in a year; filtered noise has ν ≥ 1,792/N. One start in 100,000 costs a
+    //! sample (ν = 43: 9·10⁻⁹). What passes: bit flips below the limit, larger errors that repeat, the ninth within 128
+    //! samples.
 
     extern crate std;
 
@@ -213,8 +201,7 @@ mod tests {
         refused
     }
 
-    /// 6.7e-5 beyond four rms by Student's distribution with 1,195 degrees of freedom. Rounding takes up to 11 %, 16
-    /// samples after a refusal 0.1 %. Four standard deviations, for correlated neighbours.
+    /// 6.7e-5 beyond four rms by Student's distribution; rounding takes up to 11 %; four standard deviations.
     #[test]
     fn false_alarms_come_at_the_derived_rate() {
         let samples = 500_000;
@@ -224,8 +211,7 @@ mod tests {
         assert!((0.89 * expected - bound..expected + bound).contains(&found), "{found} of {expected}");
     }
 
-    /// The limit is twice as wide: 6.35e-4 over 300,000 simulated first blocks (NumPy), 5.9e-4 with 4 counts more, 2 %
-    /// by the spacing. Four standard deviations.
+    /// The limit is twice as wide: 6.35e-4 over 300,000 simulated first blocks (NumPy); four standard deviations.
     #[test]
     fn false_alarms_after_a_start_come_at_the_derived_rate() {
         let (starts, mut normal, mut found) = (2000, Normal(4), 0);
@@ -243,7 +229,6 @@ mod tests {
         assert!((0.91 * expected - bound..expected + bound).contains(&found), "{found} of {expected}");
     }
 
-    /// Eight different errors are refused, a ninth is used; later one in sixteen.
     #[test]
     fn errors_in_a_row_are_refused_up_to_the_limit() {
         let (mut gate, mut normal) = (GrossErrorGate::<WIDTH>::new(), Normal(6));
@@ -261,7 +246,6 @@ mod tests {
         assert_eq!(find(4000.0), ChannelSet::ALL);
     }
 
-    /// Two errors are left out of the estimate.
     #[test]
     fn errors_in_the_first_block_do_not_widen_the_limit() {
         let (mut gate, mut normal) = (GrossErrorGate::<WIDTH>::new(), Normal(7));
@@ -283,7 +267,6 @@ mod tests {
         }
     }
 
-    /// One sample, or two that agree, are refused; a step costs two.
     #[test]
     fn a_step_costs_two_samples_and_two_samples_are_refused() {
         let (mut gate, mut normal) = (GrossErrorGate::<WIDTH>::new(), Normal(2));

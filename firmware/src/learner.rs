@@ -18,8 +18,7 @@ use link::{
 };
 use serde::{Deserialize, Serialize};
 
-/// p-value of the residual above which no term is searched. A term lowers the deviance by 14; at 0.2 the deviance is
-/// below 14 for a dozen octaves.
+/// p-value of the residual above which no term is searched: the deviance of a dozen octaves is then below 14.
 const P_VALUE_SUFFICIENT: f64 = 0.2;
 
 const _: () = assert!(MAX_ADDED == link::MAX_ADDED_TERMS);
@@ -67,8 +66,7 @@ fn baseline_coefficients(model: &Model) -> Option<BaselineCoefficients> {
     Some([values.next()?, values.next()?, values.next()?])
 }
 
-/// Low-pass filters of the ADIS16405 that the trace tries: Bartlett windows of 2 to 64 taps per stage (SENS_AVG), that
-/// of 8 taps also read at lower rates.
+/// Low-pass filters of the ADIS16405 that the trace tries: Bartlett windows of 2 to 64 taps per stage (SENS_AVG).
 pub const FILTERS: [MovingAverageFilter; 10] = [
     MovingAverageFilter::bartlett(2),
     MovingAverageFilter::bartlett(4),
@@ -97,9 +95,7 @@ impl EpochFit {
         Self { baseline: None, regressors, trace: Trace::empty() }
     }
 
-    /// Fits the model of [`CHANNELS`]`[index]` to an epoch.
-    ///
-    /// It takes seconds; `keep_on` is called before every step, and false cancels the fit, which returns false.
+    /// Fits the model of [`CHANNELS`]`[index]` to an epoch, for seconds; false if `keep_on`, called at every step, was.
     #[must_use]
     pub fn run(
         &mut self,

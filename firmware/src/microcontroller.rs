@@ -1,8 +1,5 @@
-//! Code shared by the images of all boards: traits of a microcontroller here, start-up and interrupts (`image`), the main
-//! loop's board (`context`), the bus (`sensor_spi`), load and LED (`processor`), settings (`settings_flash`), and a
-//! module per microcontroller.
-//!
-//! A board implements [`BoardSupport`] and names its interrupts in [`observatory!`](crate::observatory).
+//! Code shared by the images of all boards; a board implements [`BoardSupport`] and names its interrupts in
+//! [`observatory!`](crate::observatory).
 
 pub mod context;
 pub mod image;
@@ -201,7 +198,6 @@ pub enum BurstEnd<'a> {
 
 /// A serial port to the host, served in its interrupt.
 pub trait ServedPort {
-    /// Moves bytes as far as possible; returns how many received ones were lost. `now_us` is the counter of
-    /// microseconds.
+    /// Moves bytes as far as possible at `now_us`, µs; returns how many received ones were lost.
     fn serve(&mut self, now_us: u32) -> u32;
 }

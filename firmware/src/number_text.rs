@@ -1,5 +1,4 @@
-//! Decimals without exponent, and estimates with the digits of their bounds, in 2 kB of flash (`core`'s formatting
-//! takes 20 kB).
+//! Decimals without exponent, and estimates with the digits of their bounds, in 2 kB of flash.
 
 use core::fmt::{self, Display, Formatter};
 
@@ -188,7 +187,6 @@ mod tests {
         assert_eq!([0, 999, 1000, 1_002_003].map(|count| Count(count).to_string()), ["0", "999", "1,000", "1,002,003"]);
     }
 
-    /// As for the host's screen.
     #[test]
     fn estimates_have_the_digits_that_their_bounds_support() {
         for (value, low, high, text) in [

@@ -1,8 +1,6 @@
-//! Retained RAM: statistics and settings through a warm reset, with checksums.
+//! Retained RAM: statistics and settings through a warm reset, with checksums over content, build and settings.
 //!
-//! They cover a hash of the build and, for samples, the sensor's settings.
-//!
-//! With one spare slot, a write never overwrites a newest version: a reset loses only the new one.
+//! With one spare slot, a write never overwrites a newest version.
 
 use crate::channels::CHANNELS;
 use crate::epoch::FinishedEpoch;

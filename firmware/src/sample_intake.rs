@@ -21,12 +21,10 @@ const FROZEN_BURSTS: u32 = 16;
 /// Used bursts of a working sensor; twice a frozen one's behind a long filter.
 const SETTLED_BURSTS: u32 = 100;
 
-/// Memory of the analogue channel, µs: two poles at 330 Hz (data sheet Rev. B, Table 1), 0.48 ms each. ±6,000 counts
-/// decay to half a count in 12.7 of them, (1 + x)·exp(−x) = 0.5 12,000.
+/// Memory of the analogue channel, µs: 12.7 times the 0.48 ms of two poles at 330 Hz (data sheet Rev. B, Table 1).
 const ANALOGUE_SETTLING_US: u64 = 6_200;
 
-/// Samples after a probe that hold earlier ones: a self-test, a reset, another range or filter. 2N of the filter's 2N +
-/// 1 taps (Fig. 15; N = 2^M), while the channel settles.
+/// Samples after a probe that hold earlier ones: 2N of the filter's 2N + 1 taps (Fig. 15; N = 2^M).
 fn settling_samples(config: Config) -> u32 {
     let analogue = (ANALOGUE_SETTLING_US as f64 * 1e-6 * config.sample_period().hz()) as u32 + 1;
     (2 << config.filter_taps_log2()) + analogue
@@ -42,8 +40,6 @@ pub(crate) enum SensorTrouble {
 }
 
 /// The estimators of all channels; lost samples are missing in all, refused ones in theirs.
-///
-/// [`Statistics`] are borrowed: a board places them in zeroed memory.
 pub struct Estimators<'m> {
     config: Config,
     statistics: &'m mut Statistics,
@@ -342,9 +338,7 @@ fn add(counter: &mut u32, more: u32) {
     *counter = counter.saturating_add(more);
 }
 
-/// Processes queued bursts and sends full raw messages.
-///
-/// To be called at a priority below sampling and above the main loop.
+/// Processes queued bursts and sends full raw messages, at a priority between sampling and the main loop.
 pub fn estimate(
     estimators: &mut Estimators<'_>,
     transmit_queue: &mut TransmitQueue<'_>,

@@ -1,6 +1,4 @@
-//! A record in flash that survives a loss of power at any time.
-//!
-//! Pages are a ring (crate `sequential-storage`): records are appended with checksums before the old one is replaced.
+//! A record in flash that survives a loss of power at any time: appended with a checksum before the old one goes.
 
 use core::future::Future;
 use core::ops::Range;

@@ -55,7 +55,6 @@ impl Statistics {
         self.cross_sums.add(&self.estimators, counts, refused);
     }
 
-    /// Not inlined: rare.
     #[inline(never)]
     fn push_some(&mut self, counts: [i32; CHANNELS.len()], refused: ChannelSet) {
         let channels = self.estimators.iter_mut().zip(counts).zip(&mut self.losses.refused);

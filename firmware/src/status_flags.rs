@@ -1,6 +1,4 @@
-//! The sensor's status register: reading while sampling, and counts of causes.
-//!
-//! DIAG_STAT flags stay set, with every burst's error flag, until a read.
+//! The sensor's status register, whose flags stay set until a read: reading while sampling, counts of causes.
 
 use adis16405_driver::Diagnosis;
 use core::fmt;

@@ -13,9 +13,7 @@ pub type TransmitBuffer = spsc::Queue<u8, BUFFER_SLOTS>;
 /// Reports leave room for two raw messages, bytes.
 const RAW_RESERVE: usize = 2 * MAX_RAW_FRAME;
 
-/// Encodes messages and text for the UART, whole or not at all, with copies for USB.
-///
-/// The UART decides what is sent; what USB has no room for is dropped and counted there.
+/// Encodes messages and text for the UART, whole or not at all; what USB has no room for is dropped and counted.
 pub struct TransmitQueue<'q> {
     encoder: Encoder,
     uart: spsc::Producer<'q, u8>,

@@ -1,6 +1,4 @@
-//! The USB serial port (CDC-ACM) over any [`UsbBus`].
-//!
-//! [`UsbPort::serve`] never waits; an absent host's bytes stay queued, then are [dropped and
+//! The USB serial port (CDC-ACM) over any [`UsbBus`]; an absent host's bytes stay queued, then are [dropped and
 //! counted](crate::TransmitQueue).
 
 use crate::receive::Receiver;

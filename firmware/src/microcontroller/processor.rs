@@ -17,8 +17,7 @@ pub(super) static LOST_BYTES: [AtomicU32; HostPort::COUNT] = [const { AtomicU32:
 /// SysTick interrupts a second, which wake the main loop; fits 24 bits at 168 MHz.
 pub const WAKE_HZ: u32 = 16;
 
-/// Runs `work` and keeps the largest number of cycles in `longest`. `work` must take less than one period of SysTick,
-/// which counts down.
+/// Runs `work`, shorter than a period of SysTick, and keeps the largest number of cycles in `longest`.
 pub fn measure(longest: &AtomicU32, work: impl FnOnce()) {
     let start = SYST::get_current();
     work();

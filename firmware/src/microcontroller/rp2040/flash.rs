@@ -1,7 +1,5 @@
-//! The flash memory of an RP2040 board, by the boot ROM (RP2040 data sheet, section 2.8.3.1.3).
-//!
-//! While it takes commands, code runs from RAM without interrupts; the second boot stage, in RAM, makes it readable
-//! again.
+//! The flash memory of an RP2040 board, by the boot ROM (RP2040 data sheet, section 2.8.3.1.3); while it takes
+//! commands, code runs from RAM without interrupts.
 
 use crate::microcontroller::settings_flash::{FlashError, FlashMemory};
 use core::sync::atomic::{Ordering, compiler_fence};

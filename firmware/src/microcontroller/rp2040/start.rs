@@ -18,8 +18,7 @@ use rp2040_hal::pac::{CLOCKS, PLL_SYS, PLL_USB, RESETS, TIMER, VREG_AND_CHIP_RES
 const CRYSTAL_HZ: u32 = 12_000_000;
 /// For the main loop and SysTick; at most 8.388 s.
 const WATCHDOG_MS: u32 = 8_300;
-/// Feeding by SysTick after the main loop, s. The longest step is a channel's fit: 2.5 s in the emulator with 12
-/// points, perhaps twice with slow flash.
+/// Feeding by SysTick after the main loop, s; the longest step, a channel's fit, takes 2.5 s in the emulator.
 const EXTENSION_S: u32 = 30;
 static FEEDINGS: AtomicU32 = AtomicU32::new(0);
 /// Readings of the crystal's flag, 100 ms at 12 MHz; it is set after 1 ms.
@@ -64,9 +63,7 @@ pub struct ClockParts {
 }
 
 impl Rp2040 {
-    /// Starts the watchdog first, then clocks and microsecond counter.
-    ///
-    /// Without the crystal the LED blinks fast for five seconds before the next attempt.
+    /// Starts the watchdog first, then clocks and microsecond counter; without the crystal the LED blinks fast.
     ///
     /// # Errors
     /// The crystal's frequency makes no clock.

@@ -25,10 +25,8 @@ pub struct Spi1 {
     dma: DMA2,
 }
 
-/// SPI1 in mode 3 on PA5 (SCK), PA6 (MISO, pulled down) and PA7 (MOSI), chip select on PA4.
-///
-/// MISO is sampled by the clock at SCK's pad: low speed allows 25 MHz of peripheral clock, medium 75 MHz (ST, errata
-/// sheet ES0182, section 2.12.4, at 30 pF).
+/// SPI1 in mode 3 on PA5 (SCK), PA6 (MISO, pulled down) and PA7 (MOSI), chip select on PA4. Low speed of SCK's pad
+/// allows 25 MHz of peripheral clock, medium 75 MHz (ST, errata sheet ES0182, section 2.12.4).
 pub(super) fn spi1_bus(
     (spi, dma): (SPI1, DMA2),
     (select, sck, miso, mosi): (PA4, PA5, PA6, PA7),

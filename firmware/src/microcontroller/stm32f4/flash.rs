@@ -1,6 +1,5 @@
-//! The flash memory of an STM32F405 (RM0090 chapter 3); the last sectors keep the settings.
-//!
-//! The processor waits during erasure and programming (section 3.6), interrupts included.
+//! The flash memory of an STM32F405 (RM0090 chapter 3), whose last sectors keep the settings; the processor waits
+//! during erasure and programming (section 3.6).
 
 use super::watchdog;
 use crate::bus_frame::wait_for;

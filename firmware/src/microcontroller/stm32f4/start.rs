@@ -14,13 +14,11 @@ use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Enable, Rcc, Reset};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-/// Watchdog time by an oscillator of 32 kHz; 5.4 s at 47 kHz (STM32F405 data sheet, LSI). A report of all channels
-/// takes less, and so does a sector of flash.
+/// Watchdog time by an oscillator of 32 kHz, 5.4 s at 47 kHz (STM32F405 data sheet, LSI); a report takes less.
 const WATCHDOG_MS: u32 = 8_000;
 /// From crystal or internal oscillator.
 const CORE_HZ: u32 = 168_000_000;
-/// Both peripheral buses: SPI1's prescalers make 656 and 164 kHz; from 84 MHz the slowest is 328 kHz, too fast for
-/// low-power mode.
+/// Both peripheral buses; from 84 MHz the slowest clock of SPI1 is 328 kHz, too fast for low-power mode.
 const PERIPHERAL_HZ: u32 = 42_000_000;
 /// Readings of the crystal's flag at 16 MHz: 100 ms.
 const CRYSTAL_READINGS: u32 = 550_000;

@@ -221,7 +221,7 @@ pub(crate) fn is_capture(start: &[u8]) -> bool {
     start.iter().any(|&byte| matches!(decoder.push(byte), Some(Received::Message { message: Message::Raw(_), .. })))
 }
 
-/// Writes the bursts of `capture`, bytes of a raw stream, to `file`; restarts take no time.
+/// Writes the bursts of `capture`, bytes of a raw stream, to `file` (an error of either); restarts take no time.
 pub(crate) fn log_of_capture(mut capture: impl Read, file: &Path) -> io::Result<()> {
     let mut recorder = RawStreamRecorder::create(file)?;
     let (mut decoder, received) = (Decoder::new(), Instant::now());
