@@ -43,8 +43,7 @@ use core::ops::Sub;
 pub struct Cascade<const OCTAVES: usize, const OVERLAP: usize> {
     /// Sample periods since the start, those of missing samples included.
     elapsed: u64,
-    /// The time, modulo 2³², from which [`WARM`](Self::WARM) samples later no octave below [`ROUNDED`] leaves out
-    /// differences.
+    /// The time, modulo 2³², [`WARM`](Self::WARM) samples before all octaves below [`ROUNDED`] have their differences.
     settling: u32,
     /// Running sum of the samples since the start, or since the last gap that was cut out, modulo 2⁶⁴.
     sum: i64,
@@ -384,8 +383,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.sum
     }
 
-    /// The running sum of `back ≤ 2·OVERLAP` strides of `level` before the newest sample, which ends a stride. `back`
-    /// is not 0.
+    /// The running sum of `back` strides (1 to `2·OVERLAP`) of `level` before the newest sample, which ends a stride.
     #[inline]
     pub(crate) fn sum_before(&self, level: usize, back: u64) -> i64 {
         let (mut level, mut back) = (level, back);
@@ -457,7 +455,6 @@ mod tests {
             }
             assert_eq!(wrong, 0, "n = {n}");
         }
-        // At n = 9 the largest difference, 9·15, has more than 7 bits.
         assert_ne!(i32::from(wrapped_second_difference(word(-9), word(-72), word(0)).0), 135);
     }
 }

@@ -46,7 +46,6 @@ pub(crate) fn pure_octave_correlation(lag: usize, noise: usize) -> f64 {
     }
 }
 
-/// The order of the differences of the running sum that are squared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Difference {
     /// Second differences of the phase: Allan variance.
@@ -56,8 +55,7 @@ pub(crate) enum Difference {
 }
 
 impl Difference {
-    /// Autocorrelation of the differences at lag `x`, in averaging times, from the generalised autocovariance `law` of
-    /// the phase noise.
+    /// Autocorrelation of the differences at lag `x`, in averaging times, by the autocovariance `law` of the phase.
     fn correlation(self, law: &dyn Fn(f64) -> f64, x: f64) -> f64 {
         // Binomial coefficients of twice the order, with alternating signs, from the middle on.
         let coefficients: &[f64] = match self {
@@ -228,8 +226,7 @@ fn gamma_p(a: f64, x: f64) -> f64 {
     }
 }
 
-/// The `p` quantile of the normal distribution within 4.5·10⁻⁴ (Abramowitz and Stegun 26.2.23); exact for 0.975 and
-/// 0.025.
+/// The `p` quantile of the normal distribution within 4.5·10⁻⁴ (Abramowitz and Stegun 26.2.23).
 fn normal_quantile(p: f64) -> f64 {
     if p == 0.975 {
         return NORMAL_975;
@@ -246,8 +243,7 @@ mod tests {
     use super::*;
     use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-    /// Noise, overlap, differences, edf, and exact 2.5 % and 97.5 % quantiles of the mean square over its expectation
-    /// (Imhof's integral).
+    /// Noise, overlap, differences, edf, and exact quantiles (2.5 %, 97.5 %) of the mean square (Imhof's integral).
     const EXACT: &[(VarianceFractions, u32, u64, f64, f64, f64)] = &[
         (VarianceFractions::WHITE, 1, 7, 4.900, 0.1879, 2.6106),
         (VarianceFractions::WHITE, 4, 13, 5.302, 0.2355, 2.5657),

@@ -179,7 +179,6 @@ impl fmt::Display for TableError {
 
 impl core::error::Error for TableError {}
 
-/// The fields of a curve as they are deserialised.
 #[cfg(feature = "serde")]
 #[derive(serde::Deserialize)]
 struct Unchecked<const OCTAVES: usize> {
@@ -208,7 +207,6 @@ impl<const OCTAVES: usize> TryFrom<Unchecked<OCTAVES>> for Curve<OCTAVES> {
     }
 }
 
-/// Checks the averaging factors and variances of a curve.
 fn check_table(sample_period: f64, table: impl Iterator<Item = (u64, f64)>) -> Result<(), TableError> {
     if !(sample_period > 0.0 && is_finite(sample_period)) {
         return Err(TableError::SamplePeriod);
@@ -306,12 +304,10 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self.points.extend(points);
     }
 
-    /// A curve of points whose noise type is set already.
     pub(crate) fn from_classified(sample_period: f64, samples: u64, points: Vec<AllanPoint, OCTAVES>) -> Self {
         Self { sample_period, samples, points }.with_confidence(|point| point.power_law.variance_fractions())
     }
 
-    /// Sets the power law of each point from the slope around it.
     #[inline(never)] // its stack frame would otherwise be part of every caller's
     fn classify(&mut self) {
         let octaves: Vec<OctaveVariance, OCTAVES> = self.points.iter().map(AllanPoint::octave_variance).collect();

@@ -130,8 +130,7 @@ pub(crate) fn deviance(curve: CurveView, model: &Model) -> f32 {
     problem.deviance(&points)
 }
 
-/// Sets `model` to the fitted coefficients of `kinds` and the fitted shapes of those that are `free`, without bounds. A
-/// search ends when `keep_on`, called before every step, returns false.
+/// Sets `model` to the fitted coefficients of `kinds` and the shapes of `free` ones; ends if `keep_on` returns false.
 #[inline(never)]
 pub(crate) fn estimate<T: TermSet>(
     curve: CurveView,
@@ -179,8 +178,7 @@ fn goodness_of(points: &Points, problem: &mut Problem<AllTerms>) -> Goodness {
     Goodness { deviance, p_value }
 }
 
-/// The traces of `PR` and `(PR)²` for the correlation matrix `R` and the projection `P = 1 − Σ ddᵀ` off the orthonormal
-/// directions `d`.
+/// The traces of `PR` and `(PR)²` for the correlations `R` and the projection `P = 1 − Σ ddᵀ` off the directions `d`.
 #[inline(never)]
 fn traces(measured: &[Measured], directions: &[[f32; MAX_POINTS]]) -> (f32, f32) {
     let (mut mean, mut square) = (0.0, 0.0);
@@ -213,22 +211,19 @@ pub(crate) struct Baseline<'a> {
     /// Number of orthonormal directions of its own parameters in `explained`.
     directions: usize,
     explained: [[f32; MAX_POINTS]; MAX_PARAMETERS],
-    /// The terms that are compared with it.
     tried: Problem<AllTerms>,
 }
 
 /// By how much another set of terms fits better.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Improvement {
-    /// Decrease of the deviance.
     fall: f32,
     /// Mean decrease of the deviance per parameter by chance: 1 for independent points, more for correlated ones.
     scatter: f32,
 }
 
 impl Improvement {
-    /// Decrease of the deviance in units of its scatter: χ² with one degree of freedom if the added term does not
-    /// exist.
+    /// Decrease of the deviance in units of its scatter: χ² with one degree of freedom by chance.
     pub(crate) fn score(&self) -> f64 {
         f64::from(self.fall / self.scatter)
     }
@@ -266,7 +261,6 @@ impl<'a> Baseline<'a> {
         tried.kinds.clear();
     }
 
-    /// Decrease of the deviance with the terms `kinds` and their best coefficients.
     #[inline(never)]
     pub(crate) fn fall(&mut self, kinds: &[NoiseTerm]) -> f32 {
         self.tried.set_terms(&self.points, kinds);

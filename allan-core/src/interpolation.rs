@@ -43,7 +43,6 @@ impl Interpolation {
         self.squared_error.get()
     }
 
-    /// Adds a gap of `missing` samples.
     pub(crate) fn add_gap(&mut self, missing: u32) {
         self.replaced = self.replaced.saturating_add(missing);
     }
@@ -57,7 +56,6 @@ impl Interpolation {
         }
     }
 
-    /// Adds the gaps of another stretch.
     pub(crate) fn merge(&mut self, other: &Self) {
         self.add_gap(other.replaced);
         if let Some(tested) = self.tested.checked_add(other.tested) {
@@ -87,7 +85,6 @@ impl Default for Interpolation {
 pub(crate) struct BridgedGaps<F = f64> {
     /// Variance of a sample if the noise were white, counts²: for gaps without a test.
     white: F,
-    /// Number of replaced samples.
     replaced: F,
     /// Sum over the gaps of the expected squared error of the sum of their samples, counts².
     squared_error: F,
@@ -112,7 +109,6 @@ pub(crate) struct AddedVariance<F = f64> {
 const LARGEST_SUBTRACTION: f64 = 0.9;
 
 impl<F: Real> AddedVariance<F> {
-    /// Variance that is subtracted from a measured one.
     pub(crate) fn subtracted(&self, measured: F) -> F {
         let largest = F::constant(LARGEST_SUBTRACTION) * measured;
         if self.variance < largest { self.variance } else { largest }
@@ -213,8 +209,7 @@ mod tests {
         assert_close(replaced, 0.1);
     }
 
-    /// A gap of 6 samples in the octave of 64 adds its squared error less `2·6/64` of it, a single one in the octave of
-    /// 8 less `2/8`.
+    /// A gap of 6 samples adds its squared error less `2·6/64` of it in the octave of 64.
     #[test]
     fn what_a_gap_adds_becomes_less_with_its_length() {
         let tested = Interpolation::new(100, 50, 7_000);

@@ -21,8 +21,7 @@ use core::f64::consts::FRAC_2_PI;
 use core::iter::Sum;
 use core::ops::{Add, AddAssign, Div, Mul, Sub};
 
-/// A floating-point number: double precision for what is reported, single precision to spare small processors soft
-/// double arithmetic.
+/// A floating-point number, in single precision where that spares small processors soft double arithmetic.
 pub(crate) trait Real:
     Copy + PartialOrd + Add<Output = Self> + AddAssign + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Sum
 {
@@ -38,7 +37,6 @@ pub(crate) trait Real:
     fn single(self) -> f32;
     fn double(self) -> f64;
     fn sqrt(self) -> Self;
-    /// As `f64::total_cmp`.
     fn order(&self, other: &Self) -> Ordering;
 }
 
@@ -128,8 +126,7 @@ pub(crate) fn sqrt(x: f64) -> f64 {
     libm::sqrt(x)
 }
 
-/// √x with a relative error below 2⁻²² in single precision; 0 for a subnormal `x`, and `x` itself if negative, infinite
-/// or NaN.
+/// √x in single precision, with a relative error below 2⁻²²; 0 for subnormal, `x` for negative and not finite ones.
 pub(crate) fn sqrt_in_single(x: f64) -> f64 {
     let bits = x.to_bits();
     let known = bits >> 52;

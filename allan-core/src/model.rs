@@ -189,8 +189,7 @@ pub(crate) fn filter_of<'a>(kinds: impl IntoIterator<Item = &'a NoiseTerm>) -> O
     })
 }
 
-/// Sum of the variance fractions of the power laws that the terms, each with its fraction, resemble at averaging factor
-/// `n`.
+/// Sum of the variance fractions that the terms, each with its fraction, resemble at averaging factor `n`.
 pub(crate) fn variance_fractions<T: TermSet>(
     parts: impl Iterator<Item = (NoiseTerm, f64)>,
     n: u64,
@@ -332,7 +331,6 @@ pub(crate) struct FlickerCorrelations {
 }
 
 impl FlickerCorrelations {
-    /// A table without entries.
     pub(crate) const EMPTY: Self = Self { overlap: 0, table: [0.0; MAX_LAGS] };
 
     /// Computes the correlations for points of this overlap and of those that divide it.

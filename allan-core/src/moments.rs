@@ -83,8 +83,7 @@ impl Moments {
 /// The first octave whose differences are rounded.
 pub(crate) const ROUNDED: usize = 11;
 
-/// Binary digits that a difference is rounded by before its fourth power is summed. For white noise of 1 count rms this
-/// changes the kurtosis by at most 1.5·10⁻³.
+/// Binary digits that a difference is rounded by: at 1 count rms of white noise the kurtosis changes by 1.5·10⁻³.
 #[inline]
 pub(crate) const fn unit_bits(octave: usize) -> u32 {
     (octave.saturating_sub(ROUNDED - 2) / 2) as u32

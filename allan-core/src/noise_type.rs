@@ -68,7 +68,6 @@ impl VarianceFractions {
     pub const QUANTIZATION: Self = Self { quantization: 1.0, white: 0.0, flicker: 0.0, random_walk: 0.0 };
 }
 
-/// One octave of a curve, for the classification.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct OctaveVariance {
     /// `log2 n`.

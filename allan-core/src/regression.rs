@@ -24,8 +24,7 @@ use uncertainty::{OctaveWeight, edf, is_poor, sum_variance};
 pub const MAX_COVARIATES: usize = 6;
 /// Degrees of freedom below which no sensitivity is estimated.
 const LEAST_EDF: f64 = 2.0;
-/// Significance, in normal standard deviations, from which a sensitivity is accepted; 2 of 10,000 pairs of smooth
-/// independent channels exceed it.
+/// Significance, in normal standard deviations, from which a sensitivity is accepted (by chance: 2 of 10,000 pairs).
 const SIGNIFICANT: f64 = 4.5;
 
 /// Allan covariances of two channels, by averaging factor, in the product of their units.
@@ -46,11 +45,9 @@ const NOISE: [NoiseTerm; 2] = [NoiseTerm::Quantization, NoiseTerm::AngleRandomWa
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Covariate<const POINTS: usize> {
     sample_period: f64,
-    /// Coefficients of [`NOISE`].
     noise: [f64; NOISE.len()],
     /// Variance of the rounding to counts if the noise is too small to dither it, else 0; in the square of the unit.
     rounding: f64,
-    /// Averaging factors and Allan variances.
     points: Vec<(u64, f64), POINTS>,
 }
 
@@ -90,7 +87,6 @@ impl<const POINTS: usize> Covariate<POINTS> {
         Self { noise: self.noise, rounding: self.rounding, ..Self::as_measured(curve, from) }
     }
 
-    /// Measured Allan variance at averaging factor `n`.
     fn avar(&self, n: u64) -> Option<f64> {
         self.points.iter().find(|point| point.0 == n).map(|&(_, avar)| avar)
     }
@@ -105,7 +101,6 @@ impl<const POINTS: usize> Covariate<POINTS> {
     }
 }
 
-/// Sensitivities to several covariates at once.
 type Sensitivities = List<Sensitivity, MAX_COVARIATES>;
 
 /// A channel, the covariates on which it may depend, and their Allan covariances at up to `COUPLED` octaves.
@@ -245,8 +240,7 @@ impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, 
         curve.set_variances(|point| {
             let change = |a: &Sensitivity| {
                 let with_channel = self.with_channel(a.covariate, point.n);
-                // Without a known variance of its own, the channel's covariance with it has the share: `cov(y, c) =
-                // β·σ²(c)`.
+                // Without a variance of its own, the channel's covariance has the share: `cov(y, c) = β·σ²(c)`.
                 if self.covariates[a.covariate].signal(point.n).is_none() {
                     return -a.value * with_channel;
                 }

@@ -5,8 +5,7 @@ use crate::math::{ln, sqrt};
 use crate::model::Model;
 use crate::term::{Markov, NoiseTerm};
 
-/// Excess kurtosis of the second differences of a symmetric telegraph signal at 1/20, 1/10 … 3.2 correlation times, by
-/// its chain of two states.
+/// Excess kurtosis of the second differences of a symmetric telegraph signal at 1/20, 1/10 … 3.2 correlation times.
 const KURTOSIS: [f64; 7] = [38.01, 18.25, 7.61, 2.86, 0.66, -0.28, -0.52];
 /// Averaging time of the first entry, in correlation times.
 const FIRST: f64 = 1.0 / 20.0;
@@ -53,8 +52,7 @@ pub fn kurtosis_ratio<'a>(curve: impl Into<CurveView<'a>>, model: &Model, markov
     (weight > 0.0).then(|| KurtosisRatio { ratio: along / weight, error: 1.0 / sqrt(weight) })
 }
 
-/// Excess kurtosis of a symmetric telegraph signal at an averaging time in correlation times, interpolated in its
-/// product with the time.
+/// Excess kurtosis of a telegraph signal at a time in correlation times, linear in its product with the time.
 fn expected(time: f64) -> f64 {
     let octave = ln(time / FIRST) / core::f64::consts::LN_2;
     if octave < 0.0 {

@@ -201,8 +201,7 @@ impl NoiseTerm {
         matches!(self, Self::BiasInstability | Self::RateRandomWalk | Self::Markov(_))
     }
 
-    /// Allan variance as [`avar`](Self::avar), behind the model's `filter` if the term [passes
-    /// it](Self::passes_filter).
+    /// [`avar`](Self::avar) behind the model's `filter`, if the term [passes it](Self::passes_filter).
     #[inline(never)] // linked once
     pub(crate) fn avar_behind(&self, filter: Option<&MovingAverageFilter>, n: u64, sample_period: f64) -> f64 {
         match (self, filter) {

@@ -24,7 +24,6 @@ use core::fmt;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TimeStamps {
     period: u64,
-    /// Time at which the last sample was expected.
     last: Option<u64>,
 }
 

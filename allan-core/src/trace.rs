@@ -20,8 +20,7 @@ use heapless::Vec;
 /// Largest number of terms that a trace can add to the baseline model.
 pub const MAX_ADDED: usize = MAX_TERMS - NoiseTerm::BASELINE.len();
 
-/// Decrease of the deviance, in units of its scatter, from which an added parameter is accepted: 3.7 standard
-/// deviations squared.
+/// Decrease of the deviance, in units of its scatter, that accepts an added parameter: 3.7 standard deviations squared.
 const SIGNIFICANT: f32 = 14.0;
 /// Additional decrease required for each further parameter.
 const PER_PARAMETER: f32 = 4.0;
@@ -206,7 +205,6 @@ impl Search<'_> {
                 continue;
             }
             let Some(new) = best.kinds.pop().filter(|new| new.name() != old.name()) else { continue };
-            // At the index of the old term.
             let _ = best.kinds.insert(known.term.min(kinds.len()), new);
             estimate::<AllTerms>(curve, &best.kinds, self.free, self.keep_on, &mut other);
             self.check_cancelled()?;
@@ -299,7 +297,6 @@ fn with_candidate<T>(
     done
 }
 
-/// The largest residual in units of its uncertainty.
 fn largest_residual(curve: CurveView, model: &Model) -> Residual {
     let residual = |point: &AllanPoint| {
         let excess = math::sqrt(point.avar / model.avar(point.n)) - 1.0;

@@ -134,7 +134,6 @@ impl<W: Word> Sums<W> {
         Self { values: [W::default(); HISTORY + BLOCK], base: 0, past: 0, new: 0, large: 0 }
     }
 
-    /// The same sums in words that hold any value.
     fn widened(&self) -> Sums<i64> {
         let values = self.values.map(|value| self.base.wrapping_add(value.into()));
         Sums { values, base: 0, past: self.past, new: self.new, large: self.large }
@@ -182,7 +181,6 @@ impl<W: Word> Sums<W> {
 
 /// A word that holds a running sum relative to a base.
 trait Word: Copy + Default + Into<i64> {
-    /// The largest sum that fits.
     const MAX: u64;
 
     fn base(sum: i64) -> i64;
@@ -194,7 +192,6 @@ trait Word: Copy + Default + Into<i64> {
     fn powers(sums: [&[Self]; 3], bits: u32, is_large: &mut bool) -> Option<(u128, u128)>;
 }
 
-/// Holds any sum.
 impl Word for i64 {
     const MAX: u64 = u64::MAX;
 
@@ -255,8 +252,7 @@ fn narrow_powers(sums: [&[i32]; 3]) -> Option<(u128, u128)> {
     (digits < SMALL).then_some((squares.into(), fourths.into()))
 }
 
-/// The sums, and the bits of the differences; `None` if one has 27 bits or more, as squares of 26 bits fill 62 bits in
-/// a block.
+/// The sums, and the bits of the differences; `None` if one has 27 bits or more.
 fn middle_powers(sums: [&[i32]; 3]) -> Option<((u128, u128), u32)> {
     let product = |one: u64, other: u64| (one & 0xffff_ffff) * (other & 0xffff_ffff);
     let (mut digits, mut squares, mut high, mut middle, mut low) = (0, 0_u64, 0_u64, 0_u64, 0_u64);
@@ -287,7 +283,6 @@ fn wide_powers<W: Word>(sums: [&[W]; 3], bits: u32) -> Option<(u128, u128)> {
     (digits < 1 << 28).then_some((squares, fourths))
 }
 
-/// Second differences in 64 bits.
 fn differences<W: Word>(sums: [&[W]; 3]) -> impl Iterator<Item = i64> {
     zipped(sums).map(|(newest, middle, oldest)| second_difference(newest.into(), middle.into(), oldest.into()))
 }

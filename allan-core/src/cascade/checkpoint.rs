@@ -181,7 +181,6 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         })
     }
 
-    /// The gaps that an averaging factor of `n` samples bridges.
     pub(crate) fn bridged_gaps(&self, n: u64) -> BridgedGaps {
         let Moments { squares, .. } = self.octaves[0].moments;
         let mut gaps = BridgedGaps::new(squares.get() as f64 / (2.0 * self.count(0).max(1) as f64));

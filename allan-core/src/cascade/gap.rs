@@ -15,9 +15,7 @@ struct Bridge {
     /// Time of the last sample before the gap and of the last replaced one.
     start: u64,
     end: u64,
-    /// Running sum at the start.
     sum: i64,
-    /// Sum of the replaced samples.
     replaced: i64,
     /// Part of each replaced sample in the running sum, rounded down; the last one adds the rest.
     each: i64,
@@ -57,8 +55,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
     }
 
-    /// Closes the pending gap before `next`, the first sample after it. Out of line, as its locals would take the
-    /// registers of every sample.
+    /// Closes the pending gap before `next`; out of line, as its locals would take the registers of every sample.
     #[cold]
     #[inline(never)]
     pub(super) fn close_gap(&mut self, next: i32) {
@@ -112,8 +109,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         mean * missing + quotient(rest * missing, samples)
     }
 
-    /// Replaces as many known samples before the gap as are missing, and adds the squared error. The number is rounded
-    /// where the delay lines do not hold the sums for it.
+    /// Replaces about as many known samples before the gap as are missing, and adds the squared error.
     fn test_interpolation(&mut self, missing: u32, bridging: usize) {
         if let Some(octave) = self.octaves.get_mut(bridging) {
             octave.interpolation.add_gap(missing);
@@ -138,8 +134,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
     }
 
-    /// Fills the delay lines with the running sums of the gap, and adds the differences that end in it at the octaves
-    /// that bridge it.
+    /// Fills the delay lines with the running sums of the gap, and adds the differences that end in it.
     fn bridge(&mut self, gap: &Bridge, bridging: usize) {
         // Not `ilog2`, as the code for its panic is linked although a gap is never empty.
         let highest = (u64::BITS - 1).saturating_sub((gap.start ^ gap.end).leading_zeros()) as usize;

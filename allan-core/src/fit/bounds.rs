@@ -12,15 +12,12 @@ use crate::math::{Real, absf, exp, sqrtf};
 use crate::model::{MAX_TERMS, Model};
 use crate::term::TermSet;
 
-/// Relative standard deviation below which the scatter at the estimate is used, with an error of 1 % of the distance of
-/// the bounds.
+/// Relative standard deviation below which the scatter at the estimate is used.
 const SMALL: f32 = 0.02;
 /// The smallest amount that is tested, over the estimate.
 const SMALLEST: f32 = 1e-4;
-/// Largest number of secant steps.
 const SEARCH_ROUNDS: usize = 5;
 
-/// Sets the bounds of all parameters of `model`, which was fitted to the curve.
 pub(crate) fn set<T: TermSet>(curve: CurveView, model: &mut Model) {
     set_free::<T>(curve, model, FreeShapes::AllExcept(&[]));
 }
@@ -121,13 +118,11 @@ impl Scatter {
     }
 }
 
-/// The scatter of the parameter of a column under the present amounts: the sandwich covariance `H⁻¹·JᵀRJ·H⁻¹` and the
-/// weighted skewness.
+/// The scatter of a column's parameter under the present amounts: sandwich covariance `H⁻¹·JᵀRJ·H⁻¹`, and skewness.
 #[inline(never)]
 fn scatter<T: TermSet>(points: &Points, problem: &Problem<T>, parameters: usize, column: usize) -> Option<Scatter> {
     let mut weights = [0.0; MAX_POINTS];
     let direction = direction(points, problem, parameters, column, &mut weights)?;
-    // The skewness of χ² with edf degrees of freedom is √(8/edf).
     let mut skewed = weights;
     let mut pull = 0.0;
     for (at, point) in points.measured.iter().enumerate() {
@@ -139,8 +134,7 @@ fn scatter<T: TermSet>(points: &Points, problem: &Problem<T>, parameters: usize,
     Some(Scatter { deviation: sqrtf(variance), skewness, pull, direction })
 }
 
-/// The parameter's column of the inverse information matrix, with the `weights` of the residuals in its estimate;
-/// `None` if singular.
+/// The parameter's column of the inverse information, with the `weights` of the residuals; `None` if singular.
 #[inline(never)]
 fn direction<T: TermSet>(
     points: &Points,
@@ -245,8 +239,7 @@ mod tests {
     use crate::Curve;
     use crate::term::{AllTerms, NoiseTerm};
 
-    /// White noise of variance 1 with 20 and 100 degrees of freedom: χ² quantiles 9.591 and 74.22 (Abramowitz and
-    /// Stegun, table 26.8). A random walk of K = 1 has (2n² + 1)/6n.
+    /// χ² quantiles 9.591 and 74.22 (Abramowitz and Stegun, table 26.8); a random walk of K = 1 has (2n² + 1)/6n.
     #[test]
     fn no_amount_is_larger_than_the_upper_bound_of_a_point() {
         let curve = Curve::<4>::from_points(1.0, 1000, 4, &[(1, 1.0), (2, 0.5)]).expect("a curve");

@@ -50,8 +50,7 @@ pub(crate) fn non_negative<F: Real, const N: usize, const TRIANGLE: usize>(
     }
 }
 
-/// Moves `x` to the minimum over the unknowns in the bit set `free`, without those that would turn negative. Returns
-/// the remaining set; `None` if the matrix is singular.
+/// Moves `x` to the minimum over the unknowns in `free`; returns those that are not negative, `None` if singular.
 fn minimise_free<F: Real, const N: usize, const TRIANGLE: usize>(
     a: &[F; TRIANGLE],
     b: &[F; N],

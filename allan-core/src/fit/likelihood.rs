@@ -22,7 +22,6 @@ pub const MAX_POINTS: usize = 32;
 
 /// A measured point: its index in the curve and its statistical properties under the present model.
 pub(super) struct Measured {
-    /// Index in the curve.
     at: u16,
     /// `log2 n`.
     octave: f32,
@@ -117,8 +116,8 @@ pub(super) struct Problem<T> {
     /// Squared coefficient for an amount of 1.
     pub(super) units: [f64; MAX_TERMS],
     pub(super) amounts: [f32; MAX_TERMS],
-    /// Derivatives of modelled over measured variance to the amounts, and after [`differentiate`](Self::differentiate)
-    /// to the log shapes.
+    /// Derivatives of modelled over measured variance to amounts, then to [differentiated](Self::differentiate) log
+    /// shapes.
     pub(super) columns: [[f32; MAX_POINTS]; MAX_PARAMETERS],
     terms: PhantomData<T>,
 }
@@ -199,7 +198,6 @@ impl<T: TermSet> Problem<T> {
         }
     }
 
-    /// Sets the points' degrees of freedom and variance fractions from the present mixture of terms.
     #[inline(never)]
     pub(super) fn set_confidence(&self, points: &mut Points) {
         let period = points.curve.sample_period();

@@ -35,8 +35,7 @@ impl FreeShapes<'_> {
     }
 }
 
-/// Sets all free shapes to those with the least deviance at the present degrees of freedom, and returns it. The search
-/// ends when `keep_on`, called before every step, returns false.
+/// Sets all free shapes to those with the least deviance, and returns it; ends if `keep_on` returns false.
 #[inline(never)]
 pub(super) fn search<T: TermSet>(
     points: &Points,
@@ -68,8 +67,7 @@ pub(super) fn search<T: TermSet>(
     deviance
 }
 
-/// Steps along one parameter while the deviance falls, then to the vertex of a parabola. Returns the deviance, and true
-/// if the minimum is known to a fraction of its uncertainty.
+/// Steps along a parameter, then to the vertex of a parabola; returns the deviance, and true if the minimum is known.
 fn line_search<T: TermSet>(
     points: &Points,
     problem: &mut Problem<T>,
@@ -133,15 +131,13 @@ const ROUNDING: f32 = 1e-4;
 /// The parameter to which a column of derivatives belongs.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Parameter {
-    /// The amount of a term.
     Amount(usize),
     /// The logarithm of a shape parameter of a term, by its index.
     Shape(usize, usize),
 }
 
 impl<T: TermSet> Problem<T> {
-    /// Sets the columns of all amounts and of `free` shapes with a positive amount, and lists their parameters in this
-    /// order.
+    /// Sets the columns of all amounts and of `free` shapes with a positive amount, and lists their parameters.
     #[inline(never)]
     pub(super) fn differentiate(&mut self, points: &Points, free: FreeShapes) -> Vec<Parameter, MAX_PARAMETERS> {
         let mut parameters: Vec<_, MAX_PARAMETERS> = (0..self.kinds.len()).map(Parameter::Amount).collect();
@@ -166,8 +162,7 @@ impl<T: TermSet> Problem<T> {
         parameters
     }
 
-    /// Replaces the first columns by an orthonormal basis of the directions of the parameters, and returns their
-    /// number.
+    /// Replaces the first columns by an orthonormal basis of their directions, and returns its size.
     #[inline(never)]
     pub(super) fn orthonormal(&mut self, points: &Points) -> usize {
         let parameters = self.differentiate(points, FreeShapes::AllExcept(&[]));
@@ -222,8 +217,7 @@ mod tests {
     const SAMPLES: u64 = 1 << 17;
     const MARKOV: NoiseTerm = NoiseTerm::Markov(Markov { time_constant: 8.0 });
 
-    /// Allan variance at 1 Hz of white noise of variance 1 with samples of variance 4 and correlation
-    /// `exp(−k/time_constant)`, term by term.
+    /// Allan variance at 1 Hz of white noise and of a process of variance 4 and correlation `exp(−k/time_constant)`.
     fn avar(n: u64, time_constant: f64) -> f64 {
         let weight = |at: u64| if at < n { -1.0 } else { 1.0 };
         let pairs = |lag: u64| (0..2 * n - lag).map(|at| weight(at) * weight(at + lag)).sum::<f64>();

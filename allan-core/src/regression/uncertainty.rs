@@ -5,7 +5,6 @@ use crate::curve::AllanPoint;
 use crate::math::{abs, expm1, ln, sqrt};
 use crate::model::Model;
 
-/// Weight and correlations of one octave.
 pub(super) struct OctaveWeight {
     /// Averaging factor, samples.
     pub(super) n: u64,
@@ -46,7 +45,6 @@ impl OctaveWeight {
         })
     }
 
-    /// Correlation of the Allan variances of two octaves that are `lag` octaves apart.
     fn correlation(&self, other: &Self, lag: usize) -> f64 {
         let product =
             |noise: usize| f64::from(self.roots[noise] * other.roots[noise]) * pure_octave_correlation(lag, noise);
@@ -54,8 +52,7 @@ impl OctaveWeight {
     }
 }
 
-/// Variance of a weighted sum over the octaves that is proportional to `common(n)`, the Allan covariance of two
-/// covariates.
+/// Variance of a weighted sum over the octaves, proportional to `common(n)`, the covariance of two covariates.
 pub(super) fn sum_variance<const COUPLED: usize>(octaves: &[OctaveWeight], common: impl Fn(u64) -> f64) -> f64 {
     let mut roots = [0.0; COUPLED];
     for (root, octave) in roots.iter_mut().zip(octaves) {
@@ -66,8 +63,7 @@ pub(super) fn sum_variance<const COUPLED: usize>(octaves: &[OctaveWeight], commo
     quadratic_form(octaves, |k| roots[k])
 }
 
-/// Equivalent degrees of freedom of one sensitivity, from weights, correlations and the covariate's Allan variance
-/// `measured`.
+/// Equivalent degrees of freedom of one sensitivity, from the octaves and the covariate's variance `measured`.
 pub(super) fn edf(octaves: &[OctaveWeight], measured: impl Fn(u64) -> f64) -> f64 {
     let weighted = |octave: &OctaveWeight| octave.weight * measured(octave.n);
     let sum: f64 = octaves.iter().map(weighted).sum();

@@ -139,8 +139,7 @@ fn sum_variances(rate: Complex, stride: f64, table: &mut [f64]) {
     }
 }
 
-/// A complex number whose real part is the covariance of second differences at a lag of `2n`, to be multiplied by `z`
-/// per sample.
+/// A number whose real part is the covariance of second differences at `2n`, to be multiplied by `z` per sample.
 fn covariance_at_2n(rate: Complex, n: f64) -> Complex {
     let (_, bend) = line_and_bend(rate);
     let one_minus_power = (rate * n).one_minus_exp();
@@ -166,7 +165,6 @@ fn lorentzian(decay: f64, angle: f64) -> f64 {
     (1.0 - z * z) / (1.0 - 2.0 * z * cos(angle) + z * z)
 }
 
-/// A complex number.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Complex {
     pub(super) re: f64,
@@ -186,7 +184,6 @@ impl Complex {
         Self { re: self.re / square, im: -self.im / square }
     }
 
-    /// The square of its magnitude.
     fn square(self) -> f64 {
         self.re * self.re + self.im * self.im
     }

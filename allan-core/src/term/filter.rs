@@ -49,8 +49,7 @@ impl MovingAverageFilter {
         (1.0 - above) * self.value_autocorrelation(below) + above * self.value_autocorrelation(below + 1)
     }
 
-    /// Autocorrelation of the impulse response at a lag of `j` filter values, with a sum of 1: a finite difference of
-    /// binomial coefficients.
+    /// Autocorrelation of the impulse response at a lag of `j` filter values; it sums to 1.
     fn value_autocorrelation(&self, j: i64) -> f64 {
         let taps = i64::from(self.taps);
         let area = (taps * taps) as f64;
@@ -82,8 +81,7 @@ impl MovingAverageFilter {
         if self.stages == 1 { square } else { square * square }
     }
 
-    /// True if averages over `n` samples are long against the filter: two averages over L samples take `L²/2n²` of a
-    /// random walk, 1/2,000, and 1/700 of flicker noise.
+    /// True if averages over `n` samples are long against the filter: 1/2,000 of a random walk, 1/700 of flicker noise.
     pub(super) fn is_short_against(&self, n: u64) -> bool {
         n as f64 * self.decimation > LONG * f64::from(self.taps)
     }
@@ -191,7 +189,6 @@ impl Process for MovingAverageFilter {
         at_0_and_m[1]
     }
 
-    /// In one pass over the lags.
     fn sum_variances(&self, stride: f64, sample_period: f64, table: &mut [f64]) {
         let at_zero = self.autocorrelation(0.0);
         let mut others = 0.0;
@@ -208,7 +205,6 @@ impl Process for MovingAverageFilter {
         sums(stride, table).for_each(|(m, pairs)| *pairs = (m * at_zero + 2.0 * *pairs) / scale);
     }
 
-    /// In one pass over the lags.
     fn avar(&self, n: u64, sample_period: f64) -> f64 {
         let n = n as f64;
         let at_zero = self.autocorrelation(0.0);
@@ -236,7 +232,6 @@ impl Process for MovingAverageFilter {
 mod tests {
     use super::*;
 
-    /// A filter with the provided Allan variance.
     struct Provided(MovingAverageFilter);
 
     impl Process for Provided {

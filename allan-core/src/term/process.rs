@@ -20,22 +20,19 @@ pub trait Process {
         (4.0 * self.sum_variance(n, sample_period) - self.sum_variance(2.0 * n, sample_period)) / (2.0 * n * n)
     }
 
-    /// Sets `table` to [`sum_variance`](Self::sum_variance) at 0, 1, 2 … strides of `stride` samples, up to a common
-    /// factor.
+    /// Sets `table` to [`sum_variance`](Self::sum_variance) at 0, 1, 2 … strides, up to a common factor.
     fn sum_variances(&self, stride: f64, sample_period: f64, table: &mut [f64]) {
         for (k, entry) in table.iter_mut().enumerate() {
             *entry = self.sum_variance(k as f64 * stride, sample_period);
         }
     }
 
-    /// Sum of the squares of the halved covariances of second differences at the lags `2n + stride, 2n + 2·stride …`; 0
-    /// if uncorrelated there.
+    /// Sum of the squared halved covariances of second differences at lags `2n + stride, 2n + 2·stride …`; 0 if none.
     fn squared_covariance_tail(&self, _n: u64, _stride: f64, _sample_period: f64) -> f64 {
         0.0
     }
 
-    /// Relative variance, over all phases, of the mean square of `count` second differences `stride` samples apart; 0
-    /// without a phase.
+    /// Relative variance over all phases of the mean square of `count` second differences; 0 without a phase.
     fn phase_variance(&self, _count: u64, _stride: f64, _sample_period: f64) -> f64 {
         0.0
     }

@@ -30,15 +30,13 @@ pub(crate) trait TermSet {
 
     fn free_parameters(kind: &NoiseTerm) -> Range<usize>;
 
-    /// The 2.5 % quantile, 97.5 % if `upper`, of the standardised gamma distribution (Pearson type III) with this
-    /// skewness.
+    /// The 2.5 % or, if `upper`, 97.5 % quantile of the standardised gamma distribution (Pearson type III).
     fn gamma_quantile(skewness: f32, upper: bool) -> f32;
 
     /// The square root of a squared coefficient.
     fn sqrt(x: f64) -> f64;
 }
 
-/// Every [`NoiseTerm`], with exact quantiles.
 pub(crate) enum AllTerms {}
 
 impl TermSet for AllTerms {

@@ -42,12 +42,10 @@ pub(super) enum Family {
 }
 
 impl Family {
-    /// True if the family replaces a term of the model.
     pub(super) fn replaces_a_term(self) -> bool {
         matches!(self, Self::DecimatedFilter)
     }
 
-    /// Number of parameters that it adds to the model.
     pub(super) fn parameters(self) -> u32 {
         match self {
             Self::Quantization | Self::RateRamp => 1,
@@ -107,7 +105,6 @@ impl<'a> Families<'a> {
         }
     }
 
-    /// The filter with this index among the candidates of one kind.
     fn filter(&self, is_member: impl Fn(&MovingAverageFilter) -> bool, index: usize) -> Option<NoiseTerm> {
         self.filters.iter().copied().filter(is_member).nth(index).map(NoiseTerm::Filtered)
     }

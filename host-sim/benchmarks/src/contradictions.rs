@@ -63,9 +63,6 @@ impl ContradictionPlan {
 
 impl ContradictionTable {
     /// Writes the share of records with each sentence, and its count; unknown sentences as they are.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         let all = self.records.len();
         writeln!(out, "Sentences under \"Contradicted\", nothing hidden, {all} records\n")?;

@@ -130,9 +130,6 @@ impl RecordedInput {
     }
 
     /// Begins to make the hash of the bytes, as they were given.
-    ///
-    /// # Errors
-    /// The file cannot be opened.
     pub fn begin_hash(&self) -> io::Result<FileHash> {
         match &self.capture {
             Some(capture) => FileHash::begin(std::slice::from_ref(capture)),

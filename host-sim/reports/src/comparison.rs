@@ -149,9 +149,6 @@ fn compared(pairs: Vec<Pair>) -> Result<Comparison, ComparisonError> {
 
 impl Comparison {
     /// Writes a table, whose columns of values are headed `first` and `second`.
-    ///
-    /// # Errors
-    /// As `out` does.
     pub fn write(&self, first: &str, second: &str, out: &mut impl Write) -> io::Result<()> {
         let mut table = comfy_table::Table::new();
         table.load_preset(comfy_table::presets::NOTHING);

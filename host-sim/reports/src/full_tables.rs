@@ -21,9 +21,6 @@ use std::io::{self, Write};
 const WIDTH: u16 = 100;
 
 /// Writes the whole report with the recording's name.
-///
-/// # Errors
-/// `out` cannot be written.
 pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io::Result<()> {
     let title = format!("{} noise report", summary::part_name(report));
     match source {

@@ -7,9 +7,6 @@ use noise_analysis::report::several::{NoiseAgreement, NoiseInflation};
 use std::io::{self, Write};
 
 /// One row per channel: verdict, p-value, largest difference, joint coefficients.
-///
-/// # Errors
-/// As `out` does.
 pub fn write_agreement(agreement: &NoiseAgreement, out: &mut impl Write) -> io::Result<()> {
     let samples: Vec<String> = agreement.samples.iter().map(u64::to_string).collect();
     writeln!(
@@ -52,9 +49,6 @@ pub fn write_agreement(agreement: &NoiseAgreement, out: &mut impl Write) -> io::
 }
 
 /// One row per channel and octave.
-///
-/// # Errors
-/// As `out` does.
 pub fn write_inflation(inflation: &NoiseInflation, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "\ninflation: Allan deviation while running over that at rest, with 95 % bounds")?;
     let mut table = table(["channel", "averaging time", "at rest", "running", "unit", "factor"]);

@@ -40,9 +40,6 @@ pub struct Screen<'a> {
 
 impl Screen<'_> {
     /// Writes the screen.
-    ///
-    /// # Errors
-    /// `out` cannot be written.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         for line in self.lines() {
             writeln!(out, "{line}")?;

@@ -69,9 +69,6 @@ impl FilterCell {
 
 impl FilteredNoiseTable {
     /// Writes the table as text.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(
             out,

@@ -140,9 +140,6 @@ const RANGES: [(&str, u64, u64); 4] =
 
 impl LossTable {
     /// Writes two tables as text: the variances, then the coefficients.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         let hours = self.samples as f64 / RATE_HZ / 3600.0;
         writeln!(out, "{} records of {hours:.2} h at {RATE_HZ} SPS for each noise\n", self.records)?;

@@ -176,9 +176,6 @@ impl UnseenErrors {
 
 impl ScoreTable {
     /// Writes all tables and the summary as text.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         self.write_rates(out)?;
         self.write_confusion(out)?;

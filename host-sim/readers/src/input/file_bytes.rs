@@ -81,9 +81,6 @@ impl FileBytes {
     }
 
     /// The first bytes.
-    ///
-    /// # Errors
-    /// They cannot be read.
     pub fn head(&self, most: u64) -> io::Result<Vec<u8>> {
         let mut head = Vec::new();
         self.open()?.take(most).read_to_end(&mut head)?;

@@ -21,9 +21,6 @@ enum HashState {
 
 impl FileHash {
     /// Begins to read `files` in order.
-    ///
-    /// # Errors
-    /// One cannot be opened.
     pub fn begin(files: &[FileBytes]) -> io::Result<Self> {
         let inputs: Vec<OpenBytes> = files.iter().map(FileBytes::open).collect::<Result<_, _>>()?;
         Ok(Self(if may_begin_threads() {
@@ -34,9 +31,6 @@ impl FileHash {
     }
 
     /// In hexadecimal digits.
-    ///
-    /// # Errors
-    /// The file cannot be read.
     pub fn finish(self) -> io::Result<String> {
         match self.0 {
             HashState::Running(thread) => {

@@ -23,9 +23,6 @@ pub(crate) fn is_header(header: &str) -> bool {
 ///
 /// Columns: `sample` and `time_s`, if every sample has them, and counts. Neither faults nor the gyroscopes' range is in
 /// it.
-///
-/// # Errors
-/// The file cannot be created or written.
 pub fn write(recording: &Recording, file: &Path) -> io::Result<()> {
     write_text(file, |out| write_rows(recording, out))
 }

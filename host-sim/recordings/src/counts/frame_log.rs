@@ -124,9 +124,6 @@ pub struct FrameLogWriter {
 
 impl FrameLogWriter {
     /// Creates `file` and writes the header.
-    ///
-    /// # Errors
-    /// The file cannot be created or written.
     pub fn create(file: &Path) -> io::Result<Self> {
         let is_gzip = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gz"));
         let text = format!("{HEADER}\n");
@@ -134,9 +131,6 @@ impl FrameLogWriter {
     }
 
     /// Adds one frame.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn write(&mut self, frame: &Frame) -> io::Result<()> {
         let (before, text) = (self.text.len(), &mut self.text);
         let _ = write!(text, "{},", frame.time_s);
@@ -157,9 +151,6 @@ impl FrameLogWriter {
     }
 
     /// Writes what is buffered and closes the file.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn finish(mut self) -> io::Result<()> {
         self.flush()
     }

@@ -10,9 +10,6 @@ const GRAVITY: f64 = 9.806_65;
 
 /// Writes a row per sample: time in s, if every sample has one, then channels in the order of the burst; rad/s, m/s²,
 /// others in their unit. Returns the names of the columns.
-///
-/// # Errors
-/// The file cannot be created or written.
 pub fn write(recording: &Recording, file: &Path) -> io::Result<Vec<String>> {
     let has_time = recording.samples.iter().all(|sample| sample.time_stamp.time_s.is_some());
     let units: Vec<SiUnit> = recording.channels.iter().map(|channel| SiUnit::of(channel.unit())).collect();

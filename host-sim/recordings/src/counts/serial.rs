@@ -56,9 +56,6 @@ impl<P: Read + Write> SerialLink<P> {
     }
 
     /// Sends a line, ended by a carriage return.
-    ///
-    /// # Errors
-    /// The port cannot be written.
     pub fn send_command(&mut self, text: &str) -> io::Result<()> {
         self.port.write_all(format!("{text}\r").as_bytes())?;
         self.port.flush()
@@ -285,9 +282,6 @@ struct LastBurst {
 
 impl RawStreamRecorder {
     /// Creates the log.
-    ///
-    /// # Errors
-    /// The file cannot be created.
     pub fn create(file: &Path) -> io::Result<Self> {
         Ok(Self {
             log: FrameLogWriter::create(file)?,
@@ -303,9 +297,6 @@ impl RawStreamRecorder {
 
     /// Adds the bursts of a message at their data-ready times. A frame that writes SENS_AVG comes first and at changes,
     /// for the range in a replay.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn write(&mut self, raw: &RawMessage) -> io::Result<()> {
         self.write_received(raw, Instant::now())
     }
@@ -350,9 +341,6 @@ impl RawStreamRecorder {
     }
 
     /// Writes what is buffered and closes the log.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn finish(self) -> io::Result<()> {
         self.log.finish()
     }

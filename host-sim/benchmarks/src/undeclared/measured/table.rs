@@ -43,9 +43,6 @@ impl MeasuredNoiseTable {
     }
 
     /// Writes the table and its summary as text.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         let heads = ["named", "wrong", "grew", "near", "held", "before", "after", "untouched"];
         writeln!(out, "Effects in measured noise; deviance per point on the unseen half: medians\n")?;
