@@ -163,7 +163,7 @@ impl DriverState {
     }
 }
 
-/// Which byte of a register is written first. Each byte takes effect as soon as it is written.
+/// The byte of a register that is written first; each takes effect at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum WriteOrder {
     LowByteFirst,

@@ -121,7 +121,7 @@ impl ChiSquareApproximation {
     /// 95 % bounds of the true variance, where `estimate` is left of a measured variance after `subtracted` was taken
     /// off it.
     ///
-    /// Those of the measured variance, less what was subtracted; the lower one ends at 0. The χ² quantiles are
+    /// They are the bounds of the measured variance, less `subtracted`; the lower one ends at 0. The χ² quantiles are
     /// multiplied by the Cornish–Fisher term `exp(⅔(z² − 1)·excess_skewness/edf · e^(±c/√edf))` with `c` fitted to
     /// exact distributions (Imhof's integral): they cover 94.7 to 95.6 % for edf of at least 3.
     pub(crate) fn bounds(&self, estimate: f64, subtracted: f64) -> (f64, f64) {

@@ -153,7 +153,7 @@ const fn level<const OVERLAP: usize>(doubling: usize) -> usize {
     doubling.saturating_sub(OVERLAP.trailing_zeros() as usize - 3)
 }
 
-/// That level, and the number of its strides in `factor·2^doubling` samples.
+/// The [`level`], and the number of its strides in `factor·2^doubling` samples.
 const fn place<const OVERLAP: usize>(doubling: usize, factor: u64) -> (usize, u64) {
     let level = level::<OVERLAP>(doubling);
     (level, factor << (doubling - level))

@@ -11,7 +11,7 @@ pub const QUEUE_SLOTS: usize = 32;
 const TICK_Q8: u64 = 156_250;
 /// Time without an edge after which the sensor may have been reset; its shortest start-up takes longer.
 const SILENCE_US: u64 = 25_000;
-/// The same in sample periods; the longer of the two applies.
+/// [`SILENCE_US`] in sample periods; the longer of the two applies.
 const SILENT_PERIODS: u64 = 4;
 /// Periods from which on the measured mean period replaces the programmed one.
 const SETTLED_PERIODS: u64 = 64;

@@ -121,7 +121,7 @@ pub trait BoardSupport: Sized {
     type Bus: BurstBus;
     /// The serial port to the host on pins.
     type Uart: ServedPort;
-    /// That on USB, or [`NotConnected`].
+    /// The serial port to the host on USB, or [`NotConnected`].
     type Usb: ServedPort;
     /// An LED.
     type Led: OutputPin;

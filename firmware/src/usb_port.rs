@@ -8,9 +8,9 @@ use usb_device::bus::{UsbBus, UsbBusAllocator};
 use usb_device::device::{StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbDeviceState, UsbVidPid};
 use usbd_serial::{SerialPort, USB_CLASS_CDC};
 
-/// Names of the manufacturer and of the product in the descriptors.
+/// Name of the manufacturer in the descriptors.
 pub const MANUFACTURER: &str = "Noise observatory";
-/// The same of the product.
+/// Name of the product in the descriptors.
 pub const PRODUCT: &str = "ADIS16405 noise observatory";
 /// Full speed (USB 2.0, section 5.8.3).
 const PACKET: usize = 64;

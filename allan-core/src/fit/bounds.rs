@@ -255,7 +255,7 @@ mod tests {
             let square = f64::from(largest(&points, &problem, 1)) * problem.units[1];
             assert!((square / expected - 1.0).abs() < 0.005, "{square}, {expected}");
         }
-        // That of the shorter time is the smaller one.
+        // The bound of the shorter time is the smaller one.
         points.measured.truncate(1);
         let square = f64::from(largest(&points, &problem, 1)) * problem.units[1];
         assert!((square / of_point(1.0, 100.0, 74.22, 0.5) - 1.0).abs() < 0.005, "{square}");

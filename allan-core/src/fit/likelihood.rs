@@ -104,7 +104,7 @@ pub(super) const MAX_PARAMETERS: usize = MOST;
 const SCORING_ROUNDS: usize = 40;
 /// Decrease of the deviance below which the iteration ends.
 const CONVERGED: f32 = 1e-3;
-/// The same as a fraction of the deviance, for models that fit badly.
+/// [`CONVERGED`] as a fraction of the deviance, for models that fit badly.
 const CONVERGED_FRACTION: f32 = 1e-6;
 
 /// Mean deviance of a point above which a second start is tried.
@@ -162,7 +162,7 @@ impl<T: TermSet> Problem<T> {
         }
     }
 
-    /// The same where the Allan variances of some terms, behind their filter, at some averaging factors are known.
+    /// [`set_terms`](Self::set_terms) with known Allan variances of some terms behind their filter.
     #[cfg(feature = "host")]
     pub(super) fn set_terms_with(
         &mut self,

@@ -19,7 +19,7 @@ const WORTHWHILE: f32 = 0.01;
 /// Lower limit of a Markov correlation time, in samples.
 const SHORTEST: f64 = 1.5;
 
-/// Which shape parameters a fit adjusts.
+/// The shape parameters that a fit adjusts.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum FreeShapes<'a> {
     None,

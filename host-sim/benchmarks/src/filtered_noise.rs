@@ -29,7 +29,7 @@ const RESOLUTION: f64 = 0.05;
 const COEFFICIENTS: [f64; 3] = [0.0368, 0.0093, 0.0013];
 /// Taps of each of the two averages.
 pub const TAPS: [usize; 5] = [1, 4, 8, 16, 64];
-/// Which of the values are read.
+/// The values that are read.
 pub const READ_EVERY: [usize; 4] = [1, 2, 4, 9];
 const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
 

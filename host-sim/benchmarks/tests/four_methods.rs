@@ -31,7 +31,7 @@ fn equation_5_of_the_measured_spectrum_is_the_measured_allan_deviation() {
     let resolved: Vec<_> = record.spectrum.iter().filter(|octave| octave.resolved).collect();
     assert_eq!(resolved.len(), 14, "1 sample to 40 s");
     for octave in resolved {
-        // The same data: four deviations of the difference of independent ones. Half of the square's error.
+        // Four deviations of the difference of independent data; half of the square's error.
         let scatter = octave.measured_error.hypot(octave.by_spectrum_error);
         // Before the filter, beyond 16 samples.
         let low = if octave.tau_s * RATE_HZ > 16.0 { 0.5 * low_frequencies(octave, record.segment_s) } else { 0.0 };

@@ -57,7 +57,7 @@ pub struct Nonstationarity {
     /// Deviance per point of `after` on the second half, beyond the drift expected from the first half.
     pub beyond_drift: f64,
     pub tracking: TrackingErrors,
-    /// The same without added terms.
+    /// Predictions without added terms.
     pub baselines: Baselines,
     /// Prediction intervals of each epoch's octaves.
     pub intervals: IntervalCoverage,

@@ -50,7 +50,7 @@ fn a_loop_loses_what_its_long_intervals_hold_and_no_more() {
         }
         let (measured, base) = examine(&times, seed);
         let found = lost(&measured);
-        // Of a long outage the loop itself does not know how many samples it would have taken.
+        // The loop itself does not know how many samples of a long outage it would have taken.
         assert!(found.abs_diff(truth) <= truth / 8, "{seed}: {found} of {truth} lost");
         let span = times[times.len() - 1] - times[0];
         let hz = (times.len() as u64 - 1 + truth) as f64 / span;

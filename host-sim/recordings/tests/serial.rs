@@ -1,4 +1,4 @@
-//! What a recording over a serial link does where the device restarts, hangs up, or the log cannot be written.
+//! A recording over a serial link: the device restarts or hangs up, or the log cannot be written.
 
 use link::{Encoder, MessageRef, RawBurst, RawMessage};
 use recordings::frame_log::FrameLogReader;

@@ -99,7 +99,7 @@ fn coarse_time_stamps_are_no_losses_where_the_rate_is_given() {
     // 819.2 samples per second, read by a host whose clock ticks once a millisecond: intervals of 1 and 2 ms.
     let times: Vec<f64> = (0..5000).map(|i| (f64::from(i) / 819.2 * 1000.0).floor() / 1000.0).collect();
     let measured = measurement(&timed(&times), Some(819.2)).expect("a time base");
-    // Of the last 64 samples a late one cannot be told from a loss.
+    // A late sample among the last 64 cannot be told from a loss.
     assert!(gaps(&measured).iter().all(|(after, _)| *after > 5000 - 64), "{:?}", gaps(&measured));
 }
 

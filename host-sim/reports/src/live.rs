@@ -24,7 +24,7 @@ pub struct LiveCurve {
     pub points: Vec<(f64, f64)>,
 }
 
-/// Which curves are drawn.
+/// The curves that are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum CurveGroup {
     #[default]

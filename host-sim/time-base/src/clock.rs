@@ -162,7 +162,7 @@ impl Clock {
                 if first.len() < FIRST_ROWS && !is_last {
                     return Ok(Vec::new());
                 }
-                // The same first rows, whatever the batch.
+                // As many first rows whatever the batch.
                 let mut first = std::mem::take(first);
                 let later = first.split_off(first.len().min(FIRST_ROWS));
                 let is_all = is_last && later.is_empty();

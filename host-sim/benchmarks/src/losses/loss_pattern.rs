@@ -1,4 +1,4 @@
-//! Which samples of a record are lost.
+//! The samples of a record that are lost.
 
 use super::noise::RATE_HZ;
 use rand::{Rng, SeedableRng};

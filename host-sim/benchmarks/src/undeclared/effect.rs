@@ -12,7 +12,7 @@ use virtual_sensor::{InjectedEffect, OutputRegister};
 
 pub(super) const GYROS: [OutputRegister; 3] = [OutputRegister::GyroX, OutputRegister::GyroY, OutputRegister::GyroZ];
 
-/// Which variant of the virtual sensor's effect is hidden.
+/// The variant of the virtual sensor's effect that is hidden.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum, Serialize)]
 #[value(rename_all = "snake_case")]
 #[serde(rename_all = "snake_case")]

@@ -41,7 +41,7 @@ pub enum StretchLength {
     Samples(u64),
 }
 
-/// Which effects to hide in which recordings.
+/// The effects to hide, and the recordings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredNoisePlan {
     pub recordings: Vec<NoiseRecording>,

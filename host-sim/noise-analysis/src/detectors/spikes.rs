@@ -89,7 +89,7 @@ struct FilteredSpike {
 pub(crate) struct Disturbance {
     /// Sample periods from the first sample that stands out to the last one.
     pub certain: Range<u64>,
-    /// Those in which it may exceed a part of the noise.
+    /// Sample periods in which it may exceed a part of the noise.
     pub slots: Range<u64>,
     pub level: f64,
     pub count: usize,
@@ -121,12 +121,12 @@ impl FoundSpikes {
         if p_value < REFUTED { Vec::new() } else { inside.slots().collect() }
     }
 
-    /// Those before a sample period; `jumps` is kept.
+    /// The spikes before a sample period; `jumps` is kept.
     pub(crate) fn before(&self, slot: u64) -> Self {
         Self { jumps: 0, ..self.kept(|spike| spike.slot < slot) }
     }
 
-    /// Those that are no part of louder noise: all, if most stand out locally.
+    /// The spikes that are no part of louder noise: all, if most stand out locally.
     pub(crate) fn out_of_noise(&self) -> Self {
         let stands_out = self.spikes.iter().filter(|spike| spike.stands_out).count();
         let wanders = 2 * stands_out < self.spikes.len();
@@ -216,7 +216,7 @@ impl SpikeRule {
 
     /// Separates the outliers in `samples` samples into single spikes and disturbances, in ascending order.
     ///
-    /// Those with at most [`REACH`] sample periods between them are one event. An event beyond chance that is longer
+    /// Outliers with at most [`REACH`] sample periods between them are one event. An event beyond chance that is longer
     /// than an interpolation spans is a disturbance.
     pub(crate) fn separate(&self, found: FoundSpikes, samples: u64) -> (FoundSpikes, Vec<Disturbance>) {
         let events = found.events();

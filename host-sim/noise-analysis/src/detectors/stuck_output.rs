@@ -233,7 +233,7 @@ fn share(changes: &[Change]) -> Option<f64> {
     (changes.len() >= FEWEST_CHANGES).then(|| (kept as f64 + 1.0) / (changes.len() as f64 + 1.0))
 }
 
-/// That part at a lag, with its variance from the scatter between stretches as long as the lag.
+/// The [`share`] at a lag, with its variance from the scatter between stretches as long as the lag.
 fn share_at(counts: &[i32], lag: usize) -> Option<(f64, f64)> {
     let changes: Vec<Change> = changes(counts, lag).collect();
     let share = share(&changes)?;

@@ -20,7 +20,7 @@ pub struct TrackingErrors {
     pub pooled: f64,
     /// Mean over the epochs, each against its own prediction.
     pub one_step: f64,
-    /// The same for the model without tracking.
+    /// [`one_step`](Self::one_step) for the model without tracking.
     pub one_step_static: f64,
 }
 

@@ -56,7 +56,7 @@ impl Series {
         }
     }
 
-    /// The same values as multiples of `counts` counts.
+    /// The values as multiples of `counts` counts.
     #[must_use]
     pub fn with_counts_per_step(self, counts: u32) -> Self {
         Self { resolution: self.resolution * f64::from(counts), ..self }

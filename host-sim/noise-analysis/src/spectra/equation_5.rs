@@ -10,7 +10,7 @@ const SHORTEST: usize = 1 << 10;
 const LENGTH_STEP: usize = 8;
 /// Least segment length over the averaging time. A random walk loses 7.5·τ/T = 12 % of its variance below 2.5 cycles.
 const SEGMENT_PER_TAU: u64 = 64;
-/// The same at the longest averaging times, with segments about as long as the record.
+/// [`SEGMENT_PER_TAU`] at the longest averaging times, with segments about as long as the record.
 const LEAST_SEGMENT_PER_TAU: u64 = 16;
 
 /// σ²(τ) = 4·∫ S(f)·sin⁴(πfτ)/(πfτ)² df of `series` at the averaging factors `factors`, with the measured two-sided

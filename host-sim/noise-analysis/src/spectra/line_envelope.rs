@@ -51,7 +51,7 @@ pub struct Modulation {
     pub of_phase: bool,
     /// −2 log-likelihood ratio of the line without the change against with it.
     pub statistic: f64,
-    /// The same including significant multiples, as of a switched line.
+    /// [`statistic`](Self::statistic) with significant multiples, as of a switched line.
     pub with_multiples: f64,
 }
 

@@ -45,7 +45,7 @@ pub(crate) trait RowSource: Send {
     fn read(&mut self, each: &mut EachRow) -> Result<Ending, InputError>;
 }
 
-/// Which rows of a recording are wanted.
+/// The rows of a recording that are wanted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WantedRows {
     pub part: Option<TimeRange>,

@@ -76,7 +76,7 @@ impl Reading {
         Self { stated_hz, part: None, kept, batch_rows: BATCH }
     }
 
-    /// The same of a part.
+    /// The reading of a part.
     #[must_use]
     pub fn of_part(self, part: Option<TimeRange>) -> Self {
         Self { part, ..self }

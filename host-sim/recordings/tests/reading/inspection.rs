@@ -1,4 +1,4 @@
-//! What a file is found to hold, and the options that are proposed where it does not say enough.
+//! The content that is found in a file, and the options that are proposed for it.
 
 use super::harness::{inspect, normal, read_file};
 use recordings::inspection::{InspectedTable, Proposal};

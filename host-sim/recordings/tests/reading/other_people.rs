@@ -18,7 +18,7 @@ fn refusal(file: &Path, options: &[&str]) -> String {
     read_file(file, options).err().expect("refused").to_string()
 }
 
-/// What `reference_curves.py` finds with a reader and its argument.
+/// Result of `reference_curves.py` with a reader and its argument.
 fn reference(test: &str, reader: &str, file: &Path, argument: &str) -> Option<Value> {
     let arguments = [reader, file.to_str().expect("UTF-8"), argument];
     let output = python(test, "host-sim/recordings/tests/reference_curves.py", &arguments)?;

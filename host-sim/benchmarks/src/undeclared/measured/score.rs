@@ -18,7 +18,7 @@ pub(super) const FAILS: f64 = 3.0;
 pub struct MeasuredErrors {
     pub before: Option<f64>,
     pub after: Option<f64>,
-    /// The same without what the first half's rules exclude.
+    /// Deviance without what the first half's rules exclude.
     pub excluding: [Option<f64>; 2],
     /// Curve of the first half as a model.
     pub first_half_curve: Option<f64>,
