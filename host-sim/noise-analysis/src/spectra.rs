@@ -1,7 +1,7 @@
 //! Spectral analysis of one channel or of several.
 //!
-//! All densities are one-sided, in unit²/Hz: their integral over 0 … fs/2 is the variance. White noise N has the density
-//! `2N²`, flicker noise B `B²/(πf)`, a random walk K `K²/(2π²f²)`: twice the two-sided densities of IEEE Std 952.
+//! All densities are one-sided, in unit²/Hz: twice those of IEEE Std 952. White noise N has `2N²`, flicker noise B
+//! `B²/(πf)`, a random walk K `K²/(2π²f²)`.
 //!
 //! ```text
 //! UniformSeries ─► Periodogram ─► Background ─► lines    sinusoids and resonances, from the whole record at once

@@ -1,4 +1,4 @@
-//! Every table of a report as text: at most 100 columns, the same in a terminal and in a file.
+//! Every table of a report as text of at most 100 columns.
 
 use crate::coefficient_notes::coefficient_notes;
 use crate::coefficients::{self, CoefficientRow};
@@ -18,13 +18,9 @@ use noise_analysis::report::{ChannelEffect, ChannelReport, Report, TermReport};
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
-/// Columns of the longest line.
 const WIDTH: u16 = 100;
 
-/// Writes the whole report, with the name of the recording if it has one.
-///
-/// # Errors
-/// `out` cannot be written.
+/// Writes the whole report with the recording's name.
 pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io::Result<()> {
     let title = format!("{} noise report", summary::part_name(report));
     match source {
@@ -74,7 +70,7 @@ pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io:
     )
 }
 
-/// Everything that the one screen tells, without its limits.
+/// The content of the screen, without its limits.
 fn verdict(report: &Report, out: &mut impl Write) -> io::Result<()> {
     let paragraph = |out: &mut dyn Write, text: &str| writeln!(out, "{}", wrap(text, WIDTH.into()));
     writeln!(out)?;
@@ -107,7 +103,6 @@ fn verdict(report: &Report, out: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-/// Numbers of samples by cause, as a list.
 fn by_cause(counts: &BTreeMap<String, u64>) -> String {
     if counts.values().all(|&samples| samples == 0) {
         return "none".to_owned();
@@ -157,7 +152,6 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "{}", curve_table(channel))
 }
 
-/// A table whose first `left` columns are text and the others numbers.
 fn table(header: &[&str], left: usize, rows: impl IntoIterator<Item = Vec<String>>) -> TextTable {
     TextTable::new(header.iter().copied(), left, rows).within(WIDTH)
 }
@@ -236,7 +230,6 @@ fn curve_table(channel: &ChannelReport) -> TextTable {
     table(&headings.iter().map(String::as_str).collect::<Vec<_>>(), 0, rows)
 }
 
-/// The use of the model: other units, drift, a filter's innovations, longer records.
 fn write_assessment(assessment: &Assessment, out: &mut impl Write) -> io::Result<()> {
     if !assessment.coefficients.is_empty() {
         writeln!(out, "{}", unit_table(&assessment.coefficients))?;

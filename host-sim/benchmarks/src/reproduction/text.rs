@@ -1,4 +1,4 @@
-//! The results as text for the terminal.
+//! The results as text.
 
 use super::bias_and_scatter::{OctaveScatter, ReproductionResult};
 use super::four_methods::FourMethods;
@@ -8,9 +8,6 @@ use std::io::{self, Write};
 
 impl ReproductionResult {
     /// Writes the tables of the coefficients, of the scatter of the octaves and of the four methods as text.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "{} simulated hours of gyro z at 204.8 SPS, default filter, ±300 °/s\n", self.seeds)?;
         writeln!(out, "bias ± scatter of the coefficients, % of the truth")?;
@@ -52,9 +49,6 @@ impl ReproductionResult {
 
 impl FourMethods {
     /// Writes three tables as text.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "four methods on one record (seed {})\n", self.seed)?;
         let cell = |value: Option<f64>, bounds: Option<(f64, f64)>| match bounds {

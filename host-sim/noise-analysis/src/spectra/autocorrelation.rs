@@ -1,4 +1,4 @@
-//! The correlation time of a Markov process by the autocorrelation of the samples, independent of the Allan variance.
+//! The correlation time of a Markov process by the autocorrelation, independent of the Allan variance.
 
 use crate::bounds::BoundedEstimate;
 use crate::samples::uniform_series::UniformSeries;
@@ -7,21 +7,19 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Averages per correlation time.
 const PER_TIME: f64 = 3.0;
-/// Largest distance, in averages, at which the correlation is computed: three correlation times.
+/// Largest distance, averages: three correlation times.
 const LAGS: usize = 9;
-/// Number of segments for the jackknife, and the least length of each in correlation times.
+/// Segments of the jackknife, and their least length in correlation times.
 const SEGMENTS: usize = 16;
 const SHORTEST: f64 = 10.0;
-/// The time is searched for within this factor of the expected one.
+/// Factor on the expected time within which it is sought.
 const REACH: f64 = 4.0;
 
 /// The correlation time of the Markov process of `model` in s, with 95 % bounds.
 ///
-/// Averages over a third of the expected time `T` have the covariance `A·exp(−k·w/T)` at a distance of `k ≥ 1` averages of
-/// the width `w`. White noise adds nothing at these distances, the covariance of the model's other terms is subtracted, and
-/// removing the mean adds a constant. `A`, `T` and the constant are fitted by least squares; the bounds are those of the
-/// jackknife over segments of the record (R. Miller, "The jackknife – a review", Biometrika 61, 1974). `None` without a
-/// Markov process in the model, or for a record of fewer than 160 correlation times.
+/// `A·exp(−k·w/T)` and a constant are fitted to the covariances of averages over w = T/3, without that of the other
+/// terms. The bounds are by a jackknife over segments (R. Miller, Biometrika 61, 1974). `None` without a Markov process
+/// in the model, or for a record of fewer than 160 correlation times.
 #[must_use]
 pub fn correlation_time(series: &UniformSeries, model: &Model) -> Option<BoundedEstimate> {
     let expected = model.terms().iter().find_map(|term| match term.kind {
@@ -54,7 +52,7 @@ pub fn correlation_time(series: &UniformSeries, model: &Model) -> Option<Bounded
     Some(BoundedEstimate { value: all.exp(), low: (all - half_width).exp(), high: (all + half_width).exp() })
 }
 
-/// Averages over `width` values each; `NaN` where half of the values or more are missing.
+/// Averages over `width` values; `NaN` if at least half are missing.
 fn averages(values: &[f64], width: usize) -> Vec<f64> {
     let average = |chunk: &[f64]| {
         let (sum, count) = present(chunk).fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
@@ -63,14 +61,13 @@ fn averages(values: &[f64], width: usize) -> Vec<f64> {
     values.chunks_exact(width).map(average).collect()
 }
 
-/// Sum and number of the products of averages at one distance.
 #[derive(Debug, Clone, Copy, Default)]
 struct Products {
     sum: f64,
     count: f64,
 }
 
-/// Products of the deviations from the mean of a segment, at the distances 1 to [`LAGS`].
+/// Products at the distances 1 to [`LAGS`], without the segment's mean.
 fn products(segment: &[f64]) -> [Products; LAGS] {
     let mean = present(segment).sum::<f64>() / present(segment).count() as f64;
     std::array::from_fn(|lag| {
@@ -84,7 +81,7 @@ fn present(values: &[f64]) -> impl Iterator<Item = f64> + '_ {
     values.iter().copied().filter(|value| value.is_finite())
 }
 
-/// Covariance that all terms but the Markov process give to averages, up to a constant.
+/// Covariance of averages by all terms but the Markov process, up to a constant.
 fn covariance_of_others(model: &Model, width: usize) -> [f64; LAGS] {
     let width = width as f64;
     std::array::from_fn(|lag| {
@@ -100,7 +97,7 @@ fn covariance_of_others(model: &Model, width: usize) -> [f64; LAGS] {
     })
 }
 
-/// The time `T` for which `A·exp(−k·spacing/T) + C` with `A > 0` fits the correlation best; `None` at an end of the search.
+/// `T` of the best fit of `A·exp(−k·spacing/T) + C`, `A > 0`; `None` at an end of the search.
 fn fit_exponential(correlation: &[f64; LAGS], spacing: f64, expected: f64) -> Option<f64> {
     const STEPS: i32 = 400;
     let mean = correlation.iter().sum::<f64>() / LAGS as f64;
@@ -136,7 +133,7 @@ mod tests {
         Model::new(PERIOD, terms.map(|(kind, value)| FittedTerm::exact(kind, value)))
     }
 
-    /// A Markov process of deviation 1 in white noise and a random walk; the expected time is 30 % off.
+    /// The expected time is 30 % off.
     fn times(walk: f64) -> Vec<BoundedEstimate> {
         let record = |seed| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -160,7 +157,7 @@ mod tests {
         let scatter = (errors.iter().map(|error| (error - mean).powi(2)).sum::<f64>() / RECORDS as f64).sqrt();
         let covered = times.iter().filter(|time| (time.low..=time.high).contains(&TIME)).count();
         println!("mean {mean}, scatter {scatter}, covered {covered}");
-        // The logarithm of an estimate is biased by about half its variance; twice that and four standard errors are allowed.
+        // A logarithm is biased by half its variance: twice that, and four standard errors.
         assert!(mean.abs() < scatter * scatter + 4.0 * scatter / (RECORDS as f64).sqrt(), "{mean} ± {scatter}");
         // 95 % ± four standard deviations of a binomial share.
         assert!(covered as f64 >= RECORDS as f64 * 0.95 - 4.0 * (RECORDS as f64 * 0.95 * 0.05).sqrt(), "{covered}");
@@ -183,7 +180,6 @@ mod tests {
         assert_eq!(correlation_time(&series(1_000), &model(0.0)), None);
         let white = Model::new(PERIOD, [FittedTerm::exact(NoiseTerm::AngleRandomWalk, 1.0)]);
         assert_eq!(correlation_time(&series(SAMPLES), &white), None);
-        // A channel that never changes has no correlation.
         assert_eq!(correlation_time(&series(SAMPLES), &model(0.0)), None);
     }
 }

@@ -8,7 +8,7 @@ use maud::{Markup, html};
 use noise_analysis::report::assessment::{Coefficient, NavigationDrift};
 use noise_analysis::report::{ChannelReport, ModelErrorReport, ModelReport, Report};
 
-/// Content of a column's heading, and whether the column holds numbers.
+/// Heading, and whether the column has numbers.
 type Heading = (Markup, bool);
 
 fn text(heading: &str) -> Heading {
@@ -19,14 +19,13 @@ fn numbers(heading: &str) -> Heading {
     (html! { (heading) }, true)
 }
 
-/// The cells of headings.
 fn cells(headings: &[Heading]) -> Markup {
     html! {
         @for (heading, numeric) in headings { th class=[numeric.then_some("number")] scope="col" { (heading) } }
     }
 }
 
-/// A table of the given class, empty for none, with `rows` (`tr` elements).
+/// `rows` are `tr` elements.
 fn table(class: &str, headings: &[Heading], rows: &Markup) -> Markup {
     html! {
         div.scroll {
@@ -38,10 +37,10 @@ fn table(class: &str, headings: &[Heading], rows: &Markup) -> Markup {
     }
 }
 
-/// N, B and K of the gyros and accelerometers in the units of their users, the data sheet's, and the error before and after.
+/// In users' units, with data sheet and errors.
 pub(super) fn coefficients_of_all(report: &Report) -> Markup {
     let groups = summary::coefficient_tables(report);
-    // An accelerometer's random walks have other names than a gyro's.
+    // An accelerometer's random walks have other names.
     let headings = |group: &CoefficientTable| {
         let columns = group.names.iter().zip(["N", "B", "K"]).zip(&group.units);
         let columns = columns.map(|((name, letter), unit)| {
@@ -69,12 +68,11 @@ pub(super) fn coefficients_of_all(report: &Report) -> Markup {
     html! { @if let Some(first) = groups.first() { (table("", &headings(first), &rows)) } }
 }
 
-/// `2.424 ± 0.005`, which a narrow column breaks before the interval and nowhere else.
+/// Breaks only before the interval: `2.424 ± 0.005`.
 fn broken_before_interval(value: &str) -> String {
     value.replacen(' ', "\n", 1).replace(' ', "\u{a0}")
 }
 
-/// The terms of a model with all their parameters.
 pub(super) fn terms(model: &ModelReport) -> Markup {
     let rows = html! {
         @for term in &model.terms {
@@ -91,7 +89,6 @@ pub(super) fn terms(model: &ModelReport) -> Markup {
     table("", &[text("term"), text("unit"), numbers("fit")], &rows)
 }
 
-/// Errors of both models on the fitted and on the unseen half.
 pub(super) fn errors(channel: &ChannelReport) -> Markup {
     let cell = |error: &ModelErrorReport| {
         html! { td.number { (percent(error.rms_percent)) span.under { (optional(error.deviance_per_point)) }
@@ -126,7 +123,6 @@ pub(super) fn errors(channel: &ChannelReport) -> Markup {
     table("", &[text("model"), numbers("fitted half"), numbers("unseen half")], &rows)
 }
 
-/// The coefficients in other units.
 pub(super) fn units(coefficients: &[Coefficient]) -> Markup {
     let rows = html! {
         @for coefficient in coefficients {
@@ -143,7 +139,6 @@ pub(super) fn units(coefficients: &[Coefficient]) -> Markup {
     table("", &[text("coefficient"), text("unit"), numbers("continuous"), numbers("discrete, of samples")], &rows)
 }
 
-/// Predicted and observed error of the integrated channel.
 pub(super) fn drift(drifts: &[NavigationDrift]) -> Markup {
     let rows = html! {
         @for drift in drifts {
@@ -160,7 +155,6 @@ pub(super) fn drift(drifts: &[NavigationDrift]) -> Markup {
     table("", &[text("error after"), text("unit"), numbers("predicted"), numbers("unseen half")], &rows)
 }
 
-/// The measured curve with its intervals, beside the models.
 pub(super) fn curve(channel: &ChannelReport) -> Markup {
     let (headings, rows) = curve_numbers(channel);
     let headings: Vec<Heading> = headings.iter().map(|heading| numbers(heading)).collect();
