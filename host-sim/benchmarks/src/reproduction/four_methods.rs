@@ -2,15 +2,13 @@
 //! autocorrelation, power spectral density with equation (5), and Kalman innovations.
 
 use super::published_gyro::{
-    LSB, OCTAVES, RATE_HZ, SECONDS, TAPS, allan_curve, deviations, fitted_terms, simulate_counts, slope_coefficients,
-    true_model,
+    LSB, OCTAVES, RATE_HZ, TAPS, allan_curve, deviations, fitted_terms, simulate_counts, slope_coefficients, true_model,
 };
-use allan_core::fit::{fit, fit_shapes};
-use allan_core::term::Markov;
+use allan_core::fit::fit;
 use allan_core::{Curve, Model, NoiseTerm};
 use noise_analysis::report::assessment::innovations::filter_innovations;
 use noise_analysis::samples::uniform_series::UniformSeries;
-use noise_analysis::spectra::{Welch, correlation_time};
+use noise_analysis::spectra::Welch;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::f64::consts::{E, PI};
@@ -47,9 +45,6 @@ pub struct Autocorrelation {
     pub decay_s: Option<f64>,
     /// The same in the quarters of the record, mean of the four lags.
     pub decay_in_quarters_s: Option<f64>,
-    /// Time constant of a Markov process by the estimator of the report, s; `None` where the fitted process is too slow
-    /// for the record (fewer than 160 time constants).
-    pub markov_time_s: Option<f64>,
 }
 
 /// The measured Allan deviation at one octave beside that by equation (5) from the measured spectrum.
@@ -127,7 +122,7 @@ impl FourMethods {
         Self {
             seed,
             coefficients,
-            autocorrelation: autocorrelation(&samples, &grid, &overlapped),
+            autocorrelation: autocorrelation(&samples),
             segment_s: SEGMENT as f64 / RATE_HZ,
             resolved_s: SEGMENT as f64 / RATE_HZ / SEGMENT_PER_TAU,
             spectrum: welch.map_or_else(Vec::new, |welch| spectrum_octaves(&welch, &overlapped)),
@@ -181,7 +176,7 @@ fn correlation_coefficients(samples: &[f64]) -> MethodCoefficients {
     }
 }
 
-fn autocorrelation(samples: &[f64], grid: &UniformSeries, curve: &Curve<OCTAVES>) -> Autocorrelation {
+fn autocorrelation(samples: &[f64]) -> Autocorrelation {
     let second = RATE_HZ as usize;
     let means: Vec<f64> = samples.chunks_exact(second).map(|part| part.iter().sum::<f64>() / second as f64).collect();
     let decay = |means: &[f64]| {
@@ -189,14 +184,11 @@ fn autocorrelation(samples: &[f64], grid: &UniformSeries, curve: &Curve<OCTAVES>
         Some((lag * second) as f64 / RATE_HZ)
     };
     let quarters: Option<Vec<f64>> = means.chunks_exact(means.len() / 4).map(decay).collect();
-    let [white, _, _, rounding] = fitted_terms();
-    let markov = NoiseTerm::Markov(Markov { time_constant: SECONDS / 100.0 });
     Autocorrelation {
         variance: autocovariance(samples, 0),
         white_variance: white_autocovariances(samples)[0],
         decay_s: decay(&means),
         decay_in_quarters_s: quarters.map(|lags| lags.iter().sum::<f64>() / lags.len() as f64),
-        markov_time_s: correlation_time(grid, &fit_shapes(curve, &[white, markov, rounding])).map(|time| time.value),
     }
 }
 

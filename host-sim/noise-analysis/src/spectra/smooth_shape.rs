@@ -67,8 +67,7 @@ impl SpectralShape {
     }
 
     /// N in unit·√s: the root of half the density of the white noise before the filter. Only of a spectrum that is known to
-    /// be behind a filter: in white noise nothing tells the filtered noise from the floor, and
-    /// [`fit_white_noise`](super::fit_white_noise) chooses between them.
+    /// be behind a filter: in white noise nothing tells the filtered noise from the floor.
     #[must_use]
     pub fn angle_random_walk(&self) -> f64 {
         (self.densities[0] / 2.0).sqrt()
