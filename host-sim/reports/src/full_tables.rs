@@ -10,7 +10,7 @@ use crate::formatting::{
     TextTable, capital, count, duration, filter_consistency, interval, missing_samples, number, optional,
     parameter_name, percent, recording_advice, words, worst_deviations, wrap,
 };
-use crate::rounding::{NONE, Scale, bounded_quantity, p_value, parameter_magnitude, quantity_digits, unit};
+use crate::rounding::{NONE, Scale, p_value, parameter_magnitude, quantity_digits, unit};
 use crate::summary;
 use noise_analysis::report::assessment::navigation::CALIBRATION_S;
 use noise_analysis::report::assessment::{Assessment, Coefficient, NavigationDrift};
@@ -248,19 +248,6 @@ fn write_assessment(assessment: &Assessment, out: &mut impl Write) -> io::Result
             filter_consistency(innovations)
         );
         writeln!(out, "{}", wrap(&text, WIDTH.into()))?;
-    }
-    let by_spectrum = assessment.angle_random_walk_by_spectrum.as_ref().map(bounded_quantity);
-    let told = match (by_spectrum, &assessment.angle_random_walk_by_spectrum_note) {
-        (Some(value), Some(note)) => Some(format!("{value}; {note}")),
-        (Some(value), None) => Some(value),
-        (None, Some(note)) => Some(format!("none, {note}")),
-        (None, None) => None,
-    };
-    if let Some(told) = told {
-        writeln!(out, "{}", wrap(&format!("• N by the spectrum: {told}."), WIDTH.into()))?;
-    }
-    if let Some(time) = &assessment.markov_time_by_autocorrelation {
-        writeln!(out, "• Markov time by the autocorrelation: {}.", bounded_quantity(time))?;
     }
     assessment.record.iter().try_for_each(|record| writeln!(out, "• {}.", recording_advice(record)))
 }

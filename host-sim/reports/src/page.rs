@@ -372,15 +372,6 @@ fn assessment(assessment: &Assessment) -> Markup {
                         " for a true model), whiteness " (p_value(innovations.whiteness_p)) }
                 }
             }
-            @if let Some(spectrum) = &assessment.angle_random_walk_by_spectrum {
-                li { b { "N by the spectrum" } ": " (bounded_quantity(spectrum))
-                    @if let Some(note) = &assessment.angle_random_walk_by_spectrum_note { span.parameter { (note) } } }
-            } @else if let Some(note) = &assessment.angle_random_walk_by_spectrum_note {
-                li { b { "N by the spectrum" } ": none, " (note) "." }
-            }
-            @if let Some(time) = &assessment.markov_time_by_autocorrelation {
-                li { b { "Markov time by the autocorrelation" } ": " (bounded_quantity(time)) }
-            }
             @for record in &assessment.record { li { (unparted(&recording_advice(record))) } }
         }
     }

@@ -898,23 +898,6 @@ pub fn contradictions(report: &Report) -> Vec<String> {
             significant(sigma.abs(), 2)
         ));
     }
-    for channel in inertial(report) {
-        let Some((spectrum, fit)) =
-            channel.assessment.angle_random_walk_by_spectrum.as_ref().zip(coefficient(channel, LETTERS[0].0))
-        else {
-            continue;
-        };
-        if spectrum.low > fit.high || spectrum.high < fit.low {
-            let percent = 100.0 * (spectrum.value / fit.value - 1.0);
-            let name = channel_list(std::slice::from_ref(&channel.name));
-            told.push(if is_upper_bound(fit.value, fit.low) {
-                format!("{name}: the spectrum gives N, the fit only an upper limit below it")
-            } else {
-                let side = if percent < 0.0 { "lower" } else { "higher" };
-                format!("{name}: the spectrum gives N {} % {side} than the fit", significant(percent.abs(), 2))
-            });
-        }
-    }
     let is_unsure = |of: &Innovations| channels * of.chance_of_small_claim() < CHANCE;
     let unsure: Vec<String> = inertial(report)
         .filter(|channel| channel.assessment.innovations.as_ref().is_some_and(is_unsure))

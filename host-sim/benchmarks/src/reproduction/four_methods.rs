@@ -1,15 +1,13 @@
 //! The four methods of section 2.2 of the paper on one simulated record.
 
 use super::published_gyro::{
-    LSB, OCTAVES, RATE_HZ, SECONDS, TAPS, allan_curve, deviations, fitted_terms, simulate_counts, slope_coefficients,
-    true_model,
+    LSB, OCTAVES, RATE_HZ, TAPS, allan_curve, deviations, fitted_terms, simulate_counts, slope_coefficients, true_model,
 };
-use allan_core::fit::{fit, fit_shapes};
-use allan_core::term::Markov;
+use allan_core::fit::fit;
 use allan_core::{Curve, Model, NoiseTerm};
 use noise_analysis::report::assessment::innovations::filter_innovations;
 use noise_analysis::samples::uniform_series::UniformSeries;
-use noise_analysis::spectra::{Welch, correlation_time};
+use noise_analysis::spectra::Welch;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::f64::consts::{E, PI};
@@ -41,8 +39,6 @@ pub struct Autocorrelation {
     /// Lag, s, at which the autocovariance of 1 s means is 1/e of that at 1 s.
     pub decay_s: Option<f64>,
     pub decay_in_quarters_s: Option<f64>,
-    /// Markov time constant by the report's estimator, s; `None` with fewer than 160 time constants.
-    pub markov_time_s: Option<f64>,
 }
 
 /// One octave of the measured Allan deviation and of equation (5).
@@ -112,7 +108,7 @@ impl FourMethods {
         Self {
             seed,
             coefficients,
-            autocorrelation: autocorrelation(&samples, &grid, &overlapped),
+            autocorrelation: autocorrelation(&samples),
             segment_s: SEGMENT as f64 / RATE_HZ,
             resolved_s: SEGMENT as f64 / RATE_HZ / SEGMENT_PER_TAU,
             spectrum: welch.map_or_else(Vec::new, |welch| spectrum_octaves(&welch, &overlapped)),
@@ -164,7 +160,7 @@ fn correlation_coefficients(samples: &[f64]) -> MethodCoefficients {
     }
 }
 
-fn autocorrelation(samples: &[f64], grid: &UniformSeries, curve: &Curve<OCTAVES>) -> Autocorrelation {
+fn autocorrelation(samples: &[f64]) -> Autocorrelation {
     let second = RATE_HZ as usize;
     let means: Vec<f64> = samples.chunks_exact(second).map(|part| part.iter().sum::<f64>() / second as f64).collect();
     let decay = |means: &[f64]| {
@@ -172,14 +168,11 @@ fn autocorrelation(samples: &[f64], grid: &UniformSeries, curve: &Curve<OCTAVES>
         Some((lag * second) as f64 / RATE_HZ)
     };
     let quarters: Option<Vec<f64>> = means.chunks_exact(means.len() / 4).map(decay).collect();
-    let [white, _, _, rounding] = fitted_terms();
-    let markov = NoiseTerm::Markov(Markov { time_constant: SECONDS / 100.0 });
     Autocorrelation {
         variance: autocovariance(samples, 0),
         white_variance: white_autocovariances(samples)[0],
         decay_s: decay(&means),
         decay_in_quarters_s: quarters.map(|lags| lags.iter().sum::<f64>() / lags.len() as f64),
-        markov_time_s: correlation_time(grid, &fit_shapes(curve, &[white, markov, rounding])).map(|time| time.value),
     }
 }
 

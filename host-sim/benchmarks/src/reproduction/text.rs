@@ -65,10 +65,10 @@ impl FourMethods {
         writeln!(out, "{}", TextTable::new(header, 1, std::iter::once(truth).chain(rows)))?;
         let found = &self.autocorrelation;
         let [variance, white] = [found.variance, found.white_variance].map(number);
-        let [whole, quarters, markov] = [found.decay_s, found.decay_in_quarters_s, found.markov_time_s].map(optional);
+        let [whole, quarters] = [found.decay_s, found.decay_in_quarters_s].map(optional);
         writeln!(out, "autocorrelation: variance {variance} (°/s)², white part {white} (°/s)²")?;
         writeln!(out, "decay to 1/e: {whole} s in the record, {quarters} s in its quarters: flicker noise and walk")?;
-        writeln!(out, "have no correlation time; time constant of a Markov process: {markov}\n")?;
+        writeln!(out, "have no correlation time\n")?;
         writeln!(out, "Allan deviation, °/s: measured, and by equation (5) from Welch's spectrum")?;
         writeln!(out, "segments of {} s resolve τ up to {} s", number(self.segment_s), number(self.resolved_s))?;
         let rows = self.spectrum.iter().map(|octave| {

@@ -61,8 +61,8 @@ impl SpectralShape {
         mixture_density(&self.basis(frequency), &self.densities)
     }
 
-    /// N in unit·√s: the root of half the density of the white noise before the filter. Valid only behind a known
-    /// filter; else use [`fit_white_noise`](super::fit_white_noise).
+    /// N in unit·√s: the root of half the density of the white noise before the filter. Only of a spectrum that is known to
+    /// be behind a filter: in white noise nothing tells the filtered noise from the floor.
     #[must_use]
     pub fn angle_random_walk(&self) -> f64 {
         (self.densities[0] / 2.0).sqrt()

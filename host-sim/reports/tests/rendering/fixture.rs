@@ -164,10 +164,7 @@ fn assessment(scale: f64) -> Assessment {
             correlation: 0.002,
             whiteness_p: 0.4321,
         }),
-        angle_random_walk_by_spectrum: Some(parameter(0.036_77, "deg/sqrt(s)")),
         coefficients_from: CoefficientsFrom::OctavesAgainstSamples,
-        angle_random_walk_by_spectrum_note: Some("+1.9 % from the fit".to_owned()),
-        markov_time_by_autocorrelation: Some(parameter(2.1, "s")),
         record: [("bias_instability", Some(7.5)), ("rate_random_walk", None)]
             .map(|(kind, more_hours)| RecordLength { kind: kind.to_owned(), half_s: None, more_hours })
             .into(),

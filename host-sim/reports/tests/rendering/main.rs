@@ -218,8 +218,8 @@ fn no_number_with_a_unit_has_an_exponent() {
     }
 }
 
-/// Texts of the tables for [`report`].
-const EXPECTED: [&str; 32] = [
+/// Texts that the tables must contain for [`report`], in the format of [`reports::formatting`].
+const EXPECTED: [&str; 30] = [
     "gyro_x",
     "gyro_y",
     "gyro_z",
@@ -249,8 +249,6 @@ const EXPECTED: [&str; 32] = [
     "10 min",
     "0.43",
     "enough for a filter",
-    "37 ± 4 m°/√s",
-    "Markov time by the autocorrelation",
     "bias instability to ±20 %: record 7 h 30 min more",
 ];
 
@@ -271,15 +269,7 @@ fn the_page_shows_every_channel_and_coefficient() {
         assert!(page.contains(&format!("{channel} · Allan deviation")), "{channel}");
     }
     // N of `final` in the units of its users: 0.0368 deg/√s (0.0346 … 0.0394) are 2.208 °/√h; 36.8 mg·√s are 36.8 µg/√Hz.
-    for expected in [
-        "2.21\n±\u{a0}0.14",
-        "°/√h",
-        "36.8",
-        "µg/√Hz",
-        "24\u{a0}→\u{a0}4.0\u{a0}%",
-        "14,321",
-        "Markov time by the autocorrelation",
-    ] {
+    for expected in ["2.21\n±\u{a0}0.14", "°/√h", "36.8", "µg/√Hz", "24\u{a0}→\u{a0}4.0\u{a0}%", "14,321"] {
         assert!(page.contains(expected), "{expected}");
     }
     // A line does not end before a per cent sign.
@@ -459,11 +449,5 @@ fn the_deviation_by_the_spectrum_stands_beside_the_curve() {
     let by_spectrum = format!("{:.1}", 1e3 * report.channels[0].curve[3].adev_by_spectrum.expect("resolved"));
     for shown in [text(&report), html(&report)] {
         assert!(shown.contains("by PSD") && shown.contains(&by_spectrum), "{by_spectrum}");
-        assert!(shown.contains("+1.9 % from the fit"));
     }
-    let mut without = report;
-    without.channels[0].assessment.angle_random_walk_by_spectrum = None;
-    without.channels[0].assessment.angle_random_walk_by_spectrum_note = Some("rounding hides it".to_owned());
-    assert!(text(&without).contains("N by the spectrum: none, rounding hides it."));
-    assert!(html(&without).contains(": none, rounding hides it."));
 }
