@@ -33,15 +33,15 @@ impl BusTiming {
     /// Chip select is high for 16 µs, the stall that the manufacturer's own tools keep, or 75 µs, the stall of low-power mode;
     /// frames begin 40 or 150 µs apart (ADIS16400/ADIS16405 data sheet Rev. B, Table 2). Bursts have no pauses, as with the
     /// drivers of Linux and PX4.
-    pub const SAFE: Self = Self {
+    pub const USUAL: Self = Self {
         normal: SelectTiming { high_ns: 16_000, read_ns: 40_000 },
         low_power: SelectTiming { high_ns: 75_000, read_ns: 150_000 },
         word_gap_ns: 0,
     };
 
-    /// For a sensor that answers wrongly with [`SAFE`](Self::SAFE): chip select is high for 50 µs, as with the driver of
+    /// For a sensor that answers wrongly with [`USUAL`](Self::USUAL): chip select is high for 50 µs, as with the driver of
     /// Linux, and every word of a burst is followed by the stall of a frame. A burst takes 0.45 ms at 656 kHz.
-    pub const CAREFUL: Self = Self {
+    pub const SLOW: Self = Self {
         normal: SelectTiming { high_ns: 50_000, read_ns: 40_000 },
         low_power: SelectTiming { high_ns: 100_000, read_ns: 150_000 },
         word_gap_ns: 9_000,

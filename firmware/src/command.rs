@@ -39,7 +39,7 @@ pub(crate) enum Command {
     WriteRegister(Register, u16),
     /// Read a register many times, and count the answers that differ.
     CompareReads(Register),
-    CarefulBus(bool),
+    SlowBus(bool),
     Persist,
     Forget,
     Restart,
@@ -53,7 +53,7 @@ enum Form {
     Title,
     /// Nothing: a key that acts at once.
     Key(Command),
-    /// Nothing, and Enter.
+    /// Nothing, and Enter. The usage is all of it.
     Word(Command),
     /// A number in thousandths.
     Thousandths(fn(u32) -> Command),
@@ -65,7 +65,7 @@ enum Form {
 }
 
 /// The commands: usage, which begins with the word, form, and help, in the order of the list that `?` prints. A line has 80 columns.
-static COMMANDS: [(&str, Form, &str); 34] = {
+static COMMANDS: [(&str, Form, &str); 35] = {
     use Command as C;
     use Form::{Key, Number, RegisterValue, Thousandths, Title, Word};
     [
@@ -98,11 +98,8 @@ static COMMANDS: [(&str, Form, &str); 34] = {
         ("poke R V", RegisterValue(C::WriteRegister), "write one: poke smpl_prd 0007; check undoes it"),
         ("compare R", Form::Register(C::CompareReads), "read one 10,000 times, count the answers that differ"),
         ("measure", Word(C::Answer(Answer::Measurement)), "SCK, stall and read rate, period and width of data ready"),
-        (
-            "careful 1",
-            Number(|on| switch(on, C::CarefulBus)),
-            "longer times on the bus, if the sensor answers wrongly; careful 0",
-        ),
+        ("bus slow", Word(C::SlowBus(true)), "longer times on the bus, if the sensor answers wrongly"),
+        ("bus usual", Word(C::SlowBus(false)), "the usual times on the bus"),
         ("help", Word(C::Answer(Answer::Help)), "this list"),
         ("boot", Word(C::Restart), "restart; the statistics are kept"),
         ("bootsel", Word(C::BootLoader), "start the boot loader, which takes an image over USB"),
@@ -217,12 +214,15 @@ fn begins_line(byte: u8) -> bool {
 
 fn whole_line(line: &[u8]) -> Option<Command> {
     let line = core::str::from_utf8(line).ok()?;
-    COMMANDS.iter().find_map(|(usage, form, _)| form.parse(line.trim_start().strip_prefix(word(usage))?))
+    COMMANDS.iter().find_map(|(usage, form, _)| form.parse(line.trim_start().strip_prefix(word(usage, form))?))
 }
 
-/// The word that a usage begins with.
-fn word(usage: &str) -> &str {
-    usage.split(' ').next().unwrap_or_default()
+/// What a command of this usage begins with.
+fn word<'a>(usage: &'a str, form: &Form) -> &'a str {
+    match form {
+        Form::Word(_) => usage,
+        _ => usage.split(' ').next().unwrap_or_default(),
+    }
 }
 
 impl Form {
@@ -311,13 +311,13 @@ mod tests {
             ]
         );
         assert_eq!(
-            parse("dump\rmeasure\rdeflect\rcareful 1\rcareful 0\rpersist\rforget\rhelp\r"),
+            parse("dump\rmeasure\rdeflect\rbus slow\rbus usual\rpersist\rforget\rhelp\r"),
             [
                 Ok(Command::Answer(Answer::Registers)),
                 Ok(Command::Answer(Answer::Measurement)),
                 Ok(Command::Answer(Answer::Deflections)),
-                Ok(Command::CarefulBus(true)),
-                Ok(Command::CarefulBus(false)),
+                Ok(Command::SlowBus(true)),
+                Ok(Command::SlowBus(false)),
                 Ok(Command::Persist),
                 Ok(Command::Forget),
                 Ok(Command::Answer(Answer::Help)),
@@ -388,7 +388,7 @@ mod tests {
                 Form::Register(_) => "36",
                 Form::RegisterValue(_) => "36 7",
             };
-            let typed = std::format!("{} {argument}\r", word(usage));
+            let typed = std::format!("{} {argument}\r", word(usage, form));
             let expected = form.parse(argument).expect("a command");
             assert_eq!(parse(&typed), [Ok(expected)], "{typed}");
         }

@@ -39,7 +39,7 @@ const RETRY_US: u64 = 1_000_000;
 /// Time for which a sensor that may have lost its supply is left alone: its longest start-up.
 pub(crate) const START_UP_US: u64 = Timing::DEFAULT.start_up_us as u64;
 /// Time for a log to be transmitted before the microcontroller is restarted.
-const FAREWELL_US: u64 = 200_000;
+const LOG_FLUSH_US: u64 = 200_000;
 
 /// What the application knows of itself and of the sensor.
 pub(crate) struct DeviceState {
@@ -185,7 +185,7 @@ impl DeviceState {
             log(board, format_args!("sensor: {reason}; {}", step.name()));
         }
         self.sensor = match step {
-            RecoveryStep::Restart => SensorState::Restarting { at_us: now_us + FAREWELL_US },
+            RecoveryStep::Restart => SensorState::Restarting { at_us: now_us + LOG_FLUSH_US },
             step => SensorState::Probing { at_us: at_us.max(now_us), step: Some(step) },
         };
     }
@@ -196,11 +196,11 @@ impl DeviceState {
         match step {
             None | Some(RecoveryStep::Restart) => {}
             Some(RecoveryStep::Reread) => count(&mut counters.rereads),
-            Some(step @ (RecoveryStep::BusReset | RecoveryStep::CarefulBus)) => {
+            Some(step @ (RecoveryStep::BusReset | RecoveryStep::SlowBus)) => {
                 count(&mut counters.bus_resets);
                 board.reset_bus();
-                if step == RecoveryStep::CarefulBus {
-                    board.set_bus_timing(BusTiming::CAREFUL);
+                if step == RecoveryStep::SlowBus {
+                    board.set_bus_timing(BusTiming::SLOW);
                 }
                 scope = ProbeScope { pulse: true, reset: false, self_test: true };
             }
@@ -223,7 +223,7 @@ impl DeviceState {
             Ok(identity) => {
                 self.report_identity(identity, board);
                 let now_us = board.now_us();
-                board.estimators(|estimators| estimators.mark_probed(now_us));
+                board.estimators(|estimators| estimators.accept_samples_after_settling(now_us));
                 board.set_sampling(true);
                 self.sensor = SensorState::Sampled { since_us: now_us };
                 event!(info, "sensor {}", self.sensor);

@@ -12,8 +12,8 @@ pub(crate) enum RecoveryStep {
     Reread,
     /// Reset the microcontroller's SPI and end an unfinished frame by a pulse on chip select; then probe.
     BusReset,
-    /// The same, with longer times on the bus from then on: [`BusTiming::CAREFUL`](crate::BusTiming::CAREFUL).
-    CarefulBus,
+    /// The same, with longer times on the bus from then on: [`BusTiming::SLOW`](crate::BusTiming::SLOW).
+    SlowBus,
     /// Reset the sensor by its command, then probe.
     SoftwareReset,
     /// Reset the sensor by its RST line, if that is connected, else by its command; then probe.
@@ -28,7 +28,7 @@ impl RecoveryStep {
         match self {
             Self::Reread => "probing it",
             Self::BusReset => "resetting the bus",
-            Self::CarefulBus => "careful timing of the bus",
+            Self::SlowBus => "slow timing of the bus",
             Self::SoftwareReset => "resetting it",
             Self::ResetLine => "resetting it by RST",
             Self::Restart => "restarting the microcontroller",
@@ -56,7 +56,7 @@ impl RecoveryLadder {
         }
         match (taken, taken % 3) {
             (0, _) => RecoveryStep::Reread,
-            (4, _) => RecoveryStep::CarefulBus,
+            (4, _) => RecoveryStep::SlowBus,
             (_, 1) => RecoveryStep::BusReset,
             (_, 2) => RecoveryStep::SoftwareReset,
             _ => RecoveryStep::ResetLine,
@@ -77,7 +77,7 @@ impl RecoveryLadder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use RecoveryStep::{BusReset, CarefulBus, Reread, ResetLine, Restart, SoftwareReset};
+    use RecoveryStep::{BusReset, Reread, ResetLine, Restart, SlowBus, SoftwareReset};
 
     #[test]
     fn the_steps_rise_and_start_anew_after_the_sensor_has_settled() {
@@ -86,7 +86,7 @@ mod tests {
             assert_eq!(count, 5);
             core::array::from_fn(|_| ladder.next_step())
         };
-        assert_eq!(next(5), [Reread, BusReset, SoftwareReset, ResetLine, CarefulBus]);
+        assert_eq!(next(5), [Reread, BusReset, SoftwareReset, ResetLine, SlowBus]);
         ladder.settle();
         assert_eq!(ladder.next_step(), Reread);
     }

@@ -184,8 +184,8 @@ impl<'m> Estimators<'m> {
 
     /// Clears the suspicion, so that samples are used again as soon as the sensor's filter has settled: the sensor was probed
     /// and configured at `now_us`.
-    pub fn mark_probed(&mut self, now_us: u64) {
-        self.monitor.mark_probed(now_us);
+    pub fn accept_samples_after_settling(&mut self, now_us: u64) {
+        self.monitor.restart_at(now_us);
         self.unusable = 0;
         self.settling = settling_samples(self.config);
         self.learning = if self.gate.is_learning() { FIRST_BLOCK } else { 0 };
@@ -195,8 +195,8 @@ impl<'m> Estimators<'m> {
 
     /// Sampling goes on at `now_us` after a pause of the device's own: what the sensor gave meanwhile is lost, and it is not
     /// suspect.
-    pub(crate) fn mark_resumed(&mut self, now_us: u64) {
-        self.monitor.mark_probed(now_us);
+    pub(crate) fn restart_rate_check(&mut self, now_us: u64) {
+        self.monitor.restart_at(now_us);
     }
 
     /// Starts again without samples, for a sensor that has the configuration `config` from now on. The raw stream stays on

@@ -43,7 +43,7 @@ impl<P: SpiPeripheral, S: OutputPin<Error = Infallible>> SensorSpi<P, S> {
     /// A bus with the chip select `select`, which must be high. To be called once.
     pub fn new(peripheral: P, select: S) -> Self {
         let received = cortex_m::singleton!(: [u8; BURST_BYTES] = [0; BURST_BYTES]).expect("the bus is created once");
-        Self { peripheral, select: ChipSelect::new(select, BusTiming::SAFE), received, started: 0 }
+        Self { peripheral, select: ChipSelect::new(select, BusTiming::USUAL), received, started: 0 }
     }
 
     /// Transfers the next bytes of the burst: all of them, or one word if there is to be a gap between words.
