@@ -267,7 +267,7 @@ mod tests {
     fn after_a_long_loss_the_next_edge_raises_no_suspicion() {
         let mut monitor = monitor();
         feed(&mut monitor, [0.0, 1.0, 2.0], 1.0);
-        monitor.mark_probed((10_000.0 * PERIOD_US) as u64);
+        monitor.restart_at((10_000.0 * PERIOD_US) as u64);
         assert_eq!(feed(&mut monitor, [10_001.4, 10_002.4], 1.0), [1, 9_998, 0], "at another phase");
         assert!(!monitor.is_suspect());
     }
@@ -306,7 +306,7 @@ mod tests {
         let measured = monitor.measured_hz().unwrap();
         assert!((measured * 1.03 - 204.8).abs() < 1e-3, "{measured}");
         assert!(monitor.is_suspect(), "the sensor may have been reset within 100 periods");
-        monitor.mark_probed(2000 * 5000);
+        monitor.restart_at(2000 * 5000);
         assert!(!monitor.is_suspect());
     }
 
@@ -339,10 +339,10 @@ mod tests {
     #[test]
     fn silence_is_detected_without_an_edge() {
         let mut monitor = monitor();
-        monitor.mark_probed(500_000);
+        monitor.restart_at(500_000);
         assert!(!monitor.is_silent_at(525_000));
         assert!(monitor.is_silent_at(525_001), "no edge since the sensor was probed");
-        monitor.mark_probed(990_000);
+        monitor.restart_at(990_000);
         monitor.edge(1_000_000);
         assert!(!monitor.is_silent_at(1_025_000));
         assert!(monitor.is_silent_at(1_025_001));

@@ -291,12 +291,12 @@ impl App {
                 let line = bench_console::write_register(register, value, &self.state, board);
                 self.print(board, format_args!("{line}"));
             }
-            Command::CarefulBus(careful) => {
+            Command::SlowBus(is_slow) => {
                 board.set_sampling(false);
-                let set = board.set_bus_timing(if careful { BusTiming::CAREFUL } else { BusTiming::SAFE });
+                let set = board.set_bus_timing(if is_slow { BusTiming::SLOW } else { BusTiming::USUAL });
                 self.state.request_probe(now_us);
-                match (set, careful) {
-                    (true, true) => self.print(board, format_args!("careful timing of the bus, until a restart")),
+                match (set, is_slow) {
+                    (true, true) => self.print(board, format_args!("slow timing of the bus, until a restart")),
                     (true, false) => self.print(board, format_args!("usual timing of the bus")),
                     (false, _) => self.print(board, format_args!("this board has one timing of its bus")),
                 }
@@ -431,7 +431,7 @@ impl App {
         let written = board.write_record(record);
         let now_us = board.now_us();
         if self.state.is_sampled() {
-            board.estimators(|estimators| estimators.mark_resumed(now_us));
+            board.estimators(|estimators| estimators.restart_rate_check(now_us));
             board.set_sampling(true);
         }
         written.map(|()| now_us - began_us)

@@ -81,7 +81,7 @@ fn ask(request: Request, state: &DeviceState, board: &mut impl Board) -> Result<
 fn resume(state: &DeviceState, board: &mut impl Board) {
     if state.is_sampled() {
         let now_us = board.now_us();
-        board.estimators(|estimators| estimators.mark_resumed(now_us));
+        board.estimators(|estimators| estimators.restart_rate_check(now_us));
         board.set_sampling(true);
     }
 }
@@ -223,7 +223,7 @@ pub(crate) fn deflection_line(state: &DeviceState, board: &mut impl Board, index
     let response = ask(Request::Deflections(stimulus), state, board);
     // The filter holds displaced samples.
     let now_us = board.now_us();
-    board.estimators(|estimators| estimators.mark_probed(now_us));
+    board.estimators(|estimators| estimators.accept_samples_after_settling(now_us));
     AnswerLine::Text(match response {
         Ok([a, b, c, d, e, f]) => text_line(format_args!("{sign} {a} {b} {c}  {d} {e} {f}")),
         Err(error) => text_line(format_args!("{sign} {error}")),

@@ -212,7 +212,7 @@ mod tests {
     /// The waking pulse of 20 µs (data sheet Rev. B, Table 1) needs chip select low.
     #[test]
     fn a_delay_is_kept_while_chip_select_is_low() {
-        let mut select = ChipSelect::new(Pin, BusTiming::SAFE);
+        let mut select = ChipSelect::new(Pin, BusTiming::USUAL);
         let pulse = |select: &mut ChipSelect<Pin>| {
             transfer::<Clock, _>(&mut Bytes(1), select, &mut [Operation::DelayNs(20_000)])
         };
@@ -228,7 +228,7 @@ mod tests {
         for (limit_hz, byte_us, least_us) in
             [(2_000_000, 4, 40), (1_000_000, 8, 40), (300_000, 27, 150), (300_000, 60, 150)]
         {
-            let mut select = ChipSelect::new(Pin, BusTiming::SAFE);
+            let mut select = ChipSelect::new(Pin, BusTiming::USUAL);
             select.set_clock_limit(limit_hz);
             for byte in 0..4 {
                 let mut answer = [0; 2];

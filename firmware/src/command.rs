@@ -34,7 +34,7 @@ pub(crate) enum Command {
     WriteRegister(Register, u16),
     /// Read many times and count different answers.
     CompareReads(Register),
-    CarefulBus(bool),
+    SlowBus(bool),
     Persist,
     Forget,
     Restart,
@@ -87,11 +87,8 @@ static COMMANDS: [(&str, Form, &str); 34] = {
         ("poke R V", RegisterValue(C::WriteRegister), "write one: poke smpl_prd 0007; check undoes it"),
         ("compare R", Form::Register(C::CompareReads), "read one 10,000 times, count the answers that differ"),
         ("measure", Word(C::Answer(Answer::Measurement)), "SCK, stall and read rate, period and width of data ready"),
-        (
-            "careful 1",
-            Number(|on| switch(on, C::CarefulBus)),
-            "longer times on the bus, if the sensor answers wrongly; careful 0",
-        ),
+        ("bus slow", Word(C::SlowBus(true)), "longer times on the bus, if the sensor answers wrongly"),
+        ("bus usual", Word(C::SlowBus(false)), "the usual times on the bus"),
         ("help", Word(C::Answer(Answer::Help)), "this list"),
         ("boot", Word(C::Restart), "restart; the statistics are kept"),
         ("bootsel", Word(C::BootLoader), "start the boot loader, which takes an image over USB"),
@@ -198,7 +195,7 @@ fn begins_line(byte: u8) -> bool {
 
 fn whole_line(line: &[u8]) -> Option<Command> {
     let line = core::str::from_utf8(line).ok()?;
-    COMMANDS.iter().find_map(|(usage, form, _)| form.parse(line.trim_start().strip_prefix(word(usage))?))
+    COMMANDS.iter().find_map(|(usage, form, _)| form.parse(line.trim_start().strip_prefix(word(usage, form))?))
 }
 
 fn word(usage: &str) -> &str {
@@ -290,13 +287,13 @@ mod tests {
             ]
         );
         assert_eq!(
-            parse("dump\rmeasure\rdeflect\rcareful 1\rcareful 0\rpersist\rforget\rhelp\r"),
+            parse("dump\rmeasure\rdeflect\rbus slow\rbus usual\rpersist\rforget\rhelp\r"),
             [
                 Ok(Command::Answer(Answer::Registers)),
                 Ok(Command::Answer(Answer::Measurement)),
                 Ok(Command::Answer(Answer::Deflections)),
-                Ok(Command::CarefulBus(true)),
-                Ok(Command::CarefulBus(false)),
+                Ok(Command::SlowBus(true)),
+                Ok(Command::SlowBus(false)),
                 Ok(Command::Persist),
                 Ok(Command::Forget),
                 Ok(Command::Answer(Answer::Help)),
@@ -366,7 +363,7 @@ mod tests {
                 Form::Register(_) => "36",
                 Form::RegisterValue(_) => "36 7",
             };
-            let typed = std::format!("{} {argument}\r", word(usage));
+            let typed = std::format!("{} {argument}\r", word(usage, form));
             let expected = form.parse(argument).expect("a command");
             assert_eq!(parse(&typed), [Ok(expected)], "{typed}");
         }

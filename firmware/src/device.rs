@@ -172,7 +172,7 @@ impl DeviceState {
             log(board, format_args!("sensor: {reason}; {}", step.name()));
         }
         self.sensor = match step {
-            RecoveryStep::Restart => SensorState::Restarting { at_us: now_us + FAREWELL_US },
+            RecoveryStep::Restart => SensorState::Restarting { at_us: now_us + LOG_FLUSH_US },
             step => SensorState::Probing { at_us: at_us.max(now_us), step: Some(step) },
         };
     }
@@ -183,11 +183,11 @@ impl DeviceState {
         match step {
             None | Some(RecoveryStep::Restart) => {}
             Some(RecoveryStep::Reread) => count(&mut counters.rereads),
-            Some(step @ (RecoveryStep::BusReset | RecoveryStep::CarefulBus)) => {
+            Some(step @ (RecoveryStep::BusReset | RecoveryStep::SlowBus)) => {
                 count(&mut counters.bus_resets);
                 board.reset_bus();
-                if step == RecoveryStep::CarefulBus {
-                    board.set_bus_timing(BusTiming::CAREFUL);
+                if step == RecoveryStep::SlowBus {
+                    board.set_bus_timing(BusTiming::SLOW);
                 }
                 scope = ProbeScope { pulse: true, reset: false, self_test: true };
             }
@@ -210,7 +210,7 @@ impl DeviceState {
             Ok(identity) => {
                 self.report_identity(identity, board);
                 let now_us = board.now_us();
-                board.estimators(|estimators| estimators.mark_probed(now_us));
+                board.estimators(|estimators| estimators.accept_samples_after_settling(now_us));
                 board.set_sampling(true);
                 self.sensor = SensorState::Sampled { since_us: now_us };
                 event!(info, "sensor {}", self.sensor);

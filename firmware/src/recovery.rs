@@ -24,7 +24,7 @@ impl RecoveryStep {
         match self {
             Self::Reread => "probing it",
             Self::BusReset => "resetting the bus",
-            Self::CarefulBus => "careful timing of the bus",
+            Self::SlowBus => "slow timing of the bus",
             Self::SoftwareReset => "resetting it",
             Self::ResetLine => "resetting it by RST",
             Self::Restart => "restarting the microcontroller",
@@ -49,7 +49,7 @@ impl RecoveryLadder {
         }
         match (taken, taken % 3) {
             (0, _) => RecoveryStep::Reread,
-            (4, _) => RecoveryStep::CarefulBus,
+            (4, _) => RecoveryStep::SlowBus,
             (_, 1) => RecoveryStep::BusReset,
             (_, 2) => RecoveryStep::SoftwareReset,
             _ => RecoveryStep::ResetLine,
@@ -70,7 +70,7 @@ impl RecoveryLadder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use RecoveryStep::{BusReset, CarefulBus, Reread, ResetLine, Restart, SoftwareReset};
+    use RecoveryStep::{BusReset, Reread, ResetLine, Restart, SlowBus, SoftwareReset};
 
     #[test]
     fn the_steps_rise_and_start_anew_after_the_sensor_has_settled() {
@@ -79,7 +79,7 @@ mod tests {
             assert_eq!(count, 5);
             core::array::from_fn(|_| ladder.next_step())
         };
-        assert_eq!(next(5), [Reread, BusReset, SoftwareReset, ResetLine, CarefulBus]);
+        assert_eq!(next(5), [Reread, BusReset, SoftwareReset, ResetLine, SlowBus]);
         ladder.settle();
         assert_eq!(ladder.next_step(), Reread);
     }

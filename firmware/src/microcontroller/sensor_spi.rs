@@ -42,7 +42,7 @@ impl<P: SpiPeripheral, S: OutputPin<Error = Infallible>> SensorSpi<P, S> {
     /// `select` must be high; once.
     pub fn new(peripheral: P, select: S) -> Self {
         let received = cortex_m::singleton!(: [u8; BURST_BYTES] = [0; BURST_BYTES]).expect("the bus is created once");
-        Self { peripheral, select: ChipSelect::new(select, BusTiming::SAFE), received, started: 0 }
+        Self { peripheral, select: ChipSelect::new(select, BusTiming::USUAL), received, started: 0 }
     }
 
     fn start_bytes(&mut self) {

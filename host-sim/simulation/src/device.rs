@@ -349,9 +349,9 @@ impl Board for SimulatedBoard {
     }
 
     fn set_bus_timing(&mut self, timing: BusTiming) -> bool {
-        if timing == BusTiming::CAREFUL {
+        if timing == BusTiming::SLOW {
             let mut faults = self.bus.faults().borrow_mut();
-            faults.frames = faults.frames.filter(|(_, end)| *end != FaultEnd::CarefulBus);
+            faults.frames = faults.frames.filter(|(_, end)| *end != FaultEnd::SlowBus);
         }
         true
     }

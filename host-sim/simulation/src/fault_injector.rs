@@ -71,7 +71,7 @@ pub enum FaultEnd {
     /// With a pulse on the RST line.
     ResetLine,
     /// With longer times on the bus.
-    CarefulBus,
+    SlowBus,
     /// Not by itself.
     Never,
 }

@@ -43,7 +43,7 @@ pub(crate) fn learned_on_host(
     let mut statistics = Statistics::new();
     let mut estimators = Estimators::new(&mut statistics, FIRST_CONFIG);
     let at_us = |sample: u64| (sample as f64 * 1e6 / RATE_HZ) as u64;
-    estimators.mark_probed(at_us(bursts[0].0));
+    estimators.accept_samples_after_settling(at_us(bursts[0].0));
     let mut bursts = bursts.iter();
     let mut epochs = Vec::new();
     for ((number, samples), rate_hz) in (0..).zip(samples.chunks(CHANNELS.len())).zip(rates) {
