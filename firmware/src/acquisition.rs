@@ -230,7 +230,7 @@ impl DataReadyMonitor {
     }
 
     /// Clears the suspicion at `now_us`, after a probe.
-    pub fn mark_probed(&mut self, now_us: u64) {
+    pub fn restart_at(&mut self, now_us: u64) {
         self.probed_us = now_us;
         self.new_phase = true;
         self.silent = false;

@@ -31,15 +31,15 @@ pub struct BusTiming {
 impl BusTiming {
     /// Chip select is high for 16 µs (stall of the manufacturer's tools) or 75 µs (low-power mode); frames begin 40 or
     /// 150 µs apart (ADIS16400/ADIS16405 data sheet Rev. B, Table 2). Bursts have no pauses.
-    pub const SAFE: Self = Self {
+    pub const USUAL: Self = Self {
         normal: SelectTiming { high_ns: 16_000, read_ns: 40_000 },
         low_power: SelectTiming { high_ns: 75_000, read_ns: 150_000 },
         word_gap_ns: 0,
     };
 
-    /// For a sensor that fails with [`SAFE`](Self::SAFE): chip select high for 50 µs, and a frame's stall after every
+    /// For a sensor that fails with [`USUAL`](Self::USUAL): chip select high for 50 µs, and a frame's stall after every
     /// word. A burst takes 0.45 ms at 656 kHz.
-    pub const CAREFUL: Self = Self {
+    pub const SLOW: Self = Self {
         normal: SelectTiming { high_ns: 50_000, read_ns: 40_000 },
         low_power: SelectTiming { high_ns: 100_000, read_ns: 150_000 },
         word_gap_ns: 9_000,

@@ -54,7 +54,7 @@ enum Form {
 }
 
 /// Usage (begins with the word), form, help, in the order of `?`; lines of 80 columns.
-static COMMANDS: [(&str, Form, &str); 34] = {
+static COMMANDS: [(&str, Form, &str); 35] = {
     use Command as C;
     use Form::{Key, Number, RegisterValue, Thousandths, Title, Word};
     [
@@ -198,8 +198,12 @@ fn whole_line(line: &[u8]) -> Option<Command> {
     COMMANDS.iter().find_map(|(usage, form, _)| form.parse(line.trim_start().strip_prefix(word(usage, form))?))
 }
 
-fn word(usage: &str) -> &str {
-    usage.split(' ').next().unwrap_or_default()
+/// The beginning of a command of this usage: all of it where nothing follows.
+fn word<'a>(usage: &'a str, form: &Form) -> &'a str {
+    match form {
+        Form::Word(_) => usage,
+        _ => usage.split(' ').next().unwrap_or_default(),
+    }
 }
 
 impl Form {

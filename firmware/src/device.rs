@@ -36,7 +36,7 @@ pub(crate) const FIRST_SETTINGS: RetainedSettings = RetainedSettings {
 const RETRY_US: u64 = 1_000_000;
 /// Rest for a sensor that may have lost its supply: its longest start-up.
 pub(crate) const START_UP_US: u64 = Timing::DEFAULT.start_up_us as u64;
-const FAREWELL_US: u64 = 200_000;
+const LOG_FLUSH_US: u64 = 200_000;
 
 pub(crate) struct DeviceState {
     /// In the hardware, Hz.

@@ -10,8 +10,8 @@ pub(crate) enum RecoveryStep {
     Reread,
     /// Reset the SPI, end an open frame by a pulse, then probe.
     BusReset,
-    /// With longer bus times from then on: [`BusTiming::CAREFUL`](crate::BusTiming::CAREFUL).
-    CarefulBus,
+    /// With longer bus times from then on: [`BusTiming::SLOW`](crate::BusTiming::SLOW).
+    SlowBus,
     SoftwareReset,
     /// By RST if connected, else by command; then probe.
     ResetLine,

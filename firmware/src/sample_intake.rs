@@ -156,8 +156,8 @@ impl<'m> Estimators<'m> {
     }
 
     /// After a probe at `now_us`: samples are used once the filter has settled.
-    pub fn mark_probed(&mut self, now_us: u64) {
-        self.monitor.mark_probed(now_us);
+    pub fn accept_samples_after_settling(&mut self, now_us: u64) {
+        self.monitor.restart_at(now_us);
         self.unusable = 0;
         self.settling = settling_samples(self.config);
         self.learning = if self.gate.is_learning() { FIRST_BLOCK } else { 0 };
@@ -166,8 +166,8 @@ impl<'m> Estimators<'m> {
     }
 
     /// After the device's own pause: samples are lost, without suspicion.
-    pub(crate) fn mark_resumed(&mut self, now_us: u64) {
-        self.monitor.mark_probed(now_us);
+    pub(crate) fn restart_rate_check(&mut self, now_us: u64) {
+        self.monitor.restart_at(now_us);
     }
 
     /// Starts again for `config`; the raw stream stays as it is.
