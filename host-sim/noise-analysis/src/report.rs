@@ -92,17 +92,11 @@ pub enum PartNote {
     /// The noise of every inertial channel is smaller than a step of its counts, whose rounding hides the filter.
     CountsTooCoarse,
     /// Neighbouring samples are not correlated: there is no filter, or one shorter than the sample period.
-    NotCorrelated {
-        /// The sample period, s.
-        period_s: f64,
-    },
+    NotCorrelated { period_s: f64 },
     /// Fewer than half of the channels are correlated as behind a filter.
     Minority(Vec<&'static str>),
     /// Every value of the filter is recorded, so that the clock is the sample rate; without time stamps that is stated, not measured.
-    StatedClock {
-        /// The stated sample rate, Hz.
-        sample_rate_hz: f64,
-    },
+    StatedClock { sample_rate_hz: f64 },
     /// There are no time stamps to measure the clock by.
     NoTimeStamps {
         /// The part's nominal clock, Hz.
@@ -124,19 +118,9 @@ pub enum PartNote {
         nominal_hz: f64,
     },
     /// A channel's own decimation is farther from the common one than chance explains.
-    Contradicted {
-        /// Name of the channel.
-        channel: &'static str,
-        /// Its decimation alone.
-        decimation: f64,
-    },
-    /// Some channels whose noise is larger than a count do not show the filter.
-    NotInAll {
-        /// Channels that show it.
-        showing: usize,
-        /// Channels that could.
-        able: usize,
-    },
+    Contradicted { channel: &'static str, decimation: f64 },
+    /// Of the channels `able` to show the filter, whose noise is larger than a count, so many do.
+    NotInAll { showing: usize, able: usize },
 }
 
 /// A stretch of the record, in seconds from its first sample.

@@ -5,12 +5,11 @@
 //! no more than the scatter of the levels from block to block allows, so that filtered noise, lines and a level that moves
 //! by itself have the false-alarm rate that is asked for.
 
-use crate::distributions::{quantile, student_tail};
+use crate::distributions::{mean_ratio_tail, quantile, student_tail};
 use crate::effects::findings::REFUTED;
 use crate::minimum::end_of;
 use crate::robust::median;
 use crate::samples::series::Series;
-use statrs::function::beta::checked_beta_reg;
 use std::ops::Range;
 
 /// Errors above this many standard deviations are left out of the estimate of the standard deviation; of normal errors it is
@@ -409,7 +408,7 @@ impl Wandering {
 /// expectation, by the factor `ratio`: the upper tail of Fisher's F distribution.
 pub(super) fn exceedance(ratio: f64, freedom: f64, of_other: f64) -> f64 {
     let (freedom, of_other) = (freedom.min(MOST_FREEDOM), of_other.min(MOST_FREEDOM));
-    checked_beta_reg(0.5 * of_other, 0.5 * freedom, of_other / (of_other + freedom * ratio)).unwrap_or(1.0)
+    mean_ratio_tail(ratio, 0.5 * freedom, 0.5 * of_other)
 }
 
 /// The ratio whose [`exceedance`] is `p_value`, to less than one part in a million.

@@ -184,13 +184,23 @@ impl ComparedCurve {
         self.points.len()
     }
 
-    /// `mean edf·(ln(m/v) + v/m − 1)` of a model with the Allan variance `modelled`.
-    pub(crate) fn deviance_per_point(&self, modelled: impl Fn(u64) -> f64) -> f64 {
-        let of = |(point, edf): &(AllanPoint, f64)| {
-            let ratio = point.avar / modelled(point.n);
+    /// Its points, each with its degrees of freedom.
+    pub(super) fn points(&self) -> &[(AllanPoint, f64)] {
+        &self.points
+    }
+
+    /// `Σ edf·(ln(m/v) + v/m − 1)` of a model with these Allan variances at the points.
+    pub(super) fn deviance(&self, modelled: impl Iterator<Item = f64>) -> f64 {
+        let of = |((point, edf), modelled): (&(AllanPoint, f64), f64)| {
+            let ratio = point.avar / modelled;
             edf * (ratio - 1.0 - ratio.ln())
         };
-        self.points.iter().map(of).sum::<f64>() / self.len().max(1) as f64
+        self.points.iter().zip(modelled).map(of).sum()
+    }
+
+    /// The mean of this sum for a model with the Allan variance `modelled`.
+    pub(crate) fn deviance_per_point(&self, modelled: impl Fn(u64) -> f64) -> f64 {
+        self.deviance(self.points.iter().map(|(point, _)| modelled(point.n))) / self.len().max(1) as f64
     }
 }
 

@@ -1,6 +1,7 @@
 //! A model whose white noise and one of whose lines may change from epoch to epoch.
 
-use super::epochs::SIGNIFICANCE;
+use super::epochs::{ComparedCurve, SIGNIFICANCE};
+use crate::distributions::chi_squared_tail;
 use crate::fit::noise_terms::is_white;
 use crate::minimum::downhill;
 use allan_core::confidence::octave_correlation;
@@ -8,7 +9,6 @@ use allan_core::model::FittedTerm;
 use allan_core::term::{Resonance, Shape, Sinusoid};
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 use serde::Serialize;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Number of parameters that can be tracked.
 pub(crate) const PARAMETERS: usize = 2;
@@ -178,35 +178,23 @@ impl TrackedModel {
         };
         let sum: f64 = epochs.iter().map(decrease).sum();
         let count = epochs.len() as f64;
-        // `count` is above 0 for an `EpochCurves`.
-        let p_value = ChiSquared::new(count).map_or(1.0, |chi_squared| chi_squared.sf(sum.max(0.0)));
-        MovementTest { gain: sum / count, p_value }
+        MovementTest { gain: sum / count, p_value: chi_squared_tail(sum, count) }
     }
 
     /// The parameters of an epoch; those that are not in `tracked` are 0.
     #[must_use]
     pub(crate) fn estimate<const POINTS: usize>(&self, epoch: &Curve<POINTS>, tracked: TrackedSet) -> EpochEstimate {
-        let points: Vec<(&AllanPoint, f64)> = epoch
-            .points()
-            .iter()
-            .filter(|point| point.n <= epoch.samples() / 8 && point.avar > 0.0)
-            .map(|point| (point, self.model.edf(point)))
-            .collect();
+        let epoch = ComparedCurve::new(epoch, &self.model);
         let avars = |parameters: ParameterVector| -> Vec<f64> {
             let model = self.at(parameters);
-            points.iter().map(|(point, _)| model.avar(point.n)).collect()
+            epoch.points().iter().map(|(point, _)| model.avar(point.n)).collect()
         };
         // Allan variance of the white noise: the difference between the models with its variance doubled and as it is.
         let white: Vec<f64> =
             avars([2f64.ln(), 0.0]).iter().zip(avars([0.0; 2])).map(|(twice, once)| twice - once).collect();
         let deviance = |level: f64, avars: &[f64]| {
             let added = level.exp() - 1.0;
-            let modelled = avars.iter().zip(&white).map(|(all, white)| all + added * white);
-            let of = |((point, edf), modelled): (&(&AllanPoint, f64), f64)| {
-                let ratio = point.avar / modelled;
-                edf * (ratio - 1.0 - ratio.ln())
-            };
-            points.iter().zip(modelled).map(of).sum::<f64>()
+            epoch.deviance(avars.iter().zip(&white).map(|(all, white)| all + added * white))
         };
         let best_level = |avars: &[f64]| minimum(|level| deviance(level, avars), 0.0, 0.05, MAX_LEVEL);
         let at_line = |line: f64| {
@@ -225,7 +213,7 @@ impl TrackedModel {
                 [at_line(line).0, line]
             }
         };
-        let (error, scatter) = self.uncertainty(&points, parameters, tracked);
+        let (error, scatter) = self.uncertainty(epoch.points(), parameters, tracked);
         let deviance = deviance(parameters[0], &avars([0.0, parameters[1]]));
         EpochEstimate { parameters, error, deviance, scatter }
     }
@@ -234,7 +222,7 @@ impl TrackedModel {
     /// increases the variance along the last parameter.
     fn uncertainty(
         &self,
-        points: &[(&AllanPoint, f64)],
+        points: &[(AllanPoint, f64)],
         parameters: ParameterVector,
         tracked: TrackedSet,
     ) -> (ParameterVector, f64) {

@@ -14,6 +14,7 @@
 //! Differences with an excess kurtosis κ have a mean square whose variance is `(2 + κ)/2` times as large; the degrees of
 //! freedom are divided by that.
 
+use crate::distributions::chi_squared_tail;
 use crate::report::TermReport;
 use crate::report::comparison::rejected;
 use crate::samples::gapped_cascade::GappedCascade;
@@ -23,7 +24,6 @@ use allan_core::trace::{LineCandidates, trace};
 use allan_core::{AllanPoint, Cascade, Curve, Model};
 use measurement::{ChannelProfile, MeasuredChannel, Measurement};
 use serde::Serialize;
-use statrs::function::gamma::gamma_ur;
 use std::borrow::Borrow;
 
 /// Degrees of freedom from which a point takes part: below, the approximations by χ² and F are coarse.
@@ -269,7 +269,7 @@ fn agreement(recordings: &[Measurement], channel: &ChannelProfile) -> ChannelAgr
             .map(|(points, &(_, statistic))| OctaveAgreement {
                 tau_s: points[0].tau,
                 adev: points.iter().map(|point| point.avar.sqrt()).collect(),
-                p_value: upper_tail(statistic, freedom),
+                p_value: chi_squared_tail(statistic, freedom),
             })
             .collect(),
         joint: model.terms().iter().map(|term| TermReport::new(term, channel.unit)).collect(),
@@ -316,12 +316,7 @@ fn p_value_of_sum(statistics: &[(u64, f64)], freedom: f64, model: &Model) -> Opt
     }
     let sum: f64 = statistics.iter().map(|(_, statistic)| statistic).sum();
     let scale = variance / (2.0 * mean);
-    Some(upper_tail(sum / scale, mean / scale))
-}
-
-/// Probability that χ² with `freedom` degrees of freedom is at least `statistic`.
-fn upper_tail(statistic: f64, freedom: f64) -> f64 {
-    if statistic > 0.0 && statistic.is_finite() { gamma_ur(0.5 * freedom, 0.5 * statistic) } else { 1.0 }
+    Some(chi_squared_tail(sum / scale, mean / scale))
 }
 
 /// Sets which channels agree, and takes the joint model from those that differ.
@@ -370,7 +365,8 @@ fn f_quantile(z: f64, above: f64, below: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{bartlett, f_quantile, upper_tail};
+    use super::{bartlett, f_quantile};
+    use crate::distributions::chi_squared_tail;
     use allan_core::{AllanPoint, Cascade};
     use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -416,6 +412,6 @@ mod tests {
         let points: Vec<AllanPoint> = deviations.iter().map(|deviation| point(deviation * deviation, 9.0)).collect();
         let found = bartlett(&points);
         assert!((found - 20.785_86).abs() < 0.01, "{found}");
-        assert!((upper_tail(found, 9.0) - 0.0136).abs() < 2e-4);
+        assert!((chi_squared_tail(found, 9.0) - 0.0136).abs() < 2e-4);
     }
 }
