@@ -31,7 +31,6 @@ pub(crate) struct EpochCurves {
     pub unseen: Curve<OCTAVES>,
     /// Samples in an epoch: a power of 2.
     pub epoch: u64,
-    /// Length of an epoch, s.
     pub epoch_s: f64,
     /// Epochs up to the middle of the record; the sample periods that are left over lie before the first.
     pub fitted_epochs: Vec<Curve<OCTAVES>>,
@@ -207,7 +206,6 @@ impl ComparedCurve {
 /// Comparison of two stretches of a channel, at the octave at which they differ most.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Stationarity {
-    /// Averaging time, s.
     pub tau_s: f64,
     /// Allan variance of the later stretch over that of the earlier one.
     pub variance_ratio: f64,

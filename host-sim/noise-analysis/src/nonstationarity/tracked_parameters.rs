@@ -53,7 +53,6 @@ pub(crate) struct EpochEstimate {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TrackedSet {
-    /// Nothing.
     Nothing,
     /// The level of the white noise.
     Level,

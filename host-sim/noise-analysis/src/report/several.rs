@@ -59,28 +59,23 @@ impl std::fmt::Display for IncomparableRecordings {
 /// Whether recordings show the same noise.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoiseAgreement {
-    /// Version of the JSON schema.
     pub schema: u32,
     /// Of the first recording, Hz.
     pub sample_rate_hz: f64,
     /// Samples of each recording.
     pub samples: Vec<u64>,
-    /// The channels that all recordings have.
     pub channels: Vec<ChannelAgreement>,
 }
 
 /// One channel of several recordings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelAgreement {
-    /// Such as `gyro_z`.
     pub name: String,
-    /// Unit of the deviations.
     pub unit: String,
     /// Probability that recordings of the same noise differ as much; absent if no octave has enough differences.
     pub p_value: Option<f64>,
     /// Whether the recordings show the same noise at a significance of 1 % over all channels (Holm).
     pub agree: bool,
-    /// Octave by octave.
     pub octaves: Vec<OctaveAgreement>,
     /// The model of all recordings together; empty where they differ.
     pub joint: Vec<TermReport>,
@@ -89,7 +84,6 @@ pub struct ChannelAgreement {
 /// One averaging time of several recordings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OctaveAgreement {
-    /// s.
     pub tau_s: f64,
     /// Allan deviation of each recording, in the channel's unit.
     pub adev: Vec<f64>,
@@ -100,39 +94,31 @@ pub struct OctaveAgreement {
 /// How much more noise there is while a machine runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoiseInflation {
-    /// Version of the JSON schema.
     pub schema: u32,
     /// Of the still recordings, Hz.
     pub sample_rate_hz: f64,
-    /// The channels that all recordings have.
     pub channels: Vec<ChannelInflation>,
 }
 
 /// The inflation of one channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelInflation {
-    /// Such as `gyro_z`.
     pub name: String,
-    /// Unit of the deviations.
     pub unit: String,
-    /// Octave by octave.
     pub octaves: Vec<OctaveInflation>,
 }
 
 /// The inflation at one averaging time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct OctaveInflation {
-    /// s.
     pub tau_s: f64,
     /// Allan deviation at rest, in the channel's unit.
     pub still: f64,
     /// Allan deviation while the machine runs.
     pub running: f64,
-    /// Their ratio.
     pub factor: f64,
     /// Lower 95 % bound of the ratio of the true deviations.
     pub low: f64,
-    /// Upper 95 % bound.
     pub high: f64,
 }
 

@@ -23,7 +23,6 @@ const MIN_INNOVATIONS: usize = 10 * LAGS;
 /// Consistency and whiteness of the innovations.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Innovations {
-    /// Number of innovations.
     pub count: usize,
     /// Mean of the squares over the expected variance: 1 for a true model.
     pub normalised: f64,

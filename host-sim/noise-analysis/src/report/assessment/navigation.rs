@@ -37,7 +37,6 @@ pub struct ObservedError {
     pub value: f64,
     /// Lower 95 % bound, by χ².
     pub low: f64,
-    /// Upper 95 % bound.
     pub high: f64,
     /// Equivalent degrees of freedom by the model.
     pub edf: f64,
