@@ -149,8 +149,8 @@ pub(super) fn curve(series: &Series, slots: Range<u64>) -> Curve<OCTAVES> {
     Rounding::of_curve(&curve, series.resolution).subtracted_from(curve)
 }
 
-fn median_avar<const POINTS: usize>(epochs: &[Curve<POINTS>], n: u64) -> Option<f64> {
-    let used = |epoch: &Curve<POINTS>| {
+fn median_avar(epochs: &[Curve<OCTAVES>], n: u64) -> Option<f64> {
+    let used = |epoch: &Curve<OCTAVES>| {
         let point = epoch.points().iter().find(|point| point.n == n)?;
         (n * MIN_AVERAGES <= epoch.samples()).then_some(*point)
     };
@@ -172,7 +172,7 @@ pub(crate) struct ComparedCurve {
 }
 
 impl ComparedCurve {
-    pub(crate) fn new<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> Self {
+    pub(crate) fn new(curve: &Curve<OCTAVES>, model: &Model) -> Self {
         // A variance of 0, of counts that repeat with this averaging time, has no logarithm.
         let points = curve.points().iter().filter(|point| point.n <= curve.samples() / 8 && point.avar > 0.0);
         Self { points: points.map(|point| (*point, model.edf(point))).collect() }
@@ -230,7 +230,7 @@ impl Stationarity {
     /// which describes both stretches together. The probability is that of the clearest octave times the number of octaves
     /// (Bonferroni), which holds for correlated octaves too.
     #[must_use]
-    pub fn compare<const POINTS: usize>(earlier: &Curve<POINTS>, later: &Curve<POINTS>, model: &Model) -> Option<Self> {
+    pub fn compare(earlier: &Curve<OCTAVES>, later: &Curve<OCTAVES>, model: &Model) -> Option<Self> {
         let longest = earlier.samples().min(later.samples()) / 8;
         let compare = |(before, after): (&AllanPoint, &AllanPoint)| {
             let ratio = after.avar / before.avar;

@@ -7,6 +7,7 @@
 
 use super::epochs::{ComparedCurve, EpochCurves, MIN_AVERAGES, SIGNIFICANCE};
 use super::tracked_parameters::{MAX_LEVEL, PARAMETERS, ParameterVector, TrackedModel, TrackedSet, minimum};
+use crate::OCTAVES;
 use allan_core::{Curve, Model};
 use serde::Serialize;
 
@@ -27,7 +28,7 @@ pub struct TrackingErrors {
 
 /// The parameters to track, by the epochs of the first half alone. The line is tracked only together with the level.
 #[must_use]
-pub(crate) fn select_tracked<const POINTS: usize>(model: &TrackedModel, fitted: &[Curve<POINTS>]) -> TrackedSet {
+pub(crate) fn select_tracked(model: &TrackedModel, fitted: &[Curve<OCTAVES>]) -> TrackedSet {
     let level = model.test_movement(fitted, TrackedSet::Nothing, TrackedSet::Level);
     match model.largest_set() {
         TrackedSet::LevelAndLine => TrackedSet::LevelAndLine,
@@ -38,11 +39,11 @@ pub(crate) fn select_tracked<const POINTS: usize>(model: &TrackedModel, fitted: 
 
 /// Tracks the parameters `tracked` through the epochs of both halves; the errors are those on the second half `half`.
 #[must_use]
-pub(crate) fn track<const POINTS: usize>(
+pub(crate) fn track(
     model: &TrackedModel,
     tracked: TrackedSet,
-    [fitted, unseen]: [&[Curve<POINTS>]; 2],
-    half: &Curve<POINTS>,
+    [fitted, unseen]: [&[Curve<OCTAVES>]; 2],
+    half: &Curve<OCTAVES>,
 ) -> TrackingErrors {
     let models = predictions(model, tracked, [fitted, unseen]);
     let compared: Vec<_> = unseen.iter().map(|epoch| ComparedCurve::new(epoch, model.model())).collect();
@@ -56,11 +57,7 @@ pub(crate) fn track<const POINTS: usize>(
 }
 
 /// The model of each epoch of the second half, with the parameters that the epochs before it predict.
-fn predictions<const POINTS: usize>(
-    model: &TrackedModel,
-    tracked: TrackedSet,
-    [fitted, unseen]: [&[Curve<POINTS>]; 2],
-) -> Vec<Model> {
+fn predictions(model: &TrackedModel, tracked: TrackedSet, [fitted, unseen]: [&[Curve<OCTAVES>]; 2]) -> Vec<Model> {
     let estimates: Vec<_> = fitted.iter().chain(unseen).map(|epoch| model.estimate(epoch, tracked)).collect();
     let mut predicted = [[0.0; PARAMETERS]].repeat(unseen.len());
     for index in 0..PARAMETERS {
@@ -111,10 +108,10 @@ fn predict_one_step(measured: &[(f64, f64)], fitted: usize) -> Vec<f64> {
 /// With steps of variance `q`, the means over `L` epochs and over the `H` that follow differ by a variance of about
 /// `q·(L + H)/3`.
 #[must_use]
-pub(crate) fn expected_drift<const POINTS: usize>(
+pub(crate) fn expected_drift(
     model: &TrackedModel,
     tracked: TrackedSet,
-    fitted: &[Curve<POINTS>],
+    fitted: &[Curve<OCTAVES>],
     used: usize,
     unseen: usize,
 ) -> ParameterVector {
@@ -128,11 +125,7 @@ pub(crate) fn expected_drift<const POINTS: usize>(
 /// Deviance per point of a model on `half`, with parameters that may differ by `drift` (standard deviations): the minimum
 /// over the parameters `x` of the model's deviance and their cost `(x/σ)²`. Without drift the plain deviance per point.
 #[must_use]
-pub(crate) fn beyond_drift<const POINTS: usize>(
-    model: &TrackedModel,
-    drift: ParameterVector,
-    half: &Curve<POINTS>,
-) -> f64 {
+pub(crate) fn beyond_drift(model: &TrackedModel, drift: ParameterVector, half: &Curve<OCTAVES>) -> f64 {
     let half = ComparedCurve::new(half, model.model());
     let points = half.len() as f64;
     let cost = |parameters: ParameterVector| {

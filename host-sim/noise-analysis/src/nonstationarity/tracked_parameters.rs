@@ -1,6 +1,7 @@
 //! A model whose white noise and one of whose lines may change from epoch to epoch.
 
 use super::epochs::{ComparedCurve, SIGNIFICANCE};
+use crate::OCTAVES;
 use crate::distributions::chi_squared_tail;
 use crate::fit::noise_terms::is_white;
 use crate::minimum::downhill;
@@ -78,10 +79,7 @@ impl TrackedModel {
 
     /// `model` with the one of its lines that moves most clearly among `epochs`, if one does, and the test of that line.
     #[must_use]
-    pub(crate) fn select_line<const POINTS: usize>(
-        model: Model,
-        epochs: &[Curve<POINTS>],
-    ) -> (Self, Option<MovementTest>) {
+    pub(crate) fn select_line(model: Model, epochs: &[Curve<OCTAVES>]) -> (Self, Option<MovementTest>) {
         let is_line = |term: &FittedTerm| match term.kind {
             NoiseTerm::Sinusoid(_) => term.value > 0.0,
             NoiseTerm::Resonance(line) => term.value > 0.0 && line.bandwidth < MAX_BANDWIDTH * line.frequency,
@@ -165,13 +163,8 @@ impl TrackedModel {
     ///
     /// If that parameter does not move, each epoch's deviance decreases by χ² of one degree of freedom times its scatter.
     #[must_use]
-    pub(crate) fn test_movement<const POINTS: usize>(
-        &self,
-        epochs: &[Curve<POINTS>],
-        fewer: TrackedSet,
-        more: TrackedSet,
-    ) -> MovementTest {
-        let decrease = |epoch: &Curve<POINTS>| {
+    pub(crate) fn test_movement(&self, epochs: &[Curve<OCTAVES>], fewer: TrackedSet, more: TrackedSet) -> MovementTest {
+        let decrease = |epoch: &Curve<OCTAVES>| {
             let estimate = self.estimate(epoch, more);
             (self.estimate(epoch, fewer).deviance - estimate.deviance) / estimate.scatter
         };
@@ -182,7 +175,7 @@ impl TrackedModel {
 
     /// The parameters of an epoch; those that are not in `tracked` are 0.
     #[must_use]
-    pub(crate) fn estimate<const POINTS: usize>(&self, epoch: &Curve<POINTS>, tracked: TrackedSet) -> EpochEstimate {
+    pub(crate) fn estimate(&self, epoch: &Curve<OCTAVES>, tracked: TrackedSet) -> EpochEstimate {
         let epoch = ComparedCurve::new(epoch, &self.model);
         let avars = |parameters: ParameterVector| -> Vec<f64> {
             let model = self.at(parameters);
