@@ -86,7 +86,6 @@ struct Accepted {
 /// them lacks are not used; a regressor that lacks more than a tenth of the samples of `series` is left out. `accelerations`
 /// may shake the channel. Of slow changes rounding makes steps smaller than `least_step`, in the channel's unit, which is asked for where
 /// there is a step.
-#[must_use]
 pub(crate) fn find(
     series: &Series,
     regressors: &[&Series],

@@ -64,7 +64,6 @@ impl Course {
 
 impl BiasResponse {
     /// The bias in the sample period `slot`, in the channel's unit; 0 at the mean of what it follows.
-    #[must_use]
     pub(crate) fn bias(&self, slot: u64) -> f64 {
         let Course { width, values } = &self.bias;
         let place = (slot as f64 / *width as f64 - 0.5).clamp(0.0, (values.len() - 1) as f64);

@@ -13,7 +13,6 @@ use crate::samples::series::Series;
 const FEWEST_CHANGES: usize = 50;
 
 /// The largest number of counts that divides every difference of two values; 1 if the values change fewer than 50 times.
-#[must_use]
 pub(crate) fn counts_per_step(series: &Series) -> u32 {
     let Some(&first) = series.values.first() else { return 1 };
     let count = |value: f64| ((value - first) / series.resolution).round().abs() as u64;
@@ -23,7 +22,6 @@ pub(crate) fn counts_per_step(series: &Series) -> u32 {
 }
 
 /// Reports a step of more than one count.
-#[must_use]
 pub(crate) fn find(series: &Series) -> Option<Detection> {
     let counts = counts_per_step(series);
     if counts == 1 {

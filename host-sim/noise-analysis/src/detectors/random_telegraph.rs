@@ -38,7 +38,6 @@ const PER_CHANGE: f64 = 4.0;
 
 /// Looks for telegraph noise in a channel with the given unit. `correlation_times` are those that its Allan curve has shown,
 /// in s.
-#[must_use]
 pub(crate) fn find(series: &UniformSeries, unit: &'static str, correlation_times: &[f64]) -> Option<TelegraphNoise> {
     let samples = series.values().len();
     let known = correlation_times.iter().map(|time| ((time / RESOLVED / series.sample_period()) as usize).max(1));
@@ -65,7 +64,6 @@ pub(crate) fn find(series: &UniformSeries, unit: &'static str, correlation_times
 
 /// Whether a Gaussian process is [`TOLD_APART`] times as likely as two levels, both with about this standard deviation and this correlation
 /// time, in s.
-#[must_use]
 pub(crate) fn is_gaussian(series: &UniformSeries, deviation: f64, time_constant: f64) -> bool {
     let size = ((time_constant / RESOLVED / series.sample_period()) as usize).max(1);
     let mut means = PartMeans::new(series, size).means;
@@ -81,7 +79,6 @@ pub(crate) fn is_gaussian(series: &UniformSeries, deviation: f64, time_constant:
 /// In a process that is the same when time runs backwards the changes are symmetrical, so that the sum of their cubes over the
 /// root of the sum of their sixth powers is about a standard normal number; neighbouring changes have correlations below 0,
 /// which lower it.
-#[must_use]
 pub(crate) fn is_reversible(series: &UniformSeries, time_constant: f64) -> bool {
     let size = ((time_constant / PER_CHANGE / series.sample_period()) as usize).max(1);
     let means = PartMeans::new(series, size).means;
@@ -96,7 +93,6 @@ pub(crate) fn is_reversible(series: &UniformSeries, time_constant: f64) -> bool 
 /// Whether visits to a level of `telegraph` noise that last no longer than a sample are as frequent and as large as `spikes`. With
 /// the rates `a` and `b` of the jumps up and down there are `ab` times a sample period of them a second, at most a quarter of that
 /// over the square of the time constant `1/(a + b)`.
-#[must_use]
 pub(crate) fn explains_spikes(telegraph: &TelegraphNoise, spikes: &Spikes, sample_period: f64) -> bool {
     let visits_per_hour =
         3600.0 * sample_period / (4.0 * telegraph.time_constant_s.low * telegraph.time_constant_s.low);

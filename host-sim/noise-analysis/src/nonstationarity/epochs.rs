@@ -43,7 +43,6 @@ pub(crate) struct EpochCurves {
 impl EpochCurves {
     /// Curves of a series whose second half begins with the sample period `middle`, of at least 24,576 sample periods (two halves
     /// of twelve shortest epochs). `None` of a shorter one, and where the channel does not change for a whole epoch of the first half.
-    #[must_use]
     pub(crate) fn from_series(series: &Series, middle: u64) -> Option<Self> {
         let to = series.span.end;
         let (epoch, ranges) = epochs(series.span.clone(), middle)?;
@@ -67,7 +66,6 @@ impl EpochCurves {
 
     /// The same curves of a channel by averaging factors in samples, where the series has means, with those of the samples at `shorter`
     /// averaging times.
-    #[must_use]
     pub(crate) fn in_samples(self, shorter: &SampleCurves) -> Self {
         let in_samples = |means: &Curve<OCTAVES>, slots: Range<u64>| {
             let of_samples = shorter.within(slots, Exclusion::ByFirstHalf);
@@ -92,7 +90,6 @@ impl EpochCurves {
     }
 
     /// The same curves without the `signals` of the first half, which go on in the second.
-    #[must_use]
     pub(crate) fn without(mut self, signals: &SignalShare) -> Self {
         if signals.is_empty() {
             return self;
@@ -111,7 +108,6 @@ impl EpochCurves {
     }
 
     /// Epochs of the later quarter of the first half.
-    #[must_use]
     pub(crate) fn latest_epochs(&self) -> &[Curve<OCTAVES>] {
         &self.fitted_epochs[self.fitted_epochs.len() / 2..]
     }
@@ -121,7 +117,6 @@ impl EpochCurves {
     /// Some minutes of vibration raise the mean of the quarter and hardly the median of its epochs. The median of variances
     /// with `ν` degrees of freedom is low by the factor `(1 − 2/(9ν))³` (E. Wilson and M. Hilferty, 1931), which is divided
     /// out. The median scatters by a fourth more than the mean; the confidence bounds do not include that.
-    #[must_use]
     pub(crate) fn median_curve(&self) -> Curve<OCTAVES> {
         let mut curve = self.quarters[1].clone();
         curve.replace_avar(|point| median_avar(self.latest_epochs(), point.n).unwrap_or(point.avar));

@@ -27,7 +27,6 @@ pub struct TrackingErrors {
 }
 
 /// The parameters to track, by the epochs of the first half alone. The line is tracked only together with the level.
-#[must_use]
 pub(crate) fn select_tracked(model: &TrackedModel, fitted: &[Curve<OCTAVES>]) -> TrackedSet {
     let level = model.test_movement(fitted, TrackedSet::Nothing, TrackedSet::Level);
     match model.largest_set() {
@@ -38,7 +37,6 @@ pub(crate) fn select_tracked(model: &TrackedModel, fitted: &[Curve<OCTAVES>]) ->
 }
 
 /// Tracks the parameters `tracked` through the epochs of both halves; the errors are those on the second half `half`.
-#[must_use]
 pub(crate) fn track(
     model: &TrackedModel,
     tracked: TrackedSet,
@@ -107,7 +105,6 @@ fn predict_one_step(measured: &[(f64, f64)], fitted: usize) -> Vec<f64> {
 ///
 /// With steps of variance `q`, the means over `L` epochs and over the `H` that follow differ by a variance of about
 /// `q·(L + H)/3`.
-#[must_use]
 pub(crate) fn expected_drift(
     model: &TrackedModel,
     tracked: TrackedSet,
@@ -124,7 +121,6 @@ pub(crate) fn expected_drift(
 
 /// Deviance per point of a model on `half`, with parameters that may differ by `drift` (standard deviations): the minimum
 /// over the parameters `x` of the model's deviance and their cost `(x/σ)²`. Without drift the plain deviance per point.
-#[must_use]
 pub(crate) fn beyond_drift(model: &TrackedModel, drift: ParameterVector, half: &Curve<OCTAVES>) -> f64 {
     let half = ComparedCurve::new(half, model.model());
     let points = half.len() as f64;
@@ -159,7 +155,6 @@ pub struct Baselines {
 
 impl Baselines {
     /// `baseline` is the baseline model, fitted to the first half; `model` gives the degrees of freedom.
-    #[must_use]
     pub(crate) fn new(curves: &EpochCurves, baseline: &Model, model: &Model) -> Self {
         let half = ComparedCurve::new(&curves.unseen, model);
         let tracked = TrackedModel::without_line(baseline.clone());

@@ -26,7 +26,6 @@ pub struct IntervalCoverage {
 
 impl IntervalCoverage {
     /// Predicts each octave of each epoch of the second half from all epochs before it; `model` gives the degrees of freedom.
-    #[must_use]
     pub(crate) fn of_second_half(curves: &EpochCurves, model: &Model) -> Self {
         let (mut octaves, mut within) = (0, 0);
         let longest = curves.epoch / MIN_AVERAGES;

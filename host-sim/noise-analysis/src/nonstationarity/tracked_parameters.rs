@@ -72,13 +72,11 @@ pub(crate) struct MovementTest {
 
 impl TrackedModel {
     /// A model none of whose lines is tracked.
-    #[must_use]
     pub(crate) fn without_line(model: Model) -> Self {
         Self { model, line: None }
     }
 
     /// `model` with the one of its lines that moves most clearly among `epochs`, if one does, and the test of that line.
-    #[must_use]
     pub(crate) fn select_line(model: Model, epochs: &[Curve<OCTAVES>]) -> (Self, Option<MovementTest>) {
         let is_line = |term: &FittedTerm| match term.kind {
             NoiseTerm::Sinusoid(_) => term.value > 0.0,
@@ -106,13 +104,11 @@ impl TrackedModel {
     }
 
     /// The model with all parameters at their means.
-    #[must_use]
     pub(crate) fn model(&self) -> &Model {
         &self.model
     }
 
     /// Mean frequency of the line that is tracked, Hz.
-    #[must_use]
     pub(crate) fn line_frequency(&self) -> Option<f64> {
         match self.model.terms()[self.line?].kind.shape() {
             Shape::Resonance { frequency, .. } | Shape::Sinusoid { frequency } => Some(frequency),
@@ -121,13 +117,11 @@ impl TrackedModel {
     }
 
     /// All parameters that can be tracked.
-    #[must_use]
     pub(crate) fn largest_set(&self) -> TrackedSet {
         if self.line.is_some() { TrackedSet::LevelAndLine } else { TrackedSet::Level }
     }
 
     /// The model with the parameters of an epoch.
-    #[must_use]
     pub(crate) fn at(&self, [level, line]: ParameterVector) -> Model {
         let moved = |(at, term): (usize, &FittedTerm)| {
             let mut term = *term;
@@ -162,7 +156,6 @@ impl TrackedModel {
     /// Tests whether the epochs need the parameters `more`, which are one more than `fewer`.
     ///
     /// If that parameter does not move, each epoch's deviance decreases by χ² of one degree of freedom times its scatter.
-    #[must_use]
     pub(crate) fn test_movement(&self, epochs: &[Curve<OCTAVES>], fewer: TrackedSet, more: TrackedSet) -> MovementTest {
         let decrease = |epoch: &Curve<OCTAVES>| {
             let estimate = self.estimate(epoch, more);
@@ -174,7 +167,6 @@ impl TrackedModel {
     }
 
     /// The parameters of an epoch; those that are not in `tracked` are 0.
-    #[must_use]
     pub(crate) fn estimate(&self, epoch: &Curve<OCTAVES>, tracked: TrackedSet) -> EpochEstimate {
         let epoch = ComparedCurve::new(epoch, &self.model);
         let avars = |parameters: ParameterVector| -> Vec<f64> {

@@ -26,7 +26,6 @@ const WANDERING: f64 = 4.0;
 const MIN_SAMPLES: usize = 100 * SEGMENTS;
 
 /// Lost samples, repeated samples and a wrong sample rate, as far as they are found, in this order.
-#[must_use]
 pub(crate) fn detect(measurement: &Measurement) -> Vec<Detection> {
     [lost_samples_of(measurement), repeated_samples(measurement), sample_clock(measurement)]
         .into_iter()
@@ -40,7 +39,6 @@ pub(crate) fn lost_samples_of(measurement: &Measurement) -> Option<Detection> {
 
 /// Samples that never arrived, beside the `used` ones: the sample indices or time stamps have room for them. A single one is
 /// reported, because only a loss leaves such room.
-#[must_use]
 pub(crate) fn lost_samples(used: u64, dropped: &BTreeMap<&'static str, u64>, gaps: usize) -> Option<Detection> {
     let missing = dropped.get("gap").copied().unwrap_or(0);
     if missing == 0 {
@@ -62,7 +60,6 @@ pub(crate) fn lost_samples(used: u64, dropped: &BTreeMap<&'static str, u64>, gap
 }
 
 /// Samples that equal the sample before in all channels, if there are more of them than by chance.
-#[must_use]
 pub(crate) fn repeated_samples(measurement: &Measurement) -> Option<Detection> {
     let channels = &measurement.channels;
     let mut equal = vec![0u64; channels.len()];
@@ -101,7 +98,6 @@ pub(crate) fn repeated_samples(measurement: &Measurement) -> Option<Detection> {
 
 /// Compares the sample rate by the time stamps with the stated rate, or without one with the nearest rate that the sensor
 /// can be set to or that hosts usually read at; and its parts with each other. A sensor without a data sheet has no rate of its own.
-#[must_use]
 pub(crate) fn sample_clock(measurement: &Measurement) -> Option<Detection> {
     let MeasuredValue { value: measured, error } = rate_by_time_stamps(measurement)?;
     let nominal = measurement.stated_rate_hz.or_else(|| nearest_usual_rate(&measurement.profile, measured));
@@ -121,7 +117,6 @@ pub(crate) fn sample_clock(measurement: &Measurement) -> Option<Detection> {
 
 /// The sample rate by the time stamps, Hz: its standard deviation is that of the segments' rates and
 /// [`SensorProfile::host_clock_error`]. `None` without time stamps or with fewer than [`MIN_SAMPLES`].
-#[must_use]
 pub(crate) fn rate_by_time_stamps(measurement: &Measurement) -> Option<MeasuredValue> {
     let rates = segment_rates(measurement, SEGMENTS)?;
     let [measured] = segment_rates(measurement, 1)?[..] else { return None };

@@ -201,7 +201,6 @@ impl UniformSeries {
     ///
     /// Where the output stays at one step of the quantizer for several samples, the rounding error is correlated and
     /// would show as lines.
-    #[must_use]
     pub(crate) fn averaged_until_dithered(self) -> Self {
         let equal_apart = |distance: usize| {
             let pairs = self.values.iter().zip(self.values.iter().skip(distance));
@@ -219,7 +218,6 @@ impl UniformSeries {
 
     /// Means of blocks of `size` samples, at `size` times the period: of the samples that are there, where at least half are. An
     /// incomplete block at the end is left out.
-    #[must_use]
     pub(crate) fn averaged(&self, size: usize) -> Self {
         let average = |chunk: &[f64]| {
             let (sum, count) = chunk
