@@ -1,6 +1,6 @@
 //! Tail probabilities, quantiles and bounds of the normal, Student's, the Poisson and the exponential distribution.
 
-use statrs::distribution::{Continuous, ContinuousCDF, DiscreteCDF, Normal, Poisson, StudentsT};
+use statrs::distribution::{ChiSquared, Continuous, ContinuousCDF, DiscreteCDF, Normal, Poisson, StudentsT};
 use statrs::function::beta::checked_beta_reg;
 use statrs::function::gamma::checked_gamma_ur;
 
@@ -46,6 +46,11 @@ pub(crate) fn exponential_sum_tail(count: f64, sum: f64) -> f64 {
 /// Probability that the sum of the squares of `count` standard normal numbers exceeds `sum`; 1 where one of these is no positive number.
 pub(crate) fn chi_squared_tail(sum: f64, count: f64) -> f64 {
     exponential_sum_tail(0.5 * count, 0.5 * sum)
+}
+
+/// The value that the sum of the squares of so many standard normal numbers is below with this probability.
+pub(crate) fn chi_squared_quantile(probability: f64, count: f64) -> f64 {
+    ChiSquared::new(count).map_or(f64::INFINITY, |of| of.inverse_cdf(probability))
 }
 
 /// Probability that the mean of `above` exponential variables exceeds `ratio` times the mean of `below` others; 1 where one of these is

@@ -3,6 +3,10 @@
 //!
 //! The [name](Effect::name) of an effect and those of its [parameters](Effect::parameters) are for tables and files; nothing in the
 //! analysis depends on them.
+//!
+//! In every kind a name ends with its unit (`_s`, `_hz`, `_percent`), times are counted from the first sample, `sigmas` is a significance in
+//! standard deviations, and `p_value` the probability by chance anywhere in the record, in white, flicker and walking noise of any mixture
+//! where it is of a bias.
 
 mod bias;
 mod disturbances;

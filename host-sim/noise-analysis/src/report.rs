@@ -2,6 +2,9 @@
 //!
 //! A report does not name the source of its samples: a recording that is read from a file and the same recording replayed
 //! over the bus give the same bytes.
+//!
+//! A name ends with its unit (`_s`, `_hz`, `_percent`); `low` and `high` are 95 % bounds; what has the name of a coefficient or of a deviation is
+//! in the `unit` beside it.
 
 pub mod assessment;
 pub mod comparison;
@@ -33,7 +36,6 @@ pub const SCHEMA: u32 = 2;
 /// A whole analysis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
-    /// [`SCHEMA`].
     pub schema: u32,
     /// Whether the report is of the curves alone, without what needs the samples themselves: spectra, spikes, steps, covariates,
     /// causes that channels have in common, and changes of the noise. Absent where it is not.
@@ -92,17 +94,11 @@ pub enum PartNote {
     /// The noise of every inertial channel is smaller than a step of its counts, whose rounding hides the filter.
     CountsTooCoarse,
     /// Neighbouring samples are not correlated: there is no filter, or one shorter than the sample period.
-    NotCorrelated {
-        /// The sample period, s.
-        period_s: f64,
-    },
+    NotCorrelated { period_s: f64 },
     /// Fewer than half of the channels are correlated as behind a filter.
     Minority(Vec<&'static str>),
     /// Every value of the filter is recorded, so that the clock is the sample rate; without time stamps that is stated, not measured.
-    StatedClock {
-        /// The stated sample rate, Hz.
-        sample_rate_hz: f64,
-    },
+    StatedClock { sample_rate_hz: f64 },
     /// There are no time stamps to measure the clock by.
     NoTimeStamps {
         /// The part's nominal clock, Hz.
@@ -124,27 +120,15 @@ pub enum PartNote {
         nominal_hz: f64,
     },
     /// A channel's own decimation is farther from the common one than chance explains.
-    Contradicted {
-        /// Name of the channel.
-        channel: &'static str,
-        /// Its decimation alone.
-        decimation: f64,
-    },
-    /// Some channels whose noise is larger than a count do not show the filter.
-    NotInAll {
-        /// Channels that show it.
-        showing: usize,
-        /// Channels that could.
-        able: usize,
-    },
+    Contradicted { channel: &'static str, decimation: f64 },
+    /// Of the channels `able` to show the filter, whose noise is larger than a count, so many do.
+    NotInAll { showing: usize, able: usize },
 }
 
 /// A stretch of the record, in seconds from its first sample.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Stretch {
-    /// Start, s.
     pub from_s: f64,
-    /// End, s.
     pub to_s: f64,
 }
 
@@ -206,13 +190,10 @@ pub struct MissingSamples {
 pub struct CurvePoint {
     /// Averaging factor, samples.
     pub n: u64,
-    /// Averaging time, s.
     pub tau_s: f64,
     /// Allan deviation in the channel's unit.
     pub adev: f64,
-    /// Lower 95 % bound of `adev`.
     pub low: f64,
-    /// Upper 95 % bound of `adev`.
     pub high: f64,
     /// Equivalent degrees of freedom.
     pub edf: f64,
@@ -262,13 +243,11 @@ pub struct SlopeMethodReport {
 /// One coefficient by the slope method.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SlopeMethodValue {
-    /// In `unit`.
     pub value: f64,
     /// Such as `deg/sqrt(s)`.
     pub unit: String,
-    /// Start of the interval in which the slope was found, s.
+    /// The interval in which the slope was found.
     pub from_s: f64,
-    /// End of that interval, s.
     pub to_s: f64,
 }
 
@@ -300,7 +279,6 @@ pub struct TermReport {
     pub term: FittedTerm,
     /// N below the corner of a Markov process that stands in the place of white noise, which a filter has made of it; absent of other terms.
     pub white_noise: Option<BoundedEstimate>,
-    /// Unit of the channel.
     pub unit: String,
 }
 
@@ -356,13 +334,9 @@ pub struct DataSheetReport {
 /// stand out of a band have a point of their own.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SpectrumReport {
-    /// Frequency, Hz.
     pub frequency_hz: Vec<f64>,
-    /// Measured.
     pub density: Vec<f64>,
-    /// Lower 95 % bound of `density`.
     pub low: Vec<f64>,
-    /// Upper 95 % bound of `density`.
     pub high: Vec<f64>,
     /// By the model `final`, without its sinusoids and without what follows a covariate.
     pub model: Vec<f64>,
@@ -371,11 +345,9 @@ pub struct SpectrumReport {
 /// Means of successive blocks of a channel, less the mean of them all, in the channel's unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BiasOverTime {
-    /// Length of a block, s.
     pub block_s: f64,
     /// Middle of each block, s from the first sample. Blocks without half of their samples are left out.
     pub time_s: Vec<f64>,
-    /// Measured.
     pub mean: Vec<f64>,
     /// What the channel's findings explain of it: steps, a ramp, and the share of temperature, supply and specific force. Empty
     /// where they explain nothing.

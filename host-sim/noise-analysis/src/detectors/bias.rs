@@ -68,10 +68,10 @@ struct Accepted {
     p_value: f64,
 }
 
-/// Finds the changes of the bias of `series`. Samples that a regressor lacks are not used; a regressor that lacks more
-/// than a tenth of them is left out. `accelerations` may shake the channel. `least_step`, in the channel's unit, bounds
-/// the size of a step from below: rounding makes smaller steps of slow changes.
-#[must_use]
+/// Looks for what changes the bias of `series`. `regressors` are other channels that may influence it. Samples that one of
+/// them lacks are not used; a regressor that lacks more than a tenth of the samples of `series` is left out. `accelerations`
+/// may shake the channel. Of slow changes rounding makes steps smaller than `least_step`, in the channel's unit, which is asked for where
+/// there is a step.
 pub(crate) fn find(
     series: &Series,
     regressors: &[&Series],

@@ -56,8 +56,7 @@ impl Course {
 }
 
 impl BiasResponse {
-    /// Bias in the sample period `slot`, in the channel's unit; 0 at the course's mean.
-    #[must_use]
+    /// The bias in the sample period `slot`, in the channel's unit; 0 at the mean of what it follows.
     pub(crate) fn bias(&self, slot: u64) -> f64 {
         let Course { width, values } = &self.bias;
         let place = (slot as f64 / *width as f64 - 0.5).clamp(0.0, (values.len() - 1) as f64);

@@ -27,17 +27,12 @@ impl BlockMeans {
         if width < FEWEST_SLOTS {
             return None;
         }
-        let (mut sums, mut counts) = (vec![0.0; BLOCKS], vec![0u64; BLOCKS]);
-        for (&slot, value) in series.slots.iter().zip(series.values.iter()) {
-            if let Some(sum) = sums.get_mut((slot / width) as usize) {
-                *sum += value;
-                counts[(slot / width) as usize] += 1;
-            }
-        }
-        let fill = |number: usize| counts[number] as f64 / width as f64;
+        // The few samples after the last whole block are left out.
+        let sums = series.sums_of_blocks(0, width);
+        let fill = |number: usize| sums[number].1 as f64 / width as f64;
         let numbers: Vec<usize> = (0..BLOCKS).filter(|&number| fill(number) >= LEAST_FILL).collect();
         let means =
-            DVector::from_iterator(numbers.len(), numbers.iter().map(|&number| sums[number] / counts[number] as f64));
+            DVector::from_iterator(numbers.len(), numbers.iter().map(|&number| sums[number].0 / sums[number].1 as f64));
         let least = LEAST_CHANGE * series.resolution;
         let changes = means.iter().any(|mean| (mean - means[0]).abs() > least);
         (numbers.len() >= FEWEST_BLOCKS && changes).then(|| Self {

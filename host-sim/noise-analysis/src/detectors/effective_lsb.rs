@@ -10,7 +10,6 @@ use crate::samples::series::Series;
 const FEWEST_CHANGES: usize = 50;
 
 /// The largest number of counts that divides every difference of two values; 1 if the values change fewer than 50 times.
-#[must_use]
 pub(crate) fn counts_per_step(series: &Series) -> u32 {
     let Some(&first) = series.values.first() else { return 1 };
     let count = |value: f64| ((value - first) / series.resolution).round().abs() as u64;
@@ -19,7 +18,7 @@ pub(crate) fn counts_per_step(series: &Series) -> u32 {
     if changes < FEWEST_CHANGES { 1 } else { u32::try_from(divisor).unwrap_or(1).max(1) }
 }
 
-#[must_use]
+/// Reports a step of more than one count.
 pub(crate) fn find(series: &Series) -> Option<Detection> {
     let counts = counts_per_step(series);
     if counts == 1 {

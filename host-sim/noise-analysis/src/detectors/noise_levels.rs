@@ -3,12 +3,11 @@
 //! Levels of neighbouring blocks are compared by Fisher's F distribution, with no more degrees of freedom than the
 //! scatter of the levels allows.
 
-use crate::distributions::{quantile, student_tail};
+use crate::distributions::{mean_ratio_tail, quantile, student_tail};
 use crate::effects::findings::REFUTED;
 use crate::minimum::end_of;
 use crate::robust::median;
 use crate::samples::series::Series;
-use statrs::function::beta::checked_beta_reg;
 use std::ops::Range;
 
 /// Errors above this many standard deviations are left out of the estimated deviation; 7·10⁻⁶ of normal ones.
@@ -369,7 +368,7 @@ impl Wandering {
 /// Upper tail of Fisher's F distribution, for a `ratio` of mean squares with these degrees of freedom.
 pub(super) fn exceedance(ratio: f64, freedom: f64, of_other: f64) -> f64 {
     let (freedom, of_other) = (freedom.min(MOST_FREEDOM), of_other.min(MOST_FREEDOM));
-    checked_beta_reg(0.5 * of_other, 0.5 * freedom, of_other / (of_other + freedom * ratio)).unwrap_or(1.0)
+    mean_ratio_tail(ratio, 0.5 * freedom, 0.5 * of_other)
 }
 
 /// The ratio whose [`exceedance`] is `p_value`, to 10⁻⁶.

@@ -130,8 +130,8 @@ impl ValueCounts {
     }
 }
 
-/// Noise below a count: a first Allan variance below that of [dithered](dithered_avar) samples.
-#[must_use]
+/// Noise that does not reach from one count to the next: its Allan variance at the shortest octaves is below that of
+/// [dithered](dithered_avar) samples, whose variance is `dithered_avar_counts2` counts².
 pub(crate) fn find_noise_below_count(series: &Series, dithered_avar_counts2: f64) -> Option<Detection> {
     if series.values.len() < FEWEST_SAMPLES {
         return None;

@@ -31,8 +31,8 @@ const SLOW_FRACTION: f64 = 0.01;
 /// Parts of a time constant per change: a decay loses a fifth.
 const PER_CHANGE: f64 = 4.0;
 
-/// `correlation_times`, in s, are those in the Allan curve.
-#[must_use]
+/// Looks for telegraph noise in a channel with the given unit. `correlation_times` are those that its Allan curve has shown,
+/// in s.
 pub(crate) fn find(series: &UniformSeries, unit: &'static str, correlation_times: &[f64]) -> Option<TelegraphNoise> {
     let samples = series.values().len();
     let known = correlation_times.iter().map(|time| ((time / RESOLVED / series.sample_period()) as usize).max(1));
@@ -57,8 +57,8 @@ pub(crate) fn find(series: &UniformSeries, unit: &'static str, correlation_times
     found
 }
 
-/// True if a Gaussian process is [`TOLD_APART`] times as likely; correlation time in s.
-#[must_use]
+/// Whether a Gaussian process is [`TOLD_APART`] times as likely as two levels, both with about this standard deviation and this correlation
+/// time, in s.
 pub(crate) fn is_gaussian(series: &UniformSeries, deviation: f64, time_constant: f64) -> bool {
     let size = ((time_constant / RESOLVED / series.sample_period()) as usize).max(1);
     let mut means = PartMeans::new(series, size).means;
@@ -68,8 +68,12 @@ pub(crate) fn is_gaussian(series: &UniformSeries, deviation: f64, time_constant:
     gauss_markov_log_likelihood(&means) - levels.log_likelihood > TOLD_APART.ln()
 }
 
-/// True if changes up and down over `time_constant`/4 s are alike: Σd³ over √Σd⁶ is then about standard normal.
-#[must_use]
+/// Whether a series changes upwards as it changes downwards, as random telegraph noise and every Gaussian process do, over a
+/// quarter of `time_constant` s. Disturbances that begin at once and decay do not.
+///
+/// In a process that is the same when time runs backwards the changes are symmetrical, so that the sum of their cubes over the
+/// root of the sum of their sixth powers is about a standard normal number; neighbouring changes have correlations below 0,
+/// which lower it.
 pub(crate) fn is_reversible(series: &UniformSeries, time_constant: f64) -> bool {
     let size = ((time_constant / PER_CHANGE / series.sample_period()) as usize).max(1);
     let means = PartMeans::new(series, size).means;
@@ -81,8 +85,9 @@ pub(crate) fn is_reversible(series: &UniformSeries, time_constant: f64) -> bool 
     sixths <= 0.0 || cubes.abs() < quantile(0.5 * REFUTED) * sixths.sqrt()
 }
 
-/// True if visits of at most one sample explain `spikes`: `ab`·(sample period) a second, for the jump rates `a`, `b`.
-#[must_use]
+/// Whether visits to a level of `telegraph` noise that last no longer than a sample are as frequent and as large as `spikes`. With
+/// the rates `a` and `b` of the jumps up and down there are `ab` times a sample period of them a second, at most a quarter of that
+/// over the square of the time constant `1/(a + b)`.
 pub(crate) fn explains_spikes(telegraph: &TelegraphNoise, spikes: &Spikes, sample_period: f64) -> bool {
     let visits_per_hour =
         3600.0 * sample_period / (4.0 * telegraph.time_constant_s.low * telegraph.time_constant_s.low);

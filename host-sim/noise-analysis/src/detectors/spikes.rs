@@ -330,7 +330,7 @@ impl Disturbance {
     }
 }
 
-#[must_use]
+/// Looks for spikes in one channel, but for stretches in which its noise is `louder` by itself. `None` if there are none, or if jumps of the bias are at least as frequent.
 pub(crate) fn find(series: &Series, louder: &[Range<u64>]) -> Option<Detection> {
     let rule = SpikeRule::fit(series)?;
     let looked_at = (series.duration_s() / 3600.0, series.values.len() as u64);

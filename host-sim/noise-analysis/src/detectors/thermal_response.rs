@@ -28,21 +28,15 @@ impl TemperatureCourse {
     pub(super) fn new(series: &Series, width: u64) -> Option<Self> {
         let width = (width / FRACTIONS).max(1);
         let first = *series.values.first().filter(|_| series.unit == "degC")?;
-        let count = usize::try_from(series.slots.last()? / width + 1).ok()?;
-        let mut sums = vec![(0.0, 0u32); count];
-        for (&slot, value) in series.slots.iter().zip(series.values.iter()) {
-            let (sum, count) = &mut sums[(slot / width) as usize];
-            (*sum, *count) = (*sum + value, *count + 1);
-        }
-        // Missing samples repeat the last temperature.
+        // Where samples are missing, the temperature is the last one that was measured.
         let mut last = first;
-        let mean = |(sum, count): &(f64, u32)| {
-            if *count > 0 {
-                last = sum / f64::from(*count);
+        let mean = |(sum, count)| {
+            if count > 0 {
+                last = sum / count as f64;
             }
             last
         };
-        let values = sums.iter().map(mean).collect();
+        let values = series.sums_of_blocks(0, width).into_iter().map(mean).collect();
         Some(Self { measured: Course { width, values }, period_s: series.period_s })
     }
 

@@ -52,13 +52,11 @@ impl Kind for LinearDrift {
 /// A bias that becomes another one from one sample to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LevelStep {
-    /// When, s from the first sample.
     #[serde(skip)]
     pub time_s: BoundedEstimate,
     /// New level less the old one.
     #[serde(skip)]
     pub size: ChannelEstimate,
-    /// Probability of such a step anywhere by chance in white, flicker and walking noise of any mixture.
     pub p_value: f64,
 }
 
@@ -90,12 +88,9 @@ pub struct TurnOnTransient {
     /// Bias at the start less the bias that it settles to.
     #[serde(skip)]
     pub size: ChannelEstimate,
-    /// Time constant, s.
     #[serde(skip)]
     pub time_constant_s: BoundedEstimate,
-    /// Probability of such a transient by chance in white, flicker and walking noise of any mixture.
     pub p_value: f64,
-    /// Allan variance of the transient.
     #[serde(skip)]
     pub response: ResponseVariance,
 }

@@ -7,13 +7,11 @@ use serde::Serialize;
 /// Single samples that are farther from what their neighbours tell than chance explains.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spikes {
-    /// 1/h
     #[serde(skip)]
     pub rate_per_hour: BoundedEstimate,
     /// Distance from what the neighbours tell; in front of a filter, of the first sample that it changes from what those before it tell.
     #[serde(skip)]
     pub size: ChannelEstimate,
-    /// Number that was found.
     pub count: usize,
     /// Distance from which on a sample is one, in standard deviations of the interpolation.
     pub threshold_sigmas: f64,
@@ -40,10 +38,8 @@ impl Kind for Spikes {
 /// A time in which the noise is larger than before and after: a knock.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoisyInterval {
-    /// Beginning, s from the first sample.
     #[serde(skip)]
     pub from_s: BoundedEstimate,
-    /// End, s.
     #[serde(skip)]
     pub to_s: BoundedEstimate,
     /// Deviation of the noise over that of the stretches around it.
@@ -51,7 +47,6 @@ pub struct NoisyInterval {
     pub level: BoundedEstimate,
     /// Averaging time at which the levels are compared, s.
     pub tau_s: f64,
-    /// Probability of such a level by chance.
     pub p_value: f64,
     /// Names of the channels that show it at the same time, this one included.
     pub channels: Vec<&'static str>,
@@ -101,7 +96,6 @@ impl Kind for NoisyInterval {
 /// A level of the noise that becomes another one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LevelChange {
-    /// When, s from the first sample.
     #[serde(skip)]
     pub time_s: BoundedEstimate,
     /// Deviation of the noise after it over that before.
@@ -109,7 +103,6 @@ pub struct LevelChange {
     pub ratio: BoundedEstimate,
     /// Part of the changes of the level from block to block that this one explains.
     pub explained: f64,
-    /// Probability of such a change anywhere by chance.
     pub p_value: f64,
 }
 
@@ -143,9 +136,7 @@ pub struct MotionInterval {
     /// Largest distance of the mean of a second from the median.
     #[serde(skip)]
     pub size: ChannelEstimate,
-    /// What the distance is compared with.
     pub scale: MotionScale,
-    /// Number of stretches.
     pub stretches: usize,
     /// Their length together, s.
     pub moved_s: usize,

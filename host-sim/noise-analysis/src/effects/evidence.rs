@@ -20,9 +20,7 @@ pub struct CurveEvidence {
 /// What shows a line.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LineEvidence {
-    /// Whether the line has a width.
     pub has_width: bool,
-    /// The curve or the spectrum.
     pub source: LineSource,
 }
 
@@ -32,14 +30,12 @@ pub struct LineEvidence {
 pub enum LineSource {
     /// In the curve alone.
     Curve(CurveEvidence),
-    /// In the spectrum.
     Spectrum(SpectrumEvidence),
 }
 
 /// A line of a spectrum.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SpectrumEvidence {
-    /// Hz
     pub frequency_hz: f64,
     /// Whether that is half of the sample rate: an offset of every second sample.
     pub is_at_half_rate: bool,
@@ -47,7 +43,6 @@ pub struct SpectrumEvidence {
     pub width_hz: Option<f64>,
     /// Significance of the strongest peak, standard deviations.
     pub sigmas: f64,
-    /// Probability of such a peak anywhere by chance.
     pub p_value: f64,
 }
 

@@ -14,7 +14,6 @@ pub struct DroppedSamples {
     pub missing: f64,
     /// Number of all samples, those that were used and those that were dropped.
     pub samples: f64,
-    /// Number of gaps.
     pub gaps: usize,
 }
 
@@ -36,7 +35,6 @@ pub struct RepeatedSamples {
     pub fraction: BoundedEstimate,
     /// Number of those that equal the one before.
     pub equal: u64,
-    /// Number of all samples.
     pub samples: f64,
     /// How many chance makes equal, at most.
     pub by_chance: f64,
@@ -63,20 +61,16 @@ pub struct ClockDeviation {
     pub nominal_hz: f64,
     /// How far they are apart, in standard deviations of an ordinary host's clock.
     pub sigmas: f64,
-    /// A rate that becomes another one.
     pub change: Option<RateChange>,
 }
 
 /// A change of the sample rate at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RateChange {
-    /// When, s from the first sample.
     #[serde(skip)]
     pub time_s: BoundedEstimate,
-    /// The rate before it.
     #[serde(skip)]
     pub before_hz: BoundedEstimate,
-    /// The rate after it.
     #[serde(skip)]
     pub after_hz: BoundedEstimate,
     /// Their difference in standard deviations.
@@ -114,7 +108,6 @@ pub struct Saturation {
     pub is_end_of_range: bool,
     /// Number of samples at a limit.
     pub cut_off: f64,
-    /// Number of all samples.
     pub samples: f64,
     /// Most samples that have another value in common.
     pub most_of_others: u64,
@@ -138,11 +131,9 @@ pub struct StuckOutput {
     /// Its end, s.
     #[serde(skip)]
     pub to_s: BoundedEstimate,
-    /// Number of the runs.
     pub runs: u64,
     /// Number of their samples.
     pub stuck: u64,
-    /// Number of all samples.
     pub samples: u64,
 }
 

@@ -13,7 +13,6 @@ pub const REFUTED: f64 = 2e-4;
 /// An effect by which a channel shows a cause.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelEffect {
-    /// What the channel shows.
     pub effect: Effect,
     /// Position of the cause in the report's list of findings.
     pub finding: usize,
@@ -28,7 +27,6 @@ pub struct Finding {
     pub channels: Vec<String>,
     /// Position in `channels` of the one that shows it most clearly.
     pub clearest: usize,
-    /// Whether the model with this cause holds on data that it was not fitted to.
     pub validated: Validation,
     /// By channel: the part of the channel's Allan variance that is due to this cause, in percent, at the averaging time where
     /// it is largest.
@@ -50,7 +48,6 @@ pub enum Validation {
 /// An effect that a detector found in the samples of one channel or in their time base.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detection {
-    /// As reported.
     pub effect: Effect,
     /// What removes the effect from the samples; `None` where nothing can, or where the noise model has a term for it.
     pub correction: Option<Correction>,

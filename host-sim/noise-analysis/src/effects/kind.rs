@@ -122,9 +122,7 @@ impl std::iter::Sum for AddedVariance {
 pub(crate) struct AveragingTime<'a> {
     /// Averaging factor, samples.
     pub n: u64,
-    /// Sample period, s.
     pub period_s: f64,
-    /// Samples of the record.
     pub samples: u64,
     /// Allan variance of the channel's model.
     pub model_avar: f64,

@@ -10,7 +10,6 @@ use serde::Serialize;
 /// A line no wider than the record resolves.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SinusoidalLine {
-    /// Hz
     #[serde(skip)]
     pub frequency_hz: BoundedEstimate,
     #[serde(skip)]
@@ -50,7 +49,6 @@ impl Kind for SinusoidalLine {
 /// A line that is wider than the record resolves: a damped oscillation, or a frequency that wanders.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ResonantLine {
-    /// Hz
     #[serde(skip)]
     pub frequency_hz: BoundedEstimate,
     /// Full width at half maximum, Hz.
@@ -88,7 +86,6 @@ impl Kind for ResonantLine {
 /// A square wave: a fundamental with its odd harmonics, whose amplitudes fall as 1/k.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SquareWave {
-    /// Hz
     #[serde(skip)]
     pub frequency_hz: BoundedEstimate,
     /// Half the distance of its levels.

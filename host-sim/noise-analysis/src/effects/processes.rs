@@ -11,7 +11,6 @@ use serde::Serialize;
 pub struct MarkovProcess {
     #[serde(skip)]
     pub deviation: ChannelEstimate,
-    /// Correlation time, s.
     #[serde(skip)]
     pub time_constant_s: BoundedEstimate,
     pub evidence: MarkovEvidence,
@@ -55,7 +54,6 @@ pub struct TelegraphNoise {
     /// Distance of the levels.
     #[serde(skip)]
     pub amplitude: ChannelEstimate,
-    /// What tells it from a Markov process.
     pub evidence: TelegraphEvidence,
 }
 
@@ -106,7 +104,6 @@ pub struct ShotNoise {
     pub sum: f64,
     /// The same behind the filter in reversed time.
     pub reversed: f64,
-    /// Probability by chance.
     pub p_value: f64,
 }
 
@@ -130,7 +127,6 @@ impl Kind for ShotNoise {
 pub struct CommonMode {
     #[serde(skip)]
     pub deviation: ChannelEstimate,
-    /// Correlation time, s.
     #[serde(skip)]
     pub time_constant_s: BoundedEstimate,
     /// Names of the other channels that have it.

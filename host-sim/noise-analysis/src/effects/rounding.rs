@@ -14,7 +14,6 @@ pub struct AngleQuantization {
     /// Q, in the unit times s.
     #[serde(skip)]
     pub coefficient: ChannelEstimate,
-    /// What the curve shows of it.
     pub evidence: CurveEvidence,
 }
 
@@ -44,9 +43,7 @@ pub struct EffectiveLsb {
     pub step: ChannelEstimate,
     /// The same in counts.
     pub counts: u32,
-    /// Number of values.
     pub values: usize,
-    /// Number of times that the value changes.
     pub changes: usize,
 }
 

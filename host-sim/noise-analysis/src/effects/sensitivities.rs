@@ -12,7 +12,6 @@ pub struct TemperatureSensitivity {
     /// In the unit per degC.
     #[serde(skip)]
     pub sensitivity: ChannelEstimate,
-    /// Significance, standard deviations.
     pub sigmas: f64,
 }
 
@@ -40,7 +39,6 @@ pub struct SupplySensitivity {
     /// In the unit per V.
     #[serde(skip)]
     pub sensitivity: ChannelEstimate,
-    /// Significance, standard deviations.
     pub sigmas: f64,
 }
 
@@ -73,7 +71,6 @@ pub struct TemperatureCurvature {
     pub curvature: ChannelEstimate,
     /// Temperature at which the parabola is expanded, °C: the mean of the record.
     pub reference_degc: f64,
-    /// Probability of such a curvature by chance in white, flicker and walking noise of any mixture.
     pub p_value: f64,
     /// Allan variance of the part that follows the square.
     #[serde(skip)]
@@ -119,9 +116,7 @@ pub struct ThermalLag {
     /// Time constant of the lag, s.
     #[serde(skip)]
     pub time_constant_s: BoundedEstimate,
-    /// Probability of such a sensitivity by chance in white, flicker and walking noise of any mixture.
     pub p_value: f64,
-    /// Allan variance of the bias that follows.
     #[serde(skip)]
     pub response: ResponseVariance,
 }
@@ -166,7 +161,6 @@ pub struct AccelerationSensitivity {
     /// Along x, y and z, in the unit per g; `None` where there is no such channel or the rate does not follow it.
     #[serde(skip)]
     pub sensitivity: [Option<ChannelEstimate>; 3],
-    /// Significance of the clearest of them, standard deviations.
     pub sigmas: f64,
 }
 
@@ -212,9 +206,7 @@ pub struct VibrationRectification {
     pub accelerometer: &'static str,
     /// Root mean square of the strongest vibration, in the unit `per`.
     pub strongest: f64,
-    /// Probability of such a sensitivity by chance in white, flicker and walking noise of any mixture.
     pub p_value: f64,
-    /// Allan variance of the bias that follows.
     #[serde(skip)]
     pub response: ResponseVariance,
 }
@@ -243,7 +235,6 @@ pub struct SharedDrift {
     pub per: &'static str,
     /// Name of the other channel.
     pub with: &'static str,
-    /// Significance, standard deviations.
     pub sigmas: f64,
     /// How many times the data sheet's sensitivity is the largest that is plausible.
     pub largest_multiple: f64,

@@ -11,7 +11,6 @@ use serde::Serialize;
 /// differ a little.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModulatedLine {
-    /// Hz
     #[serde(skip)]
     pub frequency_hz: BoundedEstimate,
     /// Amplitude in the middle between its largest and its smallest value.
@@ -25,7 +24,6 @@ pub struct ModulatedLine {
     pub period_s: BoundedEstimate,
     /// Whether the phase changes, and not the amplitude.
     pub of_phase: bool,
-    /// What shows the change.
     pub evidence: ModulationEvidence,
 }
 
@@ -81,7 +79,6 @@ pub struct Chirp {
     pub amplitude: ChannelEstimate,
     /// Power over the noise of short spectra.
     pub excess: f64,
-    /// Probability anywhere by chance.
     pub p_value: f64,
 }
 
@@ -137,7 +134,6 @@ pub struct Periodic {
     pub harmonics: Vec<f64>,
     /// Power of the harmonics over the noise.
     pub sum: f64,
-    /// Probability at any period by chance.
     pub p_value: f64,
 }
 

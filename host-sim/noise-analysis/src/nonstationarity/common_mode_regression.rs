@@ -18,7 +18,6 @@ const DEGREES_OF_FREEDOM_PER_WEIGHT: f64 = 10.0;
 /// The share of the common mode at one averaging time of the first half.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OctaveShares {
-    /// Averaging time, s.
     pub tau_s: f64,
     /// Degrees of freedom of the variance of flicker noise.
     pub edf: f64,
@@ -29,7 +28,6 @@ pub struct OctaveShares {
 /// The gain of subtracting the common mode at one averaging time of the second half.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HoldOutGain {
-    /// Averaging time, s.
     pub tau_s: f64,
     /// By channel: Allan deviation after over before; above 1 the channel is worse after it.
     pub ratio: Vec<f64>,

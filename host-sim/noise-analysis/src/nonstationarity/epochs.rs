@@ -37,8 +37,8 @@ pub(crate) struct EpochCurves {
 }
 
 impl EpochCurves {
-    /// Curves of a series, halved at `middle`; `None` below 24,576 sample periods, or if constant for an epoch.
-    #[must_use]
+    /// Curves of a series whose second half begins with the sample period `middle`, of at least 24,576 sample periods (two halves
+    /// of twelve shortest epochs). `None` of a shorter one, and where the channel does not change for a whole epoch of the first half.
     pub(crate) fn from_series(series: &Series, middle: u64) -> Option<Self> {
         let to = series.span.end;
         let (epoch, ranges) = epochs(series.span.clone(), middle)?;
@@ -59,8 +59,8 @@ impl EpochCurves {
         self.unseen_epochs.iter().all(changes)
     }
 
-    /// The curves by averaging factors in samples if the series has means, with `shorter` ones of the samples.
-    #[must_use]
+    /// The same curves of a channel by averaging factors in samples, where the series has means, with those of the samples at `shorter`
+    /// averaging times.
     pub(crate) fn in_samples(self, shorter: &SampleCurves) -> Self {
         let in_samples = |means: &Curve<OCTAVES>, slots: Range<u64>| {
             let of_samples = shorter.within(slots, Exclusion::ByFirstHalf);
@@ -84,8 +84,7 @@ impl EpochCurves {
         }
     }
 
-    /// The curves without the `signals` of the first half, which continue in the second.
-    #[must_use]
+    /// The same curves without the `signals` of the first half, which go on in the second.
     pub(crate) fn without(mut self, signals: &SignalShare) -> Self {
         if signals.is_empty() {
             return self;
@@ -103,17 +102,16 @@ impl EpochCurves {
         self
     }
 
-    #[must_use]
+    /// Epochs of the later quarter of the first half.
     pub(crate) fn latest_epochs(&self) -> &[Curve<OCTAVES>] {
         &self.fitted_epochs[self.fitted_epochs.len() / 2..]
     }
 
     /// The later quarter's curve with the median of its epochs, at octaves with at least 64 averages in an epoch.
     ///
-    /// Some minutes of vibration hardly change it. The median of variances with `ν` degrees of freedom is low by `(1 −
-    /// 2/(9ν))³` (E. Wilson and M. Hilferty, 1931), which is divided out. Its scatter, a fourth above that of the mean,
-    /// is not in the confidence bounds.
-    #[must_use]
+    /// Some minutes of vibration raise the mean of the quarter and hardly the median of its epochs. The median of variances
+    /// with `ν` degrees of freedom is low by the factor `(1 − 2/(9ν))³` (E. Wilson and M. Hilferty, 1931), which is divided
+    /// out. The median scatters by a fourth more than the mean; the confidence bounds do not include that.
     pub(crate) fn median_curve(&self) -> Curve<OCTAVES> {
         let mut curve = self.quarters[1].clone();
         curve.replace_avar(|point| median_avar(self.latest_epochs(), point.n).unwrap_or(point.avar));
@@ -139,8 +137,8 @@ pub(super) fn curve(series: &Series, slots: Range<u64>) -> Curve<OCTAVES> {
     Rounding::of_curve(&curve, series.resolution).subtracted_from(curve)
 }
 
-fn median_avar<const POINTS: usize>(epochs: &[Curve<POINTS>], n: u64) -> Option<f64> {
-    let used = |epoch: &Curve<POINTS>| {
+fn median_avar(epochs: &[Curve<OCTAVES>], n: u64) -> Option<f64> {
+    let used = |epoch: &Curve<OCTAVES>| {
         let point = epoch.points().iter().find(|point| point.n == n)?;
         (n * MIN_AVERAGES <= epoch.samples()).then_some(*point)
     };
@@ -159,7 +157,8 @@ pub(crate) struct ComparedCurve {
 }
 
 impl ComparedCurve {
-    pub(crate) fn new<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> Self {
+    pub(crate) fn new(curve: &Curve<OCTAVES>, model: &Model) -> Self {
+        // A variance of 0, of counts that repeat with this averaging time, has no logarithm.
         let points = curve.points().iter().filter(|point| point.n <= curve.samples() / 8 && point.avar > 0.0);
         Self { points: points.map(|point| (*point, model.edf(point))).collect() }
     }
@@ -168,20 +167,29 @@ impl ComparedCurve {
         self.points.len()
     }
 
-    /// `mean edf·(ln(m/v) + v/m − 1)` of a model with the Allan variance `modelled`.
-    pub(crate) fn deviance_per_point(&self, modelled: impl Fn(u64) -> f64) -> f64 {
-        let of = |(point, edf): &(AllanPoint, f64)| {
-            let ratio = point.avar / modelled(point.n);
+    /// Its points, each with its degrees of freedom.
+    pub(super) fn points(&self) -> &[(AllanPoint, f64)] {
+        &self.points
+    }
+
+    /// `Σ edf·(ln(m/v) + v/m − 1)` of a model with these Allan variances at the points.
+    pub(super) fn deviance(&self, modelled: impl Iterator<Item = f64>) -> f64 {
+        let of = |((point, edf), modelled): (&(AllanPoint, f64), f64)| {
+            let ratio = point.avar / modelled;
             edf * (ratio - 1.0 - ratio.ln())
         };
-        self.points.iter().map(of).sum::<f64>() / self.len().max(1) as f64
+        self.points.iter().zip(modelled).map(of).sum()
+    }
+
+    /// The mean of this sum for a model with the Allan variance `modelled`.
+    pub(crate) fn deviance_per_point(&self, modelled: impl Fn(u64) -> f64) -> f64 {
+        self.deviance(self.points.iter().map(|(point, _)| modelled(point.n))) / self.len().max(1) as f64
     }
 }
 
 /// Comparison of two stretches at the octave at which they differ most.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Stationarity {
-    /// Averaging time, s.
     pub tau_s: f64,
     /// Allan variance of the later stretch over that of the earlier one.
     pub variance_ratio: f64,
@@ -205,7 +213,7 @@ impl Stationarity {
     /// The ratio of two variances has Fisher's distribution, with degrees of freedom by `model`. The p-value of the
     /// clearest octave is multiplied by the number of octaves (Bonferroni).
     #[must_use]
-    pub fn compare<const POINTS: usize>(earlier: &Curve<POINTS>, later: &Curve<POINTS>, model: &Model) -> Option<Self> {
+    pub fn compare(earlier: &Curve<OCTAVES>, later: &Curve<OCTAVES>, model: &Model) -> Option<Self> {
         let longest = earlier.samples().min(later.samples()) / 8;
         let compare = |(before, after): (&AllanPoint, &AllanPoint)| {
             let ratio = after.avar / before.avar;

@@ -6,6 +6,7 @@
 
 use super::epochs::{ComparedCurve, EpochCurves, MIN_AVERAGES, SIGNIFICANCE};
 use super::tracked_parameters::{MAX_LEVEL, PARAMETERS, ParameterVector, TrackedModel, TrackedSet, minimum};
+use crate::OCTAVES;
 use allan_core::{Curve, Model};
 use serde::Serialize;
 
@@ -24,9 +25,8 @@ pub struct TrackingErrors {
     pub one_step_static: f64,
 }
 
-/// Selects the parameters to track, by the first half alone. The line is tracked only together with the level.
-#[must_use]
-pub(crate) fn select_tracked<const POINTS: usize>(model: &TrackedModel, fitted: &[Curve<POINTS>]) -> TrackedSet {
+/// The parameters to track, by the epochs of the first half alone. The line is tracked only together with the level.
+pub(crate) fn select_tracked(model: &TrackedModel, fitted: &[Curve<OCTAVES>]) -> TrackedSet {
     let level = model.test_movement(fitted, TrackedSet::Nothing, TrackedSet::Level);
     match model.largest_set() {
         TrackedSet::LevelAndLine => TrackedSet::LevelAndLine,
@@ -35,13 +35,12 @@ pub(crate) fn select_tracked<const POINTS: usize>(model: &TrackedModel, fitted: 
     }
 }
 
-/// Tracks the parameters through the epochs of both halves; the errors are those on the second `half`.
-#[must_use]
-pub(crate) fn track<const POINTS: usize>(
+/// Tracks the parameters `tracked` through the epochs of both halves; the errors are those on the second half `half`.
+pub(crate) fn track(
     model: &TrackedModel,
     tracked: TrackedSet,
-    [fitted, unseen]: [&[Curve<POINTS>]; 2],
-    half: &Curve<POINTS>,
+    [fitted, unseen]: [&[Curve<OCTAVES>]; 2],
+    half: &Curve<OCTAVES>,
 ) -> TrackingErrors {
     let models = predictions(model, tracked, [fitted, unseen]);
     let compared: Vec<_> = unseen.iter().map(|epoch| ComparedCurve::new(epoch, model.model())).collect();
@@ -54,12 +53,8 @@ pub(crate) fn track<const POINTS: usize>(
     }
 }
 
-/// The model of each epoch of the second half, predicted from the epochs before.
-fn predictions<const POINTS: usize>(
-    model: &TrackedModel,
-    tracked: TrackedSet,
-    [fitted, unseen]: [&[Curve<POINTS>]; 2],
-) -> Vec<Model> {
+/// The model of each epoch of the second half, with the parameters that the epochs before it predict.
+fn predictions(model: &TrackedModel, tracked: TrackedSet, [fitted, unseen]: [&[Curve<OCTAVES>]; 2]) -> Vec<Model> {
     let estimates: Vec<_> = fitted.iter().chain(unseen).map(|epoch| model.estimate(epoch, tracked)).collect();
     let mut predicted = [[0.0; PARAMETERS]].repeat(unseen.len());
     for index in 0..PARAMETERS {
@@ -100,14 +95,15 @@ fn predict_one_step(measured: &[(f64, f64)], fitted: usize) -> Vec<f64> {
     predicted
 }
 
-/// Standard deviation of the difference between a parameter's means over `unseen` epochs and over the last `used` ones,
-/// if its random walk continues. With steps of variance `q`, the means over `L` epochs and over the following `H`
-/// differ by about `q·(L + H)/3`.
-#[must_use]
-pub(crate) fn expected_drift<const POINTS: usize>(
+/// Standard deviation of the difference between each parameter's mean over `unseen` epochs and its mean over the last
+/// `used` epochs of the first half, if the parameter goes on as a random walk with the steps of the first half.
+///
+/// With steps of variance `q`, the means over `L` epochs and over the `H` that follow differ by a variance of about
+/// `q·(L + H)/3`.
+pub(crate) fn expected_drift(
     model: &TrackedModel,
     tracked: TrackedSet,
-    fitted: &[Curve<POINTS>],
+    fitted: &[Curve<OCTAVES>],
     used: usize,
     unseen: usize,
 ) -> ParameterVector {
@@ -118,13 +114,9 @@ pub(crate) fn expected_drift<const POINTS: usize>(
     })
 }
 
-/// Deviance per point on `half` of a model whose parameters may differ by `drift` σ at the cost `(x/σ)²`.
-#[must_use]
-pub(crate) fn beyond_drift<const POINTS: usize>(
-    model: &TrackedModel,
-    drift: ParameterVector,
-    half: &Curve<POINTS>,
-) -> f64 {
+/// Deviance per point of a model on `half`, with parameters that may differ by `drift` (standard deviations): the minimum
+/// over the parameters `x` of the model's deviance and their cost `(x/σ)²`. Without drift the plain deviance per point.
+pub(crate) fn beyond_drift(model: &TrackedModel, drift: ParameterVector, half: &Curve<OCTAVES>) -> f64 {
     let half = ComparedCurve::new(half, model.model());
     let points = half.len() as f64;
     let cost = |parameters: ParameterVector| {
@@ -157,8 +149,7 @@ pub struct Baselines {
 }
 
 impl Baselines {
-    /// `baseline` was fitted to the first half; `model` gives the degrees of freedom.
-    #[must_use]
+    /// `baseline` is the baseline model, fitted to the first half; `model` gives the degrees of freedom.
     pub(crate) fn new(curves: &EpochCurves, baseline: &Model, model: &Model) -> Self {
         let half = ComparedCurve::new(&curves.unseen, model);
         let tracked = TrackedModel::without_line(baseline.clone());

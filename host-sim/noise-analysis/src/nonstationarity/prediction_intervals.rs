@@ -22,8 +22,7 @@ pub struct IntervalCoverage {
 }
 
 impl IntervalCoverage {
-    /// Predicts each octave of each epoch of the second half; `model` gives the degrees of freedom.
-    #[must_use]
+    /// Predicts each octave of each epoch of the second half from all epochs before it; `model` gives the degrees of freedom.
     pub(crate) fn of_second_half(curves: &EpochCurves, model: &Model) -> Self {
         let (mut octaves, mut within) = (0, 0);
         let longest = curves.epoch / MIN_AVERAGES;

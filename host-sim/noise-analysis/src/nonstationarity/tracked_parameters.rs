@@ -1,6 +1,8 @@
 //! A model whose white noise, and one of whose lines, may change between epochs.
 
-use super::epochs::SIGNIFICANCE;
+use super::epochs::{ComparedCurve, SIGNIFICANCE};
+use crate::OCTAVES;
+use crate::distributions::chi_squared_tail;
 use crate::fit::noise_terms::is_white;
 use crate::minimum::downhill;
 use allan_core::confidence::octave_correlation;
@@ -8,7 +10,6 @@ use allan_core::model::FittedTerm;
 use allan_core::term::{Resonance, Shape, Sinusoid};
 use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 use serde::Serialize;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 pub(crate) const PARAMETERS: usize = 2;
 /// Accuracy of ln of a parameter.
@@ -62,17 +63,13 @@ pub(crate) struct MovementTest {
 }
 
 impl TrackedModel {
-    #[must_use]
+    /// A model none of whose lines is tracked.
     pub(crate) fn without_line(model: Model) -> Self {
         Self { model, line: None }
     }
 
-    /// Selects the line that moves most clearly among `epochs`, if any, with its test.
-    #[must_use]
-    pub(crate) fn select_line<const POINTS: usize>(
-        model: Model,
-        epochs: &[Curve<POINTS>],
-    ) -> (Self, Option<MovementTest>) {
+    /// `model` with the one of its lines that moves most clearly among `epochs`, if one does, and the test of that line.
+    pub(crate) fn select_line(model: Model, epochs: &[Curve<OCTAVES>]) -> (Self, Option<MovementTest>) {
         let is_line = |term: &FittedTerm| match term.kind {
             NoiseTerm::Sinusoid(_) => term.value > 0.0,
             NoiseTerm::Resonance(line) => term.value > 0.0 && line.bandwidth < MAX_BANDWIDTH * line.frequency,
@@ -98,13 +95,12 @@ impl TrackedModel {
         }
     }
 
-    #[must_use]
+    /// The model with all parameters at their means.
     pub(crate) fn model(&self) -> &Model {
         &self.model
     }
 
-    /// Mean frequency of the tracked line, Hz.
-    #[must_use]
+    /// Mean frequency of the line that is tracked, Hz.
     pub(crate) fn line_frequency(&self) -> Option<f64> {
         match self.model.terms()[self.line?].kind.shape() {
             Shape::Resonance { frequency, .. } | Shape::Sinusoid { frequency } => Some(frequency),
@@ -112,12 +108,12 @@ impl TrackedModel {
         }
     }
 
-    #[must_use]
+    /// All parameters that can be tracked.
     pub(crate) fn largest_set(&self) -> TrackedSet {
         if self.line.is_some() { TrackedSet::LevelAndLine } else { TrackedSet::Level }
     }
 
-    #[must_use]
+    /// The model with the parameters of an epoch.
     pub(crate) fn at(&self, [level, line]: ParameterVector) -> Model {
         let moved = |(at, term): (usize, &FittedTerm)| {
             let mut term = *term;
@@ -148,49 +144,32 @@ impl TrackedModel {
         Model::new(moved.sample_period(), moved.terms().iter().enumerate().map(changed))
     }
 
-    /// Tests if the epochs need the parameters `more`, one more than `fewer`, by the decrease of each epoch's deviance.
-    #[must_use]
-    pub(crate) fn test_movement<const POINTS: usize>(
-        &self,
-        epochs: &[Curve<POINTS>],
-        fewer: TrackedSet,
-        more: TrackedSet,
-    ) -> MovementTest {
-        let decrease = |epoch: &Curve<POINTS>| {
+    /// Tests whether the epochs need the parameters `more`, which are one more than `fewer`.
+    ///
+    /// If that parameter does not move, each epoch's deviance decreases by χ² of one degree of freedom times its scatter.
+    pub(crate) fn test_movement(&self, epochs: &[Curve<OCTAVES>], fewer: TrackedSet, more: TrackedSet) -> MovementTest {
+        let decrease = |epoch: &Curve<OCTAVES>| {
             let estimate = self.estimate(epoch, more);
             (self.estimate(epoch, fewer).deviance - estimate.deviance) / estimate.scatter
         };
         let sum: f64 = epochs.iter().map(decrease).sum();
         let count = epochs.len() as f64;
-        // `count` > 0 in an `EpochCurves`.
-        let p_value = ChiSquared::new(count).map_or(1.0, |chi_squared| chi_squared.sf(sum.max(0.0)));
-        MovementTest { gain: sum / count, p_value }
+        MovementTest { gain: sum / count, p_value: chi_squared_tail(sum, count) }
     }
 
-    /// The parameters of an epoch; 0 if not in `tracked`.
-    #[must_use]
-    pub(crate) fn estimate<const POINTS: usize>(&self, epoch: &Curve<POINTS>, tracked: TrackedSet) -> EpochEstimate {
-        let points: Vec<(&AllanPoint, f64)> = epoch
-            .points()
-            .iter()
-            .filter(|point| point.n <= epoch.samples() / 8 && point.avar > 0.0)
-            .map(|point| (point, self.model.edf(point)))
-            .collect();
+    /// The parameters of an epoch; those that are not in `tracked` are 0.
+    pub(crate) fn estimate(&self, epoch: &Curve<OCTAVES>, tracked: TrackedSet) -> EpochEstimate {
+        let epoch = ComparedCurve::new(epoch, &self.model);
         let avars = |parameters: ParameterVector| -> Vec<f64> {
             let model = self.at(parameters);
-            points.iter().map(|(point, _)| model.avar(point.n)).collect()
+            epoch.points().iter().map(|(point, _)| model.avar(point.n)).collect()
         };
         // White Allan variance: the difference by doubling it.
         let white: Vec<f64> =
             avars([2f64.ln(), 0.0]).iter().zip(avars([0.0; 2])).map(|(twice, once)| twice - once).collect();
         let deviance = |level: f64, avars: &[f64]| {
             let added = level.exp() - 1.0;
-            let modelled = avars.iter().zip(&white).map(|(all, white)| all + added * white);
-            let of = |((point, edf), modelled): (&(&AllanPoint, f64), f64)| {
-                let ratio = point.avar / modelled;
-                edf * (ratio - 1.0 - ratio.ln())
-            };
-            points.iter().zip(modelled).map(of).sum::<f64>()
+            epoch.deviance(avars.iter().zip(&white).map(|(all, white)| all + added * white))
         };
         let best_level = |avars: &[f64]| minimum(|level| deviance(level, avars), 0.0, 0.05, MAX_LEVEL);
         let at_line = |line: f64| {
@@ -209,7 +188,7 @@ impl TrackedModel {
                 [at_line(line).0, line]
             }
         };
-        let (error, scatter) = self.uncertainty(&points, parameters, tracked);
+        let (error, scatter) = self.uncertainty(epoch.points(), parameters, tracked);
         let deviance = deviance(parameters[0], &avars([0.0, parameters[1]]));
         EpochEstimate { parameters, error, deviance, scatter }
     }
@@ -217,7 +196,7 @@ impl TrackedModel {
     /// Sandwich estimator `H⁻¹·S·H⁻¹`: standard deviations, and the factor by correlated points on the last variance.
     fn uncertainty(
         &self,
-        points: &[(&AllanPoint, f64)],
+        points: &[(AllanPoint, f64)],
         parameters: ParameterVector,
         tracked: TrackedSet,
     ) -> (ParameterVector, f64) {

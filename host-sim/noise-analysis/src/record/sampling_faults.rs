@@ -24,8 +24,7 @@ const WANDERING: f64 = 4.0;
 /// Shortest recording, samples, whose rate is compared.
 const MIN_SAMPLES: usize = 100 * SEGMENTS;
 
-/// Lost samples, repeated samples and a wrong sample rate, in this order.
-#[must_use]
+/// Lost samples, repeated samples and a wrong sample rate, as far as they are found, in this order.
 pub(crate) fn detect(measurement: &Measurement) -> Vec<Detection> {
     [lost_samples_of(measurement), repeated_samples(measurement), sample_clock(measurement)]
         .into_iter()
@@ -37,8 +36,8 @@ pub(crate) fn lost_samples_of(measurement: &Measurement) -> Option<Detection> {
     lost_samples(measurement.len() as u64, &measurement.dropped, measurement.gaps())
 }
 
-/// Samples that never arrived beside the `used` ones, by sample indices or time stamps; a single one counts.
-#[must_use]
+/// Samples that never arrived, beside the `used` ones: the sample indices or time stamps have room for them. A single one is
+/// reported, because only a loss leaves such room.
 pub(crate) fn lost_samples(used: u64, dropped: &BTreeMap<&'static str, u64>, gaps: usize) -> Option<Detection> {
     let missing = dropped.get("gap").copied().unwrap_or(0);
     if missing == 0 {
@@ -59,8 +58,7 @@ pub(crate) fn lost_samples(used: u64, dropped: &BTreeMap<&'static str, u64>, gap
     Some(Detection { effect: lost.into(), correction: None })
 }
 
-/// Samples that repeat the one before in all channels, beyond chance.
-#[must_use]
+/// Samples that equal the sample before in all channels, if there are more of them than by chance.
 pub(crate) fn repeated_samples(measurement: &Measurement) -> Option<Detection> {
     let channels = &measurement.channels;
     let mut equal = vec![0u64; channels.len()];
@@ -97,8 +95,8 @@ pub(crate) fn repeated_samples(measurement: &Measurement) -> Option<Detection> {
     Some(Detection { effect: repeated.into(), correction: Some(Correction::Exclude(positions)) })
 }
 
-/// Compares the rate by the time stamps with the stated or the nearest usual one; and its parts with each other.
-#[must_use]
+/// Compares the sample rate by the time stamps with the stated rate, or without one with the nearest rate that the sensor
+/// can be set to or that hosts usually read at; and its parts with each other. A sensor without a data sheet has no rate of its own.
 pub(crate) fn sample_clock(measurement: &Measurement) -> Option<Detection> {
     let MeasuredValue { value: measured, error } = rate_by_time_stamps(measurement)?;
     let nominal = measurement.stated_rate_hz.or_else(|| nearest_usual_rate(&measurement.profile, measured));
@@ -116,8 +114,8 @@ pub(crate) fn sample_clock(measurement: &Measurement) -> Option<Detection> {
     Some(Detection { effect: clock.into(), correction: None })
 }
 
-/// The rate by the time stamps, Hz, with [`SensorProfile::host_clock_error`]; `None` for fewer than [`MIN_SAMPLES`].
-#[must_use]
+/// The sample rate by the time stamps, Hz: its standard deviation is that of the segments' rates and
+/// [`SensorProfile::host_clock_error`]. `None` without time stamps or with fewer than [`MIN_SAMPLES`].
 pub(crate) fn rate_by_time_stamps(measurement: &Measurement) -> Option<MeasuredValue> {
     let rates = segment_rates(measurement, SEGMENTS)?;
     let [measured] = segment_rates(measurement, 1)?[..] else { return None };

@@ -1,6 +1,7 @@
 //! What the figures of a report show beside the Allan deviation: the data sheet's values, the measured spectrum and the
 //! bias over time, condensed to at most [`MOST_POINTS`] points each.
 
+use crate::distributions::chi_squared_quantile;
 use crate::effects::BiasBlocks;
 use crate::parallel::in_parallel;
 use crate::report::{BiasOverTime, ChannelReport, DataSheetReport, FigureData, Report, SpectrumReport, TermReport};
@@ -9,7 +10,6 @@ use crate::samples::uniform_series::UniformSeries;
 use crate::spectra::Welch;
 use allan_core::Model;
 use measurement::{ChannelId, DataSheetNoise, Measurement, Quantity};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::BTreeMap;
 
 /// Points of a spectrum and of a bias over time at most.
@@ -100,8 +100,7 @@ fn spectrum(series: &UniformSeries, model: impl Fn(f64) -> f64) -> Option<Spectr
     // χ² bounds of a density with 2g degrees of freedom.
     let bound = |point: &SpectralPoint, probability: f64| {
         let freedom = 2.0 * point.ordinates;
-        let quantile = ChiSquared::new(freedom).map_or(freedom, |chi| chi.inverse_cdf(probability));
-        (point.density * freedom / quantile).sqrt()
+        (point.density * freedom / chi_squared_quantile(probability, freedom)).sqrt()
     };
     (!points.is_empty()).then(|| SpectrumReport {
         frequency_hz: column(&|point| point.frequency),
@@ -155,9 +154,8 @@ fn bands(welch: &Welch, range: std::ops::Range<f64>, ratio: f64) -> Vec<Spectral
     let inside: Vec<(f64, f64)> = welch.points().filter(|(frequency, _)| range.contains(frequency)).collect();
     let ordinates = welch.ordinates();
     // The quantile of one point among all, over its mean.
-    let highest = ChiSquared::new(2.0 * ordinates).map_or(f64::INFINITY, |chi| {
-        chi.inverse_cdf(1.0 - FALSE_LINE / inside.len().max(1) as f64) / (2.0 * ordinates)
-    });
+    let highest =
+        chi_squared_quantile(1.0 - FALSE_LINE / inside.len().max(1) as f64, 2.0 * ordinates) / (2.0 * ordinates);
     let mut points = Vec::new();
     let mut rest = inside.as_slice();
     while let Some(&(from, _)) = rest.first() {
@@ -196,14 +194,8 @@ fn rounded(value: f64) -> f64 {
 fn bias_over_time(series: &Series) -> Option<BiasOverTime> {
     let periods = series.span.end - series.span.start;
     let length = periods.div_ceil(BLOCKS as u64).max(1);
-    let mut sums: BTreeMap<u64, (f64, u64)> = BTreeMap::new();
-    for (slot, value) in series.slots.iter().zip(series.values.iter()) {
-        let (sum, count) = sums.entry((slot - series.span.start) / length).or_default();
-        *sum += value;
-        *count += 1;
-    }
-    let whole: Vec<(u64, f64)> = sums
-        .into_iter()
+    let sums = series.sums_of_blocks(series.span.start, length).into_iter().enumerate();
+    let whole: Vec<(usize, f64)> = sums
         .filter(|(_, (_, count))| 2 * count >= length)
         .map(|(block, (sum, count))| (block, sum / count as f64))
         .collect();

@@ -14,6 +14,7 @@
 //! Differences with an excess kurtosis κ have a mean square whose variance is `(2 + κ)/2` times as large; the degrees of
 //! freedom are divided by that.
 
+use crate::distributions::chi_squared_tail;
 use crate::report::TermReport;
 use crate::report::comparison::rejected;
 use crate::samples::gapped_cascade::GappedCascade;
@@ -23,7 +24,6 @@ use allan_core::trace::{LineCandidates, trace};
 use allan_core::{AllanPoint, Cascade, Curve, Model};
 use measurement::{ChannelProfile, MeasuredChannel, Measurement};
 use serde::Serialize;
-use statrs::function::gamma::gamma_ur;
 use std::borrow::Borrow;
 
 /// Degrees of freedom from which a point takes part: below, the approximations by χ² and F are coarse.
@@ -59,28 +59,23 @@ impl std::fmt::Display for IncomparableRecordings {
 /// Whether recordings show the same noise.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoiseAgreement {
-    /// Version of the JSON schema.
     pub schema: u32,
     /// Of the first recording, Hz.
     pub sample_rate_hz: f64,
     /// Samples of each recording.
     pub samples: Vec<u64>,
-    /// The channels that all recordings have.
     pub channels: Vec<ChannelAgreement>,
 }
 
 /// One channel of several recordings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelAgreement {
-    /// Such as `gyro_z`.
     pub name: String,
-    /// Unit of the deviations.
     pub unit: String,
     /// Probability that recordings of the same noise differ as much; absent if no octave has enough differences.
     pub p_value: Option<f64>,
     /// Whether the recordings show the same noise at a significance of 1 % over all channels (Holm).
     pub agree: bool,
-    /// Octave by octave.
     pub octaves: Vec<OctaveAgreement>,
     /// The model of all recordings together; empty where they differ.
     pub joint: Vec<TermReport>,
@@ -89,7 +84,6 @@ pub struct ChannelAgreement {
 /// One averaging time of several recordings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OctaveAgreement {
-    /// s.
     pub tau_s: f64,
     /// Allan deviation of each recording, in the channel's unit.
     pub adev: Vec<f64>,
@@ -100,39 +94,31 @@ pub struct OctaveAgreement {
 /// How much more noise there is while a machine runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoiseInflation {
-    /// Version of the JSON schema.
     pub schema: u32,
     /// Of the still recordings, Hz.
     pub sample_rate_hz: f64,
-    /// The channels that all recordings have.
     pub channels: Vec<ChannelInflation>,
 }
 
 /// The inflation of one channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelInflation {
-    /// Such as `gyro_z`.
     pub name: String,
-    /// Unit of the deviations.
     pub unit: String,
-    /// Octave by octave.
     pub octaves: Vec<OctaveInflation>,
 }
 
 /// The inflation at one averaging time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct OctaveInflation {
-    /// s.
     pub tau_s: f64,
     /// Allan deviation at rest, in the channel's unit.
     pub still: f64,
     /// Allan deviation while the machine runs.
     pub running: f64,
-    /// Their ratio.
     pub factor: f64,
     /// Lower 95 % bound of the ratio of the true deviations.
     pub low: f64,
-    /// Upper 95 % bound.
     pub high: f64,
 }
 
@@ -269,7 +255,7 @@ fn agreement(recordings: &[Measurement], channel: &ChannelProfile) -> ChannelAgr
             .map(|(points, &(_, statistic))| OctaveAgreement {
                 tau_s: points[0].tau,
                 adev: points.iter().map(|point| point.avar.sqrt()).collect(),
-                p_value: upper_tail(statistic, freedom),
+                p_value: chi_squared_tail(statistic, freedom),
             })
             .collect(),
         joint: model.terms().iter().map(|term| TermReport::new(term, channel.unit)).collect(),
@@ -316,12 +302,7 @@ fn p_value_of_sum(statistics: &[(u64, f64)], freedom: f64, model: &Model) -> Opt
     }
     let sum: f64 = statistics.iter().map(|(_, statistic)| statistic).sum();
     let scale = variance / (2.0 * mean);
-    Some(upper_tail(sum / scale, mean / scale))
-}
-
-/// Probability that χ² with `freedom` degrees of freedom is at least `statistic`.
-fn upper_tail(statistic: f64, freedom: f64) -> f64 {
-    if statistic > 0.0 && statistic.is_finite() { gamma_ur(0.5 * freedom, 0.5 * statistic) } else { 1.0 }
+    Some(chi_squared_tail(sum / scale, mean / scale))
 }
 
 /// Sets which channels agree, and takes the joint model from those that differ.
@@ -370,7 +351,8 @@ fn f_quantile(z: f64, above: f64, below: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{bartlett, f_quantile, upper_tail};
+    use super::{bartlett, f_quantile};
+    use crate::distributions::chi_squared_tail;
     use allan_core::{AllanPoint, Cascade};
     use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -416,6 +398,6 @@ mod tests {
         let points: Vec<AllanPoint> = deviations.iter().map(|deviation| point(deviation * deviation, 9.0)).collect();
         let found = bartlett(&points);
         assert!((found - 20.785_86).abs() < 0.01, "{found}");
-        assert!((upper_tail(found, 9.0) - 0.0136).abs() < 2e-4);
+        assert!((chi_squared_tail(found, 9.0) - 0.0136).abs() < 2e-4);
     }
 }

@@ -45,16 +45,8 @@ pub(crate) struct PlatformMotion {
 /// The motion that a channel shows, if any.
 pub(crate) fn find(series: &Series, channel: &ChannelProfile) -> Option<PlatformMotion> {
     let width = (BLOCK_S / series.period_s).round().max(1.0) as u64;
-    let mut sums: Vec<(f64, u64)> = Vec::new();
-    for (&slot, value) in series.slots.iter().zip(series.values.iter()) {
-        let number = (slot / width) as usize;
-        if sums.len() <= number {
-            sums.resize(number + 1, (0.0, 0));
-        }
-        sums[number].0 += value;
-        sums[number].1 += 1;
-    }
-    let means: Vec<Option<f64>> = sums.iter().map(|(sum, count)| (*count > 0).then(|| sum / *count as f64)).collect();
+    let sums = series.sums_of_blocks(0, width).into_iter();
+    let means: Vec<Option<f64>> = sums.map(|(sum, count)| (count > 0).then(|| sum / count as f64)).collect();
     let known: Vec<f64> = means.iter().copied().flatten().collect();
     if known.is_empty() {
         return None;

@@ -67,6 +67,18 @@ impl Series {
         Arc::make_mut(&mut self.values)
     }
 
+    /// Sum and number of the samples in each block of `width` sample periods, the first of which begins with the sample period `from`, up to
+    /// the block of the last sample. No sample is before `from`.
+    pub(crate) fn sums_of_blocks(&self, from: u64, width: u64) -> Vec<(f64, u64)> {
+        let blocks = self.slots.last().map_or(0, |last| (last - from) / width + 1);
+        let mut sums = vec![(0.0, 0); blocks as usize];
+        for (slot, value) in self.slots.iter().zip(self.values.iter()) {
+            let (sum, count) = &mut sums[((slot - from) / width) as usize];
+            (*sum, *count) = (*sum + value, *count + 1);
+        }
+        sums
+    }
+
     /// Time from the start of the record to the last sample, s.
     #[must_use]
     pub fn duration_s(&self) -> f64 {

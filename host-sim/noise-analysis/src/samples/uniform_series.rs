@@ -188,8 +188,8 @@ impl UniformSeries {
     /// Block averages over the smallest power of two for which fewer than half of the pairs a block apart are equal:
     /// rounding then acts as noise.
     ///
-    /// A series that never changes has no values left.
-    #[must_use]
+    /// Where the output stays at one step of the quantizer for several samples, the rounding error is correlated and
+    /// would show as lines.
     pub(crate) fn averaged_until_dithered(self) -> Self {
         let equal_apart = |distance: usize| {
             let pairs = self.values.iter().zip(self.values.iter().skip(distance));
@@ -205,8 +205,8 @@ impl UniformSeries {
         if size == 1 { self } else { self.averaged(size) }
     }
 
-    /// Means of blocks of `size` samples with at least half of them; an incomplete block at the end is dropped.
-    #[must_use]
+    /// Means of blocks of `size` samples, at `size` times the period: of the samples that are there, where at least half are. An
+    /// incomplete block at the end is left out.
     pub(crate) fn averaged(&self, size: usize) -> Self {
         let average = |chunk: &[f64]| {
             let (sum, count) = chunk

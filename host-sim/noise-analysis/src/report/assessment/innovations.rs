@@ -3,12 +3,11 @@
 //! The innovations of a filter with the true model are white and have the variance that the filter expects. The measurements
 //! are means over [`BLOCK_S`]; half an hour has 7200 of them.
 
-use crate::distributions::mean_ratio_tail;
+use crate::distributions::{chi_squared_quantile, chi_squared_tail, mean_ratio_tail};
 use crate::samples::uniform_series::UniformSeries;
 use allan_core::{Model, NoiseTerm};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f64::consts::{LN_2, PI, TAU};
 
 /// Time over which samples are averaged to one measurement of the filter, s.
@@ -24,7 +23,6 @@ const MIN_INNOVATIONS: usize = 10 * LAGS;
 /// Consistency and whiteness of the innovations.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Innovations {
-    /// Number of innovations.
     pub count: usize,
     /// Mean of the squares over the expected variance: 1 for a true model.
     pub normalised: f64,
@@ -81,15 +79,13 @@ fn test(innovations: &[f64]) -> Option<Innovations> {
     let correlation =
         |lag: usize| innovations.iter().zip(&innovations[lag..]).map(|(a, b)| a * b).sum::<f64>() / square;
     let ljung_box = n * (n + 2.0) * (1..=LAGS).map(|lag| correlation(lag).powi(2) / (n - lag as f64)).sum::<f64>();
-    let sum_of_squares = ChiSquared::new(n).ok()?;
-    let lags = ChiSquared::new(LAGS as f64).ok()?;
     Some(Innovations {
         count,
         normalised: square / n,
-        low: sum_of_squares.inverse_cdf(0.025) / n,
-        high: sum_of_squares.inverse_cdf(0.975) / n,
+        low: chi_squared_quantile(0.025, n) / n,
+        high: chi_squared_quantile(0.975, n) / n,
         correlation: correlation(1),
-        whiteness_p: lags.sf(ljung_box),
+        whiteness_p: chi_squared_tail(ljung_box, LAGS as f64),
     })
 }
 

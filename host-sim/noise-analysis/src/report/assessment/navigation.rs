@@ -5,9 +5,9 @@
 //! samples and `r = t/c`, its variance is `r(1 + r)·V(c) + (1 + r)·V(t) − r·V(c + t)`; for `t = c` that is `2t²` Allan
 //! variances. It is finite for a random walk too, because constants and ramps of the sums cancel.
 
+use crate::distributions::chi_squared_quantile;
 use crate::samples::uniform_series::UniformSeries;
 use allan_core::Model;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Time over which the bias is estimated, s.
 pub const CALIBRATION_S: f64 = 60.0;
@@ -37,7 +37,6 @@ pub struct ObservedError {
     pub value: f64,
     /// Lower 95 % bound, by χ².
     pub low: f64,
-    /// Upper 95 % bound.
     pub high: f64,
     /// Equivalent degrees of freedom by the model.
     pub edf: f64,
@@ -112,9 +111,9 @@ impl Contrast {
         let edf = count / (1.0 + 2.0 * sum);
         let mean_square = errors.iter().map(|error| error * error).sum::<f64>() / count;
         // `edf` is not a number where no window has data or the model has no noise.
-        let chi_squared = ChiSquared::new(edf).ok()?;
-        let bound = |probability: f64| (mean_square * edf / chi_squared.inverse_cdf(probability)).sqrt();
-        Some(ObservedError { value: mean_square.sqrt(), low: bound(0.975), high: bound(0.025), edf })
+        let bound = |probability| (mean_square * edf / chi_squared_quantile(probability, edf)).sqrt();
+        let [low, high] = [0.975, 0.025].map(bound);
+        (edf > 0.0).then(|| ObservedError { value: mean_square.sqrt(), low, high, edf })
     }
 }
 
