@@ -4,6 +4,7 @@ pub(crate) mod channel_fit;
 pub mod contradiction;
 pub(crate) mod covariates;
 pub(crate) mod event_share;
+pub mod gauss_markov;
 pub(crate) mod noise_terms;
 pub(crate) mod octave_covariance;
 pub(crate) mod part_filter;
