@@ -54,27 +54,24 @@ fn with_units<'e>(channels: &'e [ChannelReport], effects: &'e [Vec<Effect>]) -> 
 
 /// The causes of the effects of all channels, each with its unit, in the order in which the channels first show them.
 fn merged(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cause> {
-    let mut causes = periodic::causes(channels, duration_s);
-    let periodic = causes.len();
-    for (channel, (unit, effects)) in channels.iter().enumerate() {
-        for effect in effects.iter().filter(|effect| !effect.is_line()) {
-            if !stands_as_cause(&CauseClaim { effect, channel, shown_by: None, periodic: &causes[..periodic] }) {
-                continue;
-            }
-            let is_same = |cause: &&mut Cause| {
-                let known = &cause.shown[0];
-                let is_known_here = cause.shown.iter().any(|shown| shown.channel == channel);
-                // Bands of one channel are two of them.
-                let is_other_band = is_known_here && matches!(effect, Effect::Unexplained(_));
-                !is_other_band && known.effect.is_one_cause(effect, channels[known.channel].0 == *unit)
-            };
-            let shown = Shown { channel, effect: effect.clone(), parts: vec![effect.clone()] };
-            match causes.iter_mut().find(is_same) {
-                Some(cause) => cause.shown.push(shown),
-                None => causes.push(Cause { shown: vec![shown] }),
-            }
-        }
+    let periodic = periodic::causes(channels, duration_s);
+    let stands = |effect: &Effect, channel: usize| {
+        let claim = CauseClaim { effect, channel, shown_by: None, periodic: &periodic };
+        !effect.is_line() && stands_as_cause(&claim)
+    };
+    let all =
+        channels.iter().enumerate().flat_map(|(channel, (_, effects))| effects.iter().map(move |of| (channel, of)));
+    let others: Vec<(usize, &Effect)> = all.filter(|(channel, effect)| stands(effect, *channel)).collect();
+    let mut groups: Vec<Vec<Shown>> = periodic.into_iter().map(|cause| cause.shown).collect();
+    for (channel, effect) in others {
+        let is_same = |known: &Shown| {
+            // Bands of one channel are two of them.
+            let is_other_band = known.channel == channel && matches!(effect, Effect::Unexplained(_));
+            !is_other_band && known.effect.is_one_cause(effect, channels[known.channel].0 == channels[channel].0)
+        };
+        join(&mut groups, is_same, Shown { channel, effect: effect.clone(), parts: vec![effect.clone()] });
     }
+    let mut causes: Vec<Cause> = groups.into_iter().map(|shown| Cause { shown }).collect();
     causes.retain(|cause| {
         let Shown { effect, channel, .. } = &cause.shown[0];
         let shown_by = Some(cause.shown.len());
@@ -82,6 +79,15 @@ fn merged(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cause> {
     });
     causes.sort_by_key(|cause| cause.shown[0].channel);
     causes
+}
+
+/// Adds `added` to the groups that have one of its like, which become one: no order of the members changes the groups.
+fn join<T>(groups: &mut Vec<Vec<T>>, is_same: impl Fn(&T) -> bool, added: T) {
+    let has_same = |group: &Vec<T>| group.iter().any(&is_same);
+    let place = groups.iter().position(has_same).unwrap_or(groups.len());
+    let (same, others): (Vec<Vec<T>>, Vec<Vec<T>>) = std::mem::take(groups).into_iter().partition(has_same);
+    *groups = others;
+    groups.insert(place, same.into_iter().flatten().chain([added]).collect());
 }
 
 /// A cause as it is reported.

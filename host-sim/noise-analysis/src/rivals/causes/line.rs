@@ -1,5 +1,6 @@
 //! Lines of the spectrum that channels show, by their frequency.
 
+use super::join;
 use crate::bounds::{BoundedEstimate, ChannelEstimate};
 use crate::distributions::NORMAL_975;
 use crate::effects::{Effect, LineEvidence};
@@ -71,17 +72,12 @@ impl Frequency {
             .iter()
             .enumerate()
             .flat_map(|(channel, (_, effects))| effects.iter().filter_map(move |effect| Line::new(channel, effect)));
-        let mut frequencies: Vec<Self> = Vec::new();
+        let mut groups: Vec<Vec<Line>> = Vec::new();
         for line in lines {
-            let is_same = |known: &&mut Self| {
-                let known = known.best();
-                (known.frequency - line.frequency).abs() < reach(known, &line, duration_s)
-            };
-            match frequencies.iter_mut().find(is_same) {
-                Some(known) => known.lines.push(line),
-                None => frequencies.push(Self { lines: vec![line] }),
-            }
+            let is_same = |known: &Line| (known.frequency - line.frequency).abs() < reach(known, &line, duration_s);
+            join(&mut groups, is_same, line.clone());
         }
+        let mut frequencies: Vec<Self> = groups.into_iter().map(|lines| Self { lines }).collect();
         frequencies.sort_by(|a, b| a.best().frequency.total_cmp(&b.best().frequency));
         frequencies
     }

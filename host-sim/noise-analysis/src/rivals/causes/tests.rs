@@ -250,3 +250,17 @@ fn an_effect_that_holds_is_validated_and_one_that_ends_is_not() {
     assert_eq!(validation::compare(&[]), Validation::Untestable);
     assert_eq!(validation::compare(&[(&knock(1.0, 2.0), &knock(1.0, 2.0))]), Validation::Untestable);
 }
+
+/// The first interval meets the second, and the second the third.
+#[test]
+fn no_order_of_the_channels_changes_the_causes() {
+    let knocks = [(100.0, 110.0), (109.0, 120.0), (119.0, 130.0)];
+    let lines = [(5.0, 0.02), (5.05, 0.02), (5.1, 0.02)].map(|(at, error)| sinusoid(estimate(at, error), 1.0));
+    for [a, b, c] in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+        let intervals = [a, b, c].map(|at: usize| vec![knock(knocks[at].0, knocks[at].1)]);
+        assert_eq!(causes(&intervals), [("knock", vec![0, 1, 2])], "{a} {b} {c}");
+        let at_frequencies = [a, b, c].map(|at: usize| vec![lines[at].clone()]);
+        let found = causes(&at_frequencies);
+        assert_eq!(found.len(), 1, "{a} {b} {c}: {found:?}");
+    }
+}
