@@ -1,9 +1,9 @@
 //! What is in a recording, as HTML: the table of `imunoise inspect`, and a form with what it proposes, for each sensor.
 
 use crate::analysis::Recorded;
-use crate::recording_options::RecordingOptions;
 use anyhow::Result;
 use maud::{Markup, html};
+use measurement::profile_file;
 use recordings::file_format::{RecordedFormat, TopicDescription};
 use recordings::inspection::{ColumnGuess, InspectedColumn, InspectedTable, Proposal};
 use recordings::time_base::TimeRange;
@@ -150,7 +150,7 @@ fn form(proposal: &Proposal, needs_topic: bool) -> Markup {
                     (input("to", "to, s", time(|part| part.to_s), "the end"))
                     label { "sensor" select name="sensor" {
                         option value="" { "by the file" }
-                        @for name in RecordingOptions::sensors() { option selected[*sensor == Some(name)] { (name) } }
+                        @for name in profile_file::sensor_names() { option selected[*sensor == Some(name)] { (name) } }
                     } }
                     label { "range of an ADIS16405, °/s" select name="range" {
                         @for (value, text) in [("", "300"), ("150", "150"), ("75", "75")] { option value=(value) { (text) } }

@@ -18,6 +18,7 @@ use noise_analysis::report::{
 };
 use noise_analysis::report::{DataSheetReport, TermReport};
 use noise_analysis::units::conversions;
+use time_base::TimeRange;
 
 /// Deviance a point on the unseen half above which a model is marked: a true model scores about 1, and what changes from one
 /// half to the other leaves up to 3.
@@ -532,11 +533,8 @@ pub fn longest_at_rest(report: &Report) -> Option<Stretch> {
 /// The options for a part of a recording, in tenths of a second within it.
 #[must_use]
 pub fn time_options(from_s: f64, to_s: f64) -> String {
-    // A tenth is none in binary.
-    const ROUNDING: f64 = 1e-6;
-    // What rounds up to 0 from below is −0, which the sum is not.
-    let (from, to) = ((10.0 * from_s - ROUNDING).ceil() / 10.0 + 0.0, (10.0 * to_s + ROUNDING).floor() / 10.0);
-    format!("--from {from} --to {to}")
+    let TimeRange { from_s, to_s } = TimeRange { from_s, to_s }.whole_tenths();
+    format!("--from {from_s} --to {to_s}")
 }
 
 /// The least time at rest of a channel, s; `None` where no channel was looked at.

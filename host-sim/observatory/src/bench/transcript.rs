@@ -145,6 +145,12 @@ impl BenchPlan {
 }
 
 impl Step {
+    /// Whether the bursts are counted in it, which a second port must carry too.
+    #[must_use]
+    pub fn counts_bursts(&self) -> bool {
+        self.topic == Topic::Bursts
+    }
+
     /// Whether `received` is the end of the answer.
     pub(super) fn is_answered_by(&self, received: &Received) -> bool {
         match (self.answered, received) {
@@ -196,7 +202,8 @@ impl Transcript {
     }
 
     /// Commands that set rate, range, filter and reports as they were.
-    pub(super) fn settings_before(&self) -> Vec<String> {
+    #[must_use]
+    pub fn settings_before(&self) -> Vec<String> {
         let Some(hello) = self.hello(Topic::Report) else { return Vec::new() };
         vec![
             format!("g {}", hello.gyro_full_scale),
