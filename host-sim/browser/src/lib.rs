@@ -5,12 +5,14 @@
 //! asked for, and 1 where it is the sentence of an error. On the way it calls the imported function `progress`.
 
 mod analysis;
+mod connection;
 mod host;
 mod inspection;
 mod recording_options;
 
 use analysis::Recorded;
 use anyhow::{Context, Result};
+use connection::{Connection, ReceiveRequest};
 use measurement::Measurement;
 use noise_analysis::report::several;
 use recording_options::RecordingOptions;
@@ -29,6 +31,8 @@ struct Exchange {
     file: Option<Arc<[u8]>>,
     /// Recordings whose noise is to be compared.
     measured: Vec<Measurement>,
+    /// The device.
+    connection: Option<Connection>,
     answer: Vec<u8>,
 }
 
@@ -169,6 +173,44 @@ pub extern "C" fn export() -> u32 {
         let report = SavedReport::from_json(&report)?;
         Ok(reports::export::export(&report, named::<ExportFormat>(&format)?, named::<AxisChoice>(&axis)?)?.text)
     })
+}
+
+/// Begins a connection to a device; the request is the name of its port.
+#[unsafe(no_mangle)]
+pub extern "C" fn connect_device() -> u32 {
+    answer(|name: String| {
+        with(|exchange| exchange.connection = Some(Connection::new(name)));
+        Ok(String::new())
+    })
+}
+
+/// Takes bytes of the device as [`reserve_file`] has them: the live view and the lines.
+#[unsafe(no_mangle)]
+pub extern "C" fn receive_bytes() -> u32 {
+    answer(|request: ReceiveRequest| {
+        with(|exchange| {
+            let bytes = exchange.file.take();
+            connected(exchange)?.receive(bytes.as_deref().unwrap_or_default(), &request)
+        })
+    })
+}
+
+/// Begins the next step of the bench, the first one where the request is true: its command, or the table.
+#[unsafe(no_mangle)]
+pub extern "C" fn bench_step() -> u32 {
+    answer(|is_first: bool| {
+        with(|exchange| {
+            let connection = connected(exchange)?;
+            if is_first {
+                connection.begin_bench();
+            }
+            connection.step()
+        })
+    })
+}
+
+fn connected(exchange: &mut Exchange) -> Result<&mut Connection> {
+    exchange.connection.as_mut().context("no device")
 }
 
 /// Serves the request that the page has written.

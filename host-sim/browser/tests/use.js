@@ -109,6 +109,8 @@ const fromServer = async (page, address) => {
   await page.idle();
   quiet(page);
   assert.equal(await page.value(refused('fetch("index.html").catch(() => {})')), "connect-src");
+  const image = await page.download(() => page.click("#image-save"));
+  assert.equal(fs.readFileSync(path.join(folder, image), "utf8"), "the bytes of an image");
 };
 
 (async () => {
