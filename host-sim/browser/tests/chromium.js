@@ -7,7 +7,7 @@ const path = require("node:path");
 /** Longest time for what a page does, ms: a fault ends a test by it, and nothing else depends on it. */
 const PATIENCE_MS = 300_000;
 
-/** Opens the page at `url`, lets `act` use it, and closes it; downloads go into `folder`; `script` runs before those of the page. */
+/** Opens the page at `url`, lets `act` use it, and closes it; downloads and the profile of the browser go into `folder`; `script` runs before those of the page. */
 exports.withPage = async (program, url, folder, act, script) => {
   const profile = fs.mkdtempSync(path.join(folder, "profile-"));
   const options = ["--headless=new", "--no-sandbox", "--disable-gpu", "--remote-debugging-pipe", `--user-data-dir=${profile}`,
@@ -18,7 +18,6 @@ exports.withPage = async (program, url, folder, act, script) => {
   } finally {
     browser.kill("SIGKILL");
     await new Promise((resolve) => { browser.on("exit", resolve); if (browser.exitCode !== null || browser.signalCode) resolve(); });
-    fs.rmSync(profile, { recursive: true, force: true, maxRetries: 5 });
   }
 };
 

@@ -106,8 +106,11 @@ const withDevice = async (page) => {
   await page.value(send("help"));
   await until('fake.commands.at(-1) === "help"');
   assert.ok((await page.value('document.getElementById("log").textContent')).endsWith("> help"));
+  // The cable ends during a recording.
+  await page.click("#record");
+  await until('fake.commands.at(-1) === "w 1"');
   await page.value('fake.fail("NetworkError", true)');
-  await until(`${text("device-status")}.includes("Disconnected")`);
+  await until(`${text("device-status")}.includes("Disconnected") && ${text("device-status")}.includes("Recorded: 0 bursts")`);
   assert.ok(await page.value(isShown("connect")));
   // It is plugged in again, and then let go.
   await page.click("#connect");
