@@ -12,7 +12,7 @@ use adis16405_driver::{BURST_BYTES, BURST_REQUEST, Burst, BurstValidator, Config
 
 /// The SPI peripheral with its DMA channels.
 struct Dma {
-    /// What the part answers next.
+    /// The part's next answer.
     part: [u8; BURST_BYTES],
     received: Option<[u8; BURST_BYTES]>,
 }
@@ -24,7 +24,7 @@ impl Dma {
     }
 }
 
-/// What the two interrupts share.
+/// State that both interrupts share.
 struct Sampler {
     dma: Dma,
     validator: BurstValidator,

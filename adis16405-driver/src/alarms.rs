@@ -36,14 +36,12 @@ pub enum AlarmThreshold {
 pub enum AlarmWatch {
     /// The value of the channel.
     Level,
-    /// The change of the channel over this number of samples (ALM_SMPL); 0 and 1 both mean one sample (data sheet Rev. B,
-    /// Table 26).
+    /// Change over this number of samples (ALM_SMPL); 0 and 1 mean one (data sheet Rev. B, Table 26).
     RateOfChange(u8),
 }
 
-/// The setting of an alarm. A raised alarm sets bit 8 or 9 of DIAG_STAT and the error/alarm flag of every output word.
-///
-/// Tables 24 to 26 of the data sheet (Rev. B, page 16) have the layout.
+/// The setting of an alarm (data sheet Rev. B, Tables 24 to 26). Raised, it sets bit 8 or 9 of DIAG_STAT and the
+/// error/alarm flag of every output word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -60,7 +58,6 @@ pub struct Alarm {
 const ABOVE: u16 = 1 << 15;
 
 impl AlarmNumber {
-    /// The register of the threshold.
     const fn magnitude(self) -> Register {
         match self {
             AlarmNumber::One => Register::AlmMag1,
@@ -68,7 +65,6 @@ impl AlarmNumber {
         }
     }
 
-    /// The register of the number of samples.
     const fn samples(self) -> Register {
         match self {
             AlarmNumber::One => Register::AlmSmpl1,
@@ -84,7 +80,6 @@ impl AlarmNumber {
         }
     }
 
-    /// The bit of ALM_CTRL that selects the rate of change.
     const fn rate_of_change(self) -> u16 {
         match self {
             AlarmNumber::One => 1 << 6,
@@ -123,7 +118,6 @@ impl Alarm {
         }
     }
 
-    /// The value of ALM_SMPL.
     fn samples(&self) -> u16 {
         match self.watch {
             AlarmWatch::Level => 0,

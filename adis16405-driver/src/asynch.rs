@@ -27,8 +27,8 @@ use crate::self_test::{FlashTest, SelfTest, Stimulus};
 use crate::spacing::{FramePauses, LONGEST_DELAY_US, SensorBus};
 
 impl<SPI: SpiDevice<u8>, D: DelayNs> Adis16405<SPI, D, Async> {
-    /// A driver on `spi` for a part that is to be configured with `config`; `delay` keeps the pauses between frames and
-    /// those of the procedures. Nothing is sent before [`init`](Self::init).
+    /// A driver for a part to be configured with `config`; `delay` keeps all pauses. Nothing is sent before
+    /// [`init`](Self::init).
     pub fn new_async(spi: SPI, delay: D, config: Config) -> Self {
         Self::with_state(spi, delay, config)
     }
@@ -36,8 +36,8 @@ impl<SPI: SpiDevice<u8>, D: DelayNs> Adis16405<SPI, D, Async> {
     /// Reads all twelve outputs in one transaction of 26 bytes, 208 µs at 1 MHz.
     ///
     /// # Errors
-    /// [`Error::Spi`]. Whether the data are usable is for [`read`](Self::read) or a
-    /// [`BurstValidator`](crate::BurstValidator) to decide.
+    /// [`Error::Spi`]; [`read`](Self::read) or a [`BurstValidator`](crate::BurstValidator) decides whether the data are
+    /// usable.
     pub async fn burst(&mut self) -> Result<Burst, Error<SPI::Error>> {
         let mut answer = [0; BURST_BYTES];
         let pauses = self.state.burst_pauses();
@@ -56,8 +56,8 @@ impl<SPI: SpiDevice<u8>, D: DelayNs> Adis16405<SPI, D, Async> {
         Ok(Burst::from_bytes(&answer))
     }
 
-    /// Reads a burst, validates it together with the bursts that this method has read before
-    /// ([`BurstValidator`](crate::BurstValidator)), and returns it as a sample. Call it at every data-ready edge.
+    /// Reads a burst at a data-ready edge and validates it together with earlier ones
+    /// ([`BurstValidator`](crate::BurstValidator)).
     ///
     /// [`burst`](Self::burst) and [`sample_from`](Self::sample_from) give the sample without a check.
     ///
@@ -72,19 +72,18 @@ impl<SPI: SpiDevice<u8>, D: DelayNs> Adis16405<SPI, D, Async> {
         self.checked_sample(burst).map_err(Error::Unusable)
     }
 
-    /// Waits until `line`, the input of data ready, is high, then does what [`read`](Self::read) does: a sample a pulse. With
-    /// [data ready active low](Self::set_data_ready) pass an input that is inverted.
+    /// Waits until `line`, the data-ready input, is high, then [`read`](Self::read)s: a sample a pulse. With [data
+    /// ready active low](Self::set_data_ready) pass an input that is inverted.
     ///
-    /// The level is waited for. A pulse is high for 100 to 200 µs (data sheet Rev. B, page 14), and a burst takes at least 208 µs,
-    /// so none is read twice:
+    /// A pulse is high for 100 to 200 µs (data sheet Rev. B, page 14), and a burst takes at least 208 µs, so none is
+    /// read twice:
     ///
-    /// - A pulse that has begun before the call is read at once: no first sample is lost.
-    /// - A pulse that begins during a read is read by the next call if the line is still high by then. If its sample was in
-    ///   the burst before already, the next burst is refused for [`Faults::NO_NEW_DATA`](crate::Faults::NO_NEW_DATA).
-    /// - A pulse that begins and ends between two calls is lost with its sample. The part does not count samples: compare the
-    ///   times of two samples with the sample period.
-    /// - A line that stays high gives [`Faults::NO_NEW_DATA`](crate::Faults::NO_NEW_DATA) until the next sample. A line that
-    ///   stays low is waited for without end: set a timeout. A future that is dropped while it waits has sent nothing.
+    /// - A pulse before the call is read at once.
+    /// - A pulse during a read is read next if the line is still high. If its sample was in the burst already, the next
+    ///   burst has [`Faults::NO_NEW_DATA`](crate::Faults::NO_NEW_DATA).
+    /// - A pulse between two calls is lost with its sample: compare the times of samples with the sample period.
+    /// - A line that stays high gives [`Faults::NO_NEW_DATA`](crate::Faults::NO_NEW_DATA); one that stays low needs a
+    ///   timeout. A future dropped while it waits has sent nothing.
     ///
     /// # Errors
     /// [`Error::Pin`] if the line cannot be waited for, and those of [`read`](Self::read).
@@ -93,12 +92,11 @@ impl<SPI: SpiDevice<u8>, D: DelayNs> Adis16405<SPI, D, Async> {
         self.read().await
     }
 
-    /// Resets the part by its reset line (RST, active low): drives `line` low for [`Timing::reset_pulse_us`], leaves the
-    /// bus silent for [`Timing::reset_us`], and configures the part as [`init`](Self::init) does. Use it when the part no
-    /// longer answers: it does not receive the command of [`software_reset`](Self::software_reset) then.
+    /// Resets the part by `line` (RST, active low): low for [`Timing::reset_pulse_us`], silence for
+    /// [`Timing::reset_us`], then [`init`](Self::init). Use it when the part does not answer, not even to
+    /// [`software_reset`](Self::software_reset).
     ///
-    /// The line must be high before; `line` may be an open-drain output. As after every reset, the registers are loaded
-    /// from flash, and SMPL_PRD there may select low-power mode.
+    /// `line` must be high before, and may be open-drain. SMPL_PRD from flash may select low-power mode.
     ///
     /// # Errors
     /// [`Error::Pin`] if the line cannot be driven, and those of [`init`](Self::init).
@@ -146,7 +144,6 @@ macro_rules! methods {
 }
 procedures!(methods);
 
-/// Runs a procedure to its end.
 async fn run<SPI: SpiDevice<u8>, D: DelayNs, T>(
     bus: &mut SensorBus<SPI, D>,
     slot: &RequestSlot,
@@ -188,8 +185,7 @@ async fn perform<SPI: SpiDevice<u8>, D: DelayNs>(
     Ok(())
 }
 
-/// Runs a transaction, whose last operation is the pause with chip select low, and keeps the one with chip select high
-/// after it, whether it has succeeded or not. If an earlier call was interrupted in its pause, that is kept first.
+/// Runs a transaction after the rest of an interrupted pause, then keeps the pause with chip select high.
 async fn transact<SPI: SpiDevice<u8>, D: DelayNs>(
     bus: &mut SensorBus<SPI, D>,
     pauses: FramePauses,
@@ -202,7 +198,6 @@ async fn transact<SPI: SpiDevice<u8>, D: DelayNs>(
     result
 }
 
-/// Waits for the pause that the part still needs.
 async fn pause<SPI, D: DelayNs>(bus: &mut SensorBus<SPI, D>) {
     if bus.pending_pause_ns > 0 {
         bus.delay.delay_ns(bus.pending_pause_ns).await;

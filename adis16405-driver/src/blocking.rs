@@ -26,8 +26,8 @@ use crate::self_test::{FlashTest, SelfTest, Stimulus};
 use crate::spacing::{FramePauses, LONGEST_DELAY_US, SensorBus};
 
 impl<SPI: SpiDevice<u8>, D: DelayNs> Adis16405<SPI, D, Blocking> {
-    /// A driver on `spi` for a part that is to be configured with `config`; `delay` keeps the pauses between frames and
-    /// those of the procedures. Nothing is sent before [`init`](Self::init).
+    /// A driver for a part to be configured with `config`; `delay` keeps all pauses. Nothing is sent before
+    /// [`init`](Self::init).
     pub fn new(spi: SPI, delay: D, config: Config) -> Self {
         Self::with_state(spi, delay, config)
     }
@@ -35,8 +35,8 @@ impl<SPI: SpiDevice<u8>, D: DelayNs> Adis16405<SPI, D, Blocking> {
     /// Reads all twelve outputs in one transaction of 26 bytes, 208 µs at 1 MHz.
     ///
     /// # Errors
-    /// [`Error::Spi`]. Whether the data are usable is for [`read`](Self::read) or a
-    /// [`BurstValidator`](crate::BurstValidator) to decide.
+    /// [`Error::Spi`]; [`read`](Self::read) or a [`BurstValidator`](crate::BurstValidator) decides whether the data are
+    /// usable.
     pub fn burst(&mut self) -> Result<Burst, Error<SPI::Error>> {
         let mut answer = [0; BURST_BYTES];
         let pauses = self.state.burst_pauses();
@@ -55,8 +55,8 @@ impl<SPI: SpiDevice<u8>, D: DelayNs> Adis16405<SPI, D, Blocking> {
         Ok(Burst::from_bytes(&answer))
     }
 
-    /// Reads a burst, validates it together with the bursts that this method has read before
-    /// ([`BurstValidator`](crate::BurstValidator)), and returns it as a sample. Call it at every data-ready edge.
+    /// Reads a burst at a data-ready edge and validates it together with earlier ones
+    /// ([`BurstValidator`](crate::BurstValidator)).
     ///
     /// [`burst`](Self::burst) and [`sample_from`](Self::sample_from) give the sample without a check.
     ///
@@ -71,12 +71,11 @@ impl<SPI: SpiDevice<u8>, D: DelayNs> Adis16405<SPI, D, Blocking> {
         self.checked_sample(burst).map_err(Error::Unusable)
     }
 
-    /// Resets the part by its reset line (RST, active low): drives `line` low for [`Timing::reset_pulse_us`], leaves the
-    /// bus silent for [`Timing::reset_us`], and configures the part as [`init`](Self::init) does. Use it when the part no
-    /// longer answers: it does not receive the command of [`software_reset`](Self::software_reset) then.
+    /// Resets the part by `line` (RST, active low): low for [`Timing::reset_pulse_us`], silence for
+    /// [`Timing::reset_us`], then [`init`](Self::init). Use it when the part does not answer, not even to
+    /// [`software_reset`](Self::software_reset).
     ///
-    /// The line must be high before; `line` may be an open-drain output. As after every reset, the registers are loaded
-    /// from flash, and SMPL_PRD there may select low-power mode.
+    /// `line` must be high before, and may be open-drain. SMPL_PRD from flash may select low-power mode.
     ///
     /// # Errors
     /// [`Error::Pin`] if the line cannot be driven, and those of [`init`](Self::init).
@@ -124,7 +123,6 @@ macro_rules! methods {
 }
 procedures!(methods);
 
-/// Runs a procedure to its end.
 fn run<SPI: SpiDevice<u8>, D: DelayNs, T>(
     bus: &mut SensorBus<SPI, D>,
     slot: &RequestSlot,
@@ -163,8 +161,7 @@ fn perform<SPI: SpiDevice<u8>, D: DelayNs>(bus: &mut SensorBus<SPI, D>, slot: &R
     Ok(())
 }
 
-/// Runs a transaction, whose last operation is the pause with chip select low, and keeps the one with chip select high
-/// after it, whether it has succeeded or not. If an earlier call was interrupted in its pause, that is kept first.
+/// Runs a transaction after the rest of an interrupted pause, then keeps the pause with chip select high.
 fn transact<SPI: SpiDevice<u8>, D: DelayNs>(
     bus: &mut SensorBus<SPI, D>,
     pauses: FramePauses,
@@ -177,7 +174,6 @@ fn transact<SPI: SpiDevice<u8>, D: DelayNs>(
     result
 }
 
-/// Waits for the pause that the part still needs.
 fn pause<SPI, D: DelayNs>(bus: &mut SensorBus<SPI, D>) {
     if bus.pending_pause_ns > 0 {
         bus.delay.delay_ns(bus.pending_pause_ns);

@@ -14,8 +14,7 @@ pub const BURST_REQUEST: [u8; BURST_BYTES] = {
     request
 };
 
-/// The operations of a burst read with a pause of `gap_ns` after each word but the last, and of `last_ns` after the
-/// last.
+/// A burst read with `gap_ns` between words and `last_ns` after the last.
 pub(crate) fn burst_with_gaps(
     answer: &mut [u8; BURST_BYTES],
     gap_ns: u32,
@@ -36,16 +35,14 @@ pub(crate) fn burst_with_gaps(
 const NEW_DATA: u16 = 1 << 15;
 const ERROR_ALARM: u16 = 1 << 14;
 
-/// An output register as read: bit 15 is the new-data flag, bit 14 the error/alarm flag, below them the 12- or 14-bit
-/// data field.
+/// An output register: bit 15 new data, bit 14 error/alarm, below them 12 or 14 bits of data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct OutputWord(pub u16);
 
 impl OutputWord {
-    /// The word that a part without errors sends for a new sample: new-data flag set, error flag clear, `counts`
-    /// truncated to the channel's width.
+    /// The word of a new sample without errors, `counts` truncated to the channel's width.
     pub const fn from_counts(channel: Channel, counts: i16) -> Self {
         Self(NEW_DATA | (counts as u16 & field_mask(channel)))
     }
@@ -103,9 +100,7 @@ pub struct Burst {
 
 impl Burst {
     /// Decodes the 26 bytes received during a burst read. The first two, received while the request is sent, are
-    /// ignored.
-    ///
-    /// Any bytes are accepted; [`BurstValidator`](crate::BurstValidator) decides whether the words are usable.
+    /// ignored. Any bytes are accepted; [`BurstValidator`](crate::BurstValidator) decides whether they are usable.
     pub fn from_bytes(bytes: &[u8; BURST_BYTES]) -> Self {
         let mut words = [OutputWord::default(); 12];
         for (word, pair) in words.iter_mut().zip(bytes[2..].chunks_exact(2)) {
@@ -114,8 +109,7 @@ impl Burst {
         Self { words }
     }
 
-    /// The burst that a part without errors sends for a new sample with these counts. For counts inside the width of
-    /// their channel it is the inverse of [`counts`](Self::counts).
+    /// The burst of a new sample without errors; inverse of [`counts`](Self::counts) within the channels' widths.
     pub fn from_counts(counts: &Counts) -> Self {
         let mut words = [OutputWord::default(); 12];
         for (word, channel) in words.iter_mut().zip(Channel::ALL) {
@@ -124,8 +118,7 @@ impl Burst {
         Self { words }
     }
 
-    /// The 26 bytes that the part sends in a burst read, the first two of them zero; inverse of
-    /// [`from_bytes`](Self::from_bytes).
+    /// The 26 bytes of a burst read, the first two zero; inverse of [`from_bytes`](Self::from_bytes).
     pub fn to_bytes(&self) -> [u8; BURST_BYTES] {
         let mut bytes = [0; BURST_BYTES];
         for (pair, word) in bytes[2..].chunks_exact_mut(2).zip(self.words) {

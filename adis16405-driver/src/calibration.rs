@@ -4,12 +4,11 @@ use crate::error::Error;
 use crate::protocol::{Protocol, ProtocolError};
 use crate::register::Register;
 
-/// The bias correction of the gyros in counts of 0.0125 °/s, which is added to the outputs, by the part or by the
-/// driver.
+/// The gyros' bias correction in counts of 0.0125 °/s, added to the outputs by the part or the driver.
 ///
-/// Erratum: after a burst read, the ADIS16405 drops the sign bit of negative x rates while XGYRO_OFF is negative, also
-/// in the single reads that follow (reported for all units tested). The driver therefore keeps a negative correction of
-/// x itself and adds it to the x rate of every [`ImuSample`](crate::ImuSample); the counts do not contain it.
+/// Erratum: while XGYRO_OFF is negative, burst reads drop the sign of negative x rates, also for following single
+/// reads. The driver keeps a negative correction of x itself and adds it to each [`ImuSample`](crate::ImuSample), not
+/// to the counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -28,8 +27,8 @@ impl GyroBias {
     }
 }
 
-/// The user's corrections that a factory restore has set to 0: the registers of Tables 10 to 12 of the data sheet (Rev. B,
-/// page 13, where "Figure 12" stands for Table 12). The soft-iron factors are not among them.
+/// Corrections that a factory restore has set to 0 (data sheet Rev. B, Tables 10 to 12, page 13); not the soft-iron
+/// factors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -121,8 +120,7 @@ impl Protocol<'_> {
             self.state.x_sign_at_risk = false;
             part[0] = 0;
         }
-        // A correction that the part has is the whole one: it comes from an auto-null or from flash, where an auto-null has
-        // stored it before its negative part was moved to the host.
+        // A correction in the part, by auto-null or from flash, is the whole one.
         if x != 0 {
             self.state.host_bias_x = x.min(0);
         }

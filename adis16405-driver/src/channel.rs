@@ -133,8 +133,7 @@ impl Channel {
         }
     }
 
-    /// Width of the data field in bits: 12 for temperature and auxiliary input, else 14 (data sheet Rev. B, Table 9). Of the
-    /// supply 12 are enough for any value that the part can measure: 5 V is count 2068.
+    /// Width of the data field: 12 bits for temperature and auxiliary input, else 14 (data sheet Rev. B, Table 9).
     pub const fn bits(self) -> u32 {
         match self {
             Channel::Temp | Channel::AuxAdc => 12,
@@ -170,8 +169,7 @@ impl Channel {
 
     /// Size of one count in [`unit`](Self::unit); only the gyroscopes depend on `range`.
     ///
-    /// That of the temperature is 0.14 °C by the data sheet (Rev. B, Tables 1 and 9), 0.1357 °C by Analog Devices' register
-    /// map; this returns 0.14 °C.
+    /// The temperature has 0.14 °C (data sheet Rev. B, Tables 1 and 9); Analog Devices' register map gives 0.1357 °C.
     pub const fn lsb(self, range: GyroRange) -> f64 {
         match self {
             Channel::Supply => 2.418e-3,
@@ -183,9 +181,7 @@ impl Channel {
         }
     }
 
-    /// Value at count 0 in [`unit`](Self::unit): 25 for the temperature, else 0.
-    ///
-    /// The value of a count is `count · lsb + offset`.
+    /// Value at count 0 in [`unit`](Self::unit): 25 for the temperature, else 0; values are `count · lsb + offset`.
     pub const fn offset(self) -> f64 {
         match self {
             Channel::Temp => 25.0,
@@ -214,12 +210,12 @@ impl ChannelMask {
         Self(self.0 | 1 << channel as u8)
     }
 
-    /// Whether `channel` is in the set.
+    /// True if `channel` is in the set.
     pub const fn contains(self, channel: Channel) -> bool {
         self.0 >> channel as u8 & 1 != 0
     }
 
-    /// Whether no channel is in the set.
+    /// True if no channel is in the set.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }

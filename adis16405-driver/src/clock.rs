@@ -18,9 +18,8 @@ pub enum TimeBase {
 
 /// The power mode of the part, which sets the limits of SPI clock and stall.
 ///
-/// The data sheet (Rev. B) contradicts itself: normal mode ends at SMPL_PRD = 0x09 by Tables 1 and 2 (pages 4 and 6) and by
-/// the text of page 13, at 0x08 by Table 7 (page 10). The driver takes the safe side at 0x09, a slow clock and the waits of
-/// low-power mode, unless [`Timing::normal_mode_max_smpl_prd`] is set.
+/// Normal mode ends at SMPL_PRD = 0x09 by Tables 1 and 2 of the data sheet (Rev. B), at 0x08 by Table 7. The driver
+/// takes the safe side unless [`Timing::normal_mode_max_smpl_prd`] is set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -68,8 +67,7 @@ impl SamplePeriod {
     /// A period of `divisor` (NS + 1 in the data sheet) time bases.
     ///
     /// # Errors
-    /// [`ConfigError::Divisor`] if `divisor` is outside 2…128 (fast; 1 would select the external clock) or 1…128
-    /// (slow).
+    /// [`ConfigError::Divisor`] outside 2…128 (fast; 1 is the external clock) or 1…128 (slow).
     pub const fn from_divisor(base: TimeBase, divisor: u8) -> Result<Self, ConfigError> {
         let (least, flag) = match base {
             TimeBase::Fast => (2, 0x00),
@@ -81,8 +79,7 @@ impl SamplePeriod {
         Ok(Self { smpl_prd: flag | (divisor - 1) })
     }
 
-    /// The period whose rate is nearest to `hz`, in samples per second; rates outside 0.4129…819.2 give the limit.
-    /// [`hz`](Self::hz) returns the rate that was chosen.
+    /// The period with the rate nearest to `hz`, samples per second, within 0.4129…819.2; [`hz`](Self::hz) returns it.
     ///
     /// # Errors
     /// [`ConfigError::Rate`] if `hz` is not finite and positive.
@@ -93,7 +90,7 @@ impl SamplePeriod {
         Ok(Self::least(|period| (period.hz() - hz).abs()))
     }
 
-    /// As [`nearest`](Self::nearest), in `f32`, for targets with a single-precision FPU.
+    /// [`nearest`](Self::nearest) in `f32`, for single-precision FPUs.
     ///
     /// # Errors
     /// [`ConfigError::Rate`] if `hz` is not finite and positive.
@@ -110,8 +107,8 @@ impl SamplePeriod {
         periods.fold(Self::RESET, |best, period| if error(period) < error(best) { period } else { best })
     }
 
-    /// As [`nearest`](Self::nearest), for a rate in 10⁻³ samples per second and in exact integers, for targets without
-    /// an FPU and for constants.
+    /// [`nearest`](Self::nearest) for 10⁻³ samples per second in exact integers, for constants and targets without an
+    /// FPU.
     ///
     /// # Errors
     /// [`ConfigError::Rate`] if `millihz` is 0.
@@ -211,8 +208,8 @@ impl TryFrom<u8> for SamplePeriod {
 pub enum SampleClock {
     /// The internal clock.
     Internal(SamplePeriod),
-    /// A clock at pin DIO4/CLKIN, which GPIO_CTRL makes an input, and SMPL_PRD = 0: pulses of at least 5 µs, at least
-    /// 833 µs apart (1.2 kHz); data ready follows 600 µs later (data sheet Rev. B, Table 2, Figure 4 and page 14).
+    /// A clock at DIO4/CLKIN, with SMPL_PRD = 0: pulses of at least 5 µs, at most 1.2 kHz; data ready 600 µs later
+    /// (data sheet Rev. B, Table 2, Figure 4, page 14).
     External,
 }
 
@@ -282,46 +279,37 @@ impl PerClockMode {
     }
 }
 
-/// The times that the driver keeps. Pages and tables are those of the data sheet Rev. B; where it contradicts itself,
-/// [`Timing::DEFAULT`] takes the safe side.
-///
-/// The data sheet gives neither the reset pulse nor the least time of chip select high.
+/// The times that the driver keeps, by the data sheet Rev. B; [`Timing::DEFAULT`] takes the safe side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Timing {
-    /// Least stall after a frame or a burst, ns. The part needs 9 µs in normal and 75 µs in low-power mode (Table 2);
-    /// Analog Devices' evaluation tool keeps 16 µs. After a single frame the stall is longer where
-    /// [`read_rate_ns`](Self::read_rate_ns) asks for it.
+    /// Least stall after a frame or burst, ns: 9 µs in normal, 75 µs in low-power mode (Table 2); Analog Devices' tool
+    /// keeps 16 µs. Longer after single frames by [`read_rate_ns`](Self::read_rate_ns).
     pub stall_ns: PerClockMode,
-    /// Least time from one falling edge of chip select to the next, ns, whatever the SCK: 40 µs in normal and 150 µs in
-    /// low-power mode (Table 2 and Figure 3). [`frame_stall_ns`](Self::frame_stall_ns) computes the stall that keeps it.
+    /// Least time between falling edges of chip select, ns: 40 µs, or 150 µs in low-power mode (Table 2, Figure 3),
+    /// kept by [`frame_stall_ns`](Self::frame_stall_ns).
     pub read_rate_ns: PerClockMode,
-    /// SCK of single frames, Hz, from which the stall after them is computed. `None`: the fastest of the power mode
-    /// ([`ClockMode::max_sck_hz`]), with which the stall is longest.
+    /// SCK of single frames, Hz, for the stall after them; `None` is the mode's fastest ([`ClockMode::max_sck_hz`]),
+    /// with the longest stall.
     pub sck_hz: Option<u32>,
     /// Level of chip select during the stall.
     pub stall_select: SelectDuringStall,
-    /// Least time that chip select is high between two frames, ns. The data sheet gives none; the
-    /// ADIS16470 needs 1 µs. With [`SelectDuringStall::High`] chip select is high for at least the stall anyway.
+    /// Least time of chip select high, ns; the ADIS16470 needs 1 µs.
     pub select_high_ns: u32,
-    /// Pause between the words of a burst, ns. The data sheet asks for one SCK period, 1 µs at 1 MHz (Table 2 and page
-    /// 10); the default is 0, since Linux, PX4 and flight software of satellites read the part without a pause, and with
-    /// one a burst is 13 transfers instead of one.
+    /// Pause between the words of a burst, ns. The data sheet asks for one SCK period (Table 2, page 10); the default
+    /// is 0, as in Linux and PX4: one transfer instead of 13.
     pub word_gap_ns: u32,
     /// Largest SMPL_PRD value in normal mode: 0x08 by Table 7, 0x09 by Tables 1 and 2 and by page 13.
     pub normal_mode_max_smpl_prd: u8,
-    /// From power-on until the part answers, µs: 220 ms, or 290 ms in low-power mode (Table 1). The default is the longer
-    /// time, since the mode at power-on depends on the settings in flash.
+    /// From power-on to the first answer, µs: 220 ms, or 290 ms in low-power mode (Table 1), the default.
     pub start_up_us: u32,
-    /// From a reset, by software or by the line, until the part answers, µs: 100 ms, or 170 ms in low-power mode (Table 1).
-    /// The default is the longer time.
+    /// From a reset to the first answer, µs: 100 ms, or 170 ms in low-power mode (Table 1), the default.
     pub reset_us: u32,
     /// Length of the low pulse on the reset line, µs. The data sheet gives none; 10 µs are usual in the family.
     pub reset_pulse_us: u32,
-    /// Length of the chip-select pulse that wakes the part, ns: at least 20 µs (Table 1). The default has 5 µs for the
-    /// clock of the microcontroller.
+    /// Chip-select pulse that wakes the part, ns: at least 20 µs (Table 1), and 5 µs for the microcontroller's clock.
     pub wake_pulse_ns: u32,
     /// From wake-up until the part answers, µs: 4 ms, or 15 ms in low-power mode (Table 1).
     pub wake_us: PerClockMode,
@@ -329,17 +317,14 @@ pub struct Timing {
     pub flash_test_us: PerClockMode,
     /// Duration of the internal self-test at 819.2 samples per second, µs: 12 ms (Table 1).
     pub self_test_us: u32,
-    /// Time without bus traffic after the flash-update command, µs. It takes 50 ms (page 10); the default is twice that,
-    /// since the clock of the part is good to ±3 % (Table 1) and a part addressed too soon may lose the update.
+    /// Silence after a flash update, µs: twice the 50 ms of page 10, since a part addressed too soon may lose it.
     pub flash_update_us: u32,
-    /// Time without bus traffic after the factory-restore command, µs. The flash update that it includes takes at most
-    /// 50 ms (page 13); the default is twice that.
+    /// Silence after a factory restore, µs: twice the 50 ms of page 13.
     pub factory_restore_us: u32,
-    /// Time without bus traffic after the auto-null command, µs. The flash update that follows the measurement takes at most
-    /// 50 ms (page 13); the default is twice that.
+    /// Silence after an auto-null, µs: twice the 50 ms of its flash update (page 13).
     pub auto_null_us: u32,
-    /// Time without bus traffic after the precision auto-null command, µs: 30 s, in which the part is offline, and a flash
-    /// update of at most 50 ms (page 13). The default has 3 % for the clock of the part (Table 1).
+    /// Silence after a precision auto-null, µs: 30 s offline, 50 ms of flash update (page 13), and 3 % for the clock
+    /// (Table 1).
     pub precision_auto_null_us: u32,
     /// Interval at which a self-clearing bit is polled, µs.
     pub poll_us: u32,
@@ -374,9 +359,9 @@ impl Timing {
         if smpl_prd <= self.normal_mode_max_smpl_prd { ClockMode::Normal } else { ClockMode::LowPower }
     }
 
-    /// The stall after a single frame, ns: what is left of [`read_rate_ns`](Self::read_rate_ns) after 16 periods of
-    /// [`sck_hz`](Self::sck_hz), and at least [`stall_ns`](Self::stall_ns). By default 32 µs in normal mode and 96.8 µs in
-    /// low-power mode; at 1 MHz 24 µs.
+    /// Stall after a single frame, ns: the rest of [`read_rate_ns`](Self::read_rate_ns) after 16 periods of
+    /// [`sck_hz`](Self::sck_hz), at least [`stall_ns`](Self::stall_ns). By default 32 µs, or 96.8 µs in low-power mode;
+    /// 24 µs at 1 MHz.
     pub const fn frame_stall_ns(&self, mode: ClockMode) -> u32 {
         let sck_hz = match self.sck_hz {
             Some(hz) => hz,

@@ -1,5 +1,4 @@
-//! Procedures on the part as a whole: identification, start-up, configuration, the commands of GLOB_CMD, sleep and
-//! wake-up.
+//! Procedures on the whole part: identification, start-up, configuration, GLOB_CMD, sleep.
 
 use core::num::NonZeroU8;
 
@@ -11,9 +10,7 @@ use crate::error::{Diagnosis, Error, FlashUpdate};
 use crate::protocol::{Protocol, ProtocolError, WriteOrder};
 use crate::register::Register;
 
-/// A part that this driver supports.
-///
-/// Both have the same registers and scale factors; they differ in the temperature range of their calibration.
+/// A supported part; both differ only in the temperature range of their calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -111,8 +108,8 @@ impl Protocol<'_> {
             self.update_register(Register::GpioCtrl, DIO4_IS_OUTPUT, 0).await?;
         }
 
-        // The upper byte of SENS_AVG holds the range, the lower one the filter. The range comes first, since it can change
-        // the filter (data sheet Rev. B, page 14).
+        // SENS_AVG: range in the upper byte, first since it can change the filter (data sheet Rev. B, page 14), filter
+        // in the lower one.
         let before = self.read(Register::SensAvg).await;
         // Stored before the write: if it is interrupted, the part more likely has the new range than the old one.
         self.state.config = config;
@@ -141,7 +138,6 @@ impl Protocol<'_> {
         self.configure(config).await
     }
 
-    /// Writes a command bit to GLOB_CMD and leaves the bus silent for `silence_us`.
     async fn command(&self, command: u16, silence_us: u32) {
         self.write_low(Register::GlobCmd, command).await;
         self.pause(silence_us).await;
@@ -163,8 +159,7 @@ impl Protocol<'_> {
         self.run_auto_null(PRECISION_AUTO_NULL, self.state.timing.precision_auto_null_us).await
     }
 
-    /// Has the part set its gyro offsets from its outputs, which replaces a host-side bias; a negative offset of x then
-    /// becomes the host-side bias.
+    /// Auto-null; a negative offset of x becomes the host-side bias.
     async fn run_auto_null(&mut self, command: u16, silence_us: u32) -> Result<GyroBias, ProtocolError> {
         self.write_low(Register::GlobCmd, command).await;
         // Known from here on, should the procedure be interrupted: XGYRO_OFF may become negative.

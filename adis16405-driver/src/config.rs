@@ -1,11 +1,10 @@
-//! The configuration: gyro range, filter and sample clock. A value that the part would
-//! not accept cannot be constructed.
+//! Gyro range, filter and sample clock; only accepted values can be constructed.
 
 use crate::channel::GyroRange;
 use crate::clock::{ConfigError, SampleClock, SamplePeriod};
 
-/// Gyro range, filter and sample clock: a combination that the part accepts. The default is that of the part after
-/// reset: ±300 °/s, M = 2 (four samples an average), 819.2 samples per second.
+/// An accepted combination; the default is that after reset: ±300 °/s, M = 2 (four samples an average), 819.2 samples
+/// per second.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -18,7 +17,7 @@ pub struct Config {
 }
 
 impl Config {
-    /// `filter_taps_log2` is M in SENS_AVG bits 2:0, 0 to 6: the filter is two cascaded averages of 2^M samples each.
+    /// `filter_taps_log2` is M in SENS_AVG bits 2:0, 0 to 6: two cascaded averages of 2^M samples.
     ///
     /// # Errors
     /// [`ConfigError::FilterTaps`] if M is above 6 or below the minimum of `range`.
@@ -152,10 +151,9 @@ impl TryFrom<SerializedConfig> for Config {
     }
 }
 
-/// The digital filter of gyroscopes, accelerometers and magnetometers: two cascaded averages of N = 2^M samples each, a
-/// Bartlett window of 2N + 1 taps, of which the first and the last are 0, with a phase of N samples (data sheet Rev. B,
-/// Figure 15). Its amplitude response at f/fs cycles per sample is |sin(πNf/fs) / (N·sin(πf/fs))|²; the analog poles before it are not
-/// included.
+/// The digital filter of gyroscopes, accelerometers and magnetometers: a Bartlett window of 2N + 1 taps (two averages
+/// of N = 2^M samples) with a phase of N samples (data sheet Rev. B, Figure 15). Its amplitude response at f/fs cycles
+/// per sample is |sin(πNf/fs) / (N·sin(πf/fs))|²; the analog poles before it are not included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BartlettFilter {

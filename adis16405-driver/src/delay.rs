@@ -4,10 +4,9 @@ use core::cell::RefCell;
 
 use embedded_hal::delay::DelayNs;
 
-/// A delay that several owners use, for HALs whose delay can neither be cloned nor made twice: `&SharedDelay` is a
-/// [`DelayNs`] too. The SPI device needs a delay beside the driver for [`wake`](crate::Adis16405::wake),
-/// [`SelectDuringStall::Low`](crate::SelectDuringStall::Low) and
-/// [`Timing::word_gap_ns`](crate::Timing::word_gap_ns).
+/// Shares a delay that can be neither cloned nor made twice: `&SharedDelay` is a [`DelayNs`] too. The SPI device needs
+/// a delay beside the driver for [`wake`](crate::Adis16405::wake),
+/// [`SelectDuringStall::Low`](crate::SelectDuringStall::Low) and [`Timing::word_gap_ns`](crate::Timing::word_gap_ns).
 ///
 /// ```
 /// # use embedded_hal::{delay::DelayNs, digital::OutputPin, spi::SpiBus};

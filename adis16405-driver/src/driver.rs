@@ -1,5 +1,4 @@
-//! The driver: its settings, and the table of its methods. Modules `blocking` and `asynch` make the methods of the
-//! table.
+//! The driver's settings and table of methods, which `blocking` and `asynch` make.
 
 use core::marker::PhantomData;
 
@@ -22,8 +21,7 @@ pub enum Async {}
 
 /// An ADIS16405 or ADIS16400 on an SPI bus: blocking, or asynchronous with `MODE` = `Async` (feature `async`).
 ///
-/// Every 16-bit frame is a transaction of its own, after which the driver waits for the stall with its delay `D`, chip
-/// select being high. [`Timing`] sets how long, and whether chip select stays low instead.
+/// Every 16-bit frame is a transaction, followed by the stall of [`Timing`] with the delay `D`.
 ///
 /// The SPI device must support [`Operation::DelayNs`](embedded_hal::spi::Operation::DelayNs) only for
 /// [`wake`](Self::wake), [`SelectDuringStall::Low`](crate::SelectDuringStall::Low) and [`Timing::word_gap_ns`].
@@ -41,16 +39,16 @@ impl<SPI, D, MODE> Adis16405<SPI, D, MODE> {
         Self { bus: SensorBus::new(spi, delay), state, validator, mode: PhantomData }
     }
 
-    /// Sets the least stall after each frame and burst in ns, for both power modes. The read rate of the part is kept in any
-    /// case ([`Timing::frame_stall_ns`]).
+    /// Sets the least stall after frames and bursts, ns, for both power modes; the read rate is kept
+    /// ([`Timing::frame_stall_ns`]).
     #[must_use]
     pub fn with_stall_ns(mut self, stall_ns: u32) -> Self {
         self.state.timing.stall_ns = PerClockMode { normal: stall_ns, low_power: stall_ns };
         self
     }
 
-    /// States the SCK of single frames, Hz. The slower it is, the shorter is the stall that keeps the read rate of the part;
-    /// without this call the fastest clock of the power mode is assumed ([`Timing::sck_hz`]).
+    /// States the SCK of single frames, Hz: slower clocks have shorter stalls; the default is the mode's fastest
+    /// ([`Timing::sck_hz`]).
     #[must_use]
     pub fn with_sck_hz(mut self, sck_hz: u32) -> Self {
         self.state.timing.sck_hz = Some(sck_hz);
@@ -72,9 +70,8 @@ impl<SPI, D, MODE> Adis16405<SPI, D, MODE> {
         self
     }
 
-    /// Sets with which faults [`read`](Self::read) refuses a sample. The default is [`Faults::REFUSED`]: all but a supply
-    /// outside its window, an error or alarm flag, and inertial words that equal those before, which are
-    /// [warnings](ImuSample::warnings) of the sample.
+    /// Sets the faults with which [`read`](Self::read) refuses a sample, [`Faults::REFUSED`] by default. Others are
+    /// [warnings](ImuSample::warnings).
     #[must_use]
     pub fn with_refused_faults(mut self, faults: Faults) -> Self {
         self.validator = self.validator.with_refused_faults(faults);
@@ -93,10 +90,9 @@ impl<SPI, D, MODE> Adis16405<SPI, D, MODE> {
         self.state.config
     }
 
-    /// True if the part is known to have the [configuration](Self::config), and no stimulus of a manual self-test is on:
-    /// [`init`](Self::init) or a later [`configure`](Self::configure) has succeeded, and no configuration, reset or
-    /// stimulus since then was left unfinished by an error or a dropped future. If false, [`init`](Self::init) makes it
-    /// true.
+    /// True if the part has its [configuration](Self::config) and no stimulus: [`init`](Self::init) or
+    /// [`configure`](Self::configure) succeeded, and nothing was left unfinished since. If false, [`init`](Self::init)
+    /// makes it true.
     pub fn is_ready(&self) -> bool {
         self.state.configured && !self.state.stimulated
     }
@@ -111,15 +107,14 @@ impl<SPI, D, MODE> Adis16405<SPI, D, MODE> {
         self.state.timing
     }
 
-    /// True if XGYRO_OFF was negative when it was last read or written by a method other than the register methods.
-    /// Then x rates may lack their sign bit after a burst read ([`GyroBias`](crate::GyroBias)).
-    /// [`keep_negative_x_bias_on_host`](Self::keep_negative_x_bias_on_host) removes the risk.
+    /// True if XGYRO_OFF was negative when last seen: x rates may lack their sign after a burst
+    /// ([`GyroBias`](crate::GyroBias)). [`keep_negative_x_bias_on_host`](Self::keep_negative_x_bias_on_host) removes
+    /// the risk.
     pub fn x_sign_at_risk(&self) -> bool {
         self.state.x_sign_at_risk
     }
 
-    /// A burst of this part as a sample, with the present gyro range and host-side bias. Neither the burst is validated
-    /// nor is it checked that the driver [is ready](Self::is_ready): [`read`](Self::read) does both.
+    /// A burst as a sample with the present range and host-side bias, without the checks of [`read`](Self::read).
     pub fn sample_from(&self, burst: Burst) -> ImuSample {
         ImuSample::new(burst.counts(), self.state.config.range()).with_host_bias_x(self.state.host_bias_x)
     }
@@ -138,10 +133,8 @@ impl<SPI, D, MODE> Adis16405<SPI, D, MODE> {
     }
 }
 
-/// The methods of the driver that run a procedure of [`Protocol`](crate::protocol::Protocol), each with the name of its
-/// procedure. The macro `$make_methods` makes a blocking or an asynchronous method of each row. A method marked
-/// `stimulating` switches the stimulus of the manual self-test off if its procedure ends with an error; the others are
-/// `plain`.
+/// The methods that run a procedure of [`Protocol`](crate::protocol::Protocol) of the same name; `$make_methods` makes
+/// each of them. `stimulating` methods switch the stimulus off after an error; others are `plain`.
 macro_rules! procedures {
     ($make_methods:ident) => {
         $make_methods! {
@@ -151,57 +144,49 @@ macro_rules! procedures {
             /// [`Error::Product`] if PROD_ID is not that of a supported part.
             plain fn identity() -> Product;
 
-            /// Checks that an ADIS16405 or ADIS16400 answers, writes the configuration, and moves a negative correction of
-            /// gyro x from the part to the driver ([`keep_negative_x_bias_on_host`](Self::keep_negative_x_bias_on_host)):
-            /// after a reset the part may have one from its flash, where an auto-null has stored it.
+            /// Checks that an ADIS16405 or ADIS16400 answers, writes the configuration, and moves a negative correction
+            /// of gyro x from the part to the driver
+            /// ([`keep_negative_x_bias_on_host`](Self::keep_negative_x_bias_on_host)).
             ///
-            /// Until SMPL_PRD is read, the waits of low-power mode are kept unless the driver has configured the part before; SCK
-            /// must suit that mode if the part may be in it.
-            ///
-            /// If a manual self-test has left its stimulus on, it is switched off first. Only bytes that differ are
-            /// written, the lower byte first; in SENS_AVG the range, then the filter, which the range can change. A register
-            /// that was written is read back.
+            /// Low-power timing applies until SMPL_PRD is read, unless the driver has configured the part before; SCK
+            /// must suit it. A stimulus left on is switched off first. Only bytes that differ are written, the lower
+            /// one first (in SENS_AVG the range first), and read back.
             ///
             /// # Errors
             /// [`Error::Product`] if PROD_ID is not that of a supported part, [`Error::Verify`] if a register did not
             /// take its value.
             plain fn init() -> Product;
 
-            /// Waits for the start-up time of the part ([`Timing::start_up_us`]), then does what [`init`](Self::init)
-            /// does.
+            /// Waits for [`Timing::start_up_us`], then [`init`](Self::init).
             ///
             /// # Errors
             /// Those of [`init`](Self::init).
             plain fn start_up() -> Product;
 
-            /// Resets the part (GLOB_CMD bit 7), leaves the bus silent for [`Timing::reset_us`], and configures the
-            /// part as [`init`](Self::init) does.
+            /// Resets the part (GLOB_CMD bit 7), leaves the bus silent for [`Timing::reset_us`], then
+            /// [`init`](Self::init).
             ///
-            /// A reset loads the registers from flash, and sets the volatile ones (GPIO, sleep, auxiliary DAC) to their
-            /// reset values. If SMPL_PRD in flash selects low-power mode, SCK must not exceed 300 kHz until `init` has
-            /// set another one; the driver keeps the stall of that mode as long.
+            /// Registers are loaded from flash, volatile ones (GPIO, sleep, auxiliary DAC) reset. If SMPL_PRD in flash
+            /// selects low-power mode, SCK must not exceed 300 kHz until `init` has ended.
             ///
             /// # Errors
             /// Those of [`init`](Self::init).
             plain fn software_reset() -> Product;
 
-            /// Sets sample period, gyro range and filter.
-            ///
-            /// After a sample period above SMPL_PRD = 0x08 was set, SCK must not exceed 300 kHz.
+            /// Sets sample period, gyro range and filter; above SMPL_PRD = 0x08 SCK must not exceed 300 kHz.
             ///
             /// # Errors
             /// [`Error::Verify`] if a register did not take its value.
             plain fn configure(config: Config) -> ();
 
-            /// Sets the period of the internal sample clock. [`SamplePeriod`] is made from a rate in `f64`, `f32` or
-            /// 10⁻³ samples per second.
+            /// Sets the period of the internal sample clock.
             ///
             /// # Errors
             /// [`Error::Verify`].
             plain fn set_sample_period(period: SamplePeriod) -> ();
 
-            /// Sets the sample rate nearest to `hz` and returns the rate that was set, both in samples per second. For
-            /// targets without a double-precision FPU, [`set_sample_period`](Self::set_sample_period) is cheaper.
+            /// Sets the rate nearest to `hz` and returns it, samples per second;
+            /// [`set_sample_period`](Self::set_sample_period) needs no double precision.
             ///
             /// # Errors
             /// [`Error::Config`] if `hz` is not finite and positive, [`Error::Verify`].
@@ -219,8 +204,7 @@ macro_rules! procedures {
             /// [`Error::Config`] if M is above 6 or too small for the range, [`Error::Verify`].
             plain fn set_filter_taps_log2(filter_taps_log2: u8) -> ();
 
-            /// Reads a register in two frames; the answer comes in the second. Bits outside the register's width are
-            /// returned as the part sends them.
+            /// Reads a register in two frames, with undefined bits as sent.
             ///
             /// # Errors
             /// [`Error::WriteOnly`] for GLOB_CMD (reading it would start a burst) and SLP_CNT.
@@ -239,10 +223,8 @@ macro_rules! procedures {
             /// [`Error::ReadOnly`] if it cannot be written.
             plain fn write_register(register: Register, value: u16) -> ();
 
-            /// Sets the bits of `mask` to their value in `value` and leaves the others. Reads the register, writes only
-            /// bytes that change, the lower one first, and reads back ([`with_verified_writes`]).
-            ///
-            /// [`with_verified_writes`]: Self::with_verified_writes
+            /// Sets the bits of `mask` to those of `value`: reads, writes changed bytes, the lower one first, and reads
+            /// back ([`with_verified_writes`](Self::with_verified_writes)).
             ///
             /// # Errors
             /// [`Error::ReadOnly`], [`Error::WriteOnly`], [`Error::Verify`] if the bits did not take their value.
@@ -254,33 +236,29 @@ macro_rules! procedures {
             /// [`Error::Spi`].
             plain fn diagnosis() -> Diagnosis;
 
-            /// Runs the internal self-test (MSC_CTRL bit 10) and waits for its end. The other bits of MSC_CTRL keep
-            /// their values, except that a manual self-test that was on is switched off.
+            /// Runs the internal self-test (MSC_CTRL bit 10) and waits for its end; switches a manual self-test off.
             ///
             /// # Errors
             /// [`Error::Deadline`] if it does not end within twice its usual time, [`Error::Product`] if the part does
             /// not answer, [`Error::Verify`].
             plain fn self_test() -> SelfTest;
 
-            /// Runs the flash memory test (MSC_CTRL bit 11) and waits for its end. It too switches a manual self-test off.
+            /// Runs the flash test (MSC_CTRL bit 11) and waits for its end; switches a manual self-test off.
             ///
             /// # Errors
             /// Those of [`self_test`](Self::self_test).
             plain fn flash_test() -> FlashTest;
 
-            /// Runs a manual self-test: deflects the sensors (MSC_CTRL bit 8 or 9) and returns the response of gyros x,
-            /// y, z and accelerometers x, y, z in counts, each the difference of two means over eight samples. The part
-            /// must be still. The limits of a valid response are in the data sheet of the part.
+            /// Runs a manual self-test (MSC_CTRL bit 8 or 9): response of gyros and accelerometers x, y, z in counts,
+            /// differences of means over eight samples. The part must be still; limits are in its data sheet.
             ///
             /// # Errors
-            /// [`Error::Verify`] if MSC_CTRL did not take the stimulus bits. After any error the method tries once more
-            /// to switch the stimulus off. If that fails too, or if the future is dropped, the sensors stay deflected
-            /// until [`stop_stimulus`](Self::stop_stimulus), [`init`](Self::init) or [`self_test`](Self::self_test)
-            /// succeeds.
+            /// [`Error::Verify`] if MSC_CTRL did not take the bits. After an error the method tries to switch the
+            /// stimulus off. If that fails too, or if the future is dropped, the sensors stay deflected until
+            /// [`stop_stimulus`](Self::stop_stimulus), [`init`](Self::init) or [`self_test`](Self::self_test) succeeds.
             stimulating fn stimulus_response(stimulus: Stimulus) -> [i16; 6];
 
-            /// Switches the stimulus of a manual self-test off (MSC_CTRL bits 9 and 8). The outputs are then settled
-            /// after the length of the filter.
+            /// Switches the stimulus off (MSC_CTRL bits 9 and 8); outputs settle after the filter's length.
             ///
             /// # Errors
             /// [`Error::Verify`] if MSC_CTRL did not take the bits.
@@ -292,14 +270,14 @@ macro_rules! procedures {
             /// [`Error::Spi`].
             plain fn gyro_offsets() -> GyroBias;
 
-            /// Sets the bias correction of the gyros x, y, z in counts of 0.0125 °/s, −4096 to 4095, which is added to
-            /// the outputs. A negative correction of x is applied by the driver: see [`GyroBias`].
+            /// Sets the gyros' bias correction x, y, z in counts of 0.0125 °/s, −4096 to 4095, added to the outputs;
+            /// the driver applies a negative x ([`GyroBias`]).
             ///
             /// # Errors
             /// [`Error::Value`] if an offset does not fit, [`Error::Verify`].
             plain fn set_gyro_offsets(offsets: [i16; 3]) -> GyroBias;
 
-            /// If XGYRO_OFF is negative, sets it to 0 and applies its value in the driver: see [`GyroBias`].
+            /// If XGYRO_OFF is negative, moves its value to the driver: see [`GyroBias`].
             ///
             /// # Errors
             /// [`Error::Verify`].
@@ -341,30 +319,27 @@ macro_rules! procedures {
             /// [`Error::Value`] if a factor does not fit, [`Error::Verify`].
             plain fn set_soft_iron(factors: [u16; 3]) -> ();
 
-            /// Runs the auto-null (GLOB_CMD bit 0): the part sets its gyro offsets from its present outputs, and must
-            /// be still. A negative offset of x is then applied by the driver: see [`GyroBias`].
+            /// Runs the auto-null (GLOB_CMD bit 0): the still part sets its gyro offsets from its outputs; the driver
+            /// applies a negative x ([`GyroBias`]).
             ///
-            /// The part then sets its outputs to 0 and writes its registers to flash, which costs one of 10,000 cycles (data
-            /// sheet Rev. B, page 13 and Table 1); [`flash_writes`](Self::flash_writes) counts
-            /// them.
+            /// The flash is written, one of 10,000 cycles (data sheet Rev. B, page 13 and Table 1), counted by
+            /// [`flash_writes`](Self::flash_writes).
             ///
             /// # Errors
             /// [`Error::Product`] if the part does not answer after the command, [`Error::Verify`].
             plain fn auto_null() -> GyroBias;
 
-            /// Runs the precision auto-null (GLOB_CMD bit 4): as [`auto_null`](Self::auto_null), from an average over
-            /// 30 s ([`Timing::precision_auto_null_us`]) during which the part is offline and must be still, and the bus
-            /// is left silent. It writes the flash too. On a sibling part it left a mean residual of 0.05 °/s.
-            ///
-            /// The delay of the driver may feed a watchdog.
+            /// Runs the precision auto-null (GLOB_CMD bit 4): [`auto_null`](Self::auto_null) over 30 s
+            /// ([`Timing::precision_auto_null_us`]) offline, still, with a silent bus. A sibling part kept a mean
+            /// residual of 0.05 °/s. The delay may feed a watchdog.
             ///
             /// # Errors
             /// Those of [`auto_null`](Self::auto_null).
             plain fn precision_auto_null() -> GyroBias;
 
-            /// Restores the factory calibration (GLOB_CMD bit 1): the part sets the offsets of gyros and accelerometers and the
-            /// hard-iron correction to 0 and writes its registers to flash, one of 10,000 cycles. Leaves the bus silent
-            /// meanwhile, configures the part again, and returns the corrections that were overwritten.
+            /// Restores the factory calibration (GLOB_CMD bit 1): offsets and hard-iron correction become 0 and are
+            /// written to flash, one of 10,000 cycles. Configures the part again, and returns the overwritten
+            /// corrections.
             ///
             /// # Errors
             /// Those of [`init`](Self::init).
@@ -376,8 +351,7 @@ macro_rules! procedures {
             /// [`Error::Spi`].
             plain fn flash_writes() -> u16;
 
-            /// Reads DIAG_STAT and FLASH_CNT, writes the present settings to flash (GLOB_CMD bit 3), leaves the bus
-            /// silent meanwhile, and reads both again.
+            /// Writes the settings to flash (GLOB_CMD bit 3), with DIAG_STAT and FLASH_CNT before and after.
             ///
             /// # Errors
             /// [`Error::FlashUpdate`] if DIAG_STAT reports a failure of this update, or if FLASH_CNT did not change.
@@ -413,7 +387,7 @@ macro_rules! procedures {
             /// [`Error::Spi`].
             plain fn alarm(number: AlarmNumber) -> Option<Alarm>;
 
-            /// Sets an alarm, or switches it off with `None`. The alarm is off while its registers change.
+            /// Sets an alarm, or switches it off with `None`; it is off while its registers change.
             ///
             /// # Errors
             /// [`Error::Value`] if the threshold is outside the limits of the channel, [`Error::Verify`].
@@ -449,15 +423,14 @@ macro_rules! procedures {
             /// [`Error::Verify`].
             plain fn set_aux_dac(level: DacLevel) -> ();
 
-            /// Sends the part to sleep. Leave the bus silent until the sleep is over, or call [`wake`](Self::wake).
+            /// Sends the part to sleep; leave the bus silent until it ends, or call [`wake`](Self::wake).
             ///
             /// # Errors
             /// [`Error::Spi`]; SLP_CNT is not read back.
             plain fn sleep(sleep: Sleep) -> ();
 
-            /// Wakes the part by a low pulse on chip select ([`Timing::wake_pulse_ns`]), waits for [`Timing::wake_us`],
-            /// and reads which part is connected. Only one source describes the pulse, without a test; a reset wakes
-            /// the part too.
+            /// Wakes the part by a chip-select pulse ([`Timing::wake_pulse_ns`]), waits for [`Timing::wake_us`], and
+            /// identifies it. The pulse has one source, without a test; a reset wakes too.
             ///
             /// # Errors
             /// [`Error::Product`] if the part does not answer.

@@ -9,11 +9,10 @@ use crate::register::Register;
 use crate::validity::Faults;
 
 bitflags::bitflags! {
-    /// The status and error flags of DIAG_STAT. A read clears the register, so a procedure that reads it returns the
-    /// flags with its result.
+    /// The flags of DIAG_STAT. A read clears them, so procedures that read them return them.
     ///
-    /// A flag is set again at the next sample while its condition persists; those of the supply return to 0 without a read
-    /// too (data sheet Rev. B, page 15 and Table 23). Linux has gyro x and z exchanged.
+    /// A flag is set again while its condition persists; supply flags clear by themselves (data sheet Rev. B, page 15
+    /// and Table 23). Linux has gyro x and z exchanged.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub struct Diagnosis: u16 {
@@ -127,8 +126,8 @@ pub enum Error<E> {
     FlashUpdate(FlashUpdate),
     /// The burst that was read is not usable.
     Unusable(Faults),
-    /// It is not known which configuration the part has, or a stimulus of the manual self-test may be on:
-    /// [`init`](crate::Adis16405::init) has to succeed first. Nothing was sent.
+    /// Unknown configuration, or a stimulus may be on: [`init`](crate::Adis16405::init) has to succeed first. Nothing
+    /// was sent.
     NotReady,
     /// A pin of the controller failed: that of the reset line, or of data ready.
     Pin,

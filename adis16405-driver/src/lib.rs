@@ -23,8 +23,8 @@
 //!
 //! # Where a call was interrupted
 //!
-//! A transaction that was under way may or may not have reached the part. The next call works: each read begins with its own
-//! request, after the pause that the part needs. The part may be left with:
+//! A transaction under way may or may not have reached the part. The next call works: each read begins with its own
+//! request and pause. The part may be left with:
 //!
 //! | interrupted | state of the part | remedy |
 //! |---|---|---|
@@ -43,22 +43,22 @@
 //!
 //! # Equal samples
 //!
-//! In a measured minute of 49,425 bursts, 45 repeated the inertial words of their predecessor. All were a full sample
-//! period apart, and 37 of them differed in another word. A sample that was read twice is distinguished from one that
-//! is equal by chance by its new-data flags, or, in a recording without them, by its time.
+//! In a measured minute of 49,425 bursts, 45 repeated the inertial words of their predecessor, a full period apart; 37
+//! differed in another word. A sample that was read twice is distinguished from one that is equal by chance by its
+//! new-data flags, or, in a recording without them, by its time.
 //!
 //! # Sources
 //!
-//! Facts of the part are those of the data sheet ADIS16400/ADIS16405 Rev. B, with the page or table where it matters. It says
-//! nothing of the reset pulse and of the least time that chip select is high ([`Timing`]), nor of the rate at which supply,
-//! magnetometers, temperature and auxiliary input are refreshed ([`Faults::NO_NEW_DATA`]). The erratum of the x rate
-//! ([`GyroBias`]) is from users of the part.
+//! Facts are those of the data sheet ADIS16400/ADIS16405 Rev. B, with page or table. It says nothing of the reset pulse
+//! and of the least time that chip select is high ([`Timing`]), nor of the rate at which supply, magnetometers,
+//! temperature and auxiliary input are refreshed ([`Faults::NO_NEW_DATA`]). The erratum of the x rate ([`GyroBias`]) is
+//! from users of the part.
 //!
 //! # Structure
 //!
-//! Every function of the part is an `async` procedure without I/O, which requests frames and pauses and receives
-//! answers. The blocking and the asynchronous driver carry the requests out; both have the same methods, from one
-//! table. A burst read does not go through a procedure, so that it takes no longer than the bus and the stall.
+//! Functions are `async` procedures without I/O that request frames and pauses. The blocking and the asynchronous
+//! driver carry them out, with the same methods from one table. A burst read needs no procedure, and so no time beyond
+//! the bus and the stall.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![no_std]
 #![forbid(unsafe_code)]

@@ -27,8 +27,7 @@ pub enum Polarity {
     ActiveLow,
 }
 
-/// The pin and the active level of the data-ready or the alarm signal. The default, DIO1 and active high, is that of
-/// data ready after a reset.
+/// Pin and active level of data ready or alarm; the default, DIO1 active high, is data ready's after a reset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -39,8 +38,7 @@ pub struct DioSignal {
     pub polarity: Polarity,
 }
 
-/// Enable (bit 2), polarity (bit 1) and line (bit 0) of a signal: the same bits in MSC_CTRL (data ready) and in
-/// ALM_CTRL (alarm).
+/// Enable (bit 2), polarity (bit 1), line (bit 0), in MSC_CTRL and ALM_CTRL alike.
 pub(crate) const SIGNAL_MASK: u16 = 0b111;
 
 impl DioSignal {
@@ -88,8 +86,7 @@ impl defmt::Format for Dio {
     }
 }
 
-/// Direction and level of the general-purpose lines, GPIO_CTRL. A line that carries data ready or an alarm does not
-/// follow these settings (data sheet Rev. B, page 14).
+/// General-purpose lines, GPIO_CTRL; lines with data ready or alarm ignore it (data sheet Rev. B, page 14).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -113,8 +110,7 @@ impl DacLevel {
         if counts <= 0x0FFF { Some(Self(counts)) } else { None }
     }
 
-    /// The level nearest to a voltage in mV, at 0.8059 mV a count; `None` above 3300 mV. The scale
-    /// is that of Table 20 of the data sheet (Rev. B).
+    /// Nearest to a voltage in mV, at 0.8059 mV a count (data sheet Rev. B, Table 20); `None` above 3300 mV.
     pub const fn from_millivolts(millivolts: u16) -> Option<Self> {
         if millivolts > 3300 {
             return None;

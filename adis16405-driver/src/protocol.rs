@@ -1,9 +1,7 @@
-//! The SPI protocol without I/O: register reads and writes as `async` sequences of bus requests.
+//! The SPI protocol without I/O.
 //!
-//! A procedure of the part (self-test, configuration, …) is an `async fn` on [`Protocol`], in one of the modules
-//! `commands`, `calibration`, `self_test`, `pins` and `alarms`. It awaits nothing but the response to a [`BusRequest`].
-//! The blocking or the asynchronous driver polls the procedure, carries out each request on its bus, and resumes the
-//! procedure with the response. Every sequence of frames therefore exists once.
+//! A procedure is an `async fn` on [`Protocol`] that awaits only responses to [`BusRequest`]s, which either driver
+//! carries out: every sequence of frames exists once.
 
 use core::convert::Infallible;
 use core::future::poll_fn;
@@ -28,10 +26,7 @@ pub(crate) enum BusRequest {
     Pause { us: u32 },
 }
 
-/// Passes requests from a procedure to the driver, and responses back.
-///
-/// The fields are atomic so that the futures of the driver are `Send`. Both sides run in the same future, one after the
-/// other, so loads and stores need no order among threads.
+/// Passes requests from a procedure to the driver, and responses back; atomic, so that the futures are `Send`.
 #[derive(Debug)]
 pub(crate) struct RequestSlot {
     /// The two bytes of a frame, or [`PAUSE`](Self::PAUSE), or [`CHIP_SELECT_PULSE`](Self::CHIP_SELECT_PULSE).
@@ -104,12 +99,12 @@ pub(crate) fn resume<T>(procedure: Pin<&mut impl Future<Output = T>>) -> Poll<T>
 /// The error of a procedure, which has no bus that could fail.
 pub(crate) type ProtocolError = Error<Infallible>;
 
-/// What the driver keeps between procedures.
+/// State of the driver between procedures.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DriverState {
     pub(crate) config: Config,
     pub(crate) timing: Timing,
-    /// Whether changed registers are read back and compared.
+    /// True if changed registers are read back and compared.
     pub(crate) verify: bool,
     /// The power mode of the part. While it is unknown or changes, low-power mode, which has the longer stall.
     pub(crate) mode: ClockMode,
@@ -148,15 +143,13 @@ impl DriverState {
         self.mode = ClockMode::LowPower;
     }
 
-    /// Unless the driver has configured the part, its power mode is not known: the part may have it from its flash, or from
-    /// before a restart of the microcontroller alone.
+    /// Low-power mode unless configured: by flash, or from before a restart.
     pub(crate) const fn assume_low_power_until_read(&mut self) {
         if !self.configured {
             self.mode = ClockMode::LowPower;
         }
     }
 
-    /// The pauses after a frame in the present power mode.
     #[inline(never)]
     pub(crate) fn frame_pauses(&self) -> FramePauses {
         let timing = &self.timing;
@@ -170,7 +163,7 @@ impl DriverState {
     }
 }
 
-/// Which byte of a register is written first. Each byte takes effect as soon as it is written.
+/// The byte of a register that is written first; each takes effect at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum WriteOrder {
     LowByteFirst,
@@ -193,19 +186,16 @@ impl<'a> Protocol<'a> {
         u16::from_be_bytes(self.slot.request(BusRequest::Frame { bytes, pauses: self.state.frame_pauses() }).await)
     }
 
-    /// Leaves the bus silent for `us`.
     pub(crate) async fn pause(&self, us: u32) {
         self.slot.request(BusRequest::Pause { us }).await;
     }
 
-    /// Holds chip select low for `ns` without clocking.
     pub(crate) async fn chip_select_pulse(&self, ns: u32) {
         let pauses = FramePauses { low_ns: ns, high_ns: self.state.timing.select_high_ns };
         self.slot.request(BusRequest::ChipSelectPulse { pauses }).await;
     }
 
-    /// Reads a register in two frames. The answer comes in the second, which itself requests FLASH_CNT, a register that
-    /// can be read without side effects.
+    /// Reads a register in two frames; the second requests FLASH_CNT, which has no side effects.
     pub(crate) async fn read(&self, register: Register) -> u16 {
         self.frame(register.read_frame()).await;
         self.frame(Register::FlashCnt.read_frame()).await
@@ -224,13 +214,11 @@ impl<'a> Protocol<'a> {
         answers
     }
 
-    /// Reads a register that the caller chose, if it can be read.
     pub(crate) async fn read_register(&self, register: Register) -> Result<u16, ProtocolError> {
         let [answer] = self.read_registers([register]).await?;
         Ok(answer)
     }
 
-    /// Reads registers that the caller chose in N + 1 frames, if all can be read.
     pub(crate) async fn read_registers<const N: usize>(
         &self,
         registers: [Register; N],
@@ -241,12 +229,10 @@ impl<'a> Protocol<'a> {
         }
     }
 
-    /// Writes the lower byte of a register.
     pub(crate) async fn write_low(&self, register: Register, value: u16) {
         self.frame(register.write_low_frame(value)).await;
     }
 
-    /// Writes the upper byte of a register.
     pub(crate) async fn write_high(&self, register: Register, value: u16) {
         self.frame(register.write_high_frame(value)).await;
     }
@@ -263,8 +249,7 @@ impl<'a> Protocol<'a> {
         Ok(())
     }
 
-    /// Sets the bits of `mask` to their value in `value`: reads the register, writes the bytes that change, and reads
-    /// back if verification is on.
+    /// Sets the bits of `mask`: reads, writes changed bytes, and reads back if verification is on.
     pub(crate) async fn update_register(&self, register: Register, mask: u16, value: u16) -> Result<(), ProtocolError> {
         match register.access() {
             Access::Read => return Err(Error::ReadOnly(register)),
@@ -308,16 +293,12 @@ impl<'a> Protocol<'a> {
         Ok(())
     }
 
-    /// Sets all bits of a register, as [`update_register`](Self::update_register) does.
     pub(crate) async fn set_register(&self, register: Register, value: u16) -> Result<(), ProtocolError> {
         self.update_register(register, u16::MAX, value).await
     }
 
-    /// Polls a register until the bits of `mask` are clear, for at most `most_us`. Returns whether they were set in any
-    /// poll.
-    ///
-    /// # Errors
-    /// [`Error::Deadline`] if they are still set after `most_us`.
+    /// Polls until the bits of `mask` are clear; true if they were set in any poll, [`Error::Deadline`] after
+    /// `most_us`.
     pub(crate) async fn wait_until_clear(
         &self,
         register: Register,

@@ -1,7 +1,6 @@
-//! The register map of the data sheet: address, name, access and width of every register, and the 16-bit SPI frames
-//! that read and write it.
+//! The register map: address, name, access and width, and the SPI frames.
 
-/// Whether a register may be read and written.
+/// True if a register may be read and written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -33,7 +32,7 @@ macro_rules! registers {
                 match self { $(Register::$variant => $name,)* }
             }
 
-            /// Whether the register can be read, written, or both.
+            /// True if the register can be read, written, or both.
             pub const fn access(self) -> Access {
                 match self { $(Register::$variant => Access::$access,)* }
             }

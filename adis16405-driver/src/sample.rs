@@ -4,10 +4,9 @@ use crate::burst::Counts;
 use crate::channel::{Channel, GyroRange};
 use crate::validity::Faults;
 
-/// The counts of one sample with the gyro range they were taken in, and their values in physical units.
+/// The counts of one sample with their gyro range, and values in physical units.
 ///
-/// Each value exists as `f32` and, for targets without an FPU, as exact `i32` in 10⁻⁶ (temperature: 10⁻⁶ or 10⁻³) of
-/// the unit. Scale factors are those of the data sheet.
+/// Values exist as `f32` and as exact `i32` in 10⁻⁶ (temperature also 10⁻³) of the unit, by the data sheet's scales.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -27,8 +26,7 @@ impl ImuSample {
         Self { counts, range, host_bias_x: 0, warnings: Faults::empty() }
     }
 
-    /// Sets the bias correction, in counts of 0.0125 °/s, that is added to the x rate: see
-    /// [`GyroBias`](crate::GyroBias).
+    /// Sets the correction of x, counts of 0.0125 °/s: see [`GyroBias`](crate::GyroBias).
     #[must_use]
     pub const fn with_host_bias_x(mut self, host_bias_x: i16) -> Self {
         self.host_bias_x = host_bias_x;
@@ -42,8 +40,8 @@ impl ImuSample {
         self
     }
 
-    /// The faults that the burst shows and that did not refuse it, [`Faults::WARNINGS`] unless
-    /// [`with_refused_faults`](crate::Adis16405::with_refused_faults) was set; none for a sample that was not validated.
+    /// Faults that did not refuse the burst, [`Faults::WARNINGS`] by default
+    /// ([`with_refused_faults`](crate::Adis16405::with_refused_faults)); none without validation.
     pub const fn warnings(&self) -> Faults {
         self.warnings
     }
@@ -115,8 +113,8 @@ impl ImuSample {
         millionths(self.aux_adc_uv())
     }
 
-    /// Internal temperature in 10⁻⁶ °C for a scale of `udegc_per_count` in 10⁻⁶ °C a count. The data sheet (Rev. B,
-    /// Table 9) gives 140,000, Analog Devices' register map 135,700.
+    /// Temperature in 10⁻⁶ °C for `udegc_per_count`: 140,000 (data sheet Rev. B, Table 9) or 135,700 (Analog Devices'
+    /// register map).
     pub fn temp_udegc(&self, udegc_per_count: i32) -> i32 {
         25_000_000i32.saturating_add(i32::from(self.counts.get(Channel::Temp)).saturating_mul(udegc_per_count))
     }

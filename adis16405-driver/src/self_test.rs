@@ -1,5 +1,4 @@
-//! The tests that the part runs on itself: internal self-test, flash memory test, manual self-test (MSC_CTRL,
-//! DIAG_STAT).
+//! The part's tests: internal, flash, manual (MSC_CTRL, DIAG_STAT).
 
 use crate::burst::OutputWord;
 use crate::channel::Channel;
@@ -15,8 +14,7 @@ use crate::register::Register;
 pub struct SelfTest {
     /// DIAG_STAT before the test; the read cleared the register.
     pub before: Diagnosis,
-    /// True if the test bit was seen set before it cleared. If false, the part may have been asleep and not have tested
-    /// anything.
+    /// True if the test bit was seen set; if false, a sleeping part may not have tested.
     pub ran: bool,
     /// DIAG_STAT after the test.
     pub diagnosis: Diagnosis,
@@ -57,9 +55,7 @@ impl FlashTest {
 pub enum Stimulus {
     /// Positive, MSC_CTRL bit 8: gyros and accelerometers.
     Positive,
-    /// Negative, MSC_CTRL bit 9. The data sheet (Rev. B, Table 22) describes it for the gyros alone, and contradicts itself on
-    /// the sign: by its words the output of a gyro rises with the negative stimulus and falls with the positive one. Compare
-    /// magnitudes.
+    /// Negative, MSC_CTRL bit 9. The data sheet (Rev. B, Table 22) contradicts itself on the sign: compare magnitudes.
     Negative,
 }
 
@@ -72,8 +68,7 @@ const SETTINGS: u16 = 0x03C7;
 const STIMULI: u16 = 0x0300;
 /// Number of samples whose mean is compared with and without a stimulus.
 const AVERAGED: i32 = 8;
-/// Sample periods that a self-test may take in addition to [`Timing::self_test_us`](crate::Timing::self_test_us),
-/// whatever the sample rate.
+/// Sample periods beside [`Timing::self_test_us`](crate::Timing::self_test_us), at any rate.
 const SAMPLES_IN_TEST: u32 = 20;
 
 const INERTIAL: [Register; 6] = [
@@ -98,9 +93,7 @@ impl Protocol<'_> {
         Ok(FlashTest { before, ran, diagnosis })
     }
 
-    /// Runs the test of an MSC_CTRL bit: sets the bit, waits until the part clears it, and restores the rest of the
-    /// register, but leaves the manual self-test off. Only the upper byte is written at the start, since the lower one holds the data-ready setting. Returns
-    /// DIAG_STAT before the test, whether the test ran, and DIAG_STAT after it.
+    /// Runs the test of an MSC_CTRL bit; returns DIAG_STAT before, whether the test ran, and DIAG_STAT after.
     async fn run_test(&mut self, bit: u16, usual_us: u32) -> Result<(Diagnosis, bool, Diagnosis), ProtocolError> {
         // A part that is absent may read as zeros, which would look like a test that has ended.
         self.identity().await?;

@@ -7,19 +7,18 @@ use embedded_hal::spi::Operation;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum SelectDuringStall {
-    /// High, the default: each frame is a transaction of its transfer alone, after which the driver waits with its own
-    /// delay. Linux, PX4 and the flight software Canopus do so. On a shared bus, other devices can use the time.
+    /// High, the default: each frame is a transaction, and the driver's delay follows (as in Linux and PX4). On a
+    /// shared bus, other devices can use the time.
     #[default]
     High,
-    /// Low: the stall is an [`Operation::DelayNs`] at the end of the transaction. Chip select is then high for
-    /// [`Timing::select_high_ns`](crate::Timing::select_high_ns) and the time of the code between two transactions.
+    /// Low: the stall is an [`Operation::DelayNs`] at the transaction's end; then
+    /// [`Timing::select_high_ns`](crate::Timing::select_high_ns).
     Low,
 }
 
 /// Longest delay that is asked for at once, µs: some HALs compute its cycles in 32 bits, which 25 s at 168 MHz overflow.
 pub(crate) const LONGEST_DELAY_US: u32 = 100_000;
 
-/// The pauses after a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FramePauses {
     /// With chip select low, ns.
@@ -37,8 +36,7 @@ impl FramePauses {
         }
     }
 
-    /// The operations of a transaction, without the last one, which is the pause with chip select low, if that is 0: an SPI
-    /// device without a delay of its own cannot carry it out.
+    /// Without the last one, the pause with chip select low, if it is 0: devices without a delay cannot carry it out.
     pub(crate) fn operations<'a, 'b>(&self, operations: &'a mut [Operation<'b, u8>]) -> &'a mut [Operation<'b, u8>] {
         if self.low_ns > 0 {
             return operations;
@@ -52,8 +50,7 @@ impl FramePauses {
 pub(crate) struct SensorBus<SPI, D> {
     pub(crate) spi: SPI,
     pub(crate) delay: D,
-    /// The pause that has to pass before the next transaction, ns. Not 0 if the transaction or the pause before was
-    /// interrupted, by a future that was dropped.
+    /// Pause before the next transaction, ns; not 0 after a dropped future.
     pub(crate) pending_pause_ns: u32,
 }
 

@@ -1,7 +1,4 @@
-//! Validity of a burst: which faults it shows, which channels they refuse, and how often each fault has occurred.
-//!
-//! The part has no checksum and no sample counter, so the checks use the flags of the words, their plausibility and
-//! their change from burst to burst.
+//! Validity of a burst by flags, plausibility and changes: faults, refused channels, counts.
 
 use crate::burst::{Burst, OutputWord};
 use crate::channel::{Channel, ChannelMask};
@@ -11,65 +8,52 @@ bitflags::bitflags! {
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     pub struct Faults: u16 {
-        /// The new-data flag of at least one inertial word (gyroscopes and accelerometers) is clear: the word was read
-        /// before. The flags of the other words are not used, since no source tells whether supply,
-        /// magnetometers, temperature and auxiliary input are refreshed with every sample.
+        /// The new-data flag of an inertial word is clear: it was read before.
         const NO_NEW_DATA = 1 << 0;
         /// The error/alarm flag of at least one word is set; DIAG_STAT holds the reason.
         const ERROR_ALARM = 1 << 1;
-        /// Supply outside 4.75…5.25 V, the limits of DIAG_STAT bits 0 and 1 (data sheet Rev. B, Table 23). The part goes on
+        /// Supply outside 4.75…5.25 V (DIAG_STAT bits 0 and 1, data sheet Rev. B, Table 23); the part goes on
         /// measuring.
         const SUPPLY = 1 << 2;
         /// All words are 0x0000: the data line is held low, or no part is connected.
         const STUCK_LOW = 1 << 3;
-        /// The last two words, temperature and auxiliary input, are 0xFFFF: the data line is held high, no part is connected, or the
-        /// burst ended early, after which nothing drives the line. A part sends both only one count below 25 °C with the input at
-        /// full scale and an error flag set, if it sets the two unused bits of a word of 12 bits.
+        /// Temperature and auxiliary input are 0xFFFF: line held high, no part, or a burst that ended early.
         const STUCK_HIGH = 1 << 4;
-        /// The six inertial words equal those of the previous burst. A warning only: where the noise is below one count
-        /// or the filter is long, consecutive samples are often equal by chance (45 of 49,425 bursts of a real part; 37
-        /// of the 45 differed in a magnetometer or supply word). The new-data flags tell whether a sample is new.
+        /// The six inertial words equal the previous ones, a warning: often chance (45 of 49,425 bursts of a real
+        /// part). The new-data flags tell whether a sample is new.
         const REPEATED = 1 << 5;
         /// The words are those of a valid burst, shifted by 1 to 15 bits: an SCK edge was lost or counted twice.
         const SHIFTED = 1 << 6;
         /// A gyro beyond ±7000 counts, where full scale is ±6000: a damaged word or a lost sign bit.
         const IMPOSSIBLE_RATE = 1 << 7;
-        /// All twelve words have been equal for [`BurstValidator::FROZEN_AFTER`] bursts, which is over four times the
-        /// length of the longest filter.
+        /// All twelve words equal for [`BurstValidator::FROZEN_AFTER`] bursts, four times the longest filter.
         const FROZEN = 1 << 8;
-        /// The x rate may be a negative one that lost its sign bit: XGYRO_OFF is negative and the count is 1192 or
-        /// more, which is what the sign erratum makes of −7000 and more. Detected only with
-        /// [`BurstValidator::with_x_sign_at_risk`].
+        /// XGYRO_OFF is negative and the count 1192 or more, the sign erratum's image of −7000 and more. Detected only
+        /// with [`BurstValidator::with_x_sign_at_risk`].
         const X_SIGN = 1 << 9;
-        /// A supply below 3.0 V or above 6.0 V, which a running part does not measure: above 6.0 V is beyond its absolute
-        /// maximum ratings (data sheet Rev. B, Table 3). The word was not sent by a part, nor were the others. Not set for
-        /// a burst that is stuck or shifted, of which it is no surprise.
+        /// Supply below 3.0 V or above 6.0 V (data sheet Rev. B, Table 3): not sent by a running part. Not set for a
+        /// stuck or shifted burst.
         const IMPLAUSIBLE_SUPPLY = 1 << 10;
-        /// The error/alarm flag of some words is set and that of others clear. A part sets it in all words of a burst or in
-        /// none, so the bits of some word are not those that it sent. Not set for a shifted burst, in which that is no
-        /// surprise.
+        /// The error/alarm flag is set in some words only: bits are damaged. Not set for a shifted burst.
         const MIXED_ALARM = 1 << 11;
     }
 }
 
 impl Faults {
-    /// Largest gyro count, of either sign, that is not an [`IMPOSSIBLE_RATE`](Self::IMPOSSIBLE_RATE): full scale is ±6000 in
-    /// every range, and a part may exceed it somewhat.
+    /// Largest magnitude of a gyro count that is no [`IMPOSSIBLE_RATE`](Self::IMPOSSIBLE_RATE); full scale is ±6000.
     pub const LARGEST_RATE: i16 = 7000;
 
-    /// Faults with which samples are used: neighbours that are equal by chance, which to leave out would bias the noise
-    /// estimate upwards; a supply outside its window; and flags in DIAG_STAT, an alarm among them.
+    /// Faults with which samples are used: chance repeats (leaving them out would bias the noise), supply outside its
+    /// window, flags in DIAG_STAT.
     pub const WARNINGS: Faults = Faults::REPEATED.union(Faults::SUPPLY).union(Faults::ERROR_ALARM);
 
     /// Faults of single inertial words, which refuse the channel of the word alone.
     pub const OF_CHANNELS: Faults = Faults::NO_NEW_DATA.union(Faults::IMPOSSIBLE_RATE).union(Faults::X_SIGN);
 
-    /// The faults that refuse data unless [`BurstValidator::with_refused_faults`] says otherwise: all but the
-    /// [`WARNINGS`](Self::WARNINGS).
+    /// Default refusal of [`BurstValidator::with_refused_faults`]: all but the [`WARNINGS`](Self::WARNINGS).
     pub const REFUSED: Faults = Faults::all().difference(Faults::WARNINGS);
 
-    /// Every fault with its name in reports. Where several are present, the one nearest to the root cause comes first, and
-    /// the [`WARNINGS`](Self::WARNINGS) last.
+    /// Faults with their names in reports, the nearest to the root cause first, [`WARNINGS`](Self::WARNINGS) last.
     pub const CAUSES: [(Faults, &'static str); 12] = [
         (Faults::STUCK_LOW, "stuck_low"),
         (Faults::STUCK_HIGH, "stuck_high"),
@@ -85,8 +69,8 @@ impl Faults {
         (Faults::SUPPLY, "supply"),
     ];
 
-    /// The name of the first fault present in the order of [`CAUSES`](Self::CAUSES); `None` without a fault. A burst of
-    /// zeros, for example, also lacks new data and shows no supply, but its cause is `stuck_low`.
+    /// The first fault's name in the order of [`CAUSES`](Self::CAUSES): zeros are `stuck_low`, though they also lack
+    /// data and supply.
     pub fn cause(self) -> Option<&'static str> {
         self.causes().next()
     }
@@ -110,8 +94,8 @@ const SUPPLY_COUNTS: core::ops::RangeInclusive<i16> = 1965..=2171;
 const PLAUSIBLE_SUPPLY_COUNTS: core::ops::RangeInclusive<i16> = 1241..=2481;
 
 impl Burst {
-    /// The faults that this burst shows without knowledge of others. [`Faults::REPEATED`], [`Faults::FROZEN`] and
-    /// [`Faults::X_SIGN`] need a [`BurstValidator`].
+    /// Faults of this burst alone; [`Faults::REPEATED`], [`Faults::FROZEN`] and [`Faults::X_SIGN`] need a
+    /// [`BurstValidator`].
     pub fn faults(&self) -> Faults {
         let words = &self.words;
         let all = words.iter().fold(u16::MAX, |all, word| all & word.0);
@@ -144,10 +128,7 @@ impl Burst {
         (-Faults::LARGEST_RATE..=Faults::LARGEST_RATE).contains(&self.words[gyro as usize].counts(gyro))
     }
 
-    /// The channels that `faults`, which this burst shows, refuse: a fault of a word that of the word, any other fault all.
-    ///
-    /// The channels that are not inertial are refused only with all others: no source tells whether they are
-    /// refreshed with every sample. Without a new inertial word a burst has no new sample.
+    /// Channels refused by `faults`: those of a word's fault, else all.
     fn refused_channels(&self, faults: Faults) -> ChannelMask {
         if faults.is_empty() {
             return ChannelMask::EMPTY;
@@ -175,10 +156,7 @@ fn supply_in_range(word: OutputWord) -> bool {
     SUPPLY_COUNTS.contains(&word.counts(Channel::Supply))
 }
 
-/// Searches for a shift by which the inertial words get a set new-data flag, and eleven words equal error/alarm flags,
-/// since the part sets that flag in all words or in none. Where the words came up to a byte late, the first shifted word
-/// is the supply and must be in range. Where they came early, it is the x rate, of which any value is accepted; the
-/// supply, partly lost, is not checked.
+/// Searches a shift that sets the inertial new-data flags, makes eleven error/alarm flags equal, and the supply valid.
 fn is_shifted(words: &[OutputWord; 12]) -> bool {
     let new = |words: &[OutputWord]| words.iter().all(|word| word.new_data());
     (1..16).any(|bits| {
@@ -195,10 +173,8 @@ fn may_have_lost_its_sign(x: i16) -> bool {
     x >= (1 << 13) - Faults::LARGEST_RATE
 }
 
-/// The faults that a burst shows, and the channels that they refuse.
-///
-/// This is the one rule of validity: a driver's [`read`](crate::Adis16405::read), a device that samples and a program that
-/// reads a recording use or leave out the same words.
+/// Faults of a burst, and the channels that they refuse: the one rule for [`read`](crate::Adis16405::read), devices and
+/// recordings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -206,8 +182,8 @@ fn may_have_lost_its_sign(x: i16) -> bool {
 pub struct Validity {
     /// The faults found.
     pub faults: Faults,
-    /// The channels whose words are not to be used: of a fault of single words ([`Faults::OF_CHANNELS`]) those channels, of
-    /// any other fault that is not a [warning](Faults::WARNINGS) all.
+    /// Not to be used: the channels of single words' faults ([`Faults::OF_CHANNELS`]), all for others that are no
+    /// [warning](Faults::WARNINGS).
     pub refused: ChannelMask,
 }
 
@@ -293,16 +269,16 @@ impl BurstValidator {
     /// Number of bursts equal to their predecessor after which [`Faults::FROZEN`] is raised.
     pub const FROZEN_AFTER: u16 = 512;
 
-    /// Sets whether x rates can lose their sign bit ([`Adis16405::x_sign_at_risk`](crate::Adis16405::x_sign_at_risk)).
-    /// If so, rates that may have lost it are marked as [`Faults::X_SIGN`]. The default is false.
+    /// Marks possible [`Faults::X_SIGN`] ([`Adis16405::x_sign_at_risk`](crate::Adis16405::x_sign_at_risk)); false by
+    /// default.
     #[must_use]
     pub const fn with_x_sign_at_risk(mut self, at_risk: bool) -> Self {
         self.x_sign_at_risk = at_risk;
         self
     }
 
-    /// Sets which faults refuse data. The default is [`Faults::REFUSED`]; `Faults::REFUSED | Faults::SUPPLY` for example
-    /// refuses a sample that was taken at 4.7 V too. A fault that is not among them is reported and counted alone.
+    /// Sets the refusing faults, [`Faults::REFUSED`] by default; with `Faults::SUPPLY` a sample at 4.7 V is refused
+    /// too. Others are only counted.
     #[must_use]
     pub const fn with_refused_faults(mut self, faults: Faults) -> Self {
         self.refused_faults = faults;

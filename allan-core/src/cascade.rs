@@ -20,42 +20,34 @@ use core::ops::Sub;
 /// }
 /// ```
 ///
-/// The running sum of the samples passes through a chain of delay lines. Level `j` receives every second value that
-/// leaves the level above it and delays it by `OVERLAP` strides of `2^j` samples. The sums of now, `n` samples ago and
-/// `2n` samples ago, of which a second difference with `n = OVERLAP·2^j` consists, are therefore available every `2^j`
-/// samples: an `OVERLAP`-fold overlap for `OVERLAP` words a level. The first line also serves `n < OVERLAP`, fully
-/// overlapping. A sample costs `log2(OVERLAP) + 2` differences on average, independent of the length of the record.
+/// The running sum of the samples passes through a chain of delay lines: level `j` receives every second value of the
+/// level above and delays it by `OVERLAP` strides of `2^j` samples. Every `2^j` samples these lines therefore hold the
+/// three sums of a second difference with `OVERLAP·2^j` samples, for `OVERLAP` words a level. A sample costs
+/// `log2(OVERLAP) + 2` differences on average, independent of the length of the record.
 ///
 /// # Gaps
-/// Time goes on through a gap of `m` samples. They are replaced by the mean of the `2m` samples around the gap, of which
-/// the last one follows it and the others, as far as they go back to the gap before, precede it. Octaves with
-/// `n ≥ 8m` (`n ≥ 16m` with an `OVERLAP` of 16) keep their differences over the gap; shorter ones leave out those that it
-/// touches. A gap that is too long for the longest octave is cut out: no difference contains it.
+/// Time goes on through a gap of `m` samples. They are replaced by the mean of the `2m` samples around the gap, of
+/// which one follows it. Octaves with `n ≥ 8m` (`n ≥ 16m` with an `OVERLAP` of 16) keep their differences over the gap;
+/// shorter ones leave out those that it touches. A gap that is too long for the longest octave is cut out: no
+/// difference contains it.
 ///
-/// Replacing samples adds variance. How much is measured on the samples before each gap, by replacing as many of them as
-/// were lost and comparing the result with what was there; [`curve`](Self::curve) subtracts it. A gap costs a bounded
-/// number of operations, whatever its length.
+/// The variance that replacing adds is measured on the samples before each gap, and [`curve`](Self::curve) subtracts
+/// it. A gap costs a bounded number of operations, whatever its length.
 ///
 /// # Range
-/// Running sums wrap modulo 2⁶⁴, but their second differences do not: `|d| ≤ n·2³²` stays below `2⁶³` for `n ≤ 2³⁰`.
-/// For samples within ±2²³, `d² ≤ 2⁴⁸·n²`, and 2⁴⁰ samples have at most `2⁴⁴/n` differences with `n ≥ 16`, one every
-/// `n/OVERLAP` samples, so for `n ≤ 2²³` no sum of squares exceeds `2¹¹⁵` and nothing is rounded. If wider samples fill the 127 bits
-/// of a sum, it stays at its maximum and [`is_saturated`](Self::is_saturated) returns true. The fourth powers are summed in 127 bits
-/// too, with differences at `n > 2¹⁰` rounded to `√(n/512)` counts. Where such a sum is full the kurtosis is `None`;
-/// within 2⁴⁰ samples that takes white noise above 2¹⁷ counts rms, or averages over `n = 2²³` samples that differ by
-/// more than 2¹⁰ counts throughout.
+/// Sums of squares are exact for `n ≤ 2²³` and 2⁴⁰ samples within ±2²³. If wider samples fill the 127 bits of a sum, it
+/// stays at its maximum and [`is_saturated`](Self::is_saturated) returns true. The kurtosis is `None` where a sum of
+/// fourth powers is full; its differences at `n > 2¹⁰` are rounded to `√(n/512)` counts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[repr(C)] // the fields that every sample touches come first, within reach of one base register
 pub struct Cascade<const OCTAVES: usize, const OVERLAP: usize> {
     /// Sample periods since the start, those of missing samples included.
     elapsed: u64,
-    /// The time, modulo 2³², from which [`WARM`](Self::WARM) samples later no octave below [`ROUNDED`] has to leave out
-    /// differences: 0 at first, so that an estimator without samples is all zeros. Now while a gap is pending.
+    /// The time, modulo 2³², [`WARM`](Self::WARM) samples before all octaves below [`ROUNDED`] have their differences.
     settling: u32,
     /// Running sum of the samples since the start, or since the last gap that was cut out, modulo 2⁶⁴.
     sum: i64,
-    /// The last `OVERLAP` running sums. The sum up to sample `k` is in slot `k mod OVERLAP`; the lines below use the
-    /// same rule with the step of their level.
+    /// The last `OVERLAP` running sums, that of sample `k` in slot `k mod OVERLAP`.
     recent: [i64; OVERLAP],
     octaves: [Octave<OVERLAP>; OCTAVES],
     /// End of the last gap.
@@ -166,7 +158,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     #[inline]
     pub fn push(&mut self, sample: i32) {
-        // Every 2³² samples this is true without need, which costs time and changes nothing.
+        // Also true once in 2³² samples without need, which changes nothing.
         if (self.elapsed as u32).wrapping_sub(self.settling) < Self::WARM as u32 - 1 {
             return self.push_unsettled(sample);
         }
@@ -220,8 +212,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         let due = (elapsed.trailing_zeros() as usize + 1).min(Self::LEVELS);
         // As a slice: chained iterators would be kept on the stack, and the code for an index's panic linked.
         let lines = self.octaves.get_mut(Self::FINE + level..Self::FINE + due).unwrap_or_default();
-        // Doubled and halved from line to line, as shifts of 64 bits by a variable take ten instructions. The slot in a line
-        // is given by bits of the time below the 31st.
+        // Shifts of 64 bits by a variable take ten instructions; a slot depends on bits below the 31st.
         let (mut step, mut reach) = ((elapsed >> level) as u32, 2 << (Self::FINE + level));
         for (at, octave) in (Self::FINE + level..).zip(lines) {
             let oldest = octave.exchange(step.into(), middle);
@@ -302,7 +293,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.ended.saturating_add(self.elapsed - self.absent)
     }
 
-    /// Whether no sample was taken.
+    /// True if no sample was taken.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.len() == 0
@@ -320,7 +311,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.octaves.iter().map(|octave| u64::from(octave.interpolation.replaced())).sum()
     }
 
-    /// Whether a sum of squares is full, so that the curve is a lower bound there; see the range of [`Cascade`].
+    /// True if a sum of squares is full, so that the curve is a lower bound there; see the range of [`Cascade`].
     #[must_use]
     pub fn is_saturated(&self) -> bool {
         self.octaves.iter().any(|octave| octave.moments.squares.is_full())
@@ -342,16 +333,14 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         })
     }
 
-    /// Differences since the last gap that the octave does not bridge: one at each multiple of its stride from `2n` samples
-    /// after the end of the gap on.
+    /// Differences since the last gap that the octave does not bridge, one at each multiple of its stride.
     fn open_differences(elapsed: u64, octave: usize, resumed: u64) -> u64 {
         let level = octave.saturating_sub(Self::FINE);
         let incomplete = (resumed + (2 << octave) - 1) >> level;
         (elapsed >> level).saturating_sub(incomplete)
     }
 
-    /// Number of octaves of which the newest sample ends a stride: those at which
-    /// [`newest_difference`](Self::newest_difference) may be `Some`.
+    /// Number of octaves at which [`newest_difference`](Self::newest_difference) may be `Some`.
     #[inline]
     #[must_use]
     pub const fn octaves_due(&self) -> usize {
@@ -365,10 +354,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
     }
 
-    /// The second difference of sums of `2^octave` samples that the newest sample completed, if it completed one and no
-    /// gap is in it that the octave does not bridge.
-    ///
-    /// [`Coupling`](crate::Coupling) multiplies these of two channels. `None` beyond the last octave.
+    /// The second difference of sums of `2^octave` samples that the newest sample completed. `None` without one, in a
+    /// gap that the octave does not bridge, and beyond the last octave.
     #[inline]
     #[must_use]
     pub fn newest_difference(&self, octave: usize) -> Option<i64> {
@@ -379,7 +366,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
             .then(|| second_difference(self.sum, self.sum_before(level, n), self.sum_before(level, 2 * n)))
     }
 
-    /// Whether the newest sample ends a stride of `level`.
+    /// True if the newest sample ends a stride of `level`.
     #[inline]
     pub(crate) const fn ends_stride(&self, level: usize) -> bool {
         self.elapsed.trailing_zeros() as usize >= level
@@ -391,14 +378,12 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.elapsed - self.octaves[octave].resumed
     }
 
-    /// The running sum up to the newest sample.
     #[inline]
     pub(crate) const fn newest_sum(&self) -> i64 {
         self.sum
     }
 
-    /// The running sum of `back ≤ 2·OVERLAP` strides of `level` before the newest sample, which ends a stride. `back` is not
-    /// 0: the search for the line would pass all levels down to the newest sum.
+    /// The running sum of `back` strides (1 to `2·OVERLAP`) of `level` before the newest sample, which ends a stride.
     #[inline]
     pub(crate) fn sum_before(&self, level: usize, back: u64) -> i64 {
         let (mut level, mut back) = (level, back);
@@ -406,7 +391,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
             (level, back) = (level - 1, 2 * back);
         }
         let slot = Self::slot((self.elapsed >> level).wrapping_sub(back));
-        // Callers have a level below LEVELS; without the bound the code for an index's panic would be linked.
+        // Callers have a level below LEVELS; the bound spares the code for an index's panic.
         let octave = &self.octaves[Self::FINE + level.min(Self::LEVELS - 1)];
         match back / OVERLAP as u64 {
             0 => self.recent[slot],
@@ -415,12 +400,12 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
     }
 
-    /// Sample periods since the start, those of missing samples included, and the samples reported missing since.
+    /// Sample periods since the start with the missing ones, and samples missing since.
     pub(crate) const fn now(&self) -> (u64, u64) {
         (self.elapsed, self.pending)
     }
 
-    /// Where the sum of a step of a level is kept in its line.
+    /// Slot of the sum of a step of a level in its line.
     #[inline]
     const fn slot(step: u64) -> usize {
         step as usize & (OVERLAP - 1)
@@ -441,12 +426,10 @@ pub(crate) fn second_difference(newest: i64, middle: i64, oldest: i64) -> i64 {
 
 /// [`second_difference`] in words of any width `w`, which hold the sums modulo `2ʷ`.
 ///
-/// A word holds what is congruent to its true sum modulo `2ʷ`, and congruences may be subtracted. So the result `r` is congruent to
-/// the true difference `d = b − a` of the sums `b` and `a` of the newest `n` samples and of the `n` before them, wherever the running
-/// sum began. Both lie in `−2ʷ⁻¹ ..= 2ʷ⁻¹ − 1` if `|d| < 2ʷ⁻¹`, where no two numbers are congruent: `r = d`.
-///
-/// Samples of `w/2` bits lie in `−2^(w/2−1) ..= 2^(w/2−1) − 1`, so `|b − a| ≤ n·(2^(w/2) − 1)`, which is below `2ʷ⁻¹` for
-/// `n ≤ 2^(w/2−1)`; with `w = 64` for `n ≤ 2³¹`, and the longest octave has `n = 2³⁰`.
+/// Congruences may be subtracted, so the result is congruent modulo `2ʷ` to the true difference `d = b − a` of the sums
+/// of the newest `n` samples and of the `n` before. Both are in `−2ʷ⁻¹ ..= 2ʷ⁻¹ − 1` if `|d| < 2ʷ⁻¹`, where congruent
+/// numbers are equal. Samples of `w/2` bits have `|d| ≤ n·(2^(w/2) − 1)`, below `2ʷ⁻¹` for `n ≤ 2^(w/2−1)`: for `n ≤
+/// 2³¹` in 64 bits, and the longest octave has `2³⁰`.
 #[inline]
 fn wrapped_second_difference<W: Sub<Output = W> + Copy>(newest: W, middle: W, oldest: W) -> W {
     newest - middle - (middle - oldest)
@@ -456,8 +439,7 @@ fn wrapped_second_difference<W: Sub<Output = W> + Copy>(newest: W, middle: W, ol
 mod tests {
     use super::*;
 
-    /// Every sum that samples of 4 bits can have, from every start of a running sum of 8 bits: the widths are those of the cascade,
-    /// 32 and 64 bits, divided by 8.
+    /// Every sum of samples of 4 bits from every start of a running sum of 8 bits.
     #[test]
     fn second_differences_of_wrapped_sums_are_exact_up_to_the_longest_averaging_time() {
         let word = |sum: i32| Wrapping(sum as i8);
@@ -473,7 +455,6 @@ mod tests {
             }
             assert_eq!(wrong, 0, "n = {n}");
         }
-        // At n = 9 the largest difference, 9·15, has more than 7 bits.
         assert_ne!(i32::from(wrapped_second_difference(word(-9), word(-72), word(0)).0), 135);
     }
 }

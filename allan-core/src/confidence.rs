@@ -1,8 +1,7 @@
-//! Confidence of a point of a curve: equivalent degrees of freedom, bounds by the χ² distribution, and the correlation
-//! between octaves.
+//! Confidence of a point of a curve: equivalent degrees of freedom, χ² bounds, and the correlation between octaves.
 //!
-//! The degrees of freedom are those of C. Greenhall and W. Riley, "Uncertainty of stability variances based on finite
-//! differences" (PTTI 2003), for differences taken every `n/P` samples.
+//! Degrees of freedom: C. Greenhall and W. Riley, "Uncertainty of stability variances based on finite differences"
+//! (PTTI 2003), for differences every `n/P` samples.
 
 use crate::math::{Real, abs, clamp, exp, ln, ln_gamma, sqrt};
 use crate::noise_type::VarianceFractions;
@@ -13,8 +12,7 @@ pub const NORMAL_975: f64 = 1.959_963_984_540_054;
 /// Equivalent degrees of freedom of the mean of `count` squared second differences at averaging factor `n`, taken every
 /// `n/overlap` samples.
 ///
-/// `overlap` is 1 to 16. The result is at least 1 for a count of at least 1. Differences on the two sides of a gap are
-/// treated as neighbours.
+/// `overlap` is 1 to 16, and the result at least 1 for a count of at least 1.
 #[must_use]
 pub fn edf(n: u64, count: u64, overlap: u32, fractions: VarianceFractions) -> f64 {
     ChiSquareApproximation::new(Difference::Second, n, count, overlap, fractions).edf
@@ -23,8 +21,7 @@ pub fn edf(n: u64, count: u64, overlap: u32, fractions: VarianceFractions) -> f6
 /// Correlation coefficient of the Allan variances measured at two octaves that are `lag` octaves apart, for near-full
 /// overlap; `a` and `b` are the noise mixtures at the two octaves.
 ///
-/// Exact for lags of one, two and three octaves of pure noises in an infinite record. Beyond, it decays geometrically with
-/// the ratio of the last two tabulated values.
+/// Exact for lags of up to three octaves of pure noises in an infinite record; beyond, it decays geometrically.
 #[must_use]
 pub fn octave_correlation(lag: usize, a: VarianceFractions, b: VarianceFractions) -> f64 {
     let (a, b): ([f64; 3], [f64; 3]) = (roots(a), roots(b));
@@ -33,7 +30,7 @@ pub fn octave_correlation(lag: usize, a: VarianceFractions, b: VarianceFractions
 
 /// Square roots of the variance fractions of white, flicker and random-walk noise.
 pub(crate) fn roots<F: Real>(fractions: VarianceFractions) -> [F; 3] {
-    // Angle quantization decorrelates faster than white noise and is counted as white noise: an upper bound.
+    // Angle quantization counts as white noise, which decorrelates more slowly: an upper bound.
     let VarianceFractions { white, flicker, random_walk, quantization } = fractions;
     let [white, quantization] = [white, quantization].map(F::constant);
     [white + quantization, F::constant(flicker), F::constant(random_walk)].map(F::sqrt)
@@ -49,7 +46,6 @@ pub(crate) fn pure_octave_correlation(lag: usize, noise: usize) -> f64 {
     }
 }
 
-/// The order of the differences of the running sum that are squared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Difference {
     /// Second differences of the phase: Allan variance.
@@ -59,8 +55,7 @@ pub(crate) enum Difference {
 }
 
 impl Difference {
-    /// Autocorrelation of the differences at lag `x`, in averaging times. `law` is the generalised autocovariance of the
-    /// phase noise.
+    /// Autocorrelation of the differences at lag `x`, in averaging times, by the autocovariance `law` of the phase.
     fn correlation(self, law: &dyn Fn(f64) -> f64, x: f64) -> f64 {
         // Binomial coefficients of twice the order, with alternating signs, from the middle on.
         let coefficients: &[f64] = match self {
@@ -78,8 +73,7 @@ impl Difference {
         at(x) / at(0.0)
     }
 
-    /// Lag, in averaging times, up to which correlations are summed. Beyond it the squared correlations of flicker noise
-    /// are below 10⁻³ and those of the other noises are zero.
+    /// Lag, in averaging times, beyond which squared correlations are below 10⁻³.
     const fn reach(self, fractions: VarianceFractions) -> u64 {
         let order = match self {
             Self::Second => 2,
@@ -92,7 +86,7 @@ impl Difference {
 /// Number of lags from 0 to 4 averaging times at 16-fold overlap.
 const LAGS: usize = 4 * 16 + 1;
 
-/// The distribution of a mean of squared, correlated Gaussian differences, described by its variance and skewness.
+/// The distribution of a mean of squared, correlated Gaussian differences.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ChiSquareApproximation {
     /// Equivalent degrees of freedom: those of the χ² distribution with the same relative variance.
@@ -102,10 +96,8 @@ pub(crate) struct ChiSquareApproximation {
 }
 
 impl ChiSquareApproximation {
-    /// For `count` differences at averaging factor `n`, taken every `n/overlap` samples; `overlap` is at most 16.
-    ///
-    /// With `R` the correlation matrix of the `M` differences, `edf = M²/tr R²` and
-    /// `1 + excess_skewness = tr R³·M/(tr R²)²`.
+    /// For `count` differences at averaging factor `n`, one every `n/overlap ≥ n/16` samples: with their correlation
+    /// matrix `R`, `edf = M²/tr R²` and `1 + excess_skewness = tr R³·M/(tr R²)²`.
     pub(crate) fn new(difference: Difference, n: u64, count: u64, overlap: u32, fractions: VarianceFractions) -> Self {
         let reach =
             (difference.reach(fractions) * u64::from(overlap)).min(count.saturating_sub(1)).min(LAGS as u64 - 1);
@@ -126,17 +118,12 @@ impl ChiSquareApproximation {
         Self { edf: m / square, excess_skewness: (cube / (square * square) - 1.0).max(0.0) }
     }
 
-    /// 95 % confidence bounds of the true variance where `estimate` is left of a measured variance after `subtracted` was
-    /// taken off it, both in one unit.
+    /// 95 % bounds of the true variance, where `estimate` is left of a measured variance after `subtracted` was taken
+    /// off it.
     ///
-    /// The scatter is that of the measured variance, `estimate + subtracted`, so its bounds are found first and what was
-    /// subtracted is taken off them: the lower one ends at 0.
-    ///
-    /// The quantiles are those of χ² with `edf` degrees of freedom, multiplied by the Cornish–Fisher term of the excess
-    /// skewness, `exp(⅔(z² − 1)·excess_skewness/edf · e^(±c/√edf))`. The damping `c` of each tail is fitted to the exact
-    /// distribution (Imhof's integral over the eigenvalues of `R`) of white, flicker, random-walk and quantization noise
-    /// at overlaps of 1 to 16 and all edf of at least 3. In this range the interval covers the true variance with a
-    /// probability of 94.7 to 95.6 %; without the term it would be 95.1 to 97.0 %.
+    /// They are the bounds of the measured variance, less `subtracted`; the lower one ends at 0. The χ² quantiles are
+    /// multiplied by the Cornish–Fisher term `exp(⅔(z² − 1)·excess_skewness/edf · e^(±c/√edf))` with `c` fitted to
+    /// exact distributions (Imhof's integral): they cover 94.7 to 95.6 % for edf of at least 3.
     pub(crate) fn bounds(&self, estimate: f64, subtracted: f64) -> (f64, f64) {
         const LOWER_TAIL: f64 = 2.7;
         const UPPER_TAIL: f64 = -3.3;
@@ -176,10 +163,10 @@ fn difference_correlation(difference: Difference, fractions: VarianceFractions, 
 /// Degrees of freedom above which the Wilson–Hilferty approximation is within 2·10⁻⁶ in probability.
 const LARGE: f64 = 2_000.0;
 
-/// The `p` quantile of the χ² distribution with `dof > 0` degrees of freedom, a real number.
+/// The `p` quantile of the χ² distribution with `dof > 0` degrees of freedom.
 ///
-/// Newton's method on the regularised incomplete gamma function, started at the Wilson–Hilferty approximation
-/// (Abramowitz and Stegun, Handbook of Mathematical Functions, 26.4.17).
+/// Newton's method from the Wilson–Hilferty approximation (Abramowitz and Stegun, Handbook of Mathematical Functions,
+/// 26.4.17).
 pub(crate) fn chi_square_quantile(p: f64, dof: f64) -> f64 {
     let cube = 1.0 - 2.0 / (9.0 * dof) + normal_quantile(p) * sqrt(2.0 / (9.0 * dof));
     let guess = dof * cube * cube * cube;
@@ -187,7 +174,7 @@ pub(crate) fn chi_square_quantile(p: f64, dof: f64) -> f64 {
         return guess;
     }
     let shape = dof / 2.0;
-    // Where the cube is near or below 0, P(a, x) ≈ x^a / Γ(a+1) gives a positive start.
+    // With a cube near or below 0, P(a, x) ≈ x^a / Γ(a+1) gives a positive start.
     let small = 2.0 * exp((ln(p) + ln_gamma(shape + 1.0)) / shape);
     let mut x = if cube > 0.1 { guess } else { small };
     for _ in 0..60 {
@@ -239,8 +226,7 @@ fn gamma_p(a: f64, x: f64) -> f64 {
     }
 }
 
-/// The `p` quantile of the normal distribution by a rational approximation with an absolute error below 4.5·10⁻⁴
-/// (Abramowitz and Stegun 26.2.23); exact for `p` = 0.975 and 0.025.
+/// The `p` quantile of the normal distribution within 4.5·10⁻⁴ (Abramowitz and Stegun 26.2.23).
 fn normal_quantile(p: f64) -> f64 {
     if p == 0.975 {
         return NORMAL_975;
@@ -257,8 +243,7 @@ mod tests {
     use super::*;
     use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-    /// Noise, overlap, number of differences, edf, and the exact 2.5 % and 97.5 % quantiles of the mean square over its
-    /// expectation (eigenvalues of the correlation matrix, Imhof's integral, computed independently).
+    /// Noise, overlap, differences, edf, and exact quantiles (2.5 %, 97.5 %) of the mean square (Imhof's integral).
     const EXACT: &[(VarianceFractions, u32, u64, f64, f64, f64)] = &[
         (VarianceFractions::WHITE, 1, 7, 4.900, 0.1879, 2.6106),
         (VarianceFractions::WHITE, 4, 13, 5.302, 0.2355, 2.5657),

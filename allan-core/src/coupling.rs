@@ -20,11 +20,8 @@ pub struct Covariance {
 
 /// Estimator of the Allan covariance of two channels that are sampled together.
 ///
-/// It multiplies the second differences of their two [`Cascade`]s. For channels `y` and `c` and any factor `β`
-///
-/// `σ²(y − βc) = σ²(y) − 2β·cov(y, c) + β²·σ²(c)`
-///
-/// holds exactly at every octave: the Allan variance that remains when `β·c` is subtracted from `y`.
+/// For channels `y` and `c` and any factor `β`, `σ²(y − βc) = σ²(y) − 2β·cov(y, c) + β²·σ²(c)` holds exactly at every
+/// octave.
 ///
 /// ```
 /// use allan_core::{Cascade, Coupling};
@@ -42,12 +39,11 @@ pub struct Covariance {
 /// assert!((at_16.covariance / variance - 3.0).abs() < 1e-3);
 /// ```
 ///
-/// Each channel has gaps of its own: products are taken after samples that both have, at the octaves at which neither leaves
-/// out its difference. Both estimators must have started together and go through the same time, missing samples included.
-/// Where they do not, nothing is added and [`out_of_step`](Self::out_of_step) counts the sample. Slices are not supported.
+/// Products are taken after samples that both channels have, at octaves at which neither leaves out its difference. The
+/// estimators must have started together and go through the same time: otherwise nothing is added and
+/// [`out_of_step`](Self::out_of_step) counts the sample.
 ///
-/// Where a sample is missing in both channels, both are interpolated, and noise that they share gains up to 1.5 times the
-/// share of the missing samples. This is not subtracted.
+/// Samples that are missing in both channels raise shared noise by up to 1.5 times their share.
 ///
 /// # Range
 /// Exact for 2⁴⁰ samples within ±2²³. An octave whose sum overflows 128 bits has no covariance from then on.
@@ -68,8 +64,8 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
         Self { products: [0; OCTAVES], counts: [0; OCTAVES], out_of_step: 0 }
     }
 
-    /// Adds the products of the differences that the newest sample of both channels completed. To be called once after
-    /// each pair of samples.
+    /// Adds the products of the differences that the newest sample of both channels completed; called once after each
+    /// pair.
     ///
     /// # Cost
     /// | `Coupling::observe` | Cortex-M4F | Cortex-M0+ |
@@ -142,8 +138,7 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
         points.collect()
     }
 
-    /// Number of samples that were left out because the two estimators were not at the same time: one has seen more sample
-    /// periods than the other, or has a gap before its next sample.
+    /// Samples left out because the two estimators were not at the same time or one has a gap before its next sample.
     #[must_use]
     pub const fn out_of_step(&self) -> u64 {
         self.out_of_step

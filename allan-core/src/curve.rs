@@ -20,11 +20,10 @@ pub struct AllanPoint {
     pub tau: f64,
     /// Allan variance, in the square of the unit of the samples, without [`interpolation`](Self::interpolation).
     pub avar: f64,
-    /// Variance that was subtracted from the measured one because replacing missing samples had added it, at most nine
-    /// tenths of the measured variance; on a host also that of rounding errors that are correlated.
+    /// Variance that was subtracted because replacing missing samples had added it, at most nine tenths of the measured
+    /// variance.
     pub interpolation: f64,
-    /// Share of the samples that was replaced because it was missing, 0 to 1. Where differences with missing samples are
-    /// left out it is 0.
+    /// Share of the samples that was missing and replaced, 0 to 1.
     pub replaced: f64,
     /// Squared differences that `avar` is the mean of.
     pub count: u64,
@@ -36,8 +35,7 @@ pub struct AllanPoint {
     pub low: f64,
     /// Upper 95 % bound of `avar`.
     pub high: f64,
-    /// Excess kurtosis of the differences: 0 for Gaussian noise. `None` if all differences are 0 or the sum of their
-    /// fourth powers is full.
+    /// Excess kurtosis of the differences, 0 for Gaussian noise; `None` if all are 0 or the sum is full.
     pub kurtosis: Option<f64>,
     /// The power law that dominates around this averaging time.
     pub power_law: PowerLaw,
@@ -64,8 +62,7 @@ impl AllanPoint {
         }
     }
 
-    /// A point without averaging time, variance, kurtosis and noise type, with bounds that every variance is within, and
-    /// with the number of differences that do not overlap as its degrees of freedom.
+    /// A point with the bounds 0 and infinity, without kurtosis and noise type.
     pub(crate) fn without_confidence(n: u64, count: u64, overlap: u32) -> Self {
         Self {
             n,
@@ -108,9 +105,7 @@ pub struct Curve<const OCTAVES: usize> {
     pub(crate) points: Vec<AllanPoint, OCTAVES>,
 }
 
-/// A curve of any number of points, borrowed: what is fitted and compared.
-///
-/// It is made of a [`Curve`], or of points from elsewhere.
+/// A curve of any number of points, borrowed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CurveView<'a> {
@@ -120,8 +115,7 @@ pub struct CurveView<'a> {
 }
 
 impl<'a> CurveView<'a> {
-    /// The curve with these points, shortest averaging time first, of a record of `samples` samples every `sample_period`
-    /// seconds.
+    /// The curve with these points, shortest averaging time first, of `samples` samples every `sample_period` seconds.
     #[must_use]
     pub const fn new(sample_period: f64, samples: u64, points: &'a [AllanPoint]) -> Self {
         Self { sample_period, samples, points }
@@ -185,7 +179,6 @@ impl fmt::Display for TableError {
 
 impl core::error::Error for TableError {}
 
-/// The fields of a curve as they are deserialised.
 #[cfg(feature = "serde")]
 #[derive(serde::Deserialize)]
 struct Unchecked<const OCTAVES: usize> {
@@ -214,7 +207,6 @@ impl<const OCTAVES: usize> TryFrom<Unchecked<OCTAVES>> for Curve<OCTAVES> {
     }
 }
 
-/// Checks the averaging factors and variances of a curve.
 fn check_table(sample_period: f64, table: impl Iterator<Item = (u64, f64)>) -> Result<(), TableError> {
     if !(sample_period > 0.0 && is_finite(sample_period)) {
         return Err(TableError::SamplePeriod);
@@ -233,11 +225,11 @@ fn check_table(sample_period: f64, table: impl Iterator<Item = (u64, f64)>) -> R
 }
 
 impl<const OCTAVES: usize> Curve<OCTAVES> {
-    /// The curve of a table that was computed elsewhere, with the noise type and the confidence that this crate gives it.
+    /// The curve of a table that was computed elsewhere, with the noise type and the confidence that this crate gives
+    /// it.
     ///
-    /// A row is an averaging factor in samples and the Allan *variance*, the square of the deviation. `overlap` is the
-    /// number of differences per averaging time: 1 for a table without overlap, 16 for full overlap. The number of
-    /// differences is that of a record of `samples` samples without gaps.
+    /// A row is an averaging factor in samples and the Allan *variance*; `overlap` is the number of differences per
+    /// averaging time, 1 to 16. The number of differences is that of `samples` samples without gaps.
     ///
     /// ```
     /// use allan_core::{Curve, NoiseTerm, fit::fit};
@@ -288,8 +280,7 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         Ok(curve)
     }
 
-    /// A curve without points, to be filled in place by [`Cascade::rebuild_curve`](crate::Cascade::rebuild_curve): with 24
-    /// octaves a curve takes about 2 kB, too much to be moved over a small stack.
+    /// A curve without points, to be filled in place by [`Cascade::rebuild_curve`](crate::Cascade::rebuild_curve).
     #[must_use]
     pub const fn empty() -> Self {
         Self { sample_period: 0.0, samples: 0, points: Vec::new() }
@@ -302,7 +293,6 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self.set_confidence(&mut |point| point.power_law.variance_fractions());
     }
 
-    /// Replaces the points by `points`, which have no confidence.
     pub(crate) fn fill_without_confidence(
         &mut self,
         sample_period: f64,
@@ -314,12 +304,10 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self.points.extend(points);
     }
 
-    /// A curve of points whose noise type is set already.
     pub(crate) fn from_classified(sample_period: f64, samples: u64, points: Vec<AllanPoint, OCTAVES>) -> Self {
         Self { sample_period, samples, points }.with_confidence(|point| point.power_law.variance_fractions())
     }
 
-    /// Sets the power law of each point from the slope around it.
     #[inline(never)] // its stack frame would otherwise be part of every caller's
     fn classify(&mut self) {
         let octaves: Vec<OctaveVariance, OCTAVES> = self.points.iter().map(AllanPoint::octave_variance).collect();
@@ -328,7 +316,6 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         }
     }
 
-    /// Sets the degrees of freedom and bounds of each point for its variance fractions.
     fn set_confidence(&mut self, fractions: &mut dyn FnMut(&AllanPoint) -> VarianceFractions) {
         for point in &mut self.points {
             let approximation =
@@ -379,8 +366,7 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         }
     }
 
-    /// Replaces the variance of every point with a positive one. The bounds change in proportion, the degrees of freedom
-    /// not at all.
+    /// Replaces the positive variances; the bounds change in proportion.
     pub(crate) fn set_variances(&mut self, avar: impl Fn(&AllanPoint) -> f64) {
         for point in self.points.iter_mut().filter(|point| point.avar > 0.0) {
             let ratio = avar(point) / point.avar;
@@ -391,8 +377,8 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         }
     }
 
-    /// Takes more off the variance of every point for the samples that were replaced: `variance` of its averaging factor, as far as no
-    /// more than nine tenths of the measured variance are taken off in all. The confidence is set anew.
+    /// Subtracts `variance` of its averaging factor from every point, up to nine tenths of the measured variance in
+    /// all.
     #[cfg(feature = "host")]
     pub fn subtract_interpolation(&mut self, variance: impl Fn(u64) -> f64) {
         for point in &mut self.points {
@@ -404,7 +390,6 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self.reset_confidence();
     }
 
-    /// Sets noise types and confidence of changed variances.
     #[cfg(feature = "host")]
     pub(crate) fn reset_confidence(&mut self) {
         self.classify();

@@ -1,9 +1,8 @@
 //! From a curve to the coefficients of a model: the maximum of a gamma likelihood over non-negative coefficients.
 //!
-//! An estimate `v` of the Allan variance with `edf` degrees of freedom is gamma distributed around the true variance `m`, so
-//! the coefficients minimise `Σ edf/2·(ln m + v/m)`. Fisher scoring makes this a sequence of small non-negative
-//! least-squares problems. The degrees of freedom depend on the fitted mixture of noises, so the two are computed in turn.
-//! Shape parameters of terms (correlation times, frequencies) are searched for around these fits.
+//! An estimate `v` with `edf` degrees of freedom is gamma distributed around the variance `m`, so the coefficients
+//! minimise `Σ edf/2·(ln m + v/m)`, by Fisher scoring. Degrees of freedom and coefficients are computed in turn, and
+//! shape parameters searched around them.
 
 mod bounds;
 pub(crate) mod least_squares;
@@ -27,10 +26,9 @@ const EDF_ROUNDS: usize = 4;
 
 /// Fits the coefficients of `kinds` to all points of a curve; shape parameters stay as given.
 ///
-/// At most the first [`MAX_TERMS`] of `kinds` are used; each must occur once. Coefficients are in the unit of the curve (see
-/// [`NoiseTerm::unit`]), with 95 % bounds. A curve without points, or of a channel that never changed, gives coefficients of 0.
-///
-/// The code is the same for curves of all sizes and is linked once.
+/// The first [`MAX_TERMS`] of `kinds` are used, each of which must occur once. Coefficients are in the unit of the
+/// curve (see [`NoiseTerm::unit`]), with 95 % bounds. A curve without points, or of a channel that never changed, gives
+/// coefficients of 0.
 ///
 /// # Cost
 /// | `fit::fit` | Cortex-M4F | Cortex-M0+ |
@@ -45,10 +43,11 @@ pub fn fit<'a>(curve: impl Into<CurveView<'a>>, kinds: &[NoiseTerm]) -> Model {
     fit_of::<AllTerms>(curve.into(), kinds)
 }
 
-/// Fits as [`fit`] does, but only power laws (Q, N, B, K and R): other `kinds` are left out, and their code is not linked.
+/// Fits as [`fit`] does, but only power laws (Q, N, B, K and R): other `kinds` are left out, and their code is not
+/// linked.
 ///
-/// The coefficients are those of [`fit`] to about four digits, as some steps use single precision. Their bounds differ by up to 3 % of
-/// their distance to the coefficient, since the quantiles are those of the approximation by Wilson and Hilferty.
+/// The coefficients are those of [`fit`] to about four digits, and the bounds differ by up to 3 % of their distance to
+/// the coefficient.
 ///
 /// # Cost
 /// | `fit::fit_power_laws` | Cortex-M4F | Cortex-M0+ |
@@ -89,7 +88,6 @@ pub fn fit_shapes<'a>(curve: impl Into<CurveView<'a>>, kinds: &[NoiseTerm]) -> M
     model
 }
 
-/// Sets the bounds of all parameters of `model`, which was fitted to `curve`.
 pub(crate) fn set_bounds(curve: CurveView, model: &mut Model) {
     bounds::set::<AllTerms>(curve, model);
 }
@@ -132,9 +130,7 @@ pub(crate) fn deviance(curve: CurveView, model: &Model) -> f32 {
     problem.deviance(&points)
 }
 
-/// Sets `model` to the fitted coefficients of `kinds` and to the fitted shapes of those that are `free`, without bounds.
-///
-/// `keep_on` is called before every step of a shape search; if it returns false, the search ends where it is.
+/// Sets `model` to the fitted coefficients of `kinds` and the shapes of `free` ones; ends if `keep_on` returns false.
 #[inline(never)]
 pub(crate) fn estimate<T: TermSet>(
     curve: CurveView,
@@ -170,8 +166,8 @@ pub struct Goodness {
 
 /// Goodness of the fitted `problem`, whose columns are overwritten.
 ///
-/// The deviance is a sum of squares of correlated normal residuals, orthogonal to the directions of the fitted parameters.
-/// Its distribution is approximated by a scaled χ² with the same mean and variance (F. Satterthwaite, Biometrics 2, 1946).
+/// The deviance is that of correlated normal residuals: a scaled χ² with the same mean and variance (F. Satterthwaite,
+/// Biometrics 2, 1946).
 fn goodness_of(points: &Points, problem: &mut Problem<AllTerms>) -> Goodness {
     let deviance = f64::from(problem.deviance(points));
     let count = problem.orthonormal(points);
@@ -182,8 +178,7 @@ fn goodness_of(points: &Points, problem: &mut Problem<AllTerms>) -> Goodness {
     Goodness { deviance, p_value }
 }
 
-/// The traces of `PR` and of `(PR)²` for the correlation matrix `R` and the projection `P = 1 − Σ ddᵀ` that removes the
-/// orthonormal directions `d`: `tr R − Σ dᵀRd` and `tr R² − 2 Σ |Rd|² + Σ (dᵀRe)²`.
+/// The traces of `PR` and `(PR)²` for the correlations `R` and the projection `P = 1 − Σ ddᵀ` off the directions `d`.
 #[inline(never)]
 fn traces(measured: &[Measured], directions: &[[f32; MAX_POINTS]]) -> (f32, f32) {
     let (mut mean, mut square) = (0.0, 0.0);
@@ -208,7 +203,7 @@ fn traces(measured: &[Measured], directions: &[[f32; MAX_POINTS]]) -> (f32, f32)
     (mean, square)
 }
 
-/// A fitted model with which other sets of terms are compared, at the degrees of freedom that it gives to the points.
+/// A fitted model that other sets of terms are compared with, at its degrees of freedom.
 pub(crate) struct Baseline<'a> {
     points: Points<'a>,
     pub(crate) deviance: f32,
@@ -216,22 +211,19 @@ pub(crate) struct Baseline<'a> {
     /// Number of orthonormal directions of its own parameters in `explained`.
     directions: usize,
     explained: [[f32; MAX_POINTS]; MAX_PARAMETERS],
-    /// The terms that are compared with it.
     tried: Problem<AllTerms>,
 }
 
 /// By how much another set of terms fits better.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Improvement {
-    /// Decrease of the deviance.
     fall: f32,
     /// Mean decrease of the deviance per parameter by chance: 1 for independent points, more for correlated ones.
     scatter: f32,
 }
 
 impl Improvement {
-    /// Decrease of the deviance in units of its scatter: χ² distributed with one degree of freedom if the added term does
-    /// not exist.
+    /// Decrease of the deviance in units of its scatter: χ² with one degree of freedom by chance.
     pub(crate) fn score(&self) -> f64 {
         f64::from(self.fall / self.scatter)
     }
@@ -243,7 +235,7 @@ impl Improvement {
 }
 
 impl<'a> Baseline<'a> {
-    /// Without a model, to be filled in place: it is too large to be moved over a small stack.
+    /// To be filled in place: too large to be moved over a small stack.
     #[inline(always)]
     pub(crate) const fn empty(curve: CurveView<'a>) -> Self {
         Self {
@@ -256,7 +248,6 @@ impl<'a> Baseline<'a> {
         }
     }
 
-    /// Sets the fitted model.
     #[inline(never)]
     pub(crate) fn fill(&mut self, model: &Model) {
         let Self { points, deviance, modelled, directions, explained, tried } = self;
@@ -270,7 +261,6 @@ impl<'a> Baseline<'a> {
         tried.kinds.clear();
     }
 
-    /// Decrease of the deviance with the terms `kinds` and their best coefficients.
     #[inline(never)]
     pub(crate) fn fall(&mut self, kinds: &[NoiseTerm]) -> f32 {
         self.tried.set_terms(&self.points, kinds);
@@ -297,7 +287,6 @@ impl<'a> Baseline<'a> {
         self.compared(deviance)
     }
 
-    /// The terms of the last comparison, with the shapes that were found.
     pub(crate) fn tried(&self) -> &Vec<NoiseTerm, MAX_TERMS> {
         &self.tried.kinds
     }

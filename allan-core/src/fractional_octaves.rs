@@ -1,5 +1,4 @@
-//! Allan variance at three averaging factors between neighbouring octaves: narrow spectral lines show there that fall
-//! between octaves.
+//! Allan variance at three averaging factors between octaves, where narrow spectral lines may fall.
 
 use crate::cascade::{Cascade, second_difference};
 use crate::confidence::Difference;
@@ -28,7 +27,7 @@ const FACTORS: [u64; 3] = [5, 6, 7];
 /// ```
 ///
 /// # Range
-/// That of [`Cascade`].
+/// As [`Cascade`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FractionalOctaves<const OCTAVES: usize, const OVERLAP: usize> {
     moments: [[Moments; FACTORS.len()]; OCTAVES],
@@ -49,7 +48,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> FractionalOctaves<OCTAVES, OVER
         Self { moments: [[Moments::ZERO; FACTORS.len()]; OCTAVES], counts: [[0; FACTORS.len()]; OCTAVES] }
     }
 
-    /// Adds the differences that the newest sample completed. To be called once after each sample.
+    /// Adds the differences that the newest sample completed; called once after each sample.
     ///
     /// # Cost
     /// | `FractionalOctaves::observe` | Cortex-M4F | Cortex-M0+ |
@@ -100,9 +99,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> FractionalOctaves<OCTAVES, OVER
 
     /// The curve of `cascade`, which must be the observed one, with these points between its octaves.
     ///
-    /// `sample_period` in seconds; `POINTS` must be `4·OCTAVES` or more. A point between octaves has the power law of the
-    /// octave below. Neighbouring points are correlated much more strongly than octaves: the bounds of a
-    /// [`fit`](crate::fit::fit) hold for curves of octaves only.
+    /// `sample_period` in seconds; `POINTS` must be `4·OCTAVES` or more. Neighbouring points are strongly correlated:
+    /// the bounds of a [`fit`](crate::fit::fit) hold for curves of octaves only.
     ///
     /// # Cost
     /// | `FractionalOctaves::curve` | Cortex-M4F | Cortex-M0+ |
@@ -155,7 +153,7 @@ const fn level<const OVERLAP: usize>(doubling: usize) -> usize {
     doubling.saturating_sub(OVERLAP.trailing_zeros() as usize - 3)
 }
 
-/// That level, and the number of its strides in `factor·2^doubling` samples.
+/// The [`level`], and the number of its strides in `factor·2^doubling` samples.
 const fn place<const OVERLAP: usize>(doubling: usize, factor: u64) -> (usize, u64) {
     let level = level::<OVERLAP>(doubling);
     (level, factor << (doubling - level))

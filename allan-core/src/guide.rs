@@ -1,5 +1,5 @@
-//! The book: what the Allan variance is for, how to record, how to choose the parameters, how to share an estimator with
-//! an interrupt, what each call costs, and where the limits are.
+//! The book: what the Allan variance is for, and how to record, choose parameters and share an estimator with an
+//! interrupt.
 #![doc = include_str!("../guide/allan_variance.md")]
 #![doc = include_str!("../guide/allan_deviation.svg")]
 #![doc = include_str!("../guide/terms.md")]

@@ -21,8 +21,8 @@ pub struct HadamardPoint {
     /// Hadamard variance `⟨(ȳ₂ − 2ȳ₁ + ȳ₀)²⟩/6`, in the square of the unit of the samples, without
     /// [`interpolation`](Self::interpolation).
     pub hvar: f64,
-    /// Variance that was subtracted from the measured one because replacing missing samples had added it. At most nine
-    /// tenths of the measured variance.
+    /// Variance that was subtracted because replacing missing samples had added it, at most nine tenths of the measured
+    /// variance.
     pub interpolation: f64,
     /// Share of the samples that was replaced because it was missing, 0 to 1.
     pub replaced: f64,
@@ -53,8 +53,7 @@ impl HadamardPoint {
 
 /// Estimator of the Hadamard variance from the running sums of a [`Cascade`], at every octave but its last.
 ///
-/// A third difference at `n ≥ OVERLAP` reaches back three averaging times, which only the next coarser delay line covers.
-/// It is therefore taken every `2n/OVERLAP` samples: half the overlap of the Allan variance.
+/// A third difference at `n ≥ OVERLAP` is taken every `2n/OVERLAP` samples: half the overlap of the Allan variance.
 ///
 /// ```
 /// use allan_core::{Cascade, Hadamard};
@@ -70,8 +69,7 @@ impl HadamardPoint {
 /// ```
 ///
 /// # Range
-/// Third differences of samples within ±2²³ stay below `2²⁵·n`, twice second differences, and are half as many, so the
-/// sum of squares of 2⁴⁰ samples stays below 2¹¹⁶ and is exact. A sum that overflows 128 bits stays at its maximum, and
+/// The sums of squares of 2⁴⁰ samples within ±2²³ are exact. A sum that overflows 128 bits stays at its maximum, and
 /// its octave has no point from then on.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Hadamard<const OCTAVES: usize, const OVERLAP: usize> {
@@ -93,7 +91,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Hadamard<OCTAVES, OVERLAP> {
         Self { squares: [0; OCTAVES], counts: [0; OCTAVES] }
     }
 
-    /// Adds the third differences that the newest sample completed. To be called once after each sample.
+    /// Adds the third differences that the newest sample completed; called once after each sample.
     ///
     /// # Cost
     /// | `Hadamard::observe` | Cortex-M4F | Cortex-M0+ |
@@ -137,7 +135,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Hadamard<OCTAVES, OVERLAP> {
 
     /// The Hadamard variance, in counts², of every octave that has at least one difference, shortest first.
     ///
-    /// `cascade` must be the observed one, `sample_period` is in seconds. The confidence is that of the power law that the local slope suggests.
+    /// `cascade` must be the observed one, `sample_period` is in seconds.
     ///
     /// # Cost
     /// | `Hadamard::points` | Cortex-M4F | Cortex-M0+ |
@@ -157,8 +155,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Hadamard<OCTAVES, OVERLAP> {
         points
     }
 
-    /// [`points`](Self::points) with the confidence of the variance fractions that `fractions` returns for each averaging
-    /// factor, for example those of a fitted model.
+    /// [`points`](Self::points) with the confidence of the variance fractions that `fractions` returns for an averaging
+    /// factor.
     #[must_use]
     pub fn points_with(
         &self,

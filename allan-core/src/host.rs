@@ -1,5 +1,4 @@
-//! What an analysis of whole recordings on a host needs beside the calls above (feature `host`): curves that are put together
-//! or changed, covariances of many channels, and fits with shapes that were estimated elsewhere.
+//! Curves that are put together or changed, covariances of many channels, and fits with known shapes (feature `host`).
 
 use crate::cascade::Cascade;
 use crate::coupling::Coupling;
@@ -12,12 +11,8 @@ use crate::term::{AllTerms, NoiseTerm};
 const LEAST_LEFT: f64 = 0.01;
 
 impl<const OCTAVES: usize> Curve<OCTAVES> {
-    /// This curve at averaging factors below `from`, and at longer ones that of the means of each `samples` samples in a row,
-    /// which are `means`.
-    ///
-    /// Second differences of such means are those of the samples at `samples` times the averaging factor, so that a long
-    /// record need not be kept to be looked at again: its means are enough. An empty curve leaves the points of the means
-    /// alone. Points for which there is no room are left out, the longest averaging times first.
+    /// This curve at averaging factors below `from`, and at longer ones that of `means`, the curve of the means of each
+    /// `samples` samples in a row. The longest averaging times are left out if there is no room.
     #[must_use]
     pub fn continued_by_means(mut self, means: &Self, samples: u64, from: u64) -> Self {
         self.points.retain(|point| point.n < from);
@@ -29,9 +24,8 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self
     }
 
-    /// Takes what rounding to counts adds off the variance of every point: `variance` of its averaging factor, as far as a hundredth of
-    /// what was measured remains. It becomes part of `interpolation`, and the confidence is set anew: the scatter is that of
-    /// the measured variance.
+    /// Subtracts `variance` of its averaging factor for rounding to counts from every point, down to a hundredth of
+    /// what was measured. It becomes part of `interpolation`.
     pub fn subtract_rounding(&mut self, variance: impl Fn(u64) -> f64) {
         for point in &mut self.points {
             let left = (point.avar - variance(point.n)).max(LEAST_LEFT * point.avar);
@@ -40,14 +34,13 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self.reset_confidence();
     }
 
-    /// Replaces the variance of every point with a positive one. The bounds change in proportion, the degrees of freedom
-    /// not at all.
+    /// Replaces the positive variances; the bounds change in proportion.
     pub fn replace_avar(&mut self, avar: impl Fn(&AllanPoint) -> f64) {
         self.set_variances(avar);
     }
 }
 
-/// The second differences that the newest sample of a channel completed: computed once for all the channels that it is coupled with.
+/// The second differences that the newest sample of a channel completed, for all channels that it is coupled with.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NewestDifferences<const OCTAVES: usize> {
@@ -57,7 +50,7 @@ pub struct NewestDifferences<const OCTAVES: usize> {
 }
 
 impl<const OCTAVES: usize> NewestDifferences<OCTAVES> {
-    /// Of this channel, until its next sample.
+    /// The differences of `channel`, until its next sample.
     #[must_use]
     pub fn of<const OVERLAP: usize>(channel: &Cascade<OCTAVES, OVERLAP>) -> Self {
         let due = channel.octaves_due();
@@ -76,9 +69,8 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
     }
 }
 
-/// Fits the coefficients of `kinds` and their shape parameters as [`fit_shapes`](crate::fit::fit_shapes) does, but keeps the
-/// shapes of the sinusoids and filters in `known`, which were estimated elsewhere. The bounds are those of a filter that is known
-/// exactly.
+/// Fits coefficients and shapes as [`fit_shapes`](crate::fit::fit_shapes) does, but keeps the shapes of the sinusoids
+/// and filters in `known`.
 #[must_use]
 pub fn fit_shapes_except<'a>(curve: impl Into<CurveView<'a>>, kinds: &[NoiseTerm], known: &[NoiseTerm]) -> Model {
     let curve = curve.into();
@@ -90,8 +82,7 @@ pub fn fit_shapes_except<'a>(curve: impl Into<CurveView<'a>>, kinds: &[NoiseTerm
     model
 }
 
-/// Compares sets of terms with fixed shapes by their deviance from one curve, all at the degrees of freedom that one fitted
-/// model gives to its points.
+/// Compares sets of terms with fixed shapes by their deviance, at the degrees of freedom of one fitted model.
 pub struct DevianceComparison<'a>(Baseline<'a>);
 
 impl<'a> DevianceComparison<'a> {
@@ -108,8 +99,8 @@ impl<'a> DevianceComparison<'a> {
         f64::from(self.0.deviance - self.0.fall(kinds))
     }
 
-    /// The same where the Allan variances of some terms at some averaging factors, for a coefficient of 1 and behind the filter of `kinds`, are
-    /// known: several channels behind one filter share them.
+    /// [`deviance`](Self::deviance) with `known` Allan variances of some terms for a coefficient of 1 behind the
+    /// filter.
     pub fn deviance_with(&mut self, kinds: &[NoiseTerm], known: impl Fn(&NoiseTerm, u64) -> Option<f64>) -> f64 {
         f64::from(self.0.deviance - self.0.fall_with(kinds, known))
     }

@@ -1,11 +1,11 @@
-//! What the interpolation of missing samples adds to an Allan or Hadamard variance.
+//! The part of the interpolation of missing samples in an Allan or Hadamard variance.
 
 use crate::confidence::Difference;
 use crate::math::Real;
 use crate::moments::Sum;
 
-/// The gaps of one length class that were closed by interpolation, and how far the interpolation was off where it was
-/// tested on samples that are known.
+/// The gaps of one length class that were closed by interpolation, and the errors of interpolating samples that are
+/// known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Interpolation {
@@ -37,20 +37,17 @@ impl Interpolation {
         self.tested
     }
 
-    /// Sum over the tests of the squared error of the sum of the replaced samples, counts². It stays at its maximum of
-    /// 2¹²⁷ − 1 once it is reached.
+    /// Sum over the tests of the squared error of the sum of the replaced samples, counts², at most 2¹²⁷ − 1.
     #[must_use]
     pub fn squared_error(&self) -> u128 {
         self.squared_error.get()
     }
 
-    /// Adds a gap of `missing` samples.
     pub(crate) fn add_gap(&mut self, missing: u32) {
         self.replaced = self.replaced.saturating_add(missing);
     }
 
-    /// Adds a test on `samples` known samples, the sum of which was off by `error`. Tests stop when they can no longer be
-    /// counted.
+    /// Adds a test on `samples` known samples whose sum was off by `error`, while tests can be counted.
     pub(crate) fn add_test(&mut self, samples: u32, error: i64) {
         if let Some(tested) = self.tested.checked_add(samples) {
             self.tested = tested;
@@ -59,7 +56,6 @@ impl Interpolation {
         }
     }
 
-    /// Adds the gaps of another stretch.
     pub(crate) fn merge(&mut self, other: &Self) {
         self.add_gap(other.replaced);
         if let Some(tested) = self.tested.checked_add(other.tested) {
@@ -89,7 +85,6 @@ impl Default for Interpolation {
 pub(crate) struct BridgedGaps<F = f64> {
     /// Variance of a sample if the noise were white, counts²: for gaps without a test.
     white: F,
-    /// Number of replaced samples.
     replaced: F,
     /// Sum over the gaps of the expected squared error of the sum of their samples, counts².
     squared_error: F,
@@ -114,15 +109,13 @@ pub(crate) struct AddedVariance<F = f64> {
 const LARGEST_SUBTRACTION: f64 = 0.9;
 
 impl<F: Real> AddedVariance<F> {
-    /// What is subtracted from a measured variance.
     pub(crate) fn subtracted(&self, measured: F) -> F {
         let largest = F::constant(LARGEST_SUBTRACTION) * measured;
         if self.variance < largest { self.variance } else { largest }
     }
 }
 
-/// Factor on the degrees of freedom of a measured variance of which `subtracted` was taken and `left` remains: the scatter
-/// is the same, the value smaller.
+/// Factor on the degrees of freedom of a measured variance of which `subtracted` was taken and `left` remains.
 pub(crate) fn subtraction_factor<F: Real>(left: F, subtracted: F) -> F {
     if subtracted > F::ZERO {
         let share = left / (left + subtracted);
@@ -147,8 +140,7 @@ impl<F: Real> BridgedGaps<F> {
         }
     }
 
-    /// Adds the gaps that an octave with an averaging factor of `n` bridges and the one before does not. `shortest` is the
-    /// octave at which gaps of one sample are bridged.
+    /// Adds the gaps that the octave of `n` bridges first; `shortest` is the octave that bridges gaps of one sample.
     pub(crate) fn add(&mut self, gaps: &Interpolation, n: u64, shortest: u64) {
         let replaced = F::from_word(gaps.replaced.into());
         self.replaced += replaced;
@@ -168,14 +160,11 @@ impl<F: Real> BridgedGaps<F> {
         self.tested_error += error;
     }
 
-    /// What the gaps add to the variance at the averaging factor `n` of a record of `samples` samples, beside which those
-    /// of the gaps are replaced.
+    /// The variance that the gaps add at averaging factor `n` of a record of `samples` samples beside the replaced
+    /// ones.
     ///
-    /// A gap of `m` samples whose sum is off by `e` lies in the second differences that end within `2n` periods after it
-    /// and adds `e²` to their squares. Where it lies at an edge or in the middle of a difference the replaced samples
-    /// vary with neighbours of other signs, which for white noise takes away `4m·e²`. The squares have a mean of `2n²σ²`,
-    /// so `⟨e²⟩(1 − 2m/n)/n` times the number of gaps per sample period remains. For third differences, which reach over `3n` periods and have a
-    /// mean square of `6n²σ²`, it is `⟨e²⟩(1 − 20m/9n)/n`.
+    /// A gap of `m` samples whose sum is off by `e` adds `⟨e²⟩(1 − 2m/n)/n` times the number of gaps per sample period
+    /// to Allan variances, and `⟨e²⟩(1 − 20m/9n)/n` times it to Hadamard variances.
     pub(crate) fn added_variance(&self, difference: Difference, n: u64, samples: u64) -> AddedVariance<F> {
         let none = F::constant(0.0);
         if self.replaced == none {
@@ -220,8 +209,7 @@ mod tests {
         assert_close(replaced, 0.1);
     }
 
-    /// Of the gaps that the octave of 64 samples bridges first, with more than 4 and at most 8 samples, 6 in the middle, each sum adds
-    /// its squared error less `2·6/64` of it; of single ones, in the octave of 8, `2/8`.
+    /// A gap of 6 samples adds its squared error less `2·6/64` of it in the octave of 64.
     #[test]
     fn what_a_gap_adds_becomes_less_with_its_length() {
         let tested = Interpolation::new(100, 50, 7_000);

@@ -1,5 +1,4 @@
 #![doc = include_str!("../README.md")]
-//!
 //! # Modules
 //!
 //! | step | module | items |
@@ -12,10 +11,10 @@
 //! | several channels | `coupling`, [`regression`] | [`Coupling`], [`regression::CovariateRegression`] |
 //! | other statistics | `hadamard`, `fractional_octaves`, [`slope_method`], [`telegraph`] | [`Hadamard`], [`FractionalOctaves`] |
 //!
-//! Everything up to the sums is integer arithmetic without rounding. From the curve on it is floating point, computed by
-//! the same code on every platform. A microcontroller and a server therefore agree to the bit.
+//! Everything up to the sums is integer arithmetic without rounding; from the curve on, floating point gives the same
+//! bits on every platform.
 //!
-//! New to the Allan variance? The [`guide`] says what it is for, how long to record, and how to choose the parameters.
+//! The [`guide`] says how long to record and how to choose the parameters.
 //!
 //! With the feature `serde`, [`Cascade`], [`Coupling`], [`Hadamard`] and [`FractionalOctaves`] can be serialised; a
 //! deserialised estimator continues to the bit.

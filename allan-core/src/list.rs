@@ -54,7 +54,7 @@ impl<T, const N: usize> DerefMut for List<T, N> {
     }
 }
 
-/// Of the first `N` values.
+/// The first `N` values.
 impl<T, const N: usize> FromIterator<T> for List<T, N> {
     fn from_iter<I: IntoIterator<Item = T>>(values: I) -> Self {
         Self(values.into_iter().take(N).collect())

@@ -1,9 +1,7 @@
 //! Elementary functions: the only module that calls a floating-point library.
 //!
-//! They are called as functions, never as methods: `x.sqrt()` is `std`'s on the host and another implementation on the
-//! target. Everything that ends in a reported figure is computed by `libm`, or by [`sin`] and [`cos`] below, which give
-//! the same bits on every platform. `micromath`, small and fast without a double-precision unit, is used only where a
-//! coarse value selects one of a few cases: the noise type.
+//! They are called as functions, never as methods, since `x.sqrt()` is `std`'s on the host. Reported figures come from
+//! `libm`, or from [`sin`] and [`cos`] below; the coarse `micromath` only selects the noise type.
 //!
 //! Largest error (relative where the result is above 1) and instructions per call on a Cortex-M4F and a Cortex-M0+:
 //!
@@ -23,8 +21,7 @@ use core::f64::consts::FRAC_2_PI;
 use core::iter::Sum;
 use core::ops::{Add, AddAssign, Div, Mul, Sub};
 
-/// A floating-point number: double precision for what is reported, single precision where its seven digits are enough and
-/// the soft double-precision arithmetic of small processors would not be linked otherwise.
+/// A floating-point number, in single precision where that spares small processors soft double arithmetic.
 pub(crate) trait Real:
     Copy + PartialOrd + Add<Output = Self> + AddAssign + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Sum
 {
@@ -40,7 +37,6 @@ pub(crate) trait Real:
     fn single(self) -> f32;
     fn double(self) -> f64;
     fn sqrt(self) -> Self;
-    /// As `f64::total_cmp`.
     fn order(&self, other: &Self) -> Ordering;
 }
 
@@ -130,8 +126,7 @@ pub(crate) fn sqrt(x: f64) -> f64 {
     libm::sqrt(x)
 }
 
-/// √x with a relative error below 2⁻²², without arithmetic in double precision: 0 for a subnormal `x`, and `x` itself if it is
-/// negative, infinite or not a number.
+/// √x in single precision, with a relative error below 2⁻²²; 0 for subnormal, `x` for negative and not finite ones.
 pub(crate) fn sqrt_in_single(x: f64) -> f64 {
     let bits = x.to_bits();
     let known = bits >> 52;
@@ -173,7 +168,7 @@ pub(crate) fn exp(x: f64) -> f64 {
     libm::exp(x)
 }
 
-/// As `f64::clamp`, but without its panic, whose message formatting takes 12 kB of flash.
+/// As `f64::clamp`, without the 12 kB of flash of its panic's message.
 pub(crate) fn clamp<F: Real>(x: F, low: F, high: F) -> F {
     if x < low {
         low
@@ -193,7 +188,7 @@ pub(crate) fn floor(x: f64) -> f64 {
     libm::floor(x)
 }
 
-/// Whether `x` is neither infinite nor NaN: `f64::is_finite` without a comparison in double precision.
+/// True if `x` is neither infinite nor NaN: `f64::is_finite` without a comparison in double precision.
 pub(crate) fn is_finite(x: f64) -> bool {
     x.to_bits() >> 52 & 0x7ff != 0x7ff
 }
@@ -206,7 +201,7 @@ pub(crate) fn abs(x: f64) -> f64 {
     libm::fabs(x)
 }
 
-/// π/2 as a sum of two parts. The first has 33 bits, so its product with a quarter-turn count up to 2²⁰ is exact.
+/// π/2 as two parts, the first of 33 bits: its product with a count of quarter turns up to 2²⁰ is exact.
 const QUARTER: (f64, f64) = (1.570_796_326_734_125_6, 6.077_100_506_506_192e-11);
 
 /// Ratios of successive Taylor coefficients; the truncation error within an eighth of a turn is below 10⁻¹⁷.
@@ -216,8 +211,7 @@ const COSINE: [f64; 8] =
 
 /// Sine of `x` radians, with an absolute error below the larger of 2.5·10⁻¹⁶ and 1.2·10⁻¹⁶·|x|, for |x| up to 10⁶.
 ///
-/// `libm`'s sine and cosine handle larger arguments too, for 5 kB of flash, 0.8 kB of stack and three times as many
-/// instructions.
+/// The sine of `libm` takes 5 kB of flash and three times as many instructions.
 pub(crate) fn sin(x: f64) -> f64 {
     sine_after_quarters(x, 0)
 }

@@ -1,5 +1,5 @@
-//! A noise model: a sum of terms with coefficients. Its Allan variance, spectrum, degrees of freedom, and its distance
-//! from a measured curve.
+//! A noise model, the sum of terms with coefficients: its Allan variance, spectrum, degrees of freedom and distance
+//! from a curve.
 
 use crate::curve::{AllanPoint, CurveView};
 use crate::interpolation::subtraction_factor;
@@ -67,7 +67,6 @@ impl Model {
         Self { sample_period, terms: terms.into_iter().take(MAX_TERMS).collect() }
     }
 
-    /// As [`new`](Self::new), in place.
     pub(crate) fn set(&mut self, sample_period: f64, terms: impl Iterator<Item = FittedTerm>) {
         self.sample_period = sample_period;
         self.terms.clear();
@@ -80,8 +79,7 @@ impl Model {
         self.sample_period
     }
 
-    /// The fitted term of this kind; where the kind has shape parameters, the first one of any shape. `None` if the model
-    /// does not have it.
+    /// The fitted term of this kind, the first one of any shape; `None` if there is none.
     #[must_use]
     pub fn get(&self, kind: NoiseTerm) -> Option<&FittedTerm> {
         self.terms.iter().find(|term| discriminant(&term.kind) == discriminant(&kind))
@@ -93,7 +91,6 @@ impl Model {
         &self.terms
     }
 
-    /// The terms without their coefficients.
     pub(crate) fn kinds(&self) -> Vec<NoiseTerm, MAX_TERMS> {
         self.terms.iter().map(|term| term.kind).collect()
     }
@@ -108,8 +105,7 @@ impl Model {
         filter_of(self.terms.iter().map(|term| &term.kind))
     }
 
-    /// The part of a term in the Allan variance at averaging factor `n`, behind the [`filter`](Self::filter) if it
-    /// [passes](NoiseTerm::passes_filter) it.
+    /// The part of a term in the Allan variance at averaging factor `n`, behind the [`filter`](Self::filter).
     #[must_use]
     pub fn part(&self, term: &FittedTerm, n: u64) -> f64 {
         term.value * term.value * term.kind.avar_behind(self.filter().as_ref(), n, self.sample_period)
@@ -137,8 +133,8 @@ impl Model {
         }
     }
 
-    /// Fractions of the modelled variance at averaging factor `n` that are due to each power law. A term that is not a power
-    /// law counts as the one that it resembles at this averaging time.
+    /// Fractions of the modelled variance at averaging factor `n` that are due to each power law or to a term that
+    /// resembles it there.
     #[must_use]
     pub fn variance_fractions(&self, n: u64) -> VarianceFractions {
         let total = self.avar(n);
@@ -186,7 +182,6 @@ impl Model {
     }
 }
 
-/// The filter among these terms.
 pub(crate) fn filter_of<'a>(kinds: impl IntoIterator<Item = &'a NoiseTerm>) -> Option<MovingAverageFilter> {
     kinds.into_iter().find_map(|kind| match kind {
         NoiseTerm::Filtered(filter) => Some(*filter),
@@ -194,8 +189,7 @@ pub(crate) fn filter_of<'a>(kinds: impl IntoIterator<Item = &'a NoiseTerm>) -> O
     })
 }
 
-/// Sum of the variance fractions of the power laws that the terms resemble at averaging factor `n`. Each term comes with
-/// its fraction of the variance.
+/// Sum of the variance fractions that the terms, each with its fraction, resemble at averaging factor `n`.
 pub(crate) fn variance_fractions<T: TermSet>(
     parts: impl Iterator<Item = (NoiseTerm, f64)>,
     n: u64,
@@ -212,8 +206,7 @@ pub(crate) fn variance_fractions<T: TermSet>(
     VarianceFractions { white, flicker, random_walk, quantization }
 }
 
-/// Distance of a model from a measured curve over the octaves with `n ≤ M/8` of a curve of `M` samples. `v` is the
-/// measured and `m` the modelled Allan variance.
+/// Distance of a model `m` from a measured curve `v` over the octaves with `n ≤ M/8` of `M` samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -222,10 +215,9 @@ pub struct Discrepancy {
     pub deviance_per_point: f64,
     /// `100·sqrt(mean (½ ln(v/m))²)`: the rms error of the Allan deviation in percent.
     pub rms_percent: f64,
-    /// The largest deviation of a point in standard deviations, over *all* octaves of the curve; positive where the measured
-    /// variance exceeds the model. The cube root of `v/m`, which is nearly normal also for few degrees of freedom (Wilson and
-    /// Hilferty; Abramowitz and Stegun, 26.4.14), is compared with its mean `1 − 2/9edf` and its variance `2/9edf`. The mean
-    /// deviance weighs short averaging times, and this figure shows a model that fails at the longest ones.
+    /// The largest deviation over *all* octaves in standard deviations, positive where the measured variance exceeds
+    /// the model. The cube root of `v/m` is compared with its mean and variance (Wilson and Hilferty; Abramowitz and
+    /// Stegun, 26.4.14).
     pub worst_sigma: f64,
     /// Averaging time of that point, s.
     pub worst_tau: f64,
@@ -238,8 +230,7 @@ pub struct Discrepancy {
 impl Discrepancy {
     /// Compares `model` with `curve`; `None` if the curve has no octave in range.
     ///
-    /// The degrees of freedom are those of the model's mixture of terms. A measured or modelled variance of 0 makes the
-    /// result infinite.
+    /// The degrees of freedom are those of the model; a variance of 0 makes the result infinite.
     #[must_use]
     pub fn between<'a>(model: &Model, curve: impl Into<CurveView<'a>>) -> Option<Self> {
         let curve = curve.into();
@@ -270,25 +261,24 @@ impl Discrepancy {
     }
 }
 
-/// Deviation of `ratio`, a χ² variable over its `edf` degrees of freedom, from its expectation in standard deviations of a
-/// normal variable (Wilson and Hilferty; Abramowitz and Stegun, 26.4.14).
+/// Deviation of a χ² `ratio` over its `edf` degrees of freedom in normal standard deviations (Wilson and Hilferty;
+/// Abramowitz and Stegun, 26.4.14).
 #[must_use]
 pub fn cube_root_deviation(ratio: f64, edf: f64) -> f64 {
     let variance = 2.0 / (9.0 * edf);
     (exp(ln(ratio) / 3.0) - (1.0 - variance)) / sqrt(variance)
 }
 
-/// Largest number of differences per averaging time whose correlations are computed; more of them hardly change the result.
+/// Largest number of differences per averaging time whose correlations are computed.
 const MAX_OVERLAP: u32 = 8;
 /// Largest number of lags: 0 to four averaging times.
 const MAX_LAGS: usize = 4 * MAX_OVERLAP as usize + 1;
 
-/// Equivalent degrees of freedom of a point under a mixture of terms, each with its fraction of the variance; first with
-/// all correlations, then without those of narrow-band terms beyond two averaging times.
+/// Equivalent degrees of freedom of a point under a mixture of terms, each with its fraction of the variance, with and
+/// without narrow-band correlations beyond two averaging times.
 ///
-/// Both are sums over the covariances of the second differences, as in Greenhall and Riley (see [`confidence`]). A
-/// deterministic term adds scatter through its product with the noise, and a sinusoid by its phase, which the differences of a record
-/// meet at few places. A narrow-band term stays correlated over many averaging times. The result is 10¹⁸ if the mixture has no random term.
+/// Sums over the covariances of the second differences, as in Greenhall and Riley (see [`confidence`]); a sinusoid adds
+/// scatter by its phase. 10¹⁸ if the mixture has no random term.
 ///
 /// [`confidence`]: crate::confidence
 #[inline(never)] // its stack frame would otherwise be part of every caller's
@@ -333,8 +323,7 @@ pub(crate) fn degrees_of_freedom<T: TermSet>(
     (edf(near + far), edf(near))
 }
 
-/// Correlations of second differences of flicker noise, computed once for all points: they depend only on the lag in
-/// averaging times.
+/// Correlations of second differences of flicker noise, the same for all points at a lag in averaging times.
 pub(crate) struct FlickerCorrelations {
     /// Number of strides per averaging time; 0 if the table is empty.
     overlap: u32,
@@ -342,7 +331,6 @@ pub(crate) struct FlickerCorrelations {
 }
 
 impl FlickerCorrelations {
-    /// A table without entries.
     pub(crate) const EMPTY: Self = Self { overlap: 0, table: [0.0; MAX_LAGS] };
 
     /// Computes the correlations for points of this overlap and of those that divide it.
@@ -352,7 +340,6 @@ impl FlickerCorrelations {
         add_flicker_correlations::<T>(1.0, overlap, &mut self.table);
     }
 
-    /// Adds `share` times the correlations at lags of 0, 1, 2 … strides to `sums`.
     fn add<T: TermSet>(&self, share: f32, overlap: u32, sums: &mut [f32]) {
         let per_lag = if self.overlap.is_multiple_of(overlap) { (self.overlap / overlap) as usize } else { 0 };
         if per_lag == 0 || (sums.len() - 1) * per_lag >= MAX_LAGS {
@@ -364,15 +351,13 @@ impl FlickerCorrelations {
     }
 }
 
-/// [`add_correlations`] of flicker noise. They do not depend on the averaging factor, for which the overlap serves.
+/// [`add_correlations`] of flicker noise, which do not depend on the averaging factor.
 fn add_flicker_correlations<T: TermSet>(share: f32, overlap: u32, sums: &mut [f32]) {
     add_correlations::<T>(&NoiseTerm::BiasInstability, share, u64::from(overlap), overlap, 1.0, sums);
 }
 
-/// Adds `share` times the correlations of second differences of averages over `n` samples to `sums`, at lags of 0, 1, 2 …
-/// strides of `n/overlap` samples.
-///
-/// For up to [`MAX_LAGS`] lags and an overlap of up to [`MAX_OVERLAP`]; otherwise nothing is added.
+/// Adds `share` times the correlations of second differences at lags of 0, 1, 2 … strides of `n/overlap` samples to
+/// `sums`, up to [`MAX_LAGS`] and [`MAX_OVERLAP`].
 #[inline(never)] // its stack frame would otherwise be part of every caller's
 fn add_correlations<T: TermSet>(
     kind: &NoiseTerm,
@@ -410,8 +395,7 @@ mod tests {
     use crate::{Cascade, Curve};
     use std::vec::Vec;
 
-    /// The Allan variance of a sinusoid depends on its phase where the differences of a short record meet few of them. The scatter over 64
-    /// phases of what the cascade makes of 15,000 samples is `2/edf` of its square.
+    /// The scatter over 64 phases, of 15,000 samples each, is `2/edf` of the squared variance.
     #[test]
     fn the_phase_of_a_sinusoid_scatters_its_variance() {
         const PHASES: usize = 64;

@@ -1,4 +1,4 @@
-//! Exact sums of the squares and fourth powers of second differences: what an octave's variance and kurtosis are made of.
+//! Exact sums of the squares and fourth powers of second differences.
 
 /// Exact sum of squares, and the sum of fourth powers of the differences rounded by [`unit_bits`] binary digits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -10,11 +10,9 @@ pub(crate) struct Moments {
 impl Moments {
     pub(crate) const ZERO: Self = Self { squares: Sum::ZERO, fourths: Sum::ZERO };
 
-    /// Adds one difference of an octave below [`ROUNDED`]. Most differences fit in 16 bits, whose powers need only
-    /// 32-bit multiplications.
+    /// Adds one difference of an octave below [`ROUNDED`].
     ///
-    /// No fourth power is below its square, so the carry of the squares may wait for the carry of the fourth powers:
-    /// `squares.low` stays below `2⁶³ + fourths.low`.
+    /// A fourth power is at least its square, so `squares.low` stays below `2⁶³ + fourths.low` and its carry may wait.
     #[inline]
     pub(crate) fn add_unrounded(&mut self, difference: i64) {
         if is_small(difference) {
@@ -65,7 +63,6 @@ impl Moments {
         self.fourths.add(fourth_power(difference, unit_bits(octave)));
     }
 
-    /// Adds the sums of another stretch.
     pub(crate) fn merge(&mut self, later: &Self) {
         self.squares.add(later.squares.get());
         self.fourths.add(later.fourths.get());
@@ -86,10 +83,7 @@ impl Moments {
 /// The first octave whose differences are rounded.
 pub(crate) const ROUNDED: usize = 11;
 
-/// Binary digits that a difference is rounded by before its fourth power is summed.
-///
-/// White noise of 1 count rms has differences of `√(2n)` counts rms, which is 32 units or more, so rounding changes the
-/// kurtosis by at most 1.5·10⁻³. Ties are rounded up for both signs, so their errors cancel.
+/// Binary digits that a difference is rounded by: at 1 count rms of white noise the kurtosis changes by 1.5·10⁻³.
 #[inline]
 pub(crate) const fn unit_bits(octave: usize) -> u32 {
     (octave.saturating_sub(ROUNDED - 2) / 2) as u32
@@ -101,7 +95,7 @@ pub(crate) const fn rounded(difference: i64, bits: u32) -> i64 {
     (difference + (1 << bits >> 1)) >> bits
 }
 
-/// Whether the fourth power fits in 60 bits.
+/// True if the fourth power fits in 60 bits.
 #[inline]
 const fn is_small(difference: i64) -> bool {
     difference.wrapping_add(1 << 15) as u64 >> 16 == 0
@@ -121,8 +115,7 @@ pub(crate) fn fourth_power(difference: i64, bits: u32) -> u128 {
 
 /// A sum of 127 bits that stays at its maximum once it is full.
 ///
-/// Held as `high·2⁶³ + low`: most additions touch `low` alone, whose top bit is a pending carry. Two pairs of words can
-/// stand for the same sum while a carry is pending, so equality compares values.
+/// Held as `high·2⁶³ + low`, with the top bit of `low` a pending carry; equality compares values.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) struct Sum {

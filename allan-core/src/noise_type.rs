@@ -68,26 +68,22 @@ impl VarianceFractions {
     pub const QUANTIZATION: Self = Self { quantization: 1.0, white: 0.0, flicker: 0.0, random_walk: 0.0 };
 }
 
-/// What the classification needs of one octave of a curve.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct OctaveVariance {
     /// `log2 n`.
     pub(crate) octave: f64,
     pub(crate) variance: f64,
-    /// Number of stretches of `n` samples that the differences cover: about the degrees of freedom for any noise.
+    /// Number of stretches of `n` samples that the differences cover.
     pub(crate) weight: f64,
 }
 
-/// The window of octaves grows until the standard deviation of the slope `d log σ²/d log τ` is below this value.
-///
-/// Slopes of power laws differ by 1, so the decision threshold of ½ is three such deviations away. The correlation of
-/// neighbouring octaves, which is ignored here, makes the true deviation larger.
+/// Standard deviation of the slope `d log σ²/d log τ` at which the window of octaves is long enough.
 const SLOPE_DEVIATION: f64 = 0.16;
 
 /// The power law with the smallest weighted squared residual in `log σ²` over the octaves around `at`.
 ///
-/// The window starts with the two neighbours of the octave and is extended towards shorter averaging times, which have
-/// more degrees of freedom, until the slope is known to [`SLOPE_DEVIATION`].
+/// The window grows from two neighbours towards shorter averaging times until the slope is known to
+/// [`SLOPE_DEVIATION`].
 pub(crate) fn classify(levels: &[OctaveVariance], at: usize) -> PowerLaw {
     let last = (at + 1).min(levels.len() - 1);
     let mut first = at.saturating_sub(1);
@@ -118,8 +114,7 @@ fn weighted_mean(levels: &[OctaveVariance], of: impl Fn(&OctaveVariance) -> f64)
     levels.iter().map(|level| level.weight * of(level)).sum::<f64>() / weight
 }
 
-/// Variance of the slope of the weighted least-squares line through the octaves. The natural logarithm of an octave's
-/// variance is assigned the variance `2/weight`.
+/// Variance of the slope of the weighted least-squares line, with `2/weight` for the natural logarithm of an octave.
 fn slope_variance(levels: &[OctaveVariance]) -> f64 {
     let mean = weighted_mean(levels, |level| level.octave);
     let spread: f64 = levels.iter().map(|level| level.weight * (level.octave - mean) * (level.octave - mean)).sum();

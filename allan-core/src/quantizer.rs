@@ -5,8 +5,8 @@ use core::fmt;
 
 /// Turns values in a physical unit into the counts that a [`Cascade`](crate::Cascade) takes.
 ///
-/// A count is `round((value − origin)/lsb)`, ties up. The Allan variance does not depend on `origin`, which is best near
-/// the mean of the values. Multiply the curve with the LSB ([`Curve::scaled`](crate::Curve::scaled)) to have it in the unit again.
+/// A count is `round((value − origin)/lsb)`, ties up; `origin` is best near the mean. Multiply the curve with the LSB
+/// ([`Curve::scaled`](crate::Curve::scaled)) to have it in the unit again.
 ///
 /// Rounding adds the variance of the rounding error. In white noise with a standard deviation of σ the estimate of N is
 /// off by a part that depends on where the mean lies between two counts:
@@ -82,12 +82,11 @@ impl Quantizer {
         (is_finite(origin) && is_finite(lsb) && lsb > 0.0).then_some(Self { origin, lsb })
     }
 
-    /// A quantizer that is fine enough for these samples: its origin is the first one, and its LSB the largest power of two
-    /// below 1/65536 of the root mean square of `(x[k+1] − x[k])/√2`, which for white noise is the standard deviation.
+    /// A quantizer for these samples: `origin` is the first one, `lsb` the largest power of two below 1/65536 of the
+    /// root mean square of `(x[k+1] − x[k])/√2`.
     ///
-    /// Rounding then adds `2⁻³²/12`, or 2·10⁻¹¹, of the variance of white noise, and counts of 32 bits reach 32,768 standard
-    /// deviations to either side. Samples that are not finite are left out. `None` if no two neighbouring samples are finite
-    /// and different.
+    /// Rounding adds 2·10⁻¹¹ of the variance of white noise, and counts reach 32,768 standard deviations. Samples that
+    /// are not finite are left out. `None` if no two neighbouring samples are finite and different.
     ///
     /// ```
     /// use allan_core::Quantizer;
@@ -147,8 +146,8 @@ impl Quantizer {
         i32::try_from(count).map_err(|_| SampleError::OutOfRange)
     }
 
-    /// Puts the counts of `values` into the first places of `counts`, as [`count`](Self::count) gives them, up to the first value
-    /// that has none; returns how many it has put there. Faster than one by one on machines with vector units.
+    /// Puts the counts of `values` into the first places of `counts` up to the first value that has none; returns their
+    /// number.
     ///
     /// ```
     /// use allan_core::Quantizer;
@@ -233,9 +232,9 @@ pub fn integer_count(value: impl Into<i128>, origin: impl Into<i128>) -> Result<
 
 /// Turns phase (time error) data of a clock into counts of its frequency.
 ///
-/// A count is the difference of two neighbouring phases, each rounded to the quantizer's LSB. The sums of the counts are
-/// therefore the rounded phases themselves, and rounding errors do not accumulate. With phases in s and a sample period in
-/// s, [`Curve::scaled`](crate::Curve::scaled) by `lsb/period` gives the curve of the fractional frequency.
+/// A count is the difference of two neighbouring phases, each rounded to the quantizer's LSB, so rounding errors do not
+/// accumulate. With phases in s and a sample period in s, [`Curve::scaled`](crate::Curve::scaled) by `lsb/period` gives
+/// the curve of the fractional frequency.
 ///
 /// ```
 /// use allan_core::{Cascade, PhaseCounts, Quantizer};
@@ -269,16 +268,15 @@ impl PhaseCounts {
     /// The count between the phase before and this one; `None` for the first.
     ///
     /// # Errors
-    /// The phase is not finite, beyond 2⁵³ counts, or 2³¹ counts or more from the phase before. The phase before stays the
-    /// same after a phase that is not finite.
+    /// The phase is not finite, beyond 2⁵³ counts, or 2³¹ counts or more from the phase before, which a phase that is
+    /// not finite leaves as it was.
     pub fn count(&mut self, phase: f64) -> Result<Option<i32>, SampleError> {
         let count = self.quantizer.wide_count(phase)?;
         let Some(last) = self.last.replace(count) else { return Ok(None) };
         i32::try_from(count - last).map(Some).map_err(|_| SampleError::OutOfRange)
     }
 
-    /// Forgets the phase before. To be called where phases are missing: `m` missing phases are a
-    /// [`gap`](crate::Cascade::gap) of `m + 1` frequencies.
+    /// Forgets the phase before; `m` missing phases are a [`gap`](crate::Cascade::gap) of `m + 1` frequencies.
     pub fn restart(&mut self) {
         self.last = None;
     }

@@ -1,11 +1,9 @@
-//! Regression of a channel on covariates (temperature, supply, acceleration), from Allan variance curves and Allan
-//! covariances alone, over all octaves at once.
+//! Regression of a channel on covariates (temperature, supply, acceleration), from Allan variances and covariances over
+//! all octaves.
 //!
-//! The second differences of an octave are modelled as `d(y) = Σ βᵢ·d(cᵢ) + d(e)`. An octave has the weight of its degrees
-//! of freedom over the variance of the residual `e`, which a fitted model gives. Measurement noise of a covariate would
-//! bias `β` towards 0; the quantization and white noise that its curve shows are subtracted first. Slow channels have few
-//! degrees of freedom, and two random walks can be similar by chance, so the significance of a sensitivity is that of
-//! Student's distribution.
+//! The second differences are `d(y) = Σ βᵢ·d(cᵢ) + d(e)`; an octave weighs its degrees of freedom over the variance of
+//! the residual `e`. Quantization and white noise of a covariate, which would bias `β` towards 0, are subtracted first.
+//! The significance of a sensitivity is by Student's distribution.
 
 mod uncertainty;
 
@@ -26,14 +24,13 @@ use uncertainty::{OctaveWeight, edf, is_poor, sum_variance};
 pub const MAX_COVARIATES: usize = 6;
 /// Degrees of freedom below which no sensitivity is estimated.
 const LEAST_EDF: f64 = 2.0;
-/// Significance, in standard deviations of a normal distribution, from which a sensitivity is accepted. Pairs of smooth
-/// independent channels exceed it in about 2 of 10,000 cases, more often than the normal distribution says.
+/// Significance, in normal standard deviations, from which a sensitivity is accepted (by chance: 2 of 10,000 pairs).
 const SIGNIFICANT: f64 = 4.5;
 
 /// Allan covariances of two channels, by averaging factor, in the product of their units.
 pub type CovarianceCurve<const POINTS: usize> = List<Covariance, POINTS>;
 
-/// Octaves at which the measurement noise of a covariate exceeds this fraction of its variance are not used.
+/// Noise over variance of a covariate above which an octave is not used.
 const NOISE_FRACTION: f64 = 0.5;
 
 /// First Allan variance, in LSB², above which the noise of a covariate dithers its rounding to counts.
@@ -42,25 +39,22 @@ const DITHERED: f64 = 0.2;
 /// The terms of a covariate's measurement noise.
 const NOISE: [NoiseTerm; 2] = [NoiseTerm::Quantization, NoiseTerm::AngleRandomWalk];
 
-/// A measured quantity on which a channel may depend: its Allan variance at up to `POINTS` averaging factors, and its
+/// A quantity on which a channel may depend: its Allan variance at up to `POINTS` averaging factors, and its
 /// measurement noise.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Covariate<const POINTS: usize> {
     sample_period: f64,
-    /// Coefficients of [`NOISE`].
     noise: [f64; NOISE.len()],
     /// Variance of the rounding to counts if the noise is too small to dither it, else 0; in the square of the unit.
     rounding: f64,
-    /// Averaging factors and Allan variances.
     points: Vec<(u64, f64), POINTS>,
 }
 
 impl<const POINTS: usize> Covariate<POINTS> {
-    /// A covariate with this curve in its unit, of which one count is `lsb`. Its measurement noise is estimated from the
-    /// curve.
+    /// A covariate with this curve, one count of which is `lsb`; its measurement noise is estimated.
     ///
-    /// Averaging factors below `from` are not used, nor those beyond the first `POINTS`.
+    /// Averaging factors below `from` and beyond the first `POINTS` are not used.
     #[must_use]
     #[inline(never)] // its stack frame would otherwise be part of every caller's
     pub fn new<const MEASURED: usize>(curve: &Curve<MEASURED>, lsb: f64, from: u64) -> Self {
@@ -93,7 +87,6 @@ impl<const POINTS: usize> Covariate<POINTS> {
         Self { noise: self.noise, rounding: self.rounding, ..Self::as_measured(curve, from) }
     }
 
-    /// Measured Allan variance at averaging factor `n`.
     fn avar(&self, n: u64) -> Option<f64> {
         self.points.iter().find(|point| point.0 == n).map(|&(_, avar)| avar)
     }
@@ -108,7 +101,6 @@ impl<const POINTS: usize> Covariate<POINTS> {
     }
 }
 
-/// Sensitivities to several covariates at once.
 type Sensitivities = List<Sensitivity, MAX_COVARIATES>;
 
 /// A channel, the covariates on which it may depend, and their Allan covariances at up to `COUPLED` octaves.
@@ -117,8 +109,8 @@ pub struct CovariateRegression<'a, const POINTS: usize, const COUPLED: usize = P
     pub channel: &'a Curve<POINTS>,
     /// At most [`MAX_COVARIATES`].
     pub covariates: &'a [Covariate<COUPLED>],
-    /// Returns the Allan covariance of the channel (first argument `None`) or of another covariate (`Some(index)`) with a
-    /// covariate (second argument) at an averaging factor, in the product of their units; `None` if it is not known.
+    /// The Allan covariance of the channel (first argument `None`) or of a covariate with the covariate of the second
+    /// argument; `None` if not known.
     pub covariance: &'a dyn Fn(Option<usize>, usize, u64) -> Option<f64>,
 }
 
@@ -172,8 +164,7 @@ impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, 
         Some(accepted)
     }
 
-    /// Sets the weights of the octaves at which any covariate is known, from N, B and K fitted to the channel without its
-    /// dependence on the covariates.
+    /// Sets the weights of the octaves from N, B and K fitted to the channel without its dependence on the covariates.
     #[inline(never)]
     fn set_weights(&self, sensitivities: &[Sensitivity], octaves: &mut Vec<OctaveWeight, COUPLED>) {
         let mut residual = Curve::empty();
@@ -189,9 +180,7 @@ impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, 
         octaves.extend(known.take(COUPLED));
     }
 
-    /// Sensitivities to the covariates in `chosen`.
-    ///
-    /// `None` if the covariates vary too little or are too similar to each other.
+    /// Sensitivities to the covariates in `chosen`; `None` if they vary too little or are too similar.
     #[inline(never)]
     fn estimate_for(&self, chosen: &[usize], octaves: &[OctaveWeight]) -> Option<Sensitivities> {
         let mut normal = [0.0; triangle(MAX_COVARIATES)];
@@ -238,8 +227,7 @@ impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, 
         matrix
     }
 
-    /// The channel's curve without its dependence on the covariates: what remains if `Σ βᵢ·cᵢ` is subtracted with the
-    /// covariates free of measurement noise.
+    /// The channel's curve without its dependence on the covariates, free of measurement noise.
     #[must_use]
     pub fn compensated(&self, sensitivities: &[Sensitivity]) -> Curve<POINTS> {
         let mut curve = self.channel.clone();
@@ -252,7 +240,7 @@ impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, 
         curve.set_variances(|point| {
             let change = |a: &Sensitivity| {
                 let with_channel = self.with_channel(a.covariate, point.n);
-                // Where its own variance is not known, the channel's covariance with it has the share: `cov(y, c) = β·σ²(c)`.
+                // Without a variance of its own, the channel's covariance has the share: `cov(y, c) = β·σ²(c)`.
                 if self.covariates[a.covariate].signal(point.n).is_none() {
                     return -a.value * with_channel;
                 }
@@ -266,15 +254,13 @@ impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, 
         });
     }
 
-    /// Makes `curve`, a copy of the channel's curve, that of the stream `y − Σ βᵢ·cᵢ` with the covariates as measured,
-    /// including their noise.
-    ///
-    /// Exact where all covariances are known; elsewhere the point stays as it is.
+    /// Makes `curve`, a copy of the channel's, that of `y − Σ βᵢ·cᵢ` with the covariates as measured, where all
+    /// covariances are known.
     pub fn subtract_from(&self, curve: &mut Curve<POINTS>, sensitivities: &[Sensitivity]) {
         curve.set_variances(|point| self.subtracted_at(point, sensitivities).unwrap_or(point.avar));
     }
 
-    /// The Allan variance of that stream at one point; `None` if a covariance is not known.
+    /// The Allan variance of `y − Σ βᵢ·cᵢ` at one point; `None` if a covariance is not known.
     #[must_use]
     pub fn subtracted_at(&self, point: &AllanPoint, sensitivities: &[Sensitivity]) -> Option<f64> {
         let mut avar = point.avar;

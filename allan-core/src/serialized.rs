@@ -1,8 +1,7 @@
-//! Serialisation of an estimator's whole state with serde: a deserialised estimator continues to the bit.
+//! Serialisation of an estimator's whole state: a header (version, type, parameters), its 64-bit words in the order of
+//! the fields, and a CRC-32.
 //!
-//! The state is a sequence of a header (version, type and parameters), the 64-bit words of the estimator in the order of
-//! its fields, and a CRC-32 of both. Deserialising refuses another version, type or size, a wrong checksum, and words that
-//! no sequence of samples leads to; the error says which.
+//! Deserialising refuses another version, type or size, a wrong checksum, and words that no samples lead to.
 
 use crate::math::is_finite;
 use core::convert::Infallible;
@@ -55,7 +54,7 @@ pub(crate) fn deserialize<'de, S: StateWords, D: Deserializer<'de>>(deserializer
     Ok(state)
 }
 
-/// Replaces `state`, whatever it was, without a second one on the stack; after an error it is that of no samples.
+/// Replaces `state` without a second one on the stack; after an error it is empty.
 pub(crate) fn deserialize_in_place<'de, S: StateWords, D: Deserializer<'de>>(
     deserializer: D,
     state: &mut S,
@@ -186,32 +185,26 @@ fn checked<'de, T: Deserialize<'de> + Copy, D: Deserializer<'de>>(
     if is_valid(value) { Ok(value) } else { Err(de::Error::custom(expected)) }
 }
 
-/// A time constant, a frequency or a bandwidth.
 pub(crate) fn positive<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     checked(deserializer, |x: f64| x > 0.0 && is_finite(x), "a shape parameter that is not positive and finite")
 }
 
-/// The damping of a filter that oscillates.
 pub(crate) fn damping<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     checked(deserializer, |x: f64| x > 0.0 && x < 1.0, "a damping that is not between 0 and 1")
 }
 
-/// The sample period of a model, 0 in a model without a curve.
 pub(crate) fn not_negative<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     checked(deserializer, |x: f64| x >= 0.0 && is_finite(x), "a sample period that is negative or not finite")
 }
 
-/// The decimation of a filter.
 pub(crate) fn at_least_one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     checked(deserializer, |x: f64| x >= 1.0 && is_finite(x), "a decimation below 1 or not finite")
 }
 
-/// The stages of a filter.
 pub(crate) fn stages<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u8, D::Error> {
     checked(deserializer, |stages| matches!(stages, 1 | 2), "a filter that has neither 1 nor 2 stages")
 }
 
-/// The taps of a filter.
 pub(crate) fn taps<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u16, D::Error> {
     checked(deserializer, |taps| (1..=128).contains(&taps), "a filter that has not 1 to 128 taps")
 }

@@ -1,6 +1,5 @@
-//! The slope method: coefficients read from the straight parts of the curve, one after the other (IEEE 952, annex C).
-//!
-//! It is biased wherever two terms overlap, and serves as a comparison with the [`fit`](crate::fit::fit).
+//! The slope method: coefficients read from the straight parts of the curve (IEEE 952, annex C). It is biased where
+//! terms overlap, and serves as a comparison with the [`fit`](crate::fit::fit).
 
 use crate::curve::{AllanPoint, CurveView};
 use crate::math;
@@ -27,8 +26,7 @@ pub struct SlopeEstimate {
     pub interval: RangeInclusive<f64>,
 }
 
-/// `100/√(2(N/n − 1))`: the accuracy in percent of a point at averaging factor `n` of a record of `N = samples` (IEEE 952,
-/// annex C).
+/// The accuracy `100/√(2(N/n − 1))` in percent of a point at averaging factor `n` of `N = samples` (IEEE 952, annex C).
 #[must_use]
 pub fn percentage_accuracy(samples: u64, n: u64) -> f64 {
     100.0 / math::sqrt(2.0 * (samples as f64 / n as f64 - 1.0))

@@ -5,10 +5,7 @@ use crate::math::{ln, sqrt};
 use crate::model::Model;
 use crate::term::{Markov, NoiseTerm};
 
-/// Excess kurtosis of the second differences of a symmetric telegraph signal at averaging times of 1/20, 1/10 … 3.2
-/// correlation times. A Gaussian process has 0 at all of them.
-///
-/// By the moments of its chain of two states with 20 samples per correlation time.
+/// Excess kurtosis of the second differences of a symmetric telegraph signal at 1/20, 1/10 … 3.2 correlation times.
 const KURTOSIS: [f64; 7] = [38.01, 18.25, 7.61, 2.86, 0.66, -0.28, -0.52];
 /// Averaging time of the first entry, in correlation times.
 const FIRST: f64 = 1.0 / 20.0;
@@ -17,24 +14,23 @@ const FIRST: f64 = 1.0 / 20.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct KurtosisRatio {
-    /// Measured kurtosis over that of a symmetric telegraph signal: 0 for a Gaussian process, 1 for two levels with equal
-    /// dwell times, more for unequal ones.
+    /// Measured over telegraph kurtosis: 0 for a Gaussian process, 1 for two levels with equal dwell times, more for
+    /// unequal ones.
     pub ratio: f64,
     /// Standard deviation of the ratio.
     pub error: f64,
 }
 
 impl KurtosisRatio {
-    /// Whether the ratio is nearer to a telegraph signal than to a Gaussian process, and 3 standard deviations above 0.
+    /// True if the ratio is nearer to a telegraph signal than to a Gaussian process, and 3 standard deviations above 0.
     #[must_use]
     pub fn is_telegraph(&self) -> bool {
         self.ratio > 0.5 && self.ratio > 3.0 * self.error
     }
 }
 
-/// Estimates the kurtosis ratio of the Markov term of `model`, which was fitted to `curve`. What passed the [filter](Model::filter) of the
-/// model has no sudden jumps any more: two averages over L values and a second difference over `n` change places without a change of the
-/// result, so that either makes it as much smoother, and together they do as `√(n² + L²)` would.
+/// Estimates the kurtosis ratio of the Markov term of `model`, which was fitted to `curve`. Behind a
+/// [filter](Model::filter) of L values the averaging factor counts as `√(n² + L²)`.
 ///
 /// `None` if the model does not have this term or the curve has no kurtosis.
 #[must_use]
@@ -56,8 +52,7 @@ pub fn kurtosis_ratio<'a>(curve: impl Into<CurveView<'a>>, model: &Model, markov
     (weight > 0.0).then(|| KurtosisRatio { ratio: along / weight, error: 1.0 / sqrt(weight) })
 }
 
-/// Excess kurtosis of a symmetric telegraph signal at an averaging time in correlation times. Its product with the time is linear between
-/// the octaves of the table; below it is that of samples, of which so many parts contain a jump.
+/// Excess kurtosis of a telegraph signal at a time in correlation times, linear in its product with the time.
 fn expected(time: f64) -> f64 {
     let octave = ln(time / FIRST) / core::f64::consts::LN_2;
     if octave < 0.0 {

@@ -1,8 +1,5 @@
-//! The terms of a noise model in the nomenclature of IEEE Std 952, and what each contributes to sampled data.
-//!
-//! Every term has its Allan variance for *samples* of the process (the formulas for continuous time are 12 to 34 % off at
-//! the shortest averaging times), its power spectral density, and the correlation of its second differences, which
-//! determines the degrees of freedom of an estimate.
+//! The terms of a noise model in the nomenclature of IEEE Std 952: Allan variance, spectrum and correlation of second
+//! differences, all for *samples* of the process.
 
 mod exponential;
 mod filter;
@@ -23,9 +20,7 @@ use crate::math::clamp;
 use crate::noise_type::VarianceFractions;
 use core::f64::consts::PI;
 
-/// A term of a noise model: a [`Process`] with an unknown coefficient.
-///
-/// "Unit" is that of the channel, of a rate in deg/s for example.
+/// A term of a noise model: a [`Process`] with an unknown coefficient; "unit" is that of the channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -40,7 +35,7 @@ pub enum NoiseTerm {
     RateRandomWalk,
     /// R: a linear trend, in unit/s.
     RateRamp,
-    /// N after a digital low-pass filter, in unit·√s. In a model with this term B, K and Markov processes have passed the filter too.
+    /// N after a digital low-pass filter, in unit·√s, through which B, K and Markov processes have passed too.
     Filtered(MovingAverageFilter),
     /// Exponentially correlated noise; its standard deviation, in the unit itself.
     Markov(Markov),
@@ -48,19 +43,17 @@ pub enum NoiseTerm {
     Resonance(Resonance),
     /// A sinusoid; its amplitude, in the unit itself.
     Sinusoid(Sinusoid),
-    /// N after an analog low-pass filter of the second order, in unit·√s. B, K and Markov processes in a model with it are as they were
-    /// sampled.
+    /// N after an analog low-pass filter of the second order, in unit·√s, through which nothing else passes.
     LowPass(LowPass),
 }
 
-/// Frequency over bandwidth above which an Allan variance curve cannot distinguish a resonance from a sinusoid.
+/// Frequency over bandwidth above which a curve cannot distinguish a resonance from a sinusoid.
 const SHARPEST: f64 = 200.0;
-/// Frequency over bandwidth below which it cannot distinguish a resonance from a Markov process.
+/// Frequency over bandwidth below which a curve cannot distinguish a resonance from a Markov process.
 const BROADEST: f64 = 1.5;
 
-/// Averaging time over time constant `x` up to which a Gauss-Markov process counts as a random walk, and from which on as white
-/// noise. Its Allan variance is proportional to `(1 − (3 − 4e⁻ˣ + e⁻²ˣ)/(2x))/x`: at these two its slope is +½ and −½, halfway
-/// between that of a random walk (+1), of flicker noise (0) and of white noise (−1).
+/// Averaging time over time constant up to which a Gauss–Markov process counts as a random walk, and from which on as
+/// white noise: the slopes are +½ and −½ there.
 const WALK_UP_TO: f64 = 0.769;
 const WHITE_FROM: f64 = 4.145;
 
@@ -80,8 +73,7 @@ pub enum CoefficientUnit {
     PerSecond,
 }
 
-/// Evaluates an expression with the process of a term, without dynamic dispatch: methods that are never called are not
-/// linked.
+/// Evaluates an expression with the process of a term; methods that are never called are not linked.
 macro_rules! with_process {
     (@one $power_law:ident, $process:ident => $expression:expr) => {{
         let $process = &$power_law;
@@ -181,7 +173,7 @@ impl NoiseTerm {
         }
     }
 
-    /// Indices of the shape parameters that a fit can adjust: real numbers, except a decimation of exactly 1 and the damping of a filter.
+    /// Indices of the shape parameters that a fit can adjust.
     pub(crate) const fn free_parameters(&self) -> core::ops::Range<usize> {
         match self {
             Self::Markov(_) | Self::Sinusoid(_) | Self::LowPass(_) => 0..1,
@@ -203,15 +195,13 @@ impl NoiseTerm {
         with_process!(self, process => process.avar(n, sample_period))
     }
 
-    /// Whether noise of this kind arises before the filter of a model and passes it: flicker noise, random walks and Gauss–Markov processes
-    /// do, rounding and what is added to the samples do not. White noise that does is [`Filtered`](Self::Filtered).
+    /// True if noise of this kind passes the filter of a model: flicker noise, random walks and Gauss–Markov processes.
     #[must_use]
     pub const fn passes_filter(&self) -> bool {
         matches!(self, Self::BiasInstability | Self::RateRandomWalk | Self::Markov(_))
     }
 
-    /// Allan variance as [`avar`](Self::avar) has it, of a term that stands in a model with this `filter`, which
-    /// [what arises before it](Self::passes_filter) has passed.
+    /// [`avar`](Self::avar) behind the model's `filter`, if the term [passes it](Self::passes_filter).
     #[inline(never)] // linked once
     pub(crate) fn avar_behind(&self, filter: Option<&MovingAverageFilter>, n: u64, sample_period: f64) -> f64 {
         match (self, filter) {
@@ -224,7 +214,6 @@ impl NoiseTerm {
         }
     }
 
-    /// [`Process::sum_variances`] of the term.
     pub(crate) fn sum_variances(&self, stride: f64, sample_period: f64, table: &mut [f64]) {
         with_process!(self, process => process.sum_variances(stride, sample_period, table));
     }
@@ -241,7 +230,6 @@ impl NoiseTerm {
         }
     }
 
-    /// [`Process::phase_variance`] of the term.
     pub(crate) fn phase_variance(&self, count: u64, stride: f64, sample_period: f64) -> f64 {
         match self {
             Self::Sinusoid(sinusoid) => sinusoid.phase_variance(count, stride, sample_period),
@@ -249,7 +237,7 @@ impl NoiseTerm {
         }
     }
 
-    /// Whether it contributes the same to every record, so that it adds no scatter of its own to an estimate.
+    /// True if the term contributes the same to every record, without scatter.
     pub(crate) const fn is_deterministic(&self) -> bool {
         matches!(self, Self::RateRamp | Self::Sinusoid(_))
     }

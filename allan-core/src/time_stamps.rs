@@ -5,10 +5,9 @@ use core::fmt;
 
 /// Finds missing samples by their time stamps.
 ///
-/// Samples are expected every `period` ticks. A stamp belongs to the expected time that it is nearest to; expected times
-/// without a stamp are missing samples. The expected times follow the stamps: a sixteenth of each deviation moves them. A
-/// clock that is off by up to 1 % is followed, and a jitter of a quarter of a period tolerated. Times that are irregular
-/// beyond that, as those of events, are no series that an Allan variance is defined for.
+/// A stamp belongs to the nearest expected time, one `period` of ticks after the other; those without a stamp are
+/// missing samples. Expected times follow the stamps by a sixteenth of each deviation: a clock may be off by 1 %, and
+/// jitter by a quarter of a period.
 ///
 /// ```
 /// use allan_core::{Cascade, TimeStamps};
@@ -25,7 +24,6 @@ use core::fmt;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TimeStamps {
     period: u64,
-    /// Time at which the last sample was expected.
     last: Option<u64>,
 }
 
@@ -60,8 +58,8 @@ impl TimeStamps {
         if period > 0 && period <= 1 << 62 { Some(Self { period, last: None }) } else { None }
     }
 
-    /// Number of samples that are missing before the one with the time stamp `time`, which becomes the last one. A counter of 64 bits
-    /// may wrap.
+    /// Number of samples missing before the one with the time stamp `time`, which becomes the last one; a counter of 64
+    /// bits may wrap.
     ///
     /// # Errors
     /// The stamp is not later than the one before by half a period, or too late. The last sample stays the same.
@@ -71,7 +69,7 @@ impl TimeStamps {
             return Ok(0);
         };
         let elapsed = time.wrapping_sub(last);
-        // Times that are more than half the range later are earlier ones.
+        // Later by more than half the range means earlier.
         let half = self.period / 2;
         if elapsed > u64::MAX / 2 || elapsed < self.period - half {
             return Err(TimeStampError::NotLater);
@@ -110,7 +108,7 @@ impl TimeStamps {
         Ok(missing)
     }
 
-    /// The time at which the last sample was expected, which its own stamp has moved; `None` before the first sample.
+    /// The time at which the last sample was expected; `None` before the first sample.
     #[must_use]
     pub const fn last(&self) -> Option<u64> {
         self.last

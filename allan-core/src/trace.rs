@@ -1,8 +1,8 @@
-//! The trace: fits the baseline model (N, B, K) to a curve, finds the term that explains the residual best, adds it, fits
-//! again, and repeats this until the residual is within its uncertainty.
+//! The trace: fits the baseline model (N, B, K) to a curve and adds the term that explains the residual best, until the
+//! residual is within its uncertainty.
 //!
-//! It needs the curve alone, so it runs on a microcontroller too. Effects that a curve does not show, such as the exact
-//! frequency of a line, need the samples; lines from a spectrum can be passed as [candidates](LineCandidates).
+//! It needs the curve alone; effects that only the samples show, such as lines of a spectrum, can be passed as
+//! [candidates](LineCandidates).
 
 mod candidates;
 
@@ -20,14 +20,12 @@ use heapless::Vec;
 /// Largest number of terms that a trace can add to the baseline model.
 pub const MAX_ADDED: usize = MAX_TERMS - NoiseTerm::BASELINE.len();
 
-/// Decrease of the deviance, in units of its scatter, from which an added parameter is accepted: the square of 3.7 standard
-/// deviations.
+/// Decrease of the deviance, in units of its scatter, that accepts an added parameter: 3.7 standard deviations squared.
 const SIGNIFICANT: f32 = 14.0;
 /// Additional decrease required for each further parameter.
 const PER_PARAMETER: f32 = 4.0;
 
-/// Fraction of the required decrease that the best starting shape of a family must reach for its shape to be searched. The
-/// best shape between the starting shapes rarely gains twice as much.
+/// Fraction of the required decrease that the best starting shape must reach for its shape to be searched.
 const PROMISING: f32 = 0.4;
 
 /// A term that was missing in the baseline model.
@@ -37,8 +35,7 @@ const PROMISING: f32 = 0.4;
 pub struct AddedTerm {
     /// Index of the term in the final model.
     pub term: usize,
-    /// Decrease of the deviance when it was added, in units of its scatter: the square of a significance in standard
-    /// deviations.
+    /// Decrease of the deviance when it was added, in units of its scatter: a squared significance.
     pub score: f64,
     /// The largest residual, in units of its uncertainty, before the term was added.
     pub residual: Residual,
@@ -82,8 +79,7 @@ impl Trace {
         trace
     }
 
-    /// A trace of no curve, to be filled in place by [`fit_baseline`](Self::fit_baseline): a trace takes about 1.5 kB, too much to
-    /// be moved over a small stack.
+    /// A trace of no curve, to be filled in place by [`fit_baseline`](Self::fit_baseline).
     #[must_use]
     pub fn empty() -> Self {
         let nothing = Goodness { deviance: 0.0, p_value: 1.0 };
@@ -107,11 +103,11 @@ impl Trace {
     }
 }
 
-/// Fits N, B and K to `curve` and adds the missing terms, the most significant first, until no candidate is significant.
+/// Fits N, B and K to `curve` and adds the missing terms, the most significant first, until no candidate is
+/// significant.
 ///
-/// The candidates are quantization, a rate ramp, Markov processes, the lines of `lines`, and the digital low-pass filters
-/// that the sensor may have: `filters` lists their starting shapes, with a decimation of 1 where every value of the filter
-/// is read. The decimation of the others is adjusted. Of each of the two kinds the first 64 are used.
+/// The candidates are quantization, a rate ramp, Markov processes, the `lines`, and digital low-pass filters with the
+/// starting shapes `filters`, with a decimation of 1 where every value is read. The first 64 of each are used.
 ///
 /// # Cost
 /// | `trace::trace` | Cortex-M4F | Cortex-M0+ |
@@ -130,10 +126,8 @@ pub fn trace<'a>(curve: impl Into<CurveView<'a>>, lines: LineCandidates, filters
     trace
 }
 
-/// As [`trace`], for a `trace` that holds the curve's [`Trace::baseline`]. Calls `keep_on` before every fit of a candidate
-/// and every step of a shape search; if it returns false, the trace is left unfinished and the result is false.
-///
-/// `keep_on` may do other work: a trace takes seconds on a microcontroller.
+/// As [`trace`], for a `trace` that holds the curve's [`Trace::baseline`]. If `keep_on`, called before every fit of a
+/// candidate, returns false, the trace is left unfinished and the result is false.
 #[must_use]
 pub fn trace_while<'a>(
     trace: &mut Trace,
@@ -154,7 +148,6 @@ struct Search<'a> {
     keep_on: &'a mut dyn FnMut() -> bool,
 }
 
-/// The trace was cancelled by `keep_on`.
 struct Cancelled;
 
 /// The best extended set of terms: its decrease of the deviance beyond the required one, and its score.
@@ -165,7 +158,6 @@ struct Best {
 }
 
 impl Search<'_> {
-    /// Adds all missing terms.
     fn complete(&mut self, curve: CurveView, trace: &mut Trace) -> Result<(), Cancelled> {
         while trace.after.terms().len() < MAX_TERMS && !trace.added.is_full() && self.extend(curve, trace)? {
             if trace.added.len() > 1 {
@@ -198,8 +190,7 @@ impl Search<'_> {
         Ok(true)
     }
 
-    /// Tests again the terms that were added before the latest one: each is replaced by another candidate that fits
-    /// significantly better.
+    /// Replaces each earlier added term by another candidate that fits significantly better.
     #[inline(never)]
     fn reconsider(&mut self, curve: CurveView, model: &mut Model, added: &[AddedTerm]) -> Result<(), Cancelled> {
         let mut other = Model::new(0.0, []);
@@ -214,7 +205,6 @@ impl Search<'_> {
                 continue;
             }
             let Some(new) = best.kinds.pop().filter(|new| new.name() != old.name()) else { continue };
-            // At the index of the old term.
             let _ = best.kinds.insert(known.term.min(kinds.len()), new);
             estimate::<AllTerms>(curve, &best.kinds, self.free, self.keep_on, &mut other);
             self.check_cancelled()?;
@@ -225,8 +215,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Sets `most` to the model extended by the candidate with the largest decrease of the deviance beyond the required one;
-    /// leaves it if no candidate reaches that.
+    /// Sets `most` to the model extended by the most significant candidate; leaves it if none is.
     #[inline(never)]
     fn most_significant(&mut self, curve: CurveView, model: &Model, most: &mut Best) -> Result<(), Cancelled> {
         let mut baseline = Baseline::empty(curve);
@@ -234,8 +223,7 @@ impl Search<'_> {
         let families = self.families;
         let mut kinds = model.kinds();
         let known = kinds.len();
-        // As many terms as points fit every curve: one more explains nothing. Of a point half of whose samples were replaced from
-        // their neighbours the interpolation has made the greater part.
+        // As many terms as points fit every curve, and a point is not measured if half of its samples were replaced.
         let is_measured = |point: &&AllanPoint| point.avar > 0.0 && point.replaced < 0.5;
         if curve.points().iter().filter(is_measured).count() <= known {
             return Ok(());
@@ -275,21 +263,20 @@ impl Best {
     const NONE: Self = Self { kinds: Vec::new(), gain: 0.0, score: 0.0 };
 }
 
-/// The index at which a candidate enters the terms of a model, at the end or in place of a term; `None` if the model already
-/// has it or another filter, or is full.
+/// The index at which a candidate enters the terms, at the end or in place of one; `None` if it does not fit in.
 fn insertion_index(kinds: &[NoiseTerm], candidate: &NoiseTerm) -> Option<usize> {
     let is_filter = |kind: &NoiseTerm| matches!(kind, NoiseTerm::Filtered(_));
     if kinds.contains(candidate) || (is_filter(candidate) && kinds.iter().any(is_filter)) {
         return None;
     }
-    // The curve cannot distinguish a decimated filter from its mixture with white noise, which it therefore replaces.
+    // A decimated filter cannot be told from its mixture with white noise, which it replaces.
     if matches!(candidate, NoiseTerm::Filtered(filter) if filter.decimation != 1.0) {
         return kinds.iter().position(|kind| *kind == NoiseTerm::AngleRandomWalk);
     }
     (kinds.len() < MAX_TERMS).then_some(kinds.len())
 }
 
-/// The result of `work` with a candidate at its index among the terms, which are the same again afterwards.
+/// The result of `work` with a candidate among the terms, which are then restored.
 fn with_candidate<T>(
     kinds: &mut Vec<NoiseTerm, MAX_TERMS>,
     at: usize,
@@ -310,7 +297,6 @@ fn with_candidate<T>(
     done
 }
 
-/// The largest residual in units of its uncertainty.
 fn largest_residual(curve: CurveView, model: &Model) -> Residual {
     let residual = |point: &AllanPoint| {
         let excess = math::sqrt(point.avar / model.avar(point.n)) - 1.0;

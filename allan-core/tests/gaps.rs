@@ -1,4 +1,4 @@
-//! What missing samples do to a curve: records with losses against the same records without, and against the formula for
+//! The effect of missing samples on a curve: records with losses against the same records without, and against the formula for
 //! white noise.
 
 use allan_core::{AllanPoint, Cascade, FractionalOctaves, Hadamard};

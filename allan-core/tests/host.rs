@@ -27,7 +27,7 @@ fn the_curve_of_means_continues_that_of_the_samples() {
     assert_eq!(full.points().len(), means.points().len().min(14));
 }
 
-/// What is taken off for replaced samples is kept beside the variance, and adds up over two times.
+/// The variance that is taken off for replaced samples is kept beside the variance, and adds up over two times.
 #[test]
 fn what_is_taken_off_twice_adds_up() {
     let mut curve = Curve::<8>::from_points(0.01, 10_000, 8, &[(1, 4.0), (2, 2.0)]).unwrap();

@@ -55,7 +55,7 @@ fn the_largest_sum_of_2_to_the_40_samples_of_24_bits_fits() {
         (0..HALF_PERIOD / 4096).for_each(|_| cascade.push_slice(&[sample; 4096]));
     }
     let (square, count) = cascade.sum_of_squares(23).unwrap();
-    // Where a window lies half a stride off, the difference is smaller; the peaks are n·(2²⁴ − 1).
+    // If a window lies half a stride off, the difference is smaller; the peaks are n·(2²⁴ − 1).
     assert!(square > u128::from(count) * ((1 << 46) - 1_u128).pow(2));
     for _ in 0..15 {
         cascade.merge(&cascade.clone());

@@ -73,7 +73,7 @@ fn the_curve_after_subtracting_covariates_is_exact() {
         // The calculation subtracts sums 10⁴ times as large.
         assert!((found.avar / expected.avar - 1.0).abs() < 1e-9, "{found:?}, {expected:?}");
     }
-    // Where a covariance is not known, nothing is subtracted.
+    // If a covariance is not known, nothing is subtracted.
     let short = [Covariate::<OCTAVES>::as_measured(&curves[1], 256)];
     let regression = CovariateRegression { channel: &curves[0], covariates: &short, covariance: &known };
     let mut subtracted = curves[0].clone();

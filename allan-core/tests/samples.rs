@@ -113,7 +113,7 @@ fn a_quantizer_for_samples_is_fine_against_their_white_noise() {
         samples[5_000] = f64::NAN;
         let quantizer = Quantizer::for_samples(samples.iter().copied()).unwrap();
         assert_eq!(quantizer.origin(), samples[1]);
-        // Of 10,000 samples the deviation is known within √(3/(4·10,000)), 0.9 %, and none of these is at a power of two.
+        // With 10,000 samples the deviation is known within √(3/(4·10,000)), 0.9 %, and none of these is at a power of two.
         let lsb = (deviation / 65_536.0).log2().floor().exp2();
         assert_eq!(quantizer.lsb(), lsb, "a standard deviation of {deviation}");
     }

@@ -108,7 +108,7 @@ fn what_passes_a_filter_that_is_read_slowly_has_the_allan_variance_of_its_sample
             let passed = |f: f64| of.gain(f, PERIOD) * term.kind.process().density(f, value_s);
             for n in FACTORS {
                 let (found, integral) = (model.part(term, n), integral(passed, n, value_s));
-                // Of a filter of that length the closed form leaves out what reading at intervals folds beyond the first order.
+                // For a filter of that length the closed form leaves out what reading at intervals folds beyond the first order.
                 let tolerance = if n < 4 { 0.031 } else { 2e-3 };
                 assert!(
                     (found / integral - 1.0).abs() < tolerance,

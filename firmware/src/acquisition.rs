@@ -1,7 +1,5 @@
-//! Acquisition: bursts at data-ready (DRDY) edges, and what is concluded from the times of the edges.
-//!
-//! [`Sampler`] runs in the two sampling interrupts (data-ready edge, end of the DMA transfer) and queues [`TimedBurst`]s.
-//! [`DataReadyMonitor`] runs behind the queue: sample rate, lost and spurious edges, a suspect sensor.
+//! Acquisition: [`Sampler`] queues [`TimedBurst`]s in the two sampling interrupts (data-ready edge, end of the
+//! transfer); behind the queue [`DataReadyMonitor`] finds sample rate, lost and spurious edges, and a suspect sensor.
 
 use adis16405_driver::{BURST_BYTES, Burst, SamplePeriod};
 use heapless::spsc;
@@ -11,11 +9,11 @@ pub const QUEUE_SLOTS: usize = 32;
 
 /// One tick of the sensor's sample clock, 1/1638.4 s, in 1/256 µs; this is exact.
 const TICK_Q8: u64 = 156_250;
-/// Time without an edge after which the sensor may have been reset. Its shortest start-up takes far longer.
+/// Time without an edge after which the sensor may have been reset; its shortest start-up takes longer.
 const SILENCE_US: u64 = 25_000;
-/// The same in sample periods; the longer of the two applies.
+/// [`SILENCE_US`] in sample periods; the longer of the two applies.
 const SILENT_PERIODS: u64 = 4;
-/// From so many periods on, the measured mean period is used in the place of the programmed one.
+/// Periods from which on the measured mean period replaces the programmed one.
 const SETTLED_PERIODS: u64 = 64;
 /// Suspicion from which on the sensor is to be probed.
 const SUSPECT: u32 = 8;
@@ -34,13 +32,12 @@ pub struct TimedBurst {
     pub burst: Option<Burst>,
 }
 
-/// Edges in [`OSCILLATION_US`] from which on the data-ready line is masked: a sensor gives 1.2 a millisecond at most, with an
-/// external clock of 1.2 kHz. Each edge costs an interrupt, and a line that oscillates would leave the processor no time.
+/// Edges in [`OSCILLATION_US`] that mask the data-ready line; a sensor gives at most 1.2 a millisecond.
 const OSCILLATION_EDGES: u32 = 16;
-/// Time in which they come, in µs.
+/// µs.
 const OSCILLATION_US: u64 = 1_000;
 
-/// What is to be done at a data-ready edge.
+/// The action at a data-ready edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EdgeAction {
     /// Nothing: sampling is disabled, or a burst is being transferred.
@@ -60,15 +57,14 @@ pub struct SamplingActivity {
     pub ended: u32,
     /// Times that the data-ready line was masked, since it oscillated.
     pub masked: u32,
-    /// Whether it is masked now.
+    /// True if it is masked now.
     pub is_masked: bool,
 }
 
-/// Decides at each data-ready edge whether a burst is read, and queues the bursts. It never blocks.
+/// Decides at each data-ready edge whether a burst is read, and queues the bursts; never blocks.
 pub struct Sampler<'q> {
     queue: spsc::Producer<'q, TimedBurst>,
     enabled: bool,
-    /// Time of the edge whose burst is being transferred.
     reading: Option<u64>,
     dropped: u32,
     activity: SamplingActivity,
@@ -82,7 +78,7 @@ impl<'q> Sampler<'q> {
         Self { queue, enabled: false, reading: None, dropped: 0, activity: SamplingActivity::default(), edges: (0, 0) }
     }
 
-    /// Enables or disables sampling. A transfer in progress is completed and queued.
+    /// Enables or disables sampling; a transfer in progress is completed and queued.
     pub fn set_enabled(&mut self, enabled: bool) {
         self.enabled = enabled;
         if enabled {
@@ -90,7 +86,7 @@ impl<'q> Sampler<'q> {
         }
     }
 
-    /// Whether a burst is being transferred.
+    /// True if a burst is being transferred.
     #[must_use]
     pub fn is_reading(&self) -> bool {
         self.reading.is_some()
@@ -102,10 +98,7 @@ impl<'q> Sampler<'q> {
         self.activity
     }
 
-    /// To be called at every data-ready edge; returns what must be done now.
-    ///
-    /// An edge during a transfer starts none: its sample is lost, which
-    /// [`DataReadyMonitor`] concludes from the time to the next edge.
+    /// To be called at every data-ready edge; returns what must be done now; a sample during a transfer is lost.
     #[must_use]
     pub fn data_ready(&mut self, at_us: u64) -> EdgeAction {
         let (edges, since_us) = &mut self.edges;
@@ -154,15 +147,14 @@ pub struct DataReadyMonitor {
     /// Programmed period in 1/256 µs; above 0.
     period_q8: u64,
     last_us: Option<u64>,
-    /// When the sensor was probed last.
     probed_us: u64,
     /// Periods between edges so far, and the time that they took.
     periods: u64,
     elapsed_us: u64,
-    /// Rises with every lost or spurious edge, falls with every regular one.
+    /// Rises with every irregular edge, falls with every regular one.
     suspicion: u32,
     silent: bool,
-    /// The next edge may come at any phase: configuring the sensor restarts its sample clock.
+    /// The next edge may come at any phase: configuring restarts the sample clock.
     new_phase: bool,
 }
 
@@ -192,7 +184,7 @@ impl DataReadyMonitor {
         };
         let interval_us = at_us.saturating_sub(last_us);
         let (interval, period) = (interval_us << 8, self.mean_period_q8());
-        // Without a period memory is damaged: the main loop, not an interrupt, restarts the device.
+        // Damaged memory: the main loop restarts the device.
         let Some(periods) = (interval + period / 2).checked_div(period) else { return DrdyEdge::Spurious };
         let deviation = interval.abs_diff(periods * period);
         if core::mem::take(&mut self.new_phase) {
@@ -213,8 +205,7 @@ impl DataReadyMonitor {
         DrdyEdge::Periods(u32::try_from(periods).unwrap_or(u32::MAX))
     }
 
-    /// Whether the sensor must be probed before its samples are used: it was silent for so long that it may have been
-    /// reset, or its edges come at another rate.
+    /// True if the sensor must be probed before its samples are used: after a silence, or at another edge rate.
     #[must_use]
     pub const fn is_suspect(&self) -> bool {
         self.silent || self.suspicion >= SUSPECT
@@ -226,28 +217,27 @@ impl DataReadyMonitor {
         self.last_us
     }
 
-    /// Whether no edge has come for so long before `now_us` that the sensor may be disconnected or reset.
+    /// True if no edge has come for so long that the sensor may be disconnected or reset.
     #[must_use]
     pub fn is_silent_at(&self, now_us: u64) -> bool {
         let last_sign_us = self.last_us.unwrap_or(0).max(self.probed_us);
         now_us.saturating_sub(last_sign_us) > self.silence_us()
     }
 
-    /// Whether there is a programmed period, as with every configuration: without it memory is damaged.
+    /// False only with damaged memory.
     pub(crate) const fn has_period(&self) -> bool {
         self.period_q8 > 0
     }
 
-    /// Clears the suspicion: the sensor was probed and configured at `now_us`.
-    pub fn mark_probed(&mut self, now_us: u64) {
+    /// Clears the suspicion at `now_us`, after a probe.
+    pub fn restart_at(&mut self, now_us: u64) {
         self.probed_us = now_us;
         self.new_phase = true;
         self.silent = false;
         self.suspicion = 0;
     }
 
-    /// Mean sample rate in Hz; `None` before 64 periods. An edge is timed to within some microseconds, so that the error is
-    /// below 10⁻⁴ at 819.2 Hz, and falls with the time.
+    /// Mean sample rate in Hz; `None` before 64 periods. The error is below 10⁻⁴ at 819.2 Hz, and falls with time.
     #[must_use]
     pub fn measured_hz(&self) -> Option<f64> {
         (self.periods >= SETTLED_PERIODS).then(|| self.periods as f64 * 1e6 / self.elapsed_us as f64)
@@ -277,13 +267,12 @@ mod tests {
     fn after_a_long_loss_the_next_edge_raises_no_suspicion() {
         let mut monitor = monitor();
         feed(&mut monitor, [0.0, 1.0, 2.0], 1.0);
-        monitor.mark_probed((10_000.0 * PERIOD_US) as u64);
+        monitor.restart_at((10_000.0 * PERIOD_US) as u64);
         assert_eq!(feed(&mut monitor, [10_001.4, 10_002.4], 1.0), [1, 9_998, 0], "at another phase");
         assert!(!monitor.is_suspect());
     }
 
-    /// Feeds edges at these multiples of the period, by a clock that is `fast` times too fast; counts the regular, lost and
-    /// spurious ones.
+    /// Feeds edges at multiples of the period by a clock `fast` times too fast; counts regular, lost and spurious ones.
     fn feed(monitor: &mut DataReadyMonitor, at: impl IntoIterator<Item = f64>, fast: f64) -> [u32; 3] {
         let [mut single, mut lost, mut spurious] = [0; 3];
         for periods in at {
@@ -303,13 +292,12 @@ mod tests {
             assert_eq!(monitor.measured_hz(), None);
             assert_eq!(feed(&mut monitor, (0..10_000).map(f64::from), fast), [10_000, 0, 0]);
             let measured = monitor.measured_hz().unwrap();
-            // Times are truncated to microseconds: 1 µs in 10 000 periods of 4.9 ms.
+            // Truncated to µs: 1 µs in 10,000 periods.
             assert!((measured * fast / 204.8 - 1.0).abs() < 1.0 / (9_999.0 * PERIOD_US * fast), "{measured}");
             assert!(!monitor.is_suspect());
         }
     }
 
-    /// With a clock 3 % off, 100 lost edges are counted correctly once the rate is measured.
     #[test]
     fn lost_edges_are_counted_exactly() {
         let mut monitor = monitor();
@@ -318,7 +306,7 @@ mod tests {
         let measured = monitor.measured_hz().unwrap();
         assert!((measured * 1.03 - 204.8).abs() < 1e-3, "{measured}");
         assert!(monitor.is_suspect(), "the sensor may have been reset within 100 periods");
-        monitor.mark_probed(2000 * 5000);
+        monitor.restart_at(2000 * 5000);
         assert!(!monitor.is_suspect());
     }
 
@@ -338,7 +326,6 @@ mod tests {
         assert!(!monitor.is_suspect());
     }
 
-    /// A reset sets the sensor to 819.2 samples a second; a disturbed write may set a slower rate.
     #[test]
     fn another_rate_raises_suspicion_within_a_few_edges() {
         for ratio in [0.25, 0.3, 0.5, 1.4, 2.0, 4.0] {
@@ -352,10 +339,10 @@ mod tests {
     #[test]
     fn silence_is_detected_without_an_edge() {
         let mut monitor = monitor();
-        monitor.mark_probed(500_000);
+        monitor.restart_at(500_000);
         assert!(!monitor.is_silent_at(525_000));
         assert!(monitor.is_silent_at(525_001), "no edge since the sensor was probed");
-        monitor.mark_probed(990_000);
+        monitor.restart_at(990_000);
         monitor.edge(1_000_000);
         assert!(!monitor.is_silent_at(1_025_000));
         assert!(monitor.is_silent_at(1_025_001));

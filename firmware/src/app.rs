@@ -25,7 +25,7 @@ use adis16405_driver::{Config, ConfigError, SamplePeriod};
 use core::fmt::Arguments;
 use link::{Boot, BootCause, Health, MessageRef, text_line};
 
-/// What the start-up code of a board hands to the application.
+/// The start-up data of a board for the application.
 pub struct Start {
     /// Why the microcontroller started, and the crash record.
     pub boot: Boot,
@@ -46,18 +46,16 @@ const CHECKPOINT_US: u64 = 100_000;
 pub struct App {
     state: DeviceState,
     retained: RetainedRam,
-    /// One for each port: a line is not made of what two of them receive.
+    /// One for each port: lines are not mixed.
     parsers: [CommandParser; HostPort::COUNT],
     console: Console,
     report: ReportProgress,
     next_report_us: u64,
     next_checkpoint_us: u64,
-    /// Channel of the last checkpoint.
     checkpoint_channel: usize,
-    /// Time that retained RAM has been told of.
     noted_us: u64,
     armed_until_us: u64,
-    /// When models may be kept without power again.
+    /// Earliest time of the next write of models.
     next_kept_us: u64,
     tasks: TaskMonitor,
     counter_log: CounterLog,
@@ -78,8 +76,8 @@ fn interval_us(settings: RetainedSettings) -> u64 {
 }
 
 impl App {
-    /// Restores settings and statistics from retained RAM, if it holds any; after three crashes within ten minutes nothing that was
-    /// stored, which may be their cause.
+    /// Restores settings and statistics from retained RAM; nothing after three crashes within ten minutes, which stored
+    /// data may cause.
     pub fn new(start: Start, board: &mut impl Board) -> Self {
         let Start { mut boot, mut retained, finished } = start;
         let has_crashed = boot.cause == BootCause::Watchdog || !boot.crash_record.is_empty();
@@ -111,7 +109,7 @@ impl App {
             }
         }
         retained.write_settings(settings, first);
-        // A restart while the last finished epoch was being learned from: its report starts again.
+        // The device restarted while learning: its report starts again.
         let interrupted = !first
             && learner.finished.as_deref_mut().is_some_and(|finished| {
                 retained.restore_epoch(finished) && finished.number.wrapping_add(1) == settings.epoch
@@ -127,7 +125,7 @@ impl App {
             report.start_epoch_end();
         }
         let now_us = board.now_us();
-        // Unless the microcontroller alone was restarted, the sensor may be starting up too.
+        // After other restarts the sensor may be starting up too.
         let sensor_runs = matches!(boot.cause, BootCause::Pin | BootCause::Software | BootCause::Watchdog);
         let probe_us = if sensor_runs { now_us } else { now_us + START_UP_US };
         Self {
@@ -160,14 +158,14 @@ impl App {
         }
     }
 
-    /// One pass of the main loop: all commands received, and at most one message. Returns false if nothing is left to do
-    /// before the next interrupt.
+    /// One pass of the main loop: all commands received, at most one message. Returns false if nothing is left before
+    /// the next interrupt.
     pub fn turn(&mut self, board: &mut impl Board) -> bool {
         self.service(board);
         self.transmit(board)
     }
 
-    /// What must not wait, also while a model is being fitted: watchdog, commands, sensor, checkpoints, timers.
+    /// The urgent work, also during a fit: watchdog, commands, sensor, checkpoints, timers.
     fn service(&mut self, board: &mut impl Board) {
         if !self.tasks.are_alive(board) {
             return; // nothing that would feed the watchdog
@@ -190,8 +188,7 @@ impl App {
         self.check_timers(board);
     }
 
-    /// Sends waiting text, then a line of an answer and a message of the report. Returns false if nothing is left or there
-    /// is no room.
+    /// Sends waiting text, a line of an answer, a message of the report; false if nothing is left or there is no room.
     fn transmit(&mut self, board: &mut impl Board) -> bool {
         if !self.flush(board) {
             return false;
@@ -201,7 +198,6 @@ impl App {
         self.console.has_answers() || self.report.is_active()
     }
 
-    /// Sends waiting text. Returns whether there is room for more.
     fn flush(&mut self, board: &mut impl Board) -> bool {
         let has_room = self.console.flush(board);
         if has_room {
@@ -213,8 +209,6 @@ impl App {
     fn print(&mut self, board: &mut impl Board, text: Arguments<'_>) {
         self.console.print(board, text);
     }
-
-    // Commands
 
     fn execute(&mut self, command: Command, board: &mut impl Board) {
         let now_us = board.now_us();
@@ -297,12 +291,12 @@ impl App {
                 let line = bench_console::write_register(register, value, &self.state, board);
                 self.print(board, format_args!("{line}"));
             }
-            Command::CarefulBus(careful) => {
+            Command::SlowBus(is_slow) => {
                 board.set_sampling(false);
-                let set = board.set_bus_timing(if careful { BusTiming::CAREFUL } else { BusTiming::SAFE });
+                let set = board.set_bus_timing(if is_slow { BusTiming::SLOW } else { BusTiming::USUAL });
                 self.state.request_probe(now_us);
-                match (set, careful) {
-                    (true, true) => self.print(board, format_args!("careful timing of the bus, until a restart")),
+                match (set, is_slow) {
+                    (true, true) => self.print(board, format_args!("slow timing of the bus, until a restart")),
                     (true, false) => self.print(board, format_args!("usual timing of the bus")),
                     (false, _) => self.print(board, format_args!("this board has one timing of its bus")),
                 }
@@ -373,7 +367,7 @@ impl App {
         self.print(board, format_args!("statistics reset: the sensor is configured anew"));
     }
 
-    /// Returns whether a write to the sensor's flash was armed; the next one has to be armed again.
+    /// Returns whether a flash write was armed; the next one must be armed again.
     fn disarm(&mut self, now_us: u64) -> bool {
         now_us < core::mem::take(&mut self.armed_until_us)
     }
@@ -392,7 +386,7 @@ impl App {
                 self.reset_statistics(board);
                 match bias.host_x {
                     0 => self.print(board, format_args!("bias nulled, statistics reset")),
-                    // Kept by a driver, as bursts would lose the sign of x (erratum); the Allan variance does not depend on it.
+                    // A driver keeps it: bursts lose the sign of x (erratum). The Allan variance does not depend on it.
                     x => self.print(
                         board,
                         format_args!("bias of y and z nulled, statistics reset; x: {x} counts not applied by the part"),
@@ -403,9 +397,7 @@ impl App {
         }
     }
 
-    // What is kept without power
-
-    /// Keeps the settings and the models. Returns the time in µs for which nothing was sampled.
+    /// Keeps settings and models without power; returns the pause of sampling in µs.
     #[inline(never)]
     fn persist(&mut self, board: &mut impl Board) -> Result<u64, StoreError> {
         let raw_stream = board.estimators(|estimators| estimators.has_raw_stream());
@@ -416,7 +408,7 @@ impl App {
         self.write_record(record, board)
     }
 
-    /// Keeps the models of an epoch, once an hour at most: a write costs samples.
+    /// Once an hour at most: a write costs samples.
     fn keep_models(&mut self, board: &mut impl Board) {
         let now_us = board.now_us();
         if now_us < self.next_kept_us {
@@ -430,7 +422,6 @@ impl App {
         }
     }
 
-    /// Writes a record while nothing is sampled; the samples that this costs are a gap.
     fn write_record(&mut self, record: &[u8], board: &mut impl Board) -> Result<u64, StoreError> {
         if !board.keeps_record() {
             return Err(StoreError::NoMemory);
@@ -440,7 +431,7 @@ impl App {
         let written = board.write_record(record);
         let now_us = board.now_us();
         if self.state.is_sampled() {
-            board.estimators(|estimators| estimators.mark_resumed(now_us));
+            board.estimators(|estimators| estimators.restart_rate_check(now_us));
             board.set_sampling(true);
         }
         written.map(|()| now_us - began_us)
@@ -453,11 +444,7 @@ impl App {
         }
     }
 
-    // Checkpoints and timers
-
-    /// Writes one channel after the other, and then the age of the epoch, to retained RAM, all of them once in 0.8 s: a restart
-    /// loses no more than that. What
-    /// became due during a long step of a fit is written at once.
+    /// Writes channel by channel, then the epoch's age, once in 0.8 s each, or at once behind a fit.
     fn checkpoint(&mut self, board: &mut impl Board) {
         let now_us = board.now_us();
         for _ in 0..CHANNELS.len() {
@@ -497,15 +484,11 @@ impl App {
         }
         let interval_us = interval_us(self.state.settings);
         if interval_us > 0 && now_us >= self.next_report_us {
-            // One report, however many intervals have passed.
             self.next_report_us += ((now_us - self.next_report_us) / interval_us + 1) * interval_us;
             self.report.start();
         }
     }
 
-    // Epochs
-
-    /// Resets the statistics, the number of epochs and all learned models.
     fn reset_statistics(&mut self, board: &mut impl Board) {
         board.estimators(|estimators| estimators.reset());
         self.state.settings.epoch = 0;
@@ -515,15 +498,14 @@ impl App {
         self.start_epoch(board);
     }
 
-    /// Ends the running epoch and starts its report. While the epoch before is still being learned from, the running epoch
-    /// goes on.
+    /// Ends the running epoch and starts its report, unless the epoch before is still being learned from.
     fn finish_epoch(&mut self, board: &mut impl Board) {
         let finished = self.state.learner.finished.as_deref_mut();
         let Some(finished) = finished.filter(|_| !self.report.ends_epoch()) else { return };
         board.estimators(|estimators| finished.fill(estimators));
         finished.number = self.state.settings.epoch;
         event!(info, "epoch {=u32} finished", finished.number);
-        // Before the settings, so that a restart in between finds the epoch either running or finished.
+        // Before the settings: a restart in between finds the epoch running or finished.
         self.retained.write_epoch(finished);
         self.state.settings.epoch = self.state.settings.epoch.saturating_add(1);
         self.report.start_epoch_end();
@@ -536,7 +518,6 @@ impl App {
         self.retained.write_settings(self.state.settings, true);
     }
 
-    /// Makes and sends the next message of the report, for which there must be room.
     fn send_report_part(&mut self, board: &mut impl Board) {
         let ends_epoch = self.report.ends_epoch();
         let Some(part) = self.report.part() else {
@@ -556,7 +537,7 @@ impl App {
         self.report.advance(ends_epoch);
     }
 
-    /// Fits the model of a channel to the finished epoch, servicing everything else meanwhile, and sends it.
+    /// Fits a channel's model to the finished epoch, servicing everything else meanwhile, and sends it.
     fn learn(&mut self, board: &mut impl Board, index: usize) {
         let Some(epoch) = self.state.learner.finished.take() else { return };
         let scale = epoch.scale(self.state.config);
@@ -576,7 +557,7 @@ impl App {
         send_learned(board, &fit, index, epoch.number);
     }
 
-    /// Everything but reports and tables. Returns false if the fit is to be cancelled, since the statistics were reset.
+    /// All but reports and tables; false cancels the fit, after a reset of the statistics.
     fn service_during_fit(&mut self, board: &mut impl Board) -> bool {
         self.service(board);
         if self.flush(board) {
@@ -586,7 +567,7 @@ impl App {
     }
 }
 
-/// Settings that were kept without power, if there are any, and the models, in `learner`.
+/// Kept settings, if any, and models (into `learner`).
 #[inline(never)]
 fn read_stored(board: &mut impl Board, learner: &mut Learner) -> Option<StoredSettings> {
     let mut record = [0; MAX_RECORD];

@@ -1,5 +1,4 @@
-//! What a person at a bench asks for: registers by name, the times of the bus and of the data-ready line as they are, and the
-//! deflections of the self-test. Everything is read while nothing is sampled; the samples that this costs are a gap.
+//! Requests of a person at a bench (registers, bus and data-ready times, self-test), during which sampling pauses.
 
 use crate::answer::AnswerLine;
 use crate::board::{Board, FrameTimes};
@@ -27,20 +26,18 @@ pub(crate) fn hexadecimal(digits: &str) -> Option<u16> {
     digits.bytes().all(|byte| byte.is_ascii_hexdigit()).then(|| u16::from_str_radix(digits, 16).ok())?
 }
 
-/// What is asked of the sensor.
 enum Request {
     Read(Register),
     Write(Register, u16),
     Deflections(Stimulus),
-    /// Many reads of a register.
     Compare(Register),
 }
 
-/// Reads of [`Request::Compare`], so many of them overlapping. They take 0.43 s in normal mode, 1.6 s in low-power mode.
+/// Overlapping reads of [`Request::Compare`]: 0.43 s in normal, 1.6 s in low-power mode.
 const COMPARED_READS: usize = 10_000;
 const OVERLAPPING_READS: usize = 16;
 
-/// The first value that a register answers, the number of others, and the bits in which they differ from it.
+/// First value, number of other values, and the bits in which they differ.
 fn compared<SPI: SpiDevice<u8>, D: DelayNs>(
     register: Register,
     sensor: &mut Adis16405<SPI, D>,
@@ -56,8 +53,8 @@ fn compared<SPI: SpiDevice<u8>, D: DelayNs>(
     Ok([first as i16, others, bits as i16, 0, 0, 0])
 }
 
-/// Asks the sensor while nothing is sampled, at the clock and with the stall that it takes in either power mode; many reads are as fast as
-/// its configuration allows. The answer is the value of a register, six deflections, or what [`compared`] says; the error is one to be printed.
+/// Asks the sensor while nothing is sampled, with timing for either power mode; many reads go as fast as configured.
+/// Returns a register's value, six deflections or [`compared`]; the error is to be printed.
 #[allow(clippy::result_large_err, reason = "the text of an error is made where its type is known, and printed")]
 fn ask(request: Request, state: &DeviceState, board: &mut impl Board) -> Result<[i16; 6], TextLine> {
     board.set_sampling(false);
@@ -81,11 +78,10 @@ fn ask(request: Request, state: &DeviceState, board: &mut impl Board) -> Result<
     answer
 }
 
-/// Samples again if that was done before.
 fn resume(state: &DeviceState, board: &mut impl Board) {
     if state.is_sampled() {
         let now_us = board.now_us();
-        board.estimators(|estimators| estimators.mark_resumed(now_us));
+        board.estimators(|estimators| estimators.restart_rate_check(now_us));
         board.set_sampling(true);
     }
 }
@@ -98,7 +94,6 @@ fn line(register: Register, state: &DeviceState, board: &mut impl Board) -> Text
     }
 }
 
-/// Reads a register.
 pub(crate) fn read_register(register: Register, state: &DeviceState, board: &mut impl Board) -> TextLine {
     if register.access() == Access::Write {
         return text_line(format_args!("{} cannot be read", register.name()));
@@ -106,7 +101,6 @@ pub(crate) fn read_register(register: Register, state: &DeviceState, board: &mut
     line(register, state, board)
 }
 
-/// Reads a register many times.
 pub(crate) fn compare_reads(register: Register, state: &DeviceState, board: &mut impl Board) -> TextLine {
     let (name, address) = (register.name(), register.address());
     match ask(Request::Compare(register), state, board) {
@@ -118,17 +112,15 @@ pub(crate) fn compare_reads(register: Register, state: &DeviceState, board: &mut
     }
 }
 
-/// The bits of GLOB_CMD by which the sensor writes its flash memory: auto-null, factory restore, flash update, precision auto-null
-/// (ADIS16400/ADIS16405 data sheet Rev. B, pages 10 and 13).
+/// Bits of GLOB_CMD that write the sensor's flash (data sheet Rev. B, pages 10 and 13).
 const FLASH_COMMANDS: u16 = 1 << 0 | 1 << 1 | 1 << 3 | 1 << 4;
 
-/// Whether the sensor writes its flash memory, of which each write takes one of 10,000 cycles, when this is written.
+/// True if this writes the sensor's flash, one of 10,000 cycles.
 pub(crate) fn writes_flash(register: Register, value: u16) -> bool {
     register == Register::GlobCmd && value & FLASH_COMMANDS != 0
 }
 
-/// Writes a register and, if it can be read, reads it back. The device does not know of the change: `check` sets rate, range, filter and
-/// data ready as it has them.
+/// Writes a register and reads it back if possible; `check` restores the device's own settings.
 pub(crate) fn write_register(register: Register, value: u16, state: &DeviceState, board: &mut impl Board) -> TextLine {
     match register.access() {
         Access::Read => text_line(format_args!("{} cannot be written", register.name())),
@@ -140,7 +132,7 @@ pub(crate) fn write_register(register: Register, value: u16, state: &DeviceState
     }
 }
 
-/// The line at an index of the dump: the registers that can be read, in the order of their addresses. DIAG_STAT is cleared by it.
+/// A line of the dump: readable registers by address; clears DIAG_STAT.
 pub(crate) fn dump_line(state: &DeviceState, board: &mut impl Board, index: usize) -> AnswerLine {
     match Register::ALL.get(index) {
         Some(register) if register.access() == Access::Write => AnswerLine::Skip,
@@ -149,11 +141,10 @@ pub(crate) fn dump_line(state: &DeviceState, board: &mut impl Board, index: usiz
     }
 }
 
-/// Sample periods for which a pulse of data ready is waited for, and the least time in µs.
+/// Longest wait for a data-ready pulse, sample periods, and its minimum, µs.
 const PULSE_PERIODS: f64 = 2.5;
 const PULSE_US: u32 = 250_000;
 
-/// The line at an index of the measurement.
 pub(crate) fn measurement_line(state: &DeviceState, board: &mut impl Board, index: usize) -> AnswerLine {
     let hz = |hz: f64| Decimal::significant(hz, 5);
     AnswerLine::Text(match index {
@@ -204,14 +195,13 @@ pub(crate) fn measurement_line(state: &DeviceState, board: &mut impl Board, inde
     })
 }
 
-/// Reads a register as often as makes the times of single frames known.
 fn register_frames(state: &DeviceState, board: &mut impl Board) -> Option<FrameTimes> {
     board.frame_times()?;
     ask(Request::Read(Register::ProdId), state, board).ok()?;
     board.frame_times()
 }
 
-/// The line at an index of the self-test with deflections: of gyros x, y, z and accelerometers x, y, z, in counts.
+/// Deflections of gyros x, y, z and accelerometers x, y, z, counts.
 pub(crate) fn deflection_line(state: &DeviceState, board: &mut impl Board, index: usize) -> AnswerLine {
     let (sign, stimulus) = match index {
         0 => {
@@ -231,19 +221,19 @@ pub(crate) fn deflection_line(state: &DeviceState, board: &mut impl Board, index
         )));
     }
     let response = ask(Request::Deflections(stimulus), state, board);
-    // The filter holds samples that were displaced.
+    // The filter holds displaced samples.
     let now_us = board.now_us();
-    board.estimators(|estimators| estimators.mark_probed(now_us));
+    board.estimators(|estimators| estimators.accept_samples_after_settling(now_us));
     AnswerLine::Text(match response {
         Ok([a, b, c, d, e, f]) => text_line(format_args!("{sign} {a} {b} {c}  {d} {e} {f}")),
         Err(error) => text_line(format_args!("{sign} {error}")),
     })
 }
 
-/// Longest test with one stimulus, in s: nothing else is done meanwhile.
+/// Longest test with one stimulus, s: everything waits.
 const LONGEST_TEST_S: f64 = 3.0;
 
-/// Time of a test with one stimulus in s: twice the filter settles, and eight samples are read.
+/// Test with one stimulus, s: two filter lengths and eight samples.
 fn deflection_s(config: Config) -> f64 {
     let samples = (2 << config.filter_taps_log2()) + 8;
     2.0 * f64::from(samples) / config.sample_period().hz()

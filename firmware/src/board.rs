@@ -8,7 +8,7 @@ use crate::transmit::TransmitQueue;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::SpiDevice;
 
-/// Times of chip select between two frames in one of the sensor's power modes, in ns.
+/// Times of chip select between two frames in one power mode, ns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SelectTiming {
     /// Least time that chip select is high.
@@ -17,38 +17,36 @@ pub struct SelectTiming {
     pub read_ns: u32,
 }
 
-/// Times of the sensor's bus that the board keeps whatever the driver does.
+/// Minimum times of the sensor's bus, whatever the driver does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BusTiming {
     /// Between two frames in normal mode.
     pub normal: SelectTiming,
-    /// At a serial clock of at most 300 kHz: the sensor is, or may be, in low-power mode.
+    /// With a serial clock of at most 300 kHz, for low-power mode.
     pub low_power: SelectTiming,
-    /// Pause between two words of a burst in ns; 0 for none. With a pause every word is a DMA transfer of its own, with an
-    /// interrupt at its end.
+    /// Pause between two words of a burst in ns, each of which is then a DMA transfer; 0 for none.
     pub word_gap_ns: u32,
 }
 
 impl BusTiming {
-    /// Chip select is high for 16 µs, the stall that the manufacturer's own tools keep, or 75 µs, the stall of low-power mode;
-    /// frames begin 40 or 150 µs apart (ADIS16400/ADIS16405 data sheet Rev. B, Table 2). Bursts have no pauses, as with the
-    /// drivers of Linux and PX4.
-    pub const SAFE: Self = Self {
+    /// Chip select is high for 16 µs (stall of the manufacturer's tools) or 75 µs (low-power mode); frames begin 40 or
+    /// 150 µs apart (ADIS16400/ADIS16405 data sheet Rev. B, Table 2). Bursts have no pauses.
+    pub const USUAL: Self = Self {
         normal: SelectTiming { high_ns: 16_000, read_ns: 40_000 },
         low_power: SelectTiming { high_ns: 75_000, read_ns: 150_000 },
         word_gap_ns: 0,
     };
 
-    /// For a sensor that answers wrongly with [`SAFE`](Self::SAFE): chip select is high for 50 µs, as with the driver of
-    /// Linux, and every word of a burst is followed by the stall of a frame. A burst takes 0.45 ms at 656 kHz.
-    pub const CAREFUL: Self = Self {
+    /// For a sensor that fails with [`USUAL`](Self::USUAL): chip select high for 50 µs, and a frame's stall after every
+    /// word. A burst takes 0.45 ms at 656 kHz.
+    pub const SLOW: Self = Self {
         normal: SelectTiming { high_ns: 50_000, read_ns: 40_000 },
         low_power: SelectTiming { high_ns: 100_000, read_ns: 150_000 },
         word_gap_ns: 9_000,
     };
 }
 
-/// Times of frames on the sensor's bus as the board has made them, in µs, to within one.
+/// Measured times of frames on the sensor's bus, ±1 µs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FrameTimes {
     /// Time for which chip select was low in the last frame.
@@ -76,7 +74,7 @@ pub trait SensorBus: SpiDevice<u8> {
     fn take_frame_times(&mut self) -> FrameTimes;
 }
 
-/// What the application needs of a board: its microcontroller, or a virtual sensor on the host.
+/// The application's view of a board: its microcontroller, or a virtual sensor on the host.
 pub trait Board {
     /// The sensor's bus, for registers.
     type Bus<'a>: SpiDevice<u8>
@@ -91,38 +89,36 @@ pub trait Board {
     fn now_us(&mut self) -> u64;
     /// Sleeps until the next interrupt.
     fn sleep(&mut self) {}
-    /// The sensor's bus and a delay. To be used only while sampling is disabled.
+    /// Bus and delay; only while sampling is disabled.
     fn sensor_bus(&mut self) -> (Self::Bus<'_>, Self::Delay<'_>);
-    /// Sets the fastest serial clock of at most `limit_hz`, or the slowest one if none is slow enough; returns it in Hz. To be
-    /// used only while sampling is disabled.
+    /// Sets the fastest serial clock of at most `limit_hz`, or the slowest one if none is slow enough; returns it in
+    /// Hz. Only while sampling is disabled.
     fn set_clock_limit(&mut self, limit_hz: u32) -> u32;
-    /// Enables or disables sampling. On return after disabling, no burst is being transferred, and the sensor's stall time
-    /// has passed.
+    /// Enables or disables sampling. Returns when no burst is being transferred and the stall time has passed.
     fn set_sampling(&mut self, enabled: bool);
     /// Transfers of bursts so far.
     fn sampling_activity(&mut self) -> SamplingActivity;
-    /// Resets the microcontroller's side of the sensor's bus. To be used only while sampling is disabled.
+    /// Resets the microcontroller's side of the bus; only while sampling is disabled.
     fn reset_bus(&mut self);
-    /// Keeps other times on the sensor's bus. Returns false if the board cannot. To be used only while sampling is disabled.
+    /// Sets other bus times, only while sampling is disabled; false if the board cannot.
     fn set_bus_timing(&mut self, _timing: BusTiming) -> bool {
         false
     }
-    /// Times of the frames on the sensor's bus since they were asked for last; `None` if the board does not know them.
+    /// Frame times since the last call; `None` if unknown.
     fn frame_times(&mut self) -> Option<FrameTimes> {
         None
     }
-    /// Width of the next pulse of data ready in µs; `None` if none ends within `limit_us`, or the board does not see the level. To
-    /// be used only while sampling is disabled.
+    /// Width of the next data-ready pulse in µs, while sampling is disabled; `None` if none ends within `limit_us`.
     fn data_ready_width_us(&mut self, _limit_us: u32) -> Option<u32> {
         None
     }
-    /// Pulses the sensor's RST line. Returns false if the board does not connect it.
+    /// Pulses the sensor's RST line; false if not connected.
     fn reset_sensor(&mut self) -> bool {
         false
     }
-    /// Gives access to the estimators, which process no burst meanwhile: `access` must be short.
+    /// Gives access to the estimators, which wait: `access` must be short.
     fn estimators<R>(&mut self, access: impl FnOnce(&mut Estimators<'static>) -> R) -> R;
-    /// Gives access to the transmit queue, and has what is queued transmitted.
+    /// Gives access to the transmit queue, then starts transmission.
     fn transmit_queue<R>(&mut self, access: impl FnOnce(&mut TransmitQueue<'static>) -> R) -> R;
     /// The next received byte, and the port that has received it.
     fn receive(&mut self) -> Option<(HostPort, u8)>;
@@ -132,42 +128,42 @@ pub trait Board {
     fn feed_watchdog(&mut self);
     /// Restarts the microcontroller; retained RAM keeps its content.
     fn restart(&mut self);
-    /// Programs the level of the supply below which the microcontroller is reset into memory that keeps it.
+    /// Programs the brown-out level into memory that keeps it.
     fn program_brown_out(&mut self) -> BrownOutLevel {
         BrownOutLevel::Fixed
     }
-    /// Whether the board has memory that keeps a record without power.
+    /// True if the board has memory that keeps a record without power.
     fn keeps_record(&mut self) -> bool {
         false
     }
-    /// Copies the record in memory that keeps it without power to `record`, and returns its length; `None` if there is none.
+    /// Copies the persistent record and returns its length; `None` without one.
     fn read_record(&mut self, _record: &mut [u8]) -> Option<usize> {
         None
     }
-    /// Replaces that record, or erases it if `record` is empty. Interrupts may be disabled for the time that the memory takes: to be used
-    /// only while sampling is disabled.
+    /// Replaces the record, or erases it if `record` is empty. Only while sampling is disabled: interrupts may be off
+    /// meanwhile.
     ///
     /// # Errors
     /// The board has no such memory, or it does not take the record. The one before is kept.
     fn write_record(&mut self, _record: &[u8]) -> Result<(), StoreError> {
         Err(StoreError::NoMemory)
     }
-    /// Starts the boot loader that takes an image over USB. Returns false if the board has none that a program can start.
+    /// Starts the boot loader for images over USB; false without one.
     fn start_boot_loader(&mut self) -> bool {
         false
     }
 }
 
-/// The brown-out level of a microcontroller after the request to program it.
+/// Brown-out level after a request to program it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BrownOutLevel {
-    /// It needs no programming: it is set at every start, or cannot be set.
+    /// Set at every start, or cannot be set.
     Fixed,
-    /// It was programmed before.
+    /// Was programmed before.
     Set,
-    /// It was programmed now.
+    /// Was programmed now.
     Programmed,
-    /// It could not be programmed.
+    /// Could not be programmed.
     Failed,
 }
 
@@ -202,7 +198,7 @@ impl Uptime {
         Self { last: counter, total_us: 0 }
     }
 
-    /// The time at counter value `counter`; must be called at least once in 71 minutes, in which the counter wraps.
+    /// The time at a counter value; to be called at least once in 71 minutes, before the counter wraps.
     pub fn at(&mut self, counter: u32) -> u64 {
         self.total_us += u64::from(counter.wrapping_sub(self.last));
         self.last = counter;
@@ -212,7 +208,7 @@ impl Uptime {
 
 /// The data-ready line, whose edges raise an interrupt.
 pub trait DataReadyLine {
-    /// Ignores edges, or takes them again; those that came meanwhile are forgotten.
+    /// Masks edges, or takes them again without those in between.
     fn set_masked(&mut self, masked: bool);
     /// The level of the line.
     fn is_active(&mut self) -> bool;

@@ -1,5 +1,4 @@
-//! Frames on the sensor's bus as every microcontroller sends them: chip select with its times, and the operations between
-//! its edges.
+//! Frames on the sensor's bus: chip select with its times, and the operations between.
 
 use crate::board::{BusTiming, FrameTimes};
 use crate::sensor::LOW_POWER_LIMIT_HZ;
@@ -31,16 +30,15 @@ impl spi::Error for BusFault {
     }
 }
 
-/// Readings of a flag before [`wait_for`] gives up. A reading takes at least three cycles, so that this is 0.4 ms at 168 MHz;
-/// a byte takes 49 µs at the slowest serial clock.
+/// Readings of a flag before [`wait_for`] gives up: 0.4 ms at 168 MHz; a byte takes 49 µs at the slowest clock.
 const READINGS: u32 = 25_000;
 
-/// Waits until a flag of a peripheral is set; returns false if that takes longer than [`READINGS`] readings.
+/// Waits for a flag; false after [`READINGS`] readings.
 pub(crate) fn wait_for(mut flag: impl FnMut() -> bool) -> bool {
     (0..READINGS).any(|_| flag())
 }
 
-/// Waits for at least `ns`; a microcontroller whose counter stands still waits for a bounded time.
+/// Waits for at least `ns`, and a bounded time if the counter stands still.
 pub(crate) fn wait_ns<M: MicrosecondCounter>(ns: u32) {
     if ns > 0 {
         let (start, us) = (M::counter(), ns.div_ceil(1000));
@@ -58,25 +56,22 @@ pub trait ByteExchange {
     fn finish(&mut self) -> Result<(), BusFault>;
 }
 
-/// The chip-select pin, active low, which stays high between two frames, and from one falling edge to the next, for the times
-/// that the settings ask for.
+/// The chip-select pin, active low, with minimum times high and between falling edges.
 pub(crate) struct ChipSelect<S> {
     pin: S,
     pub(crate) timing: BusTiming,
     low_power: bool,
-    /// The counter when the pin has fallen, and when it has risen.
+    /// Counter at the last falling and rising edge.
     fallen_at: u32,
     risen_at: u32,
     times: FrameTimes,
 }
 
 impl<S: OutputPin<Error = Infallible>> ChipSelect<S> {
-    /// `pin` must be high.
     pub(crate) fn new(pin: S, timing: BusTiming) -> Self {
         Self { pin, timing, low_power: true, fallen_at: 0, risen_at: 0, times: FrameTimes::NONE }
     }
 
-    /// To be called when the limit of the serial clock has changed.
     pub(crate) fn set_clock_limit(&mut self, limit_hz: u32) {
         self.low_power = limit_hz <= LOW_POWER_LIMIT_HZ;
     }
@@ -85,7 +80,7 @@ impl<S: OutputPin<Error = Infallible>> ChipSelect<S> {
         let times = if self.low_power { self.timing.low_power } else { self.timing.normal };
         let now = M::counter();
         let rest_ns = |since: u32, least_ns: u32| {
-            // A difference of readings may be almost one microsecond longer than the time between them.
+            // Differences of readings may be almost 1 µs too long.
             let elapsed_us = now.wrapping_sub(since).saturating_sub(1);
             least_ns.saturating_sub(elapsed_us.saturating_mul(1000))
         };
@@ -104,15 +99,13 @@ impl<S: OutputPin<Error = Infallible>> ChipSelect<S> {
         self.times.low_us = self.risen_at.wrapping_sub(self.fallen_at);
     }
 
-    /// The times of the frames since they were taken last.
     pub(crate) fn take_times(&mut self) -> FrameTimes {
         let low_us = self.times.low_us;
         core::mem::replace(&mut self.times, FrameTimes { low_us, ..FrameTimes::NONE })
     }
 }
 
-/// Performs the operations of one frame while the sensor is selected, delays among them: a frame that is a delay alone is the
-/// pulse that wakes a sleeping sensor. Delays are timed by the microcontroller's counter.
+/// Performs the operations of a frame; a frame of one delay wakes a sleeping sensor.
 pub(crate) fn transfer<M: MicrosecondCounter, S: OutputPin<Error = Infallible>>(
     bytes: &mut impl ByteExchange,
     select: &mut ChipSelect<S>,
@@ -163,11 +156,9 @@ mod tests {
 
     std::thread_local! {
         static COUNTER: Cell<u32> = const { Cell::new(u32::MAX - 300) };
-        /// Times of the edges of chip select in µs.
         static EDGES: RefCell<Vec<(u32, bool)>> = const { RefCell::new(Vec::new()) };
     }
 
-    /// A counter that advances by one at each reading.
     struct Clock;
 
     impl MicrosecondCounter for Clock {
@@ -195,7 +186,7 @@ mod tests {
         }
     }
 
-    /// Each byte takes so many microseconds, and is answered by itself.
+    /// Each byte takes this many µs and is echoed.
     struct Bytes(u32);
 
     impl ByteExchange for Bytes {
@@ -209,7 +200,7 @@ mod tests {
         }
     }
 
-    /// For each frame how long chip select was low, and how long from its falling edge to the one before.
+    /// Low time of chip select, and period of falling edges.
     fn frames() -> Vec<(u32, u32)> {
         let edges = EDGES.take();
         let fallen: Vec<u32> = edges.iter().step_by(2).map(|&(at, _)| at).collect();
@@ -218,10 +209,10 @@ mod tests {
         edges.chunks(2).map(|pair| pair[1].0.wrapping_sub(pair[0].0)).zip([0].into_iter().chain(before)).collect()
     }
 
-    /// A pulse of 20 us, which the data sheet asks for (Rev. B, Table 1), wakes the sensor only while chip select is low.
+    /// The waking pulse of 20 µs (data sheet Rev. B, Table 1) needs chip select low.
     #[test]
     fn a_delay_is_kept_while_chip_select_is_low() {
-        let mut select = ChipSelect::new(Pin, BusTiming::SAFE);
+        let mut select = ChipSelect::new(Pin, BusTiming::USUAL);
         let pulse = |select: &mut ChipSelect<Pin>| {
             transfer::<Clock, _>(&mut Bytes(1), select, &mut [Operation::DelayNs(20_000)])
         };
@@ -231,14 +222,13 @@ mod tests {
         }
     }
 
-    /// Data sheet Rev. B, Table 2: from one falling edge of chip select to the next 40 us, and 150 us in low-power mode,
-    /// whatever the serial clock: a frame takes 8 us at 2 MHz and 54 us at 297 kHz.
+    /// 40 µs, or 150 µs in low-power mode (data sheet Rev. B, Table 2); a frame takes 8 µs at 2 MHz, 54 µs at 297 kHz.
     #[test]
     fn frames_keep_the_read_rate_at_every_serial_clock() {
         for (limit_hz, byte_us, least_us) in
             [(2_000_000, 4, 40), (1_000_000, 8, 40), (300_000, 27, 150), (300_000, 60, 150)]
         {
-            let mut select = ChipSelect::new(Pin, BusTiming::SAFE);
+            let mut select = ChipSelect::new(Pin, BusTiming::USUAL);
             select.set_clock_limit(limit_hz);
             for byte in 0..4 {
                 let mut answer = [0; 2];
@@ -247,7 +237,7 @@ mod tests {
                 assert_eq!(answer, [byte, 7]);
             }
             let frames = frames();
-            // Longer only by the stall of 16 or 75 us after a slow frame, and by the readings of the counter.
+            // Stall of 16 or 75 µs, and readings of the counter.
             let most_us = (least_us + 10).max(2 * byte_us + 85);
             for &(_, period_us) in &frames[1..] {
                 assert!((least_us..most_us).contains(&period_us), "{limit_hz} Hz: {frames:?}");

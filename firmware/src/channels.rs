@@ -1,4 +1,4 @@
-//! The channels that are estimated, sets of them, and their estimator.
+//! The estimated channels, their sets and their estimator.
 
 use adis16405_driver::Channel;
 use allan_core::Cascade;
@@ -8,7 +8,6 @@ pub const CHANNELS: [Channel; 8] = {
     let [a, b, c, d, e, f] = Channel::INERTIAL;
     [a, b, c, d, e, f, Channel::Temp, Channel::Supply]
 };
-/// Number of inertial channels, which come first in [`CHANNELS`] and have models.
 pub(crate) const INERTIAL: usize = Channel::INERTIAL.len();
 /// Number of gyros, which come first in [`CHANNELS`].
 pub(crate) const GYROS: usize = 3;
@@ -21,14 +20,12 @@ pub const OVERLAP: usize = 8;
 /// The streaming estimator of one channel.
 pub type ChannelEstimator = Cascade<OCTAVES, OVERLAP>;
 
-/// A set of [`CHANNELS`], by index.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct ChannelSet(pub(crate) u8);
 
 impl ChannelSet {
     pub(crate) const EMPTY: Self = Self(0);
     pub(crate) const ALL: Self = Self(u8::MAX);
-    /// The six inertial channels.
     const INERTIAL: Self = Self((1 << INERTIAL) - 1);
 
     pub(crate) const fn contains(self, index: usize) -> bool {
@@ -39,7 +36,6 @@ impl ChannelSet {
         self.0 == 0
     }
 
-    /// Whether it has every inertial channel.
     pub(crate) const fn has_all_inertial(self) -> bool {
         self.0 & Self::INERTIAL.0 == Self::INERTIAL.0
     }
@@ -48,7 +44,6 @@ impl ChannelSet {
         Self(self.0 | other.0)
     }
 
-    /// Adds a channel if the condition holds.
     pub(crate) fn insert_if(&mut self, index: usize, condition: bool) {
         self.0 |= u8::from(condition) << index;
     }

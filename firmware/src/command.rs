@@ -7,65 +7,54 @@ use adis16405_driver::{GyroRange, Register};
 use heapless::Vec;
 use link::{TextLine, text_line};
 
-/// A valid command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(all(target_os = "none", feature = "microcontroller"), derive(defmt::Format))]
 pub(crate) enum Command {
-    /// Give an answer of several lines.
     Answer(Answer),
-    /// Send a report in frames.
     Report,
     Version,
-    /// Reset statistics, models and counters.
     ResetStatistics,
-    /// In 1/1000 Hz.
+    /// 1/1000 Hz.
     Rate(u32),
     Range(GyroRange),
-    /// The base-2 logarithm of the filter's taps.
+    /// Base-2 logarithm of the taps.
     Filter(u8),
-    /// In s, 0 for no end.
+    /// s, 0 for no end.
     Epoch(u32),
-    /// In s, 0 for none.
+    /// s, 0 for none.
     Interval(u32),
     RawStream(bool),
-    /// Take a part that answers this PROD_ID for an ADIS16405, 0 for none.
+    /// Accept this PROD_ID for an ADIS16405, 0 for none.
     ProductId(u16),
     SelfTest,
     BrownOut,
-    /// Allow a write to the sensor's flash.
     Arm,
     AutoNull,
     ReadRegister(Register),
     WriteRegister(Register, u16),
-    /// Read a register many times, and count the answers that differ.
+    /// Read many times and count different answers.
     CompareReads(Register),
-    CarefulBus(bool),
+    SlowBus(bool),
     Persist,
     Forget,
     Restart,
     BootLoader,
 }
 
-/// What follows the word of a command, and the command that both make.
+/// Form of a command, and its constructor.
 #[derive(Clone, Copy)]
 enum Form {
-    /// The title of a group of commands.
     Title,
-    /// Nothing: a key that acts at once.
     Key(Command),
-    /// Nothing, and Enter.
     Word(Command),
-    /// A number in thousandths.
     Thousandths(fn(u32) -> Command),
-    /// A whole number.
     Number(fn(u32) -> Option<Command>),
     Register(fn(Register) -> Command),
-    /// A register and its value.
     RegisterValue(fn(Register, u16) -> Command),
 }
 
-/// The commands: usage, which begins with the word, form, and help, in the order of the list that `?` prints. A line has 80 columns.
-static COMMANDS: [(&str, Form, &str); 34] = {
+/// Usage (begins with the word), form, help, in the order of `?`; lines of 80 columns.
+static COMMANDS: [(&str, Form, &str); 35] = {
     use Command as C;
     use Form::{Key, Number, RegisterValue, Thousandths, Title, Word};
     [
@@ -98,11 +87,8 @@ static COMMANDS: [(&str, Form, &str); 34] = {
         ("poke R V", RegisterValue(C::WriteRegister), "write one: poke smpl_prd 0007; check undoes it"),
         ("compare R", Form::Register(C::CompareReads), "read one 10,000 times, count the answers that differ"),
         ("measure", Word(C::Answer(Answer::Measurement)), "SCK, stall and read rate, period and width of data ready"),
-        (
-            "careful 1",
-            Number(|on| switch(on, C::CarefulBus)),
-            "longer times on the bus, if the sensor answers wrongly; careful 0",
-        ),
+        ("bus slow", Word(C::SlowBus(true)), "longer times on the bus, if the sensor answers wrongly"),
+        ("bus usual", Word(C::SlowBus(false)), "the usual times on the bus"),
         ("help", Word(C::Answer(Answer::Help)), "this list"),
         ("boot", Word(C::Restart), "restart; the statistics are kept"),
         ("bootsel", Word(C::BootLoader), "start the boot loader, which takes an image over USB"),
@@ -110,7 +96,7 @@ static COMMANDS: [(&str, Form, &str); 34] = {
     ]
 };
 
-/// The line of the list at an index.
+/// Line of the help at an index.
 pub fn help(index: usize) -> Option<TextLine> {
     COMMANDS.get(index).map(|(usage, form, help)| match form {
         Form::Title => text_line(format_args!("{usage}")),
@@ -139,32 +125,26 @@ fn switch(number: u32, command: fn(bool) -> Command) -> Option<Command> {
     (number <= 1).then(|| command(number == 1))
 }
 
-/// Why input is no command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum CommandError {
-    /// No command begins with this byte. The rest of the line is ignored, except keys that act at once.
+    /// No command begins with this byte; the rest of the line is ignored, except keys.
     UnknownKey(u8),
-    /// The line, which begins with this letter, is no command.
+    /// A line with this first letter is no command.
     InvalidLine(u8),
-    /// Bytes were lost: the line is ignored.
     LostBytes,
 }
 
-/// Longest line in bytes.
+/// Bytes.
 const MAX_LINE: usize = 32;
 
-/// Parses commands from received bytes.
-///
-/// Commands that change or interrupt something are whole lines, so that noise on an unconnected input does not trigger them.
+/// Parses commands, which are whole lines, so that noise on an open input triggers none.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct CommandParser {
     line: Vec<u8, MAX_LINE>,
-    /// The line is invalid: ignored up to its end.
     invalid: bool,
 }
 
 impl CommandParser {
-    /// Takes one byte and returns the command or error that it completes, if any.
     pub(crate) fn push(&mut self, byte: u8) -> Option<Result<Command, CommandError>> {
         match byte {
             b'\r' | b'\n' => {
@@ -201,7 +181,6 @@ impl CommandParser {
     }
 }
 
-/// The command of a key that acts at once.
 fn key(byte: u8) -> Option<Command> {
     COMMANDS.iter().find_map(|(usage, form, _)| match form {
         Form::Key(command) if usage.as_bytes() == [byte] => Some(*command),
@@ -209,7 +188,6 @@ fn key(byte: u8) -> Option<Command> {
     })
 }
 
-/// Whether a command with Enter begins with this byte.
 fn begins_line(byte: u8) -> bool {
     let is_line = |form: &Form| !matches!(form, Form::Title | Form::Key(_));
     COMMANDS.iter().any(|(usage, form, _)| is_line(form) && usage.as_bytes()[0] == byte)
@@ -217,16 +195,18 @@ fn begins_line(byte: u8) -> bool {
 
 fn whole_line(line: &[u8]) -> Option<Command> {
     let line = core::str::from_utf8(line).ok()?;
-    COMMANDS.iter().find_map(|(usage, form, _)| form.parse(line.trim_start().strip_prefix(word(usage))?))
+    COMMANDS.iter().find_map(|(usage, form, _)| form.parse(line.trim_start().strip_prefix(word(usage, form))?))
 }
 
-/// The word that a usage begins with.
-fn word(usage: &str) -> &str {
-    usage.split(' ').next().unwrap_or_default()
+/// The beginning of a command of this usage: all of it where nothing follows.
+fn word<'a>(usage: &'a str, form: &Form) -> &'a str {
+    match form {
+        Form::Word(_) => usage,
+        _ => usage.split(' ').next().unwrap_or_default(),
+    }
 }
 
 impl Form {
-    /// The command with what follows its word.
     fn parse(self, rest: &str) -> Option<Command> {
         let mut words = rest.split_ascii_whitespace();
         let first = words.next();
@@ -245,7 +225,7 @@ impl Form {
     }
 }
 
-/// Parses a decimal number as thousandths, truncated after the third decimal; the largest is 4 294 967.295.
+/// Decimal number in thousandths, truncated; at most 4 294 967.295.
 fn thousandths(digits: &str) -> Option<u32> {
     let mut parts = digits.split('.');
     let (whole, fraction) = (parts.next()?, parts.next().unwrap_or_default());
@@ -311,13 +291,13 @@ mod tests {
             ]
         );
         assert_eq!(
-            parse("dump\rmeasure\rdeflect\rcareful 1\rcareful 0\rpersist\rforget\rhelp\r"),
+            parse("dump\rmeasure\rdeflect\rbus slow\rbus usual\rpersist\rforget\rhelp\r"),
             [
                 Ok(Command::Answer(Answer::Registers)),
                 Ok(Command::Answer(Answer::Measurement)),
                 Ok(Command::Answer(Answer::Deflections)),
-                Ok(Command::CarefulBus(true)),
-                Ok(Command::CarefulBus(false)),
+                Ok(Command::SlowBus(true)),
+                Ok(Command::SlowBus(false)),
                 Ok(Command::Persist),
                 Ok(Command::Forget),
                 Ok(Command::Answer(Answer::Help)),
@@ -333,7 +313,7 @@ mod tests {
                 Ok(Command::WriteRegister(Register::GlobCmd, 0x0080)),
             ]
         );
-        // After an unknown key the line is ignored, except the key `t`, which acts at once.
+        // Except `t`, which acts at once.
         assert_eq!(
             parse("xautonull\rclear\r"),
             [Err(CommandError::UnknownKey(b'x')), Ok(Command::Answer(Answer::Table)), Ok(Command::ResetStatistics),]
@@ -371,7 +351,6 @@ mod tests {
         }
     }
 
-    /// No command hides another: each word gives its own, and each line of the list fits a terminal.
     #[test]
     fn every_command_of_the_list_is_parsed() {
         for (index, (usage, form, _)) in COMMANDS.iter().enumerate() {
@@ -388,14 +367,13 @@ mod tests {
                 Form::Register(_) => "36",
                 Form::RegisterValue(_) => "36 7",
             };
-            let typed = std::format!("{} {argument}\r", word(usage));
+            let typed = std::format!("{} {argument}\r", word(usage, form));
             let expected = form.parse(argument).expect("a command");
             assert_eq!(parse(&typed), [Ok(expected)], "{typed}");
         }
         assert!(help(COMMANDS.len()).is_none());
     }
 
-    /// A million random bytes give keys, but no command that changes something.
     #[test]
     fn noise_changes_nothing() {
         let mut parser = CommandParser::default();

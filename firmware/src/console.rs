@@ -1,4 +1,4 @@
-//! Text for a person at a terminal: single lines, and answers of several lines that are made and sent one line at a time.
+//! Text for a person: lines, and answers sent line by line.
 
 use crate::answer::{Answer, AnswerLine};
 use crate::bench_console::{deflection_line, dump_line, measurement_line};
@@ -11,25 +11,20 @@ use core::fmt::Arguments;
 use heapless::Deque;
 use link::{ClockSource, Health, TextLine, text_line};
 
-/// Answer to the version command.
 pub(crate) const VERSION_LINE: &str = concat!("ADIS16405 noise observatory ", env!("CARGO_PKG_VERSION"));
 
-/// What the device says of a start without anything that was stored.
 pub(crate) const SAFE_MODE: &str = "safe mode after three crashes: stored settings and models are not used";
 
-/// Text lines that may wait for room in the transmit queue.
 const WAITING_LINES: usize = 4;
-/// Answers that may wait, the one that is being sent included.
+/// Answers that may wait, including the current one.
 const WAITING_ANSWERS: usize = 4;
 
-/// Text lines and answers that wait to be sent.
 pub(crate) struct Console {
     lines: Deque<TextLine, WAITING_LINES>,
-    /// Answers in order; the first is being sent.
     answers: Deque<Answer, WAITING_ANSWERS>,
     /// Index of the next line of the first answer.
     next_line: usize,
-    /// The counters as they were when their answer began: reading them searches the stack, which takes a millisecond.
+    /// Read once per answer: it searches the stack for a millisecond.
     counted: Health,
 }
 
@@ -38,7 +33,7 @@ impl Console {
         Self { lines: Deque::new(), answers: Deque::new(), next_line: 0, counted: Health::default() }
     }
 
-    /// Sends a text line, after those that wait. If too many wait, the oldest is dropped.
+    /// Sends a line behind the waiting ones; drops the oldest of too many.
     pub(crate) fn print(&mut self, board: &mut impl Board, text: Arguments<'_>) {
         let line = text_line(text);
         if self.lines.is_empty() && board.transmit_queue(|queue| queue.send_text(&line)) {
@@ -50,7 +45,7 @@ impl Console {
         let _room_was_made = self.lines.push_back(line);
     }
 
-    /// Sends the text lines that wait. Returns whether there is room for a message or a line of an answer.
+    /// Sends waiting lines; returns whether there is room for more.
     pub(crate) fn flush(&mut self, board: &mut impl Board) -> bool {
         while let Some(line) = self.lines.front() {
             if !board.transmit_queue(|queue| queue.send_text(line)) {
@@ -61,7 +56,6 @@ impl Console {
         board.transmit_queue(|queue| queue.has_room())
     }
 
-    /// Queues an answer after those that wait.
     pub(crate) fn answer(&mut self, board: &mut impl Board, answer: Answer) {
         if self.answers.push_back(answer).is_err() {
             self.print(board, format_args!("busy: too many answers waiting; repeat the command"));
@@ -72,14 +66,13 @@ impl Console {
         !self.answers.is_empty()
     }
 
-    /// Sends the next line of the first answer, unless it takes long: a table, whose lines may need a model fit, or deflections.
+    /// Sends the next line unless it takes long (tables, deflections).
     pub(crate) fn send_quick_line(&mut self, state: &DeviceState, board: &mut impl Board) {
         if self.answers.front().is_some_and(|answer| !matches!(answer, Answer::Table | Answer::Deflections)) {
             self.send_line(state, board);
         }
     }
 
-    /// Makes and sends the next line of the first answer.
     pub(crate) fn send_line(&mut self, state: &DeviceState, board: &mut impl Board) {
         let Some(&answer) = self.answers.front() else { return };
         let index = self.next_line;
@@ -154,7 +147,6 @@ fn status_line(state: &DeviceState, board: &mut impl Board, index: usize) -> Ans
     })
 }
 
-/// A line for each counter that is not 0.
 fn counter_line(health: &Health, index: usize) -> AnswerLine {
     match health.counters().get(index) {
         Some(counter) => {

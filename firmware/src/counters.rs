@@ -1,4 +1,4 @@
-//! Which counters of a health message have risen since a debug probe was told last.
+//! Counters that have risen since the last log to the debug probe.
 
 use crate::event::event;
 use link::{Counter, Health};
@@ -6,7 +6,7 @@ use link::{Counter, Health};
 /// Time between two comparisons, in µs.
 const COMPARE_US: u64 = 1_000_000;
 
-/// Logs once a second, for the bench, every counter of events that has risen.
+/// Logs risen event counters once a second.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct CounterLog {
     logged: Health,
@@ -14,12 +14,10 @@ pub(crate) struct CounterLog {
 }
 
 impl CounterLog {
-    /// Whether the counters are to be compared at `now_us`.
     pub(crate) fn is_due(&self, now_us: u64) -> bool {
         now_us >= self.next_us
     }
 
-    /// Logs what has risen.
     pub(crate) fn compare(&mut self, health: &Health, now_us: u64) {
         self.next_us = now_us + COMPARE_US;
         for (counter, more) in risen(&self.logged, health) {
@@ -29,7 +27,7 @@ impl CounterLog {
     }
 }
 
-/// Every counter of events that has risen, or that was reset and has risen since, and by how much.
+/// Counters that have risen, also since a reset, and by how much.
 fn risen(before: &Health, now: &Health) -> impl Iterator<Item = (Counter, u32)> {
     let pairs = before.counters().into_iter().zip(now.counters());
     let risen = pairs.map(|(before, now)| (now, now.value.checked_sub(before.value).unwrap_or(now.value)));
@@ -45,7 +43,7 @@ mod tests {
 
     #[test]
     fn every_counter_of_events_is_told_when_it_rises() {
-        // Of the numbers 1, 2, 3, … by the order of the fields, which the wire format has.
+        // Numbers 1, 2, 3, … in the wire format's order.
         let bytes: Vec<u8> = (1..=Health::COUNTERS as u8).collect();
         let health: Health = postcard::from_bytes(&bytes).expect("as many varints as there are counters");
         let all = health.counters();
@@ -56,7 +54,7 @@ mod tests {
         assert!(figures.iter().map(|counter| counter.name).eq(others), "{figures:?}");
         assert!(risen(&Health::default(), &health).eq(events.iter().map(|counter| (*counter, counter.value))));
         assert_eq!(risen(&health, &health).count(), 0);
-        // Reset, and risen again.
+        // Reset and risen again.
         let again = Health { lost_edges: 3, ..Health::default() };
         assert!(risen(&health, &again).map(|(counter, more)| (counter.name, more)).eq([("lost_edges", 3)]));
     }

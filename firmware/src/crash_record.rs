@@ -6,10 +6,10 @@ use heapless::Vec;
 use link::{MAX_TEXT, TextLine, text_line};
 
 const TEXT_WORDS: usize = MAX_TEXT / 4;
-/// Of no build: what a program leaves is told by the one that was flashed next.
+/// Independent of the build: the next image reads it.
 const KEY: u32 = 0xC4A5_4EC0;
 
-/// A line of text in memory that a warm reset does not clear: its length and its bytes.
+/// Length and bytes of a text that a warm reset keeps.
 pub struct CrashRecord(Slot<{ 1 + TEXT_WORDS }>);
 
 impl CrashRecord {
@@ -19,8 +19,7 @@ impl CrashRecord {
         Self(Slot::blank())
     }
 
-    /// Writes `text`, truncated to [`MAX_TEXT`] bytes, unless there is one already: what crashes later, such as the report of a panic,
-    /// is not the cause.
+    /// Writes `text`, truncated to [`MAX_TEXT`] bytes, unless there is one: later crashes are not the cause.
     pub fn write(&self, text: fmt::Arguments<'_>) {
         if self.0.read(KEY).is_none() {
             let line = text_line(text);

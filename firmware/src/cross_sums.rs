@@ -2,12 +2,11 @@
 
 use crate::channels::{CHANNELS, ChannelEstimator, ChannelSet, GYROS};
 
-/// First octave of the cross sums: 256 samples. Covariates act slowly, and the sums over pairs are updated once in 32
-/// samples at most, an eighth of this octave's averaging time.
+/// First octave of the cross sums, 256 samples; they are updated once in 32 samples.
 pub(crate) const FIRST_CROSS_OCTAVE: usize = 8;
 /// Octaves of the cross sums: up to 2¹⁹ samples, 43 minutes at 204.8 samples a second.
 pub(crate) const CROSS_OCTAVES: usize = 12;
-/// Pairs of channels of which one may be a regressor of the other: all but the pairs of two gyros.
+/// Pairs for regression: all but two gyros.
 pub(crate) const PAIRS: [(usize, usize); 25] = {
     let mut pairs = [(0, 0); 25];
     let (mut low, mut at) = (0, 0);
@@ -23,22 +22,19 @@ pub(crate) const PAIRS: [(usize, usize); 25] = {
     pairs
 };
 
-/// Sums of products of the second differences of pairs of channels, octave by octave, and the sum of every channel's counts.
-/// A pair is observed where both channels have completed a difference with the newest sample.
-///
-/// A count has 14 bits, so a difference is within ±2¹⁴·n, and in 2⁴⁰ samples there are 2⁴³/n of them: no sum exceeds
-/// 2⁷¹·n ≤ 2⁹⁰. A sum takes 96 bits: a low word of 64 and a high word of 32 bits.
+/// Sums of products of second differences of channel pairs by octave, and of counts. A sum stays below 2⁹⁰ for 2⁴⁰
+/// samples and is stored in 64 + 32 bits.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct CrossSums {
     low: [[u64; PAIRS.len()]; CROSS_OCTAVES],
     high: [[i32; PAIRS.len()]; CROSS_OCTAVES],
-    /// Products in each sum: one in 32 samples at most.
+    /// Once in 32 samples at most.
     counts: [[u32; PAIRS.len()]; CROSS_OCTAVES],
     totals: [i64; CHANNELS.len()],
-    /// Samples that at least one channel has taken, and how many of them were refused in each channel.
+    /// Samples in any channel, and refused ones per channel.
     samples: u64,
     refused_counts: [u64; CHANNELS.len()],
-    /// A channel has samples of before a restart, which are not in these sums.
+    /// Samples before a restart are missing.
     incomplete: bool,
 }
 
@@ -56,7 +52,7 @@ impl CrossSums {
     }
 
     pub(crate) fn reset(&mut self) {
-        // In place: assigning a new value would build it, 5 kB, on the stack first.
+        // In place: 5 kB would go over the stack.
         self.low.fill([0; PAIRS.len()]);
         self.high.fill([0; PAIRS.len()]);
         self.counts.fill([0; PAIRS.len()]);
@@ -64,13 +60,11 @@ impl CrossSums {
         self.incomplete = false;
     }
 
-    /// The channels have samples that are not in these sums.
     pub(crate) fn mark_incomplete(&mut self) {
         self.incomplete = true;
     }
 
-    /// Adds the counts that the estimators of all channels but the `refused` ones have just taken, and the second
-    /// differences that these completed.
+    /// Adds counts of all but the `refused` channels, and completed second differences.
     pub(crate) fn add(
         &mut self,
         estimators: &[ChannelEstimator; CHANNELS.len()],
@@ -87,7 +81,7 @@ impl CrossSums {
         if !refused.is_empty() {
             self.subtract_refused(counts, refused);
         }
-        // All channels with a sample are at the same time, so the same octaves are due in them.
+        // All channels have the same time, and due octaves.
         let due =
             (0..CHANNELS.len()).find(|&index| !refused.contains(index)).map(|index| estimators[index].octaves_due());
         for octave in FIRST_CROSS_OCTAVE..due.unwrap_or(0).min(FIRST_CROSS_OCTAVE + CROSS_OCTAVES) {
@@ -97,7 +91,7 @@ impl CrossSums {
         }
     }
 
-    /// Takes refused counts out of the totals again. Not inlined: they are rare.
+    /// Removes refused counts from the totals; rare, so not inlined.
     #[inline(never)]
     fn subtract_refused(&mut self, counts: [i32; CHANNELS.len()], refused: ChannelSet) {
         for (index, (total, refused_counts)) in self.totals.iter_mut().zip(&mut self.refused_counts).enumerate() {
@@ -108,7 +102,7 @@ impl CrossSums {
     }
 
     fn add_products(&mut self, row: usize, differences: &[Option<i64>; CHANNELS.len()]) {
-        // Without a check that would panic: this is a part of the sampling path.
+        // No panic in the sampling path.
         let (Some(low), Some(high)) = (self.low.get_mut(row), self.high.get_mut(row)) else { return };
         let Some(counts) = self.counts.get_mut(row) else { return };
         let difference = |of: usize| differences.get(of).copied().flatten();
@@ -126,21 +120,19 @@ fn wide(low: u64, high: i32) -> i128 {
     i128::from(high) << 64 | i128::from(low)
 }
 
-/// The covariance of a pair that was not observed.
 const NOT_OBSERVED: f64 = 0.0;
 
 /// Mean of every channel of [`CHANNELS`] in counts.
 pub(crate) type ChannelMeans = [f64; CHANNELS.len()];
 
-/// Allan covariances and means of a finished epoch, rounded from its [`CrossSums`]: nothing is added to them any more.
+/// Rounded Allan covariances and means of a finished epoch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllanCovariances {
-    /// Allan covariance of each pair at each octave in counts²; 0 where the pair was not observed, and −0 for a covariance of 0: an epoch
-    /// of no samples is then memory of zeros, which takes no flash.
+    /// By pair and octave, counts²; 0 if not observed, −0 for a covariance of 0.
     pub(crate) pairs: [[f64; CROSS_OCTAVES]; PAIRS.len()],
     /// Mean of every channel; 0 without samples.
     pub means: ChannelMeans,
-    /// Whether they cover all samples of the channels: not after a restart in the epoch.
+    /// False after a restart in the epoch.
     pub complete: bool,
 }
 
@@ -149,7 +141,7 @@ impl AllanCovariances {
     pub const EMPTY: Self =
         Self { pairs: [[NOT_OBSERVED; CROSS_OCTAVES]; PAIRS.len()], means: [0.0; CHANNELS.len()], complete: false };
 
-    /// Overwrites them with those of an epoch's sums, in place: 2.5 kB.
+    /// In place: 2.5 kB.
     pub(crate) fn fill(&mut self, sums: &CrossSums) {
         self.complete = !sums.incomplete;
         let samples = |index: usize| (sums.samples - sums.refused_counts[index]).max(1);
@@ -158,15 +150,14 @@ impl AllanCovariances {
             for (k, covariance) in covariances.iter_mut().enumerate() {
                 let (n, count) = ((1_u64 << (FIRST_CROSS_OCTAVE + k)) as f64, f64::from(sums.counts[k][pair]));
                 let sum = wide(sums.low[k][pair], sums.high[k][pair]) as f64;
-                // A sum of 0 is none of −0.
+                // Never −0.
                 let sum = if sum == 0.0 { -0.0 } else { sum };
                 *covariance = if count > 0.0 { sum / (2.0 * count * n * n) } else { NOT_OBSERVED };
             }
         }
     }
 
-    /// Allan covariance of two channels at averaging factor `n`, in the product of their counts; `None` where it was not
-    /// estimated, as for two gyros.
+    /// Allan covariance at averaging factor `n`, in counts of both; `None` if not estimated, as for two gyros.
     #[must_use]
     pub fn covariance(&self, a: usize, b: usize, n: u64) -> Option<f64> {
         let pair = PAIRS.iter().position(|&pair| pair == (a.min(b), a.max(b)))?;
@@ -186,12 +177,11 @@ mod tests {
     const TEMPERATURE: usize = 6;
     const SUPPLY: usize = 7;
 
-    /// Counts of a sawtooth, the same in every channel.
     fn count(k: u32) -> i32 {
         (k % 1000) as i32
     }
 
-    /// Sums over samples of which `refused` says, for each, which channels lack it.
+    /// `refused` gives the missing channels per sample.
     fn sums(samples: u32, refused: impl Fn(u32) -> ChannelSet) -> Box<CrossSums> {
         let mut estimators = Box::new([const { ChannelEstimator::new() }; CHANNELS.len()]);
         let mut sums = Box::new(CrossSums::new());
@@ -209,15 +199,14 @@ mod tests {
         sums.counts[0][pair]
     }
 
-    /// Forty samples of gyro x from the 600th on are refused, more than n = 256 bridges: the pair of temperature and supply loses nothing, and the means are those of
-    /// what each channel has.
+    /// Forty samples of gyro x from the 600th on, more than n = 256 bridges: other pairs lose nothing.
     #[test]
     fn a_channel_without_a_sample_costs_its_own_pairs_only() {
         let complete = sums(4096, |_| ChannelSet::EMPTY);
         let gap = |k| if (600..640).contains(&k) { ChannelSet(1 << GYRO_X) } else { ChannelSet::EMPTY };
         let gapped = sums(4096, gap);
         let pair = (TEMPERATURE, SUPPLY);
-        // 512 samples complete the first difference at n = 256, and then every 32nd does.
+        // 512 samples for the first difference at n = 256, then every 32nd.
         assert_eq!(observed(&complete, pair.0, pair.1), (4096 - 512) / 32 + 1);
         assert_eq!(observed(&gapped, pair.0, pair.1), observed(&complete, pair.0, pair.1));
         assert!(observed(&gapped, GYRO_X, TEMPERATURE) < observed(&complete, GYRO_X, TEMPERATURE));
@@ -243,7 +232,7 @@ mod tests {
         assert_eq!(covariances.means[GYRO_X], 0.0);
     }
 
-    /// Samples that do not vary have a covariance of 0, which is not the same as none.
+    /// 0 differs from none.
     #[test]
     fn a_covariance_of_zero_is_one() {
         let mut estimators = Box::new([const { ChannelEstimator::new() }; CHANNELS.len()]);

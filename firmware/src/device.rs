@@ -1,5 +1,4 @@
-//! State of the device, and supervision of the sensor: it is probed before its samples are used, recovered when it is in
-//! trouble, and its status register is read when it reports an error.
+//! State of the device, and supervision of the sensor: probes, recovery, status register.
 
 use crate::board::{Board, BusTiming};
 use crate::channels::{CHANNELS, ChannelSet};
@@ -22,7 +21,7 @@ pub const FIRST_CONFIG: Config = {
     config
 };
 
-/// Settings at the first start: a report every ten seconds, one epoch without end.
+/// First start: a report every ten seconds, an endless epoch.
 pub(crate) const FIRST_SETTINGS: RetainedSettings = RetainedSettings {
     smpl_prd: FIRST_CONFIG.sample_period().register(),
     sens_avg: FIRST_CONFIG.sens_avg(),
@@ -34,40 +33,34 @@ pub(crate) const FIRST_SETTINGS: RetainedSettings = RetainedSettings {
     prod_id: 0,
 };
 
-/// Time between two probes of a sensor that does not answer.
 const RETRY_US: u64 = 1_000_000;
-/// Time for which a sensor that may have lost its supply is left alone: its longest start-up.
+/// Rest for a sensor that may have lost its supply: its longest start-up.
 pub(crate) const START_UP_US: u64 = Timing::DEFAULT.start_up_us as u64;
-/// Time for a log to be transmitted before the microcontroller is restarted.
-const FAREWELL_US: u64 = 200_000;
+const LOG_FLUSH_US: u64 = 200_000;
 
-/// What the application knows of itself and of the sensor.
 pub(crate) struct DeviceState {
-    /// Serial clock of the sensor's bus as set in the hardware, in Hz.
+    /// In the hardware, Hz.
     pub(crate) spi_clock_hz: u32,
     pub(crate) boot: Boot,
     pub(crate) settings: RetainedSettings,
-    /// Configuration that the sensor has, or will have after the next probe.
     pub(crate) config: Config,
-    /// Product identification that the sensor answered last; 0 before.
+    /// 0 before an answer.
     pub(crate) product_id: u16,
     pub(crate) sensor: SensorState,
     pub(crate) learner: Learner,
-    /// When the running epoch began, in µs since the start; negative if that was before.
+    /// µs since the start; negative if before.
     pub(crate) epoch_start_us: i64,
-    /// The counters of the application; those of sampling and estimating, and the load, are 0.
+    /// Without sampling, estimating and load.
     pub(crate) counters: Health,
     pub(crate) recovery: SensorRecovery,
     pub(crate) status_flags: StatusFlags,
-    /// ReportScale of the report that is being sent.
     pub(crate) report_scale: ReportScale,
 }
 
-/// Whether the sensor is in use.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(all(target_os = "none", feature = "microcontroller"), derive(defmt::Format))]
 pub(crate) enum SensorState {
-    /// To be probed at this time, as this step of recovery or, with `None`, because it was requested.
+    /// To be probed at this time, as this step of recovery, or on request (`None`).
     Probing { at_us: u64, step: Option<RecoveryStep> },
     /// Sampled since this time.
     Sampled { since_us: u64 },
@@ -75,15 +68,11 @@ pub(crate) enum SensorState {
     Restarting { at_us: u64 },
 }
 
-/// What has been done to recover the sensor.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct SensorRecovery {
     ladder: RecoveryLadder,
-    /// The sensor has been tested since the start, or since a test was requested.
     pub(crate) tested: bool,
-    /// Channels that have failed their last self-test; their samples are used.
     pub(crate) failed_test: ChannelSet,
-    /// The result of the next self-test was asked for.
     check_requested: bool,
 }
 
@@ -100,7 +89,6 @@ impl DeviceState {
         self.epoch_age_us(now_us) / 1_000_000
     }
 
-    /// The counters of sampling, estimating and the application and the load figures of the board.
     pub(crate) fn health(&self, board: &mut impl Board) -> Health {
         let (meters, now_us) = (board.meters(), board.now_us());
         let asleep_permille = (1000 * meters.asleep_us).checked_div(now_us).unwrap_or(0);
@@ -118,8 +106,7 @@ impl DeviceState {
         board.estimators(|estimators| estimators.health()).with(&self.counters).with(&of_board)
     }
 
-    /// Probes the sensor when that is due, and stops using one that is in trouble. Returns true if the microcontroller is to
-    /// be restarted, as the last step of recovery.
+    /// Probes when due, and stops using a sensor in trouble; true if the microcontroller is to be restarted.
     pub(crate) fn supervise_sensor(&mut self, board: &mut impl Board) -> bool {
         let now_us = board.now_us();
         match self.sensor {
@@ -131,7 +118,7 @@ impl DeviceState {
                     (estimators.is_intact(), estimators.trouble(now_us), used, settled)
                 });
                 if !is_intact {
-                    // The burst under way ends first: a sensor that is cut off within one does not answer at once.
+                    // Ends the burst: a sensor cut off within one is late to answer.
                     board.set_sampling(false);
                     panic!("memory is damaged: the sample period is 0");
                 }
@@ -147,7 +134,7 @@ impl DeviceState {
             }
             SensorState::Restarting { at_us } => {
                 if now_us >= at_us {
-                    // A board that does restart does not come here again.
+                    // Reached only if the board does not restart.
                     self.request_probe(now_us);
                     return true;
                 }
@@ -156,19 +143,19 @@ impl DeviceState {
         false
     }
 
-    /// Has the sensor probed at `at_us`, because that was requested. Sampling must have been disabled.
+    /// Requests a probe at `at_us`; sampling must be disabled.
     pub(crate) fn request_probe(&mut self, at_us: u64) {
         self.sensor = SensorState::Probing { at_us, step: None };
     }
 
-    /// Stops using the sensor and begins the next step of recovery, not before `earliest_us`.
+    /// Begins the next step of recovery, at `earliest_us` or later.
     fn recover(&mut self, trouble: SensorTrouble, earliest_us: u64, board: &mut impl Board) {
         event!(warn, "sensor in trouble: {}", trouble);
         let last_edge_us = board.estimators(|estimators| estimators.last_edge_us());
         board.set_sampling(false);
         let (reason, cause, left_alone_us) = match trouble {
             _ if board.sampling_activity().is_masked => ("the data-ready line oscillates and is masked", "", 0),
-            // It may have lost its supply, and must not be clocked while it starts up.
+            // It must not be clocked during a start-up.
             SensorTrouble::NoEdges => ("no data-ready edges", "", last_edge_us.unwrap_or(0) + START_UP_US),
             SensorTrouble::EdgeRate => ("silent, or edges at another rate", "", 0),
             SensorTrouble::Unusable(cause) => ("unusable bursts: ", cause, 0),
@@ -176,7 +163,7 @@ impl DeviceState {
         self.take_step(earliest_us.max(left_alone_us), board, format_args!("{reason}{cause}"));
     }
 
-    /// Begins the next step of recovery at `at_us` or now, whichever is later.
+    /// At `at_us` or now, whichever is later.
     fn take_step(&mut self, at_us: u64, board: &mut impl Board, reason: Arguments<'_>) {
         let now_us = board.now_us();
         let step = self.recovery.ladder.next_step();
@@ -185,7 +172,7 @@ impl DeviceState {
             log(board, format_args!("sensor: {reason}; {}", step.name()));
         }
         self.sensor = match step {
-            RecoveryStep::Restart => SensorState::Restarting { at_us: now_us + FAREWELL_US },
+            RecoveryStep::Restart => SensorState::Restarting { at_us: now_us + LOG_FLUSH_US },
             step => SensorState::Probing { at_us: at_us.max(now_us), step: Some(step) },
         };
     }
@@ -196,11 +183,11 @@ impl DeviceState {
         match step {
             None | Some(RecoveryStep::Restart) => {}
             Some(RecoveryStep::Reread) => count(&mut counters.rereads),
-            Some(step @ (RecoveryStep::BusReset | RecoveryStep::CarefulBus)) => {
+            Some(step @ (RecoveryStep::BusReset | RecoveryStep::SlowBus)) => {
                 count(&mut counters.bus_resets);
                 board.reset_bus();
-                if step == RecoveryStep::CarefulBus {
-                    board.set_bus_timing(BusTiming::CAREFUL);
+                if step == RecoveryStep::SlowBus {
+                    board.set_bus_timing(BusTiming::SLOW);
                 }
                 scope = ProbeScope { pulse: true, reset: false, self_test: true };
             }
@@ -214,7 +201,7 @@ impl DeviceState {
                 scope = ProbeScope { pulse: true, reset: true, self_test: true };
             }
         }
-        // The sensor may be in low-power mode until it is configured.
+        // Perhaps in low-power mode.
         let sck_hz = board.set_clock_limit(LOW_POWER_LIMIT_HZ);
         let result = probe(board.sensor_bus(), self.config, sck_hz, scope, self.settings.prod_id)
             .map_err(|error| text_line(format_args!("{error}")));
@@ -223,7 +210,7 @@ impl DeviceState {
             Ok(identity) => {
                 self.report_identity(identity, board);
                 let now_us = board.now_us();
-                board.estimators(|estimators| estimators.mark_probed(now_us));
+                board.estimators(|estimators| estimators.accept_samples_after_settling(now_us));
                 board.set_sampling(true);
                 self.sensor = SensorState::Sampled { since_us: now_us };
                 event!(info, "sensor {}", self.sensor);
@@ -235,7 +222,7 @@ impl DeviceState {
         }
     }
 
-    /// Logs what a probe has found, and marks the channels that have failed the self-test.
+    /// Logs a probe, and marks failed channels.
     fn report_identity(&mut self, identity: SensorIdentity, board: &mut impl Board) {
         let product = identity.product.prod_id();
         self.product_id = product;
@@ -257,17 +244,13 @@ impl DeviceState {
         }
     }
 
-    /// Has the sensor tested, because that was requested.
     pub(crate) fn request_check(&mut self, now_us: u64, board: &mut impl Board) {
         board.set_sampling(false);
         (self.recovery.tested, self.recovery.check_requested) = (false, true);
         self.request_probe(now_us);
     }
 
-    /// Disables sampling and sets a serial clock that the sensor takes with `config`; the probe that follows sets it again.
-    ///
-    /// # Errors
-    /// The clock in Hz, if the board has none that is slow enough; sampling goes on.
+    /// Disables sampling and sets a serial clock for `config`; the error is the clock in Hz if none is slow enough.
     pub(crate) fn prepare_clock(&mut self, config: Config, board: &mut impl Board) -> Result<(), u32> {
         board.set_sampling(false);
         let clock_hz = board.set_clock_limit(clock_limit_hz(config));
@@ -280,8 +263,7 @@ impl DeviceState {
         Err(clock_hz)
     }
 
-    /// Reads DIAG_STAT, which clears it, if the sensor has its error flag set: in the first half of a sample period, so that
-    /// the next burst is not missed, and once a second at most.
+    /// Reads and clears DIAG_STAT after an error flag, in the first half of a sample period, once a second at most.
     fn read_status(&mut self, board: &mut impl Board) {
         let now_us = board.now_us();
         let half_period_us = (5e5 / self.config.sample_period().hz()) as u64;
@@ -303,7 +285,6 @@ impl DeviceState {
     }
 }
 
-/// Largest serial clock that the sensor takes with a configuration, in Hz.
 pub(crate) fn clock_limit_hz(config: Config) -> u32 {
     match config.sample_period().clock_mode() {
         ClockMode::Normal => BURST_LIMIT_HZ,
@@ -311,13 +292,11 @@ pub(crate) fn clock_limit_hz(config: Config) -> u32 {
     }
 }
 
-/// Sends a text as a log message, which host programs receive too.
 pub(crate) fn log(board: &mut impl Board, text: Arguments<'_>) {
     let line = text_line(text);
     board.transmit_queue(|queue| queue.send(MessageRef::Log(&line)));
 }
 
-/// The configuration of a sensor whose registers have these values.
 pub(crate) fn config_from_registers(smpl_prd: u8, sens_avg: u16) -> Option<Config> {
     let range = match sens_avg >> 8 {
         0b100 => GyroRange::Dps300,

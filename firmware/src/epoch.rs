@@ -1,8 +1,7 @@
-//! A finished epoch: its sums, the regression of its channels on covariates, and the curves of the compensated streams.
+//! A finished epoch: sums, regression on covariates, compensated curves.
 //!
-//! The compensated stream of a channel is `y − Σ βᵢ·(cᵢ − rᵢ)`, sample by sample, with the sensitivities `β` and references
-//! `r` learned in the epoch before. Its Allan variance follows from the curves and covariances of the epoch,
-//! `σ²(y − βc) = σ²(y) − 2β·cov(y, c) + β²·σ²(c)`, so that no second estimator is needed.
+//! The compensated stream `y − Σ βᵢ·(cᵢ − rᵢ)` uses the epoch before; `σ²(y − βc) = σ²(y) − 2β·cov(y, c) + β²·σ²(c)`
+//! needs no second estimator.
 
 use crate::sample_intake::Estimators;
 use crate::scale::ReportScale;
@@ -19,7 +18,7 @@ use serde::{Deserialize, Serialize};
 /// The statistics of a finished epoch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FinishedEpoch {
-    /// Number of the epoch: epochs finished before it.
+    /// Epochs finished before it.
     pub number: u32,
     /// Measured sample rate in Hz; `None` if too few samples have come.
     pub measured_hz: Option<f64>,
@@ -65,7 +64,7 @@ impl FinishedEpoch {
         self.sums[index].rebuild_curve(curve, CHANNELS[index], scale);
     }
 
-    /// The covariances of the channels; `None` if they do not cover all samples of the channels, as after a restart.
+    /// `None` if samples are missing in them, as after a restart.
     #[must_use]
     pub fn covariances(&self) -> Option<&AllanCovariances> {
         self.covariances.complete.then_some(&self.covariances)
@@ -81,20 +80,17 @@ pub struct Regressor {
     pub value: f64,
     /// Standard error of the sensitivity: value ± 1.96·error holds 95 %.
     pub error: f64,
-    /// Value of the covariate at which the correction is 0, in its unit: the mean of the epoch that was learned from.
+    /// Covariate value of no correction, in its unit: the learned epoch's mean.
     pub reference: f64,
 }
 
 /// The regressors of one channel.
 pub type Regressors = Vec<Regressor, MAX_COVARIATES>;
 
-/// Indices of covariates in [`CHANNELS`].
 type Candidates = Vec<usize, MAX_COVARIATES>;
 
-/// Estimates the significant sensitivities of the inertial channel [`CHANNELS`]`[index]` in an epoch. The result is empty
-/// also if the epoch has no [covariances](FinishedEpoch::covariances).
-///
-/// Calls `keep_on` before every fit; `None` if that returned false.
+/// Estimates significant sensitivities of [`CHANNELS`]`[index]`, none without
+/// [covariances](FinishedEpoch::covariances); `None` if `keep_on`, called before every fit, returned false.
 #[must_use]
 pub fn estimate_regressors(
     epoch: &FinishedEpoch,
@@ -111,7 +107,7 @@ pub fn estimate_regressors(
         if !keep_on() {
             return None;
         }
-        // There is room for as many covariates as there are candidates.
+        // There is room for all candidates.
         let _ = covariates.push(covariate(epoch, candidate, scale, true));
     }
     let sensitivities = loop {
@@ -126,7 +122,7 @@ pub fn estimate_regressors(
         let regression = CovariateRegression { channel: &channel, covariates: &covariates, covariance: &covariance };
         let sensitivities = regression.sensitivities_while(keep_on)?;
         let degrades = || degrades(epoch, &candidates, scale, &sensitivities, &regression);
-        // Sensitivities are chosen by falling significance: the last one is the weakest.
+        // By falling significance: the last is the weakest.
         let Some(weakest) = sensitivities.last().filter(|_| degrades()) else { break sensitivities };
         candidates.remove(weakest.covariate);
         covariates.remove(weakest.covariate);
@@ -139,9 +135,8 @@ pub fn estimate_regressors(
     Some(sensitivities.iter().map(with_reference).take(MAX_COVARIATES).collect())
 }
 
-/// Rebuilds the curve of the compensated stream of [`CHANNELS`]`[index]` over an epoch. Below 2⁸ samples it is the curve of
-/// the stream itself. `None`, with the curve of the stream itself, if the epoch has no
-/// [covariances](FinishedEpoch::covariances).
+/// Rebuilds the compensated curve of [`CHANNELS`]`[index]`, the stream's own below 2⁸ samples. `None`, and the stream's
+/// own curve, without [covariances](FinishedEpoch::covariances).
 pub(crate) fn rebuild_compensated_curve(
     curve: &mut Curve<OCTAVES>,
     epoch: &FinishedEpoch,
@@ -153,7 +148,7 @@ pub(crate) fn rebuild_compensated_curve(
     if regressors.is_empty() { Some(()) } else { subtract(curve, epoch, index, scale, regressors) }
 }
 
-/// Subtracts the regressors' share from the curve of the stream itself; `None` without covariances.
+/// `None` without covariances.
 fn subtract(
     curve: &mut Curve<OCTAVES>,
     epoch: &FinishedEpoch,
@@ -178,8 +173,7 @@ fn subtract(
     Some(())
 }
 
-/// Change of the mean of a stream, and of the compensated stream, since the epoch before, in the channel's unit.
-/// `before` are the means of that epoch in counts.
+/// Change of the mean of stream and compensated stream since the epoch `before` (counts), in the channel's unit.
 #[must_use]
 pub(crate) fn mean_shift(
     epoch: &FinishedEpoch,
@@ -195,7 +189,7 @@ pub(crate) fn mean_shift(
     Some(ReportedShift { raw, compensated: raw - correction })
 }
 
-/// Candidate covariates of an inertial channel: temperature and supply, and for a gyro the accelerations.
+/// Temperature and supply; accelerations for a gyro.
 fn candidates(index: usize) -> impl Iterator<Item = usize> {
     let position = |channel: Channel| CHANNELS.iter().position(move |&other| other == channel);
     let environment = [Channel::Temp, Channel::Supply].into_iter();
@@ -203,7 +197,7 @@ fn candidates(index: usize) -> impl Iterator<Item = usize> {
     environment.chain(motion).filter_map(position)
 }
 
-/// Allan covariance of two channels at averaging factor `n`, in the product of their units.
+/// In the product of both units.
 fn scaled_covariance(
     covariances: &AllanCovariances,
     (a, b): (usize, usize),
@@ -213,8 +207,7 @@ fn scaled_covariance(
     Some(covariances.covariance(a, b, n)? * lsb(a, scale) * lsb(b, scale))
 }
 
-/// The covariate [`CHANNELS`]`[index]` at the octaves of the cross sums, with its own noise modelled (`modelled`, for an
-/// estimate) or as measured (for a subtraction).
+/// The covariate at the octaves of the cross sums, its own noise modelled (estimate) or measured (subtraction).
 fn covariate(epoch: &FinishedEpoch, index: usize, scale: ReportScale, modelled: bool) -> Covariate<CROSS_OCTAVES> {
     let mut curve = Curve::empty();
     epoch.rebuild_curve(&mut curve, index, scale);
@@ -229,14 +222,8 @@ fn lsb(index: usize, scale: ReportScale) -> f64 {
     scale.lsb(CHANNELS[index])
 }
 
-/// Whether the subtraction raises the Allan variance at any octave by more than twice the standard error of the rise.
-///
-/// A chance correlation with a covariate that hardly varies has a large sensitivity, which would add the covariate's noise
-/// to the stream `y`. With the share `s = Σ βᵢ·cᵢ` and the stream halfway, `u = y − s/2`, the rise is
-/// `σ²(y − s) − σ²(y) = −2·cov(u, s)`, and without one the estimate of `cov(u, s)` has the variance `σ²(u)·σ²(s)/edf`. A
-/// stream whose variance is small by chance, because its noise has cancelled `s`, is no evidence against a true `s`.
-/// Below the octaves with covariances the noise of the covariates is all that the subtraction adds; there it may be twice the
-/// standard error of the stream's variance.
+/// True if the subtraction raises the Allan variance of any octave by more than twice the standard error of the rise.
+/// For `s = Σ βᵢ·cᵢ` and `u = y − s/2` the rise is `−2·cov(u, s)`, with the variance `4·σ²(u)·σ²(s)/edf`.
 fn degrades(
     epoch: &FinishedEpoch,
     candidates: &Candidates,

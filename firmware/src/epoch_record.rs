@@ -1,4 +1,4 @@
-//! The words of a finished epoch, and of a channel's sums, in retained RAM: a restart while an epoch is being learned from does not lose it.
+//! Words of a finished epoch in retained RAM: a restart while learning does not lose it.
 
 use crate::channels::{CHANNELS, OCTAVES};
 use crate::cross_sums::{CROSS_OCTAVES, PAIRS};
@@ -8,20 +8,14 @@ use crate::statistics::ChannelSums;
 use allan_core::Interpolation;
 
 const OCTAVE_WORDS: usize = 10;
-/// Words of a channel's sums: the samples, the missing ones, and for every octave a sum of 96 and a count of 64 bits, and of
-/// the gaps that it bridges two numbers of samples and a sum of 96 bits.
+/// Samples, missing ones; per octave a sum of 96 and a count of 64 bits, and the bridged gaps.
 pub(crate) const SUMS_WORDS: usize = 4 + OCTAVES * OCTAVE_WORDS;
-/// Largest sum that is stored.
 pub(crate) const MAX_SUM: u128 = (1 << 96) - 1;
-/// Words of an epoch: its number, whether the covariances are complete, the measured sample rate, the sums, and the means and pairs of
-/// 64 bits each.
+/// Number, completeness, rate, sums, means and pairs of 64 bits.
 pub(crate) const EPOCH_WORDS: usize =
     4 + CHANNELS.len() * SUMS_WORDS + 2 * (CHANNELS.len() + PAIRS.len() * CROSS_OCTAVES);
 
-/// The words of a channel's sums.
-///
-/// Differences of counts of 14 bits are within ±2¹⁴·n, and in 2⁴⁰ samples there are 2⁴³/n of them: no sum of squares
-/// exceeds 2⁷¹·n ≤ 2⁹⁴.
+/// Sums of squares stay below 2⁹⁴: differences within ±2¹⁴·n, 2⁴³/n of them in 2⁴⁰ samples.
 pub(crate) fn sums_words(sums: &ChannelSums) -> impl Iterator<Item = u32> {
     let sum = |wide: u128| {
         let wide = wide.min(MAX_SUM);
@@ -35,7 +29,6 @@ pub(crate) fn sums_words(sums: &ChannelSums) -> impl Iterator<Item = u32> {
     [sums.samples, sums.missing].into_iter().flat_map(halves).chain(octaves)
 }
 
-/// The sums in the next [`SUMS_WORDS`] words.
 pub(crate) fn sums_from_words(words: &mut Words<impl Iterator<Item = u32>>) -> ChannelSums {
     let mut sums = ChannelSums { samples: words.wide(), missing: words.wide(), ..ChannelSums::EMPTY };
     for (octave, gaps) in sums.octaves.iter_mut().zip(&mut sums.gaps) {
@@ -46,7 +39,6 @@ pub(crate) fn sums_from_words(words: &mut Words<impl Iterator<Item = u32>>) -> C
     sums
 }
 
-/// The words of an epoch.
 pub(crate) fn epoch_words(epoch: &FinishedEpoch) -> impl Iterator<Item = u32> {
     let covariances = &epoch.covariances;
     let floats = covariances.means.iter().chain(covariances.pairs.as_flattened()).map(|value| value.to_bits());
@@ -55,7 +47,6 @@ pub(crate) fn epoch_words(epoch: &FinishedEpoch) -> impl Iterator<Item = u32> {
     head.into_iter().chain(rate).chain(epoch.sums.iter().flat_map(sums_words)).chain(floats.flat_map(halves))
 }
 
-/// Overwrites `epoch` with the one in [`EPOCH_WORDS`] words.
 pub(crate) fn epoch_from_words(epoch: &mut FinishedEpoch, words: &mut Words<impl Iterator<Item = u32>>) {
     epoch.number = words.word();
     let covariances = &mut epoch.covariances;
@@ -72,7 +63,6 @@ mod tests {
     use super::*;
     use crate::cross_sums::AllanCovariances;
 
-    /// An epoch in which every number differs from the others.
     fn epoch() -> FinishedEpoch {
         let mut number = 0_u64;
         let mut next = || {

@@ -1,6 +1,6 @@
-//! Events that a debug probe reads: structured, with a level, and made text by the host of the probe.
+//! Structured events for a debug probe.
 
-/// Logs an event as `defmt::$level!` does. On the host there is no probe.
+/// Logs as `defmt::$level!`; nothing on the host.
 macro_rules! event {
     ($level:ident, $format:literal $(, $value:expr)*) => {{
         #[cfg(all(target_os = "none", feature = "microcontroller"))]

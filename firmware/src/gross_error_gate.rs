@@ -1,73 +1,53 @@
-//! The gate against gross errors: single samples that the noise of their channel does not explain, such as those with a flipped
-//! bit. The sensor sends no checksum, and one flipped bit in a million raises the variance of a gyro's noise by a fifth.
+//! The gate against gross errors, such as flipped bits: one in a million raises a gyro's variance by a fifth.
 //!
-//! A sample is refused if it differs from the last one used by more than seven times the rms of such differences, unless it agrees
-//! with two that were refused just before: a step costs two samples. A channel has eight refusals at once and then one in sixteen
-//! samples, so that motion, which goes on, does not end the sampling. What exceeds the limit and is used for lack of a refusal
-//! counts as noise, and the limit follows.
-//!
-//! **The first block.** From 32 samples, of which none is used, the gate learns the noise: the 28 smallest of 32 squared normal
-//! numbers hold half of their sum (0.498), and the four largest have room for two gross errors, as each makes two differences.
-//! Blocks of 64 and 128 judged samples replace this estimate, and those of 256 take a quarter of the weight each.
-//!
-//! The probability of false alarms, and what passes, are derived at the tests.
+//! A sample is refused beyond seven times the rms difference from the last one used, unless it agrees with two refused
+//! ones (a step); after eight refusals only one in sixteen is. The first 32 samples are not used: the 28 smallest of 32
+//! squared normal numbers hold half of their sum (0.498).
 
 use crate::channels::{CHANNELS, ChannelSet};
 
-/// Samples from which the gate learns the noise before it judges any.
 pub(crate) const FIRST_BLOCK: u32 = 32;
-/// Samples between two estimates of the noise once it is known. With 256 the sum of squares of a block is its mean in 1/256
-/// counts².
+/// Samples between estimates; the sum of squares of 256 is their mean in 1/256 counts².
 const BLOCK: u32 = 256;
-/// Differences of the first block that are left out of its estimate, as they may be those of gross errors.
+/// Possible gross errors in the first block.
 const LEFT_OUT: usize = 4;
-/// The sum of squares of the first block over that without those left out, for a normal distribution.
+/// Sum of squares over that without [`LEFT_OUT`], in a normal distribution.
 const NORMAL_SHARE: u32 = 2;
-/// Limit in rms differences.
 const WIDTH: u32 = 7;
-/// What the limit is wider by, in counts: two samples are rounded by half a count each, and so is the limit.
+/// Rounding of two samples and of the limit, counts.
 const ROUNDING: u32 = 3;
-/// Refused samples in a row that agree, after which the next one that agrees is used: a step. With one, two damaged bursts in a row, 75 in an hour
-/// where one in a hundred is damaged, would confirm each other.
+/// Refused samples that agree before a step; one would let two damaged bursts in a row confirm each other.
 const AGREEING: u32 = 2;
-/// Samples that give a channel one more refusal.
 const SPACING: u64 = 16;
-/// Refusals that a channel has at once.
 const REFUSALS: u64 = 8;
 
-/// The gate of one channel.
 #[derive(Debug, Clone, Copy)]
 struct ChannelGate {
-    /// The last sample that was used.
     last: i32,
-    /// Largest difference that noise explains, in counts.
     limit: i32,
-    /// Sum of the squared differences of this block, counts².
     sum: u32,
-    /// Mean squared difference in 1/256 counts².
+    /// 1/256 counts².
     noise: u32,
-    /// The latest sample beyond the limit, and its number.
+    /// Latest sample beyond the limit, and its number.
     beyond: (i32, u64),
-    /// Samples in a row up to this one that agree.
     agreeing: u32,
-    /// Number of the sample at which all refusals are available again.
     full_at: u64,
-    /// Largest squared differences of the first block, the largest first, counts².
+    /// For the first block, the largest first, counts².
     left_out: [u32; LEFT_OUT],
 }
 
-/// The gates of all channels. With another width than that of the device the rate of false alarms can be measured.
+/// The gates of all channels; other widths serve to measure false alarms.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GrossErrorGate<const W: u32 = WIDTH> {
     channels: [ChannelGate; CHANNELS.len()],
     samples: u64,
-    /// Length of the running block, and what is left of it.
+    /// Length and rest of the running block.
     block: u32,
     left: u32,
 }
 
 impl<const W: u32> GrossErrorGate<W> {
-    /// A gate that knows nothing of the noise: it [learns](Self::is_learning) from the first block.
+    /// Knows no noise: it [learns](Self::is_learning) first.
     pub(crate) const fn new() -> Self {
         let channel = ChannelGate {
             last: 0,
@@ -82,12 +62,12 @@ impl<const W: u32> GrossErrorGate<W> {
         Self { channels: [channel; CHANNELS.len()], samples: 0, block: FIRST_BLOCK, left: FIRST_BLOCK }
     }
 
-    /// Whether the next samples belong to the first block, of which none is refused.
+    /// True in the first block, which is never refused.
     pub(crate) const fn is_learning(&self) -> bool {
         self.block == FIRST_BLOCK
     }
 
-    /// Takes the level of samples that are not to be used: what comes next is compared with it. A first block begins anew.
+    /// Takes the level of unused samples for the next comparison; restarts a first block.
     pub(crate) fn follow(&mut self, counts: &[i32; CHANNELS.len()]) {
         if self.is_learning() {
             *self = Self::new();
@@ -97,7 +77,7 @@ impl<const W: u32> GrossErrorGate<W> {
         }
     }
 
-    /// The channels whose sample is a gross error; those that are `refused` anyway are left out.
+    /// Gross errors, without those `refused` anyway.
     pub(crate) fn find(&mut self, counts: &[i32; CHANNELS.len()], refused: ChannelSet) -> ChannelSet {
         let mut gross = ChannelSet::EMPTY;
         self.samples += 1;
@@ -117,7 +97,7 @@ impl<const W: u32> GrossErrorGate<W> {
                 continue;
             }
             channel.last = count;
-            // At most (2¹⁴)², as counts have 14 bits.
+            // At most (2¹⁴)².
             channel.sum = channel.sum.saturating_add((difference * difference) as u32);
         }
         self.left -= 1;
@@ -127,7 +107,7 @@ impl<const W: u32> GrossErrorGate<W> {
         gross
     }
 
-    /// Takes a sample of the first block. Not inlined: they are few.
+    /// Not inlined: rare.
     #[inline(never)]
     fn learn(&mut self, counts: &[i32; CHANNELS.len()]) {
         for (channel, &count) in self.channels.iter_mut().zip(counts) {
@@ -139,7 +119,6 @@ impl<const W: u32> GrossErrorGate<W> {
         }
     }
 
-    /// Estimates the noise anew. Not inlined: it is needed once in a block.
     #[inline(never)]
     fn end_block(&mut self) {
         let (is_first, is_known) = (self.is_learning(), self.block == BLOCK);
@@ -148,7 +127,7 @@ impl<const W: u32> GrossErrorGate<W> {
         for channel in &mut self.channels {
             let newest = core::mem::take(&mut channel.sum).saturating_mul(to_mean);
             channel.noise = if is_known { channel.noise - channel.noise / 4 + newest / 4 } else { newest };
-            // The root is in 1/16 counts.
+            // In 1/16 counts.
             channel.limit = ((width * channel.noise.isqrt()).div_ceil(16) + ROUNDING) as i32;
         }
         self.block = (2 * self.block).min(BLOCK);
@@ -168,7 +147,6 @@ impl ChannelGate {
         self.sum = self.sum.saturating_add(square);
     }
 
-    /// Whether a sample beyond the limit is to be refused. Not inlined: they are rare.
     #[inline(never)]
     fn is_gross(&mut self, count: i32, now: u64) -> bool {
         let (before, number) = core::mem::replace(&mut self.beyond, (count, now));
@@ -189,23 +167,17 @@ impl ChannelGate {
 
 #[cfg(test)]
 mod tests {
-    //! **False alarms.** The rms is that of about 1,792 differences, which in white noise are correlated by −1/2 with their neighbours, so that
-    //! its square has ν = 1,792/1.5 = 1,195 degrees of freedom. A difference over its estimated rms then has Student's distribution: beyond ±7
-    //! it has a probability of 4·10⁻¹², one sample of eight channels at 819.2 samples a second in a year. Noise behind the sensor's filter has
-    //! fewer degrees of freedom, ν = 1,792/N at least, and rounding to counts, for which the limit is three counts wider. The first estimate
-    //! has ν = 17, and a limit twice as wide, beyond which are 3·10⁻¹² of the samples; the second has ν = 43, and beyond ±7 are 9·10⁻⁹, 10⁻⁵ of
-    //! the 128 samples of eight channels that it judges. So one start in 100,000 costs a sample.
-    //!
-    //! **What passes.** Bit flips smaller than the limit are not detected: with a noise of 10 counts the lower 7 of 14 bits, whose flips add
-    //! (4⁷ − 1)/3·10⁻⁶ = 0.005 counts² to a variance of 110 at a bit error rate of 10⁻⁶; one bit more in the 64 samples after the first
-    //! block. A larger error passes if it repeats that of the sample before within the limit, or if it is the ninth within 128 samples.
+    //! False alarms: 1,792 differences have ν = 1,195 in white noise, and Student's probability beyond ±7 is 4·10⁻¹²,
+    //! one sample of eight channels at 819.2 Hz in a year; filtered noise has ν ≥ 1,792/N. One start in 100,000 costs a
+    //! sample (ν = 43: 9·10⁻⁹). What passes: bit flips below the limit, larger errors that repeat, the ninth within 128
+    //! samples.
 
     extern crate std;
 
     use super::*;
     use std::f64::consts::TAU;
 
-    /// Normal random numbers by Box and Muller, from a linear congruential generator (Knuth's MMIX constants).
+    /// Box and Muller, from a linear congruential generator (Knuth's MMIX).
     struct Normal(u64);
 
     impl Normal {
@@ -220,7 +192,6 @@ mod tests {
         }
     }
 
-    /// Refused samples of `samples` of white noise in every channel.
     fn refused<const W: u32>(samples: u32, sigma: f64) -> u32 {
         let (mut gate, mut normal, mut refused) = (GrossErrorGate::<W>::new(), Normal(1), 0);
         for _ in 0..samples {
@@ -230,9 +201,7 @@ mod tests {
         refused
     }
 
-    /// Four rms differences have a probability of 6.7e-5 by Student's distribution with 1,195 degrees of freedom (6.33e-5 in the
-    /// limit of many). The limit of 4·√2·100 counts is wider by at most 4 counts, 0.7 %, which takes up to 11 %; after a refused
-    /// sample 16 are not, 0.1 %. Neighbouring differences share a sample, so a bound of four standard deviations is taken.
+    /// 6.7e-5 beyond four rms by Student's distribution; rounding takes up to 11 %; four standard deviations.
     #[test]
     fn false_alarms_come_at_the_derived_rate() {
         let samples = 500_000;
@@ -242,9 +211,7 @@ mod tests {
         assert!((0.89 * expected - bound..expected + bound).contains(&found), "{found} of {expected}");
     }
 
-    /// In the 64 samples after the first block the limit is twice as many rms differences, here four. Over 300,000 simulated first
-    /// blocks (NumPy) the mean probability of a difference beyond it is 6.35e-4, and 5.9e-4 if the limit of 4·√2·100 counts is wider
-    /// by 4 counts; the spacing of refusals takes 2 %. Four standard deviations.
+    /// The limit is twice as wide: 6.35e-4 over 300,000 simulated first blocks (NumPy); four standard deviations.
     #[test]
     fn false_alarms_after_a_start_come_at_the_derived_rate() {
         let (starts, mut normal, mut found) = (2000, Normal(4), 0);
@@ -262,7 +229,6 @@ mod tests {
         assert!((0.91 * expected - bound..expected + bound).contains(&found), "{found} of {expected}");
     }
 
-    /// Eight errors at once, all different, are refused, and a ninth is used; later there is one refusal in sixteen samples.
     #[test]
     fn errors_in_a_row_are_refused_up_to_the_limit() {
         let (mut gate, mut normal) = (GrossErrorGate::<WIDTH>::new(), Normal(6));
@@ -280,7 +246,6 @@ mod tests {
         assert_eq!(find(4000.0), ChannelSet::ALL);
     }
 
-    /// Two gross errors of the first block are left out of its estimate: what it judges next is judged by the noise alone.
     #[test]
     fn errors_in_the_first_block_do_not_widen_the_limit() {
         let (mut gate, mut normal) = (GrossErrorGate::<WIDTH>::new(), Normal(7));
@@ -289,12 +254,12 @@ mod tests {
         for k in 0..FIRST_BLOCK {
             gate.find(&noise(if k == 5 || k == 20 { 4096 } else { 0 }), ChannelSet::EMPTY);
         }
-        // 14 rms of 14 counts are 198; without the four left out of 32 the estimate is that of 28 of 28.
+        // 14 rms of 14 counts are 198, and 28 of 28.
         assert!(gate.channels.iter().all(|channel| (80..400).contains(&channel.limit)), "{gate:?}");
         assert_eq!(gate.find(&noise(512), ChannelSet::EMPTY), ChannelSet::ALL);
     }
 
-    /// Of four million samples 2e-5 false alarms are expected, whatever the noise, below one count too.
+    /// For four million samples 2e-5 are expected, below one count too.
     #[test]
     fn no_sample_of_noise_is_refused() {
         for sigma in [0.1, 0.4, 3.0, 10.5, 300.0] {
@@ -302,7 +267,6 @@ mod tests {
         }
     }
 
-    /// One sample is refused, and so are two that agree; a level that stays costs two samples.
     #[test]
     fn a_step_costs_two_samples_and_two_samples_are_refused() {
         let (mut gate, mut normal) = (GrossErrorGate::<WIDTH>::new(), Normal(2));
@@ -319,8 +283,7 @@ mod tests {
         assert!((0..100).all(|_| find(1000.0) == ChannelSet::EMPTY));
     }
 
-    /// A part that is turned by hand, 100 deg/s at 1 Hz, and shaken, 300 deg/s at 20 Hz, both beginning at once: at most one sample in
-    /// seventeen is refused, and after five seconds none.
+    /// Turned by 100 deg/s at 1 Hz and shaken by 300 deg/s at 20 Hz: at most one in seventeen, none after five seconds.
     #[test]
     fn motion_costs_few_samples() {
         for (amplitude, frequency) in [(2000.0, 1.0), (6000.0, 20.0)] {

@@ -1,5 +1,4 @@
-//! Learning from epoch to epoch: the model of every inertial channel is fitted to a finished epoch and validated on the next
-//! one, which the fit has not seen.
+//! Learning: each inertial channel's model is fitted to an epoch and validated on the next.
 
 use crate::epoch::{FinishedEpoch, Regressor, Regressors, mean_shift, rebuild_compensated_curve};
 use crate::report_messages::{model_error, reported_term};
@@ -19,45 +18,39 @@ use link::{
 };
 use serde::{Deserialize, Serialize};
 
-/// p-value of the residual under N, B and K above which no further term is searched.
-///
-/// The search adds a term only if it lowers the deviance by 14 of its standard deviations or more. At a p-value of 0.2 the
-/// deviance itself is below 14 for up to 10 degrees of freedom, which is what curves of a dozen octaves have.
+/// p-value of the residual above which no term is searched: the deviance of a dozen octaves is then below 14.
 const P_VALUE_SUFFICIENT: f64 = 0.2;
 
 const _: () = assert!(MAX_ADDED == link::MAX_ADDED_TERMS);
-/// Most that a model has beyond N, B and K.
+/// Most findings of a model beyond N, B and K.
 pub(crate) const MAX_FINDINGS: usize = MAX_COVARIATES + MAX_ADDED;
 
-/// The model of one channel: only coefficients, since the device stores six of them.
+/// Coefficients of one channel; the device stores six of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EpochModel {
-    /// N, B and K of the stream itself; `None` before the first fit.
+    /// `None` before the first fit.
     baseline: Option<BaselineCoefficients>,
-    /// All terms of the compensated stream.
     full: Vec<(NoiseTerm, f64), MAX_TERMS>,
-    /// What is subtracted from the stream.
     pub(crate) regressors: Regressors,
 }
 
 type BaselineCoefficients = [f64; NoiseTerm::BASELINE.len()];
 
 impl EpochModel {
-    /// The model before the first fit.
     pub(crate) const EMPTY: Self = Self { baseline: None, full: Vec::new(), regressors: Vec::new() };
 
-    /// N, B and K of the stream itself; `None` before the first fit.
+    /// `None` before the first fit.
     #[must_use]
     pub(crate) fn baseline(&self, scale: ReportScale) -> Option<Model> {
         Some(model(NoiseTerm::BASELINE.into_iter().zip(self.baseline?), scale))
     }
 
-    /// The terms of the compensated stream beyond N, B and K, with their coefficients.
+    /// Beyond N, B and K, with coefficients.
     pub(crate) fn added_terms(&self) -> impl Iterator<Item = (NoiseTerm, f64)> {
         self.full.iter().copied().filter(|(term, _)| !NoiseTerm::BASELINE.contains(term))
     }
 
-    /// All terms of the compensated stream; `None` before the first fit.
+    /// `None` before the first fit.
     #[must_use]
     fn full(&self, scale: ReportScale) -> Option<Model> {
         (!self.full.is_empty()).then(|| model(self.full.iter().copied(), scale))
@@ -73,8 +66,7 @@ fn baseline_coefficients(model: &Model) -> Option<BaselineCoefficients> {
     Some([values.next()?, values.next()?, values.next()?])
 }
 
-/// Low-pass filters of the ADIS16405 that the trace tries. SENS_AVG selects Bartlett windows of 2 to 64 taps per stage; the
-/// window of 8 taps is also tried as read at a lower rate than the part samples at, from four starting decimations.
+/// Low-pass filters of the ADIS16405 that the trace tries: Bartlett windows of 2 to 64 taps per stage (SENS_AVG).
 pub const FILTERS: [MovingAverageFilter; 10] = [
     MovingAverageFilter::bartlett(2),
     MovingAverageFilter::bartlett(4),
@@ -93,21 +85,17 @@ pub const FILTERS: [MovingAverageFilter; 10] = [
 pub struct EpochFit {
     baseline: Option<BaselineCoefficients>,
     regressors: Regressors,
-    /// Search for the terms that N, B and K lack in the compensated stream.
     trace: Trace,
 }
 
 impl EpochFit {
-    /// The fit of a channel with these [regressors](crate::epoch::estimate_regressors), before it is [run](Self::run).
+    /// With [regressors](crate::epoch::estimate_regressors), before its [run](Self::run).
     #[must_use]
     pub fn new(regressors: Regressors) -> Self {
         Self { baseline: None, regressors, trace: Trace::empty() }
     }
 
-    /// Fits the model of the inertial channel [`CHANNELS`]`[index]` to an epoch.
-    ///
-    /// This takes seconds on a microcontroller. `keep_on` is called before every step and may do other work meanwhile; if it
-    /// returns false, the fit is cancelled, which returns false.
+    /// Fits the model of [`CHANNELS`]`[index]` to an epoch, for seconds; false if `keep_on`, called at every step, was.
     #[must_use]
     pub fn run(
         &mut self,
@@ -125,7 +113,7 @@ impl EpochFit {
         done
     }
 
-    /// Traces what N, B and K lack in the compensated stream. Returns false if it was cancelled.
+    /// Traces further terms; false if cancelled.
     fn search(
         &mut self,
         epoch: &FinishedEpoch,
@@ -134,7 +122,7 @@ impl EpochFit {
         keep_on: &mut dyn FnMut() -> bool,
     ) -> bool {
         let mut curve = Curve::empty();
-        // Without covariances there are no regressors, and the curve is that of the stream itself.
+        // Without covariances it is the stream's own curve.
         let _ = rebuild_compensated_curve(&mut curve, epoch, index, scale, &self.regressors);
         self.trace.fit_baseline(&curve);
         let sufficient = self.trace.before_goodness.p_value > P_VALUE_SUFFICIENT;
@@ -169,8 +157,8 @@ fn refit_baseline(epoch: &FinishedEpoch, index: usize, scale: ReportScale) -> Op
     baseline_coefficients(&fit(&curve, &NoiseTerm::BASELINE))
 }
 
-/// Validates on an epoch the model of [`CHANNELS`]`[index]` from the epoch before, whose means are `means`. `None` before the
-/// first fit, or if the compensated stream cannot be reconstructed because the epoch has no covariances.
+/// Validates the model of [`CHANNELS`]`[index]` on an epoch; `means` are those of the epoch before. `None` before the
+/// first fit, or without covariances.
 #[must_use]
 pub fn validate(
     model: &EpochModel,
@@ -191,7 +179,7 @@ pub fn validate(
     Some(message)
 }
 
-/// Error of N, B and K on the stream itself; the outer `None` before the first fit.
+/// The outer `None` is before the first fit.
 fn baseline_error(
     model: &EpochModel,
     epoch: &FinishedEpoch,
@@ -203,7 +191,7 @@ fn baseline_error(
     Some(model_error(&model.baseline(scale)?, &curve))
 }
 
-/// Fills in the error of the full model on the compensated stream, and the Allan deviations of both streams.
+/// Error of the full model, and both streams' Allan deviations.
 fn fill_compensated(
     model: &EpochModel,
     epoch: &FinishedEpoch,
@@ -246,19 +234,17 @@ fn reported_added_term(found: &AddedTerm, model: &Model) -> ReportedAddedTerm {
     }
 }
 
-/// The models of all inertial channels, and the finished epoch from which they are learned.
 pub(crate) struct Learner {
-    /// The last finished epoch; `None` while a model is being fitted to it.
+    /// `None` during a fit.
     pub(crate) finished: Option<&'static mut FinishedEpoch>,
     pub(crate) models: [EpochModel; INERTIAL],
-    /// Channel means of the epoch that the models were fitted to.
     means: Option<ChannelMeans>,
-    /// Deviance per point on the last finished epoch, of N, B and K on the stream, and of the full model on the compensated stream.
+    /// Per point on the finished epoch: N, B and K on the stream, full model on the compensated stream.
     pub(crate) errors: [Option<(f64, f64)>; INERTIAL],
 }
 
 impl Learner {
-    /// A learner without models; `finished` is the memory for finished epochs.
+    /// Without models; `finished` is memory for epochs.
     pub(crate) fn new(finished: &'static mut FinishedEpoch) -> Self {
         Self {
             finished: Some(finished),
@@ -268,19 +254,17 @@ impl Learner {
         }
     }
 
-    /// Discards the models and the results.
     pub(crate) fn reset(&mut self) {
         self.models = [const { EpochModel::EMPTY }; INERTIAL];
         self.errors = [None; INERTIAL];
         self.means = None;
     }
 
-    /// The last finished epoch; `None` while a model is being fitted to it.
+    /// `None` during a fit.
     pub(crate) fn finished(&self) -> Option<&FinishedEpoch> {
         self.finished.as_deref()
     }
 
-    /// Validates the model of a channel on the finished epoch.
     pub(crate) fn validate(&mut self, index: usize, config: Config) -> Option<ValidationMessage> {
         let epoch = self.finished.as_deref()?;
         let scale = epoch.scale(config);
@@ -291,7 +275,6 @@ impl Learner {
         message
     }
 
-    /// Replaces the model of a channel by one that was fitted to `epoch`.
     pub(crate) fn learn(&mut self, fit: &EpochFit, epoch: &FinishedEpoch, index: usize) {
         if index + 1 == INERTIAL {
             self.means = epoch.covariances().map(|covariances| covariances.means);

@@ -1,5 +1,5 @@
-//! The application that characterises an ADIS16405 while it is sampled: the same code in the images of all boards and on the
-//! host.
+//! The application that characterises an ADIS16405 while it is sampled: the same code in the images of all boards and
+//! on the host.
 //!
 //! ```text
 //! data-ready edge ─► Sampler ─► burst queue ─► Estimators ─► App ─► transmit queue ─► serial port
@@ -31,8 +31,8 @@
 //! | [`retained`], `slot`, `epoch_record`, `crash_record` | what survives a warm reset |
 //! | `stored_state`, [`settings_store`] | what survives the loss of power, and the flash memory that keeps it |
 //!
-//! Sampling has a higher priority than the estimators, and these a higher one than the main loop. While a lower priority
-//! holds the lock of a shared resource, the interrupts that share it wait; locks are short.
+//! Sampling has priority over the estimators, and these over the main loop. Interrupts that share a locked resource
+//! wait; locks are short.
 #![no_std]
 #![deny(unsafe_code)]
 #![deny(missing_docs)]

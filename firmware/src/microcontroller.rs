@@ -1,8 +1,5 @@
-//! What the images of all boards share beside the application: traits of a microcontroller and its peripherals, in this
-//! file; start-up, interrupts and panics (`image`); the board as the main loop sees it (`context`); the sensor's bus (`sensor_spi`); load figures and the LED (`processor`); the flash memory that keeps the settings
-//! (`settings_flash`); and one module for each microcontroller.
-//!
-//! A board is an implementation of [`BoardSupport`], and names its interrupts in [`observatory!`](crate::observatory).
+//! Code shared by the images of all boards; a board implements [`BoardSupport`] and names its interrupts in
+//! [`observatory!`](crate::observatory).
 
 pub mod context;
 pub mod image;
@@ -49,9 +46,9 @@ pub struct UsbParts<U> {
 }
 
 impl<B: UsbBus> UsbParts<UsbPort<'static, B>> {
-    /// Starts the port of a `vendor`'s `product` on a bus, with the number of the board in hexadecimal as its serial number: at most
-    /// twelve bytes. `reconnect` resets the controller and keeps it off the bus (false), and starts it again (true). To be called once; `None`
-    /// afterwards, or if the bus has too few endpoints.
+    /// Starts the port of a `vendor`'s `product`, with the board's number (at most twelve bytes) in hexadecimal.
+    /// `reconnect` resets the controller off the bus (false) and starts it again (true). Once; `None` afterwards, or
+    /// with too few endpoints.
     pub fn start(
         bus: &'static UsbBusAllocator<B>,
         (vendor, product): (u16, u16),
@@ -89,7 +86,7 @@ impl<U> UsbParts<U> {
     }
 }
 
-/// What stands for a part that a board does not have: no value of it exists.
+/// Stands for an absent part: no value exists.
 pub enum NotConnected {}
 
 impl embedded_hal::digital::ErrorType for NotConnected {
@@ -124,22 +121,22 @@ pub trait BoardSupport: Sized {
     type Bus: BurstBus;
     /// The serial port to the host on pins.
     type Uart: ServedPort;
-    /// That on USB, or [`NotConnected`].
+    /// The serial port to the host on USB, or [`NotConnected`].
     type Usb: ServedPort;
     /// An LED.
     type Led: OutputPin;
-    /// The pin at RST of the sensor, or [`NotConnected`]. It is low for a reset.
+    /// The pin at RST of the sensor, low for a reset, or [`NotConnected`].
     type ResetLine: OutputPin;
 
     /// Starts clocks, watchdog and pins.
     fn start(device: Self::Device, queues: UartQueues) -> BoardParts<Self>;
 }
 
-/// What a board has after its start.
+/// The parts of a board after its start.
 pub struct BoardParts<B: BoardSupport> {
     /// Why the microcontroller started.
     pub cause: BootCause,
-    /// What the clocks are derived from.
+    /// The source of the clocks.
     pub clock: ClockSource,
     /// Clock of the processor in Hz.
     pub core_hz: u32,
@@ -170,8 +167,8 @@ pub trait Microcontroller: Watchdog {
     }
     /// Starts the boot loader that takes an image over USB.
     fn start_boot_loader() -> !;
-    /// To be called at every interrupt of SysTick, of which there are [`processor::WAKE_HZ`] a second: prolongs the time of a
-    /// watchdog that is shorter than a step of the main loop.
+    /// To be called [`processor::WAKE_HZ`] times a second: prolongs a watchdog that is shorter than a step of the main
+    /// loop.
     fn extend_watchdog(_extension: &mut WatchdogExtension) {}
 }
 
@@ -181,9 +178,9 @@ pub trait DataReadyPin: DataReadyLine {
     fn clear(&mut self);
 }
 
-/// The sensor's bus. Bursts are transferred by DMA while the processor does other work.
+/// The sensor's bus, with bursts by DMA.
 pub trait BurstBus: SensorBus {
-    /// Selects the sensor and starts the transfer of a burst, the end of which, or of a part of which, raises an interrupt.
+    /// Selects the sensor and starts a burst; an interrupt follows at its end, or at that of a part.
     fn start_burst(&mut self);
     /// To be called in that interrupt.
     fn end_burst(&mut self) -> BurstEnd<'_>;
@@ -195,13 +192,12 @@ pub enum BurstEnd<'a> {
     MoreWords,
     /// The sensor is deselected; these bytes were received.
     Complete(&'a [u8; BURST_BYTES]),
-    /// The sensor is deselected, and the transfer failed. The bus is ready for the next one.
+    /// The sensor is deselected after a failure; the bus is ready.
     Failed,
 }
 
 /// A serial port to the host, served in its interrupt.
 pub trait ServedPort {
-    /// Moves bytes between the peripheral and its queues as far as possible; returns how many received bytes were lost. `now_us` is the
-    /// counter of microseconds.
+    /// Moves bytes as far as possible at `now_us`, µs; returns how many received ones were lost.
     fn serve(&mut self, now_us: u32) -> u32;
 }

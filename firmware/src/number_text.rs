@@ -1,26 +1,22 @@
-//! Numbers as a person reads them: decimals without an exponent, and estimates with as many digits as their bounds support.
-//!
-//! The formatting of floating-point numbers in `core` takes 20 kB of flash; this takes 2 kB.
+//! Decimals without exponent, and estimates with the digits of their bounds, in 2 kB of flash.
 
 use core::fmt::{self, Display, Formatter};
 
 /// Values from this one on are not written out.
 const TOO_LARGE: f64 = 1e15;
-/// Decimals at most.
 const MOST_DECIMALS: i32 = 12;
 
-/// Widest relative half-width at which bounds are written as `+- half`, and the largest ratio of the wider to the narrower
-/// side of such an interval: as on the host's screen.
+/// Widest relative half-width of `+- half`, and largest ratio of both sides, as on the host.
 const SYMMETRIC: f64 = 0.25;
 const SKEW: f64 = 1.3;
 
-/// Ten to a power between -22 and 22, for which it is exact or one rounding off.
+/// Between -22 and 22: exact or one rounding off.
 fn power_of_ten(exponent: i32) -> f64 {
     let power = (0..exponent.unsigned_abs()).fold(1.0, |power, _| power * 10.0);
     if exponent < 0 { 1.0 / power } else { power }
 }
 
-/// The exponent of the leading digit of a positive number.
+/// Exponent of the leading digit of a positive number.
 fn exponent(mut value: f64) -> i32 {
     let mut exponent = 0;
     while value >= 10.0 {
@@ -32,7 +28,7 @@ fn exponent(mut value: f64) -> i32 {
     exponent
 }
 
-/// A number with so many decimals, half rounded up, and a comma between thousands; what is not finite or at least 10^15 as `-`.
+/// So many decimals, half up, commas between thousands; `-` if not finite or at least 10^15.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decimal {
     value: f64,
@@ -48,12 +44,12 @@ impl Decimal {
             return Self { value, decimals: 0 };
         }
         let place = exponent(magnitude) - digits + 1;
-        // 9.96 in two digits is 10, whose last digit is one place further left.
+        // 9.96 in two digits is 10.
         let carried = magnitude + power_of_ten(place) / 2.0;
         Self::at_place(value, exponent(carried) - digits + 1)
     }
 
-    /// Rounded to a multiple of ten to the power of `place`.
+    /// Multiple of ten to the power `place`.
     fn at_place(value: f64, place: i32) -> Self {
         if place <= 0 {
             return Self { value, decimals: (-place).min(MOST_DECIMALS) };
@@ -101,7 +97,7 @@ impl Display for Count {
     }
 }
 
-/// An estimate with its 95 % bounds: `2.43 +- 0.04`, `24 (14 .. 37)`, `< 190` where only an upper bound is known.
+/// Estimate with 95 % bounds: `2.43 +- 0.04`, `24 (14 .. 37)`, `< 190` for an upper bound alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     /// Best value.
@@ -123,7 +119,7 @@ impl Display for Estimate {
         let (below, above) = (value - low, high - value);
         let (half, wider, narrower) = ((high - low) / 2.0, below.max(above), below.min(above));
         if wider <= SKEW * narrower && half <= SYMMETRIC * libm::fabs(value) {
-            // Two digits of the half-width where it begins with 1 or 2, else one.
+            // Two digits if it begins with 1 or 2.
             let leading = exponent(half);
             let place = if half / power_of_ten(leading) < 2.95 { leading - 1 } else { leading };
             return write!(f, "{} +- {}", Decimal::at_place(value, place), Decimal::at_place(half, place));
@@ -143,8 +139,7 @@ mod tests {
     use std::format;
     use std::string::ToString;
 
-    /// `core`'s own formatting is the reference: it rounds the exact binary value, this a product that is one rounding off, so
-    /// numbers are taken that do not lie on a tie.
+    /// `core` rounds the exact value, this a product: no ties.
     #[test]
     fn decimals_equal_the_standard_formatting() {
         let mut value = 1.234_56e-9;
@@ -152,7 +147,7 @@ mod tests {
             for decimals in 0..=9 {
                 let text = Decimal { value, decimals }.to_string().replace(',', "");
                 let expected = format!("{value:.*}", decimals as usize);
-                // With up to 11 digits the product is exact to 10⁻⁵ of the last one: none of these values is as near to a tie.
+                // Exact to 10⁻⁵ of the last digit.
                 if value * power_of_ten(decimals) < 1e11 {
                     assert_eq!(text, expected, "{value} to {decimals} decimals");
                     assert_eq!(
@@ -165,7 +160,7 @@ mod tests {
                 let shown: f64 =
                     Decimal::significant(value, digits).to_string().replace(',', "").parse().expect("a number");
                 let expected: f64 = format!("{value:.*e}", digits as usize - 1).parse().expect("a number");
-                // Exponents below the last decimal that is written are cut off.
+                // Below the last decimal written.
                 let limit = 0.5 * power_of_ten(-MOST_DECIMALS);
                 assert!((shown - expected).abs() <= 1e-14 * expected + limit, "{value} in {digits} digits: {shown}");
             }
@@ -192,7 +187,6 @@ mod tests {
         assert_eq!([0, 999, 1000, 1_002_003].map(|count| Count(count).to_string()), ["0", "999", "1,000", "1,002,003"]);
     }
 
-    /// The same cases as in the test of the host's screen, in ASCII.
     #[test]
     fn estimates_have_the_digits_that_their_bounds_support() {
         for (value, low, high, text) in [

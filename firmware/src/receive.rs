@@ -5,13 +5,13 @@ use heapless::spsc;
 /// The bytes from a serial port to the application.
 pub type ReceiveBuffer = spsc::Queue<u8, 256>;
 
-/// Takes the place of bytes that were lost (ASCII: cancel): what is left of their line is not a command.
+/// Stands for lost bytes (ASCII cancel): the line is no command.
 pub(crate) const LOST: u8 = 0x18;
 
 /// A serial port's end of the queue of received bytes.
 pub struct Receiver<'q> {
     queue: spsc::Producer<'q, u8>,
-    /// Bytes were lost, and the queue had no room to say so.
+    /// Without room in the queue to say so.
     has_lost: bool,
 }
 
@@ -21,7 +21,7 @@ impl<'q> Receiver<'q> {
         Self { queue, has_lost: false }
     }
 
-    /// Queues a byte, or marks the place of one that was not received, and returns how many bytes were lost.
+    /// Queues a byte, or marks a lost one; returns how many bytes were lost.
     pub fn push(&mut self, byte: Option<u8>) -> u32 {
         self.has_lost |= byte.is_none();
         if self.has_lost && self.queue.enqueue(LOST).is_ok() {
@@ -56,7 +56,6 @@ pub struct ReceivedBytes<'q> {
 }
 
 impl ReceivedBytes<'_> {
-    /// The next byte, and the port that has received it.
     #[cfg_attr(not(target_os = "none"), allow(dead_code, reason = "a board on a host has its own queue"))]
     pub(crate) fn next(&mut self) -> Option<(HostPort, u8)> {
         let usb = || self.usb.as_mut().and_then(|queue| queue.dequeue()).map(|byte| (HostPort::Usb, byte));
@@ -72,7 +71,7 @@ mod tests {
     use crate::command::{Command, CommandParser};
     use std::vec::Vec;
 
-    /// `e 3600` loses its end where the queue is full. With the lines after it, it would be `e 36` or `e 36boot`.
+    /// `e 3600` would become `e 36` or `e 36boot`.
     #[test]
     fn a_line_that_has_lost_bytes_is_no_command() {
         for lost in [1, 2, 4] {

@@ -1,34 +1,30 @@
-//! Recovery of a sensor that is in trouble: which step comes next, from reading its registers again to a restart of the
-//! microcontroller.
+//! Recovery steps of a sensor in trouble, up to a restart of the microcontroller.
 
-/// Failed steps in a row after which the microcontroller is restarted. They come once a second.
+/// Failed steps, once a second, before a restart.
 pub(crate) const FAILURES_BEFORE_RESTART: u32 = 30;
 
-/// A step of recovery, by rising effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(all(target_os = "none", feature = "microcontroller"), derive(defmt::Format))]
 pub(crate) enum RecoveryStep {
-    /// Read identity and configuration, and set what differs.
+    /// Identity and configuration.
     Reread,
-    /// Reset the microcontroller's SPI and end an unfinished frame by a pulse on chip select; then probe.
+    /// Reset the SPI, end an open frame by a pulse, then probe.
     BusReset,
-    /// The same, with longer times on the bus from then on: [`BusTiming::CAREFUL`](crate::BusTiming::CAREFUL).
-    CarefulBus,
-    /// Reset the sensor by its command, then probe.
+    /// With longer bus times from then on: [`BusTiming::SLOW`](crate::BusTiming::SLOW).
+    SlowBus,
     SoftwareReset,
-    /// Reset the sensor by its RST line, if that is connected, else by its command; then probe.
+    /// By RST if connected, else by command; then probe.
     ResetLine,
-    /// Restart the microcontroller. The statistics are kept.
+    /// For the microcontroller; statistics are kept.
     Restart,
 }
 
 impl RecoveryStep {
-    /// What is being done, for a log.
     pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Reread => "probing it",
             Self::BusReset => "resetting the bus",
-            Self::CarefulBus => "careful timing of the bus",
+            Self::SlowBus => "slow timing of the bus",
             Self::SoftwareReset => "resetting it",
             Self::ResetLine => "resetting it by RST",
             Self::Restart => "restarting the microcontroller",
@@ -36,18 +32,15 @@ impl RecoveryStep {
     }
 }
 
-/// Chooses the steps. The sequence starts anew only after the sensor has [settled](Self::settle), so that one that passes
-/// every probe and then fails again is reset too.
+/// Chooses the steps. Starts anew only after the sensor has [settled](Self::settle), not after each probe.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct RecoveryLadder {
-    /// Steps taken since the sensor has settled.
     taken: u32,
-    /// The sensor has settled since the last restart: one that is absent restarts the microcontroller once at most.
+    /// Since the last restart: an absent sensor causes one at most.
     has_settled: bool,
 }
 
 impl RecoveryLadder {
-    /// The step to take now.
     pub(crate) fn next_step(&mut self) -> RecoveryStep {
         let taken = self.taken;
         self.taken = taken.saturating_add(1);
@@ -56,19 +49,19 @@ impl RecoveryLadder {
         }
         match (taken, taken % 3) {
             (0, _) => RecoveryStep::Reread,
-            (4, _) => RecoveryStep::CarefulBus,
+            (4, _) => RecoveryStep::SlowBus,
             (_, 1) => RecoveryStep::BusReset,
             (_, 2) => RecoveryStep::SoftwareReset,
             _ => RecoveryStep::ResetLine,
         }
     }
 
-    /// The sensor has delivered so many usable bursts since the latest step that it is known to work.
+    /// Enough usable bursts since the latest step.
     pub(crate) fn settle(&mut self) {
         *self = Self { taken: 0, has_settled: true };
     }
 
-    /// Whether the latest step is to be logged: each of the first eight, then one of 32.
+    /// The first eight, then one of 32.
     pub(crate) const fn is_logged(&self) -> bool {
         self.taken <= 8 || self.taken.is_multiple_of(32)
     }
@@ -77,7 +70,7 @@ impl RecoveryLadder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use RecoveryStep::{BusReset, CarefulBus, Reread, ResetLine, Restart, SoftwareReset};
+    use RecoveryStep::{BusReset, Reread, ResetLine, Restart, SlowBus, SoftwareReset};
 
     #[test]
     fn the_steps_rise_and_start_anew_after_the_sensor_has_settled() {
@@ -86,13 +79,12 @@ mod tests {
             assert_eq!(count, 5);
             core::array::from_fn(|_| ladder.next_step())
         };
-        assert_eq!(next(5), [Reread, BusReset, SoftwareReset, ResetLine, CarefulBus]);
+        assert_eq!(next(5), [Reread, BusReset, SoftwareReset, ResetLine, SlowBus]);
         ladder.settle();
         assert_eq!(ladder.next_step(), Reread);
     }
 
-    /// The microcontroller is restarted after 30 failures, once for each loss, and never for a sensor that was absent from
-    /// the start.
+    /// After 30 failures, once per loss, never for a sensor absent from the start.
     #[test]
     fn the_microcontroller_is_restarted_once() {
         let mut ladder = RecoveryLadder::default();

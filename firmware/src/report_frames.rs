@@ -1,5 +1,4 @@
-//! The report in frames: device and settings, every channel, health. A report is sent message by message; one that ends an
-//! epoch also has the validation and the learned model of every inertial channel.
+//! The report in frames: device and settings, channels, health; at an epoch's end also validation and learned models.
 
 use crate::board::Board;
 use crate::device::DeviceState;
@@ -9,14 +8,13 @@ use crate::statistics::{CHANNELS, ChannelSums, INERTIAL};
 use adis16405_driver::{Channel, GyroRange};
 use link::{Hello, MessageRef, ReportedModelError};
 
-/// Version of the firmware, from the manifest.
 const VERSION: (u8, u8, u8) = (
     decimal(env!("CARGO_PKG_VERSION_MAJOR")),
     decimal(env!("CARGO_PKG_VERSION_MINOR")),
     decimal(env!("CARGO_PKG_VERSION_PATCH")),
 );
 
-/// Parses a version number of the manifest; one above 255 fails the compilation.
+/// Above 255 fails the compilation.
 const fn decimal(digits: &str) -> u8 {
     match u8::from_str_radix(digits, 10) {
         Ok(number) => number,
@@ -25,8 +23,7 @@ const fn decimal(digits: &str) -> u8 {
 }
 
 impl DeviceState {
-    /// Device and settings, for a report on the finished epoch (`ends_epoch`) or on the running one. The measured rate is the
-    /// one that the whole report is made with.
+    /// Device and settings; fixes the measured rate of the whole report.
     fn hello(&mut self, ends_epoch: bool, board: &mut impl Board) -> Hello {
         let finished = self.learner.finished().filter(|_| ends_epoch);
         let (number, finished_hz) =
@@ -83,12 +80,11 @@ impl DeviceState {
         }
     }
 
-    /// Error of the previous epoch's N, B and K on the sums.
+    /// Previous epoch's N, B and K on the sums.
     fn unseen_error(&self, model: &EpochModel, channel: Channel, sums: &ChannelSums) -> Option<ReportedModelError> {
         sums.error_of(&model.baseline(self.report_scale)?, channel, self.report_scale)
     }
 
-    /// Validates the model of an inertial channel on the finished epoch and sends the result, if there is one.
     pub(crate) fn send_validation(&mut self, index: usize, board: &mut impl Board) {
         if let Some(message) = self.learner.validate(index, self.config) {
             send(board, MessageRef::Validation(&message));
@@ -96,45 +92,38 @@ impl DeviceState {
     }
 }
 
-/// The sums of [`CHANNELS`]`[index]` of the running epoch.
 pub(crate) fn running_sums(board: &mut impl Board, index: usize) -> ChannelSums {
     board.estimators(|estimators| estimators.channel(index).map_or(ChannelSums::EMPTY, ChannelSums::from_estimator))
 }
 
-/// Queues a message. If there is no room it is dropped, and the receiver counts it as missing.
+/// Queues a message; without room it is dropped and counted as missing.
 pub(crate) fn send(board: &mut impl Board, message: MessageRef<'_>) {
     board.transmit_queue(|queue| queue.send(message));
 }
 
-/// A message of a report.
 #[derive(Clone, Copy)]
 pub(crate) enum ReportPart {
     Hello,
-    /// Sums and baseline model of a channel.
     Channel(usize),
-    /// Validation, on the finished epoch, of an inertial channel's model.
     Validation(usize),
-    /// Model that an inertial channel learns from the finished epoch.
     Learned(usize),
     Health,
 }
 
-/// Progress of the report that is being sent.
 #[derive(Default)]
 pub(crate) struct ReportProgress {
-    /// Position of the next message; `None` if no report is being sent.
+    /// `None` without a report.
     next: Option<usize>,
-    /// Whether the report ends an epoch: then its sums are those of the finished epoch.
+    /// With the finished epoch's sums.
     ends_epoch: bool,
 }
 
 impl ReportProgress {
-    /// Starts a report on the running epoch. Has no effect while a report is being sent.
+    /// Reports the running epoch; no effect during a report.
     pub(crate) fn start(&mut self) {
         self.next.get_or_insert(0);
     }
 
-    /// Starts the report that ends an epoch; a report that is being sent is abandoned.
     pub(crate) fn start_epoch_end(&mut self) {
         *self = Self { next: Some(0), ends_epoch: true };
     }
@@ -147,7 +136,7 @@ impl ReportProgress {
         self.ends_epoch
     }
 
-    /// The next message; `None` if no report is being sent or the last message was sent, which ends the report.
+    /// `None` without a report, or at its end.
     pub(crate) fn part(&mut self) -> Option<ReportPart> {
         let learners = if self.ends_epoch { INERTIAL } else { 0 };
         let channels = 1 + CHANNELS.len();
@@ -164,8 +153,7 @@ impl ReportProgress {
         })
     }
 
-    /// Advances to the next message, unless the report was replaced or abandoned while the message was made: then
-    /// `ended_epoch`, the kind of report that the message belongs to, differs from the present kind.
+    /// Advances unless the report was replaced meanwhile: `ended_epoch` is the message's kind of report.
     pub(crate) fn advance(&mut self, ended_epoch: bool) {
         if self.ends_epoch == ended_epoch {
             self.next = self.next.map(|next| next + 1);

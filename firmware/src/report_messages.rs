@@ -1,4 +1,4 @@
-//! The messages of a report that are made of one channel's sums: octaves and coefficients, and the error of a model.
+//! Report messages of one channel's sums, and a model's error.
 
 use crate::channels::{ChannelEstimator, OCTAVES};
 use crate::scale::ReportScale;
@@ -9,7 +9,7 @@ use heapless::Vec;
 use link::{ChannelMessage, ReportedCoefficient, ReportedModelError, ReportedOctave, ReportedTerm};
 
 impl ChannelSums {
-    /// Error of a model that was not fitted to these sums; `None` if no octave can be compared.
+    /// For an unfitted model; `None` without comparable octaves.
     #[must_use]
     pub(crate) fn error_of(&self, model: &Model, channel: Channel, scale: ReportScale) -> Option<ReportedModelError> {
         let mut curve = Curve::empty();
@@ -54,7 +54,7 @@ impl ChannelSums {
     }
 }
 
-/// Error of a model on a curve; `None` if no octave can be compared.
+/// `None` without comparable octaves.
 pub(crate) fn model_error(model: &Model, curve: &Curve<OCTAVES>) -> Option<ReportedModelError> {
     let error = allan_core::model::Discrepancy::between(model, curve)?;
     Some(ReportedModelError { deviance_per_point: error.deviance_per_point, rms_percent: error.rms_percent })
@@ -67,7 +67,7 @@ pub(crate) fn reported_term(kind: NoiseTerm) -> ReportedTerm {
         NoiseTerm::BiasInstability => ReportedTerm::BiasInstability,
         NoiseTerm::RateRandomWalk => ReportedTerm::RateRandomWalk,
         NoiseTerm::RateRamp => ReportedTerm::RateRamp,
-        // No candidate of the device is a low-pass filter of the second order.
+        // No candidate is a second-order low-pass.
         NoiseTerm::Filtered(_) | NoiseTerm::LowPass(_) => ReportedTerm::Filtered,
         NoiseTerm::Markov(_) => ReportedTerm::Markov,
         NoiseTerm::Resonance(_) => ReportedTerm::Resonance,

@@ -1,5 +1,4 @@
-//! The report on the running epoch as a table for a person at a terminal: 80 columns of ASCII, made one line at a time. A host program
-//! draws it with the words of its screen.
+//! The running epoch as a table: 80 columns of ASCII, line by line.
 
 use crate::answer::AnswerLine;
 use crate::board::Board;
@@ -13,25 +12,17 @@ use allan_core::NoiseTerm;
 use allan_core::confidence::NORMAL_975;
 use link::{TextLine, text_line};
 
-/// A part of the table.
 #[derive(Debug, Clone, Copy)]
 enum Section {
-    /// Part, samples, length, epoch.
     Headline,
-    /// What is missing, and when the epoch ends.
     Record,
     Text(&'static str),
-    /// Label, three coefficients and an error.
     Cells([&'static str; 5]),
-    /// A row a channel from this one of [`CHANNELS`] on.
     Coefficients(usize),
-    /// What the models have beyond N, B and K: a row a term of a channel.
     Found,
-    /// A row an octave.
     Curve,
 }
 
-/// The sections, each with its lines at most.
 const SECTIONS: [(Section, usize); 12] = [
     (Section::Headline, 1),
     (Section::Record, 1),
@@ -47,7 +38,6 @@ const SECTIONS: [(Section, usize); 12] = [
     (Section::Curve, OCTAVES + 2),
 ];
 
-/// The line of the table at an index.
 pub(crate) fn line(state: &DeviceState, board: &mut impl Board, mut index: usize) -> AnswerLine {
     for (section, lines) in SECTIONS {
         if index < lines {
@@ -67,7 +57,7 @@ pub(crate) fn line(state: &DeviceState, board: &mut impl Board, mut index: usize
     AnswerLine::End
 }
 
-/// A row of the coefficients' table: 8, 20, 19 and 19 columns, and 13 for the error.
+/// 8, 20, 19, 19 and 13 columns.
 fn row([label, n, b, k, error]: [&str; 5]) -> TextLine {
     let line = text_line(format_args!(" {label:<7}{n:<20}{b:<19}{k:<19}{error:>13}"));
     text_line(format_args!("{}", line.trim_end()))
@@ -98,11 +88,10 @@ fn record(state: &DeviceState, board: &mut impl Board) -> TextLine {
     }
 }
 
-/// N, B and K of the running epoch with their bounds, and the error of the last model on the epoch after it. A channel that has failed
-/// its self-test is marked.
+/// N, B and K with bounds, and the last model's error; marks a failed self-test.
 fn coefficients(state: &DeviceState, board: &mut impl Board, index: usize) -> TextLine {
     let channel = CHANNELS[index];
-    // From deg/s and g to the units in the table.
+    // From deg/s and g to the table's units.
     let factors = if index < GYROS { [1.0, 1e3, 1e3] } else { [1e6; 3] };
     let scale = board.estimators(|estimators| estimators.scale());
     let model = running_sums(board, index).fit_baseline(channel, scale);
@@ -122,12 +111,11 @@ fn coefficients(state: &DeviceState, board: &mut impl Board, index: usize) -> Te
     row([axis.trim_end(), &cells[0], &cells[1], &cells[2], &error])
 }
 
-/// The letter of the axis of an inertial channel.
 fn axis(index: usize) -> &'static str {
     ["x", "y", "z"][index % GYROS]
 }
 
-/// Channel, term and value: `gyro x  temperature  0.048 +- 0.007 deg/s/degC`.
+/// `gyro x temperature 0.048 +- 0.007 deg/s/degC`.
 fn found(models: &[EpochModel; INERTIAL], index: usize) -> Option<TextLine> {
     let (channel, number) = (index / MAX_FINDINGS, index % MAX_FINDINGS);
     let (model, unit) = (models.get(channel)?, CHANNELS[channel].unit());
@@ -150,7 +138,7 @@ fn found(models: &[EpochModel; INERTIAL], index: usize) -> Option<TextLine> {
         NoiseTerm::Markov(noise) => text_line(format_args!("Gauss-Markov, {} s", three(noise.time_constant))),
         NoiseTerm::Quantization => text_line(format_args!("quantization")),
         NoiseTerm::RateRamp => text_line(format_args!("rate ramp")),
-        // Terms of the baseline, and one that the device does not trace.
+        // Baseline, and one that is not traced.
         NoiseTerm::AngleRandomWalk | NoiseTerm::BiasInstability | NoiseTerm::RateRandomWalk | NoiseTerm::LowPass(_) => {
             return None;
         }
@@ -164,7 +152,7 @@ fn found(models: &[EpochModel; INERTIAL], index: usize) -> Option<TextLine> {
     Some(text_line(format_args!("{label:<9}{name:<32}{} {unit}{per}", three(value))))
 }
 
-/// Title, head, and the Allan deviations at one octave each; `None` where no channel has a value.
+/// Title, head, Allan deviations by octave; `None` without values.
 fn curve(board: &mut impl Board, line: usize) -> Option<TextLine> {
     match line {
         0 => Some(text_line(format_args!("Allan deviation, gyros in deg/s, accelerometers in mg"))),
@@ -173,12 +161,11 @@ fn curve(board: &mut impl Board, line: usize) -> Option<TextLine> {
     }
 }
 
-/// Columns of a row of the curve.
 fn octave_cells(tau: &str, [a, b, c, d, e, f]: [&str; INERTIAL]) -> TextLine {
     text_line(format_args!("{tau:>9}{a:>11}{b:>11}{c:>11}{d:>11}{e:>11}{f:>11}"))
 }
 
-/// The Allan deviations of the inertial channels at one octave; `None` where no channel has a value.
+/// `None` without values.
 fn octave_row(estimators: &Estimators<'_>, octave: usize) -> Option<TextLine> {
     let scale = estimators.scale();
     let n = (1_u64 << octave.min(OCTAVES)) as f64;

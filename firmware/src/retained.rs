@@ -1,10 +1,6 @@
-//! Retained RAM: statistics and settings in memory that a warm reset does not clear, each record with a checksum.
+//! Retained RAM: statistics and settings through a warm reset, with checksums over content, build and settings.
 //!
-//! The checksum also covers a hash of the build, so that a program of other sources finds no record, and records of samples carry
-//! the settings of the sensor that took them.
-//!
-//! There is one slot more than there are records. A record is always written into a slot that is not the newest version of any
-//! record, so that a reset during the write loses that version and not the one before.
+//! With one spare slot, a write never overwrites a newest version.
 
 use crate::channels::CHANNELS;
 use crate::epoch::FinishedEpoch;
@@ -12,22 +8,20 @@ use crate::epoch_record::{EPOCH_WORDS, SUMS_WORDS, epoch_from_words, epoch_words
 use crate::slot::{Slot, halves};
 use crate::statistics::ChannelSums;
 
-/// Words of a record before the payload: kind, version, generation, the sensor's settings.
+/// Kind, version, generation, sensor settings.
 const HEAD: usize = 4;
-/// Hash of what this program was built from.
 const BUILD: u32 = match u32::from_str_radix(env!("FIRMWARE_BUILD"), 10) {
     Ok(hash) => hash,
     Err(_) => panic!("the build script gives a number"),
 };
-/// Kinds of records: the settings, then the channels.
 const KINDS: usize = 1 + CHANNELS.len();
 const SETTINGS: usize = 0;
-/// Crashes within this time, in s, after which the device starts without anything that was stored.
+/// s; then nothing stored is used.
 const CRASHES_S: u32 = 600;
-/// Crashes after which a finished epoch is not learned from again.
+/// Then the finished epoch is dropped.
 const CRASHES_OF_EPOCH: u32 = 2;
 
-/// The memory, to be placed in a linker section that is not initialised at the start.
+/// For a linker section that is not initialised.
 pub struct RetainedMemory {
     records: [Slot<{ HEAD + SUMS_WORDS }>; KINDS + 1],
     epoch: Slot<EPOCH_WORDS>,
@@ -56,25 +50,24 @@ pub struct RetainedSettings {
     pub interval_s: u32,
     /// Starts since power-on.
     pub starts: u32,
-    /// Age of the running epoch in µs at the last checkpoint.
+    /// At the last checkpoint, µs.
     pub epoch_age_us: u64,
-    /// PROD_ID of a part that is to be taken for an ADIS16405 although it answers this; 0 for none.
+    /// Accepted for an ADIS16405; 0 for none.
     pub prod_id: u16,
 }
 
 impl RetainedSettings {
-    /// The settings of the sensor: samples of others are of another scale, rate or filter.
+    /// Scale, rate and filter of samples.
     fn of_sensor(&self) -> u32 {
         u32::from(self.smpl_prd) << 16 | u32::from(self.sens_avg)
     }
 }
 
-/// The latest crashes: each a panic, a fault, or a hang that the watchdog has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Crashes {
-    /// Time since the last one and since the one before, in s.
+    /// Last and second last, s.
     ages_s: [u32; 2],
-    /// Crashes while the finished epoch was not learned from.
+    /// Before the finished epoch was learned from.
     of_epoch: u32,
 }
 
@@ -85,12 +78,9 @@ impl Crashes {
 /// The records in a [`RetainedMemory`].
 pub struct RetainedRam {
     memory: &'static RetainedMemory,
-    /// Hash that all checksums cover.
     build: u32,
-    /// Channel records of another generation are out of date.
     generation: u32,
     version: u32,
-    /// Slot of the newest version of each record, and that version.
     newest: [Option<(usize, u32)>; KINDS],
     settings: Option<RetainedSettings>,
     crashes: Crashes,
@@ -103,7 +93,6 @@ impl RetainedRam {
         Self::open_by(BUILD, memory)
     }
 
-    /// As [`open`](Self::open), as a program with this hash does.
     fn open_by(build: u32, memory: &'static RetainedMemory) -> Self {
         let crashes = memory
             .crashes
@@ -146,22 +135,20 @@ impl RetainedRam {
         self.clear_statistics();
     }
 
-    /// Erases settings, statistics and the finished epoch.
     pub(crate) fn clear_statistics(&mut self) {
         self.clear_epoch();
         self.memory.records.iter().for_each(Slot::clear);
         *self = Self::open_by(self.build, self.memory);
     }
 
-    /// Notes that the program before has crashed. Returns whether that was the third crash within ten minutes: what is stored may be the
-    /// cause, and is not to be used.
+    /// Notes a crash; true for the third within ten minutes, when stored data must not be used.
     pub(crate) fn note_crash(&mut self) -> bool {
         let Crashes { ages_s: [last, before], of_epoch } = self.crashes;
         self.write_crashes(Crashes { ages_s: [0, last], of_epoch: of_epoch.saturating_add(1) });
         before <= CRASHES_S
     }
 
-    /// Notes that the program has run for some time, in s.
+    /// Run time, s.
     pub(crate) fn note_time(&mut self, seconds: u32) {
         let ages_s = self.crashes.ages_s.map(|age| age.saturating_add(seconds));
         if ages_s != self.crashes.ages_s {
@@ -181,8 +168,7 @@ impl RetainedRam {
         self.settings
     }
 
-    /// The sums of [`CHANNELS`]`[index]`; `None` without a record of the present generation and the present settings of the
-    /// sensor.
+    /// Sums of [`CHANNELS`]`[index]`; `None` unless of the present generation and settings.
     #[must_use]
     pub fn restore(&self, index: usize) -> Option<ChannelSums> {
         let (slot, _) = self.newest.get(1 + index).copied()??;
@@ -191,31 +177,30 @@ impl RetainedRam {
         (generation == self.generation && of_sensor == self.of_sensor()).then(|| sums_from_words(&mut words))
     }
 
-    /// Writes a finished epoch in the place of the one before. A reset during the write loses it.
+    /// Replaces the finished epoch; a reset during the write loses it.
     pub fn write_epoch(&mut self, epoch: &FinishedEpoch) {
         self.write_crashes(Crashes { of_epoch: 0, ..self.crashes });
         self.memory.epoch.write(self.epoch_key(), epoch_words(epoch));
     }
 
-    /// Overwrites `epoch` with the finished epoch. Returns false, and leaves `epoch` alone, if there is none, or if the program has crashed
-    /// twice before it was learned from.
+    /// Restores into `epoch`; false without one, or after two crashes before it was learned from.
     #[must_use]
     pub fn restore_epoch(&self, epoch: &mut FinishedEpoch) -> bool {
         let words = self.memory.epoch.read(self.epoch_key()).filter(|_| self.crashes.of_epoch < CRASHES_OF_EPOCH);
         words.map(|mut words| epoch_from_words(epoch, &mut words)).is_some()
     }
 
-    /// Erases the finished epoch: nothing is left to be learned from it.
+    /// After learning.
     pub fn clear_epoch(&mut self) {
         self.memory.epoch.clear();
     }
 
-    /// Samples of a sensor with other settings are not of the same epoch.
+    /// With the sensor's settings.
     fn epoch_key(&self) -> u32 {
         self.build ^ self.of_sensor()
     }
 
-    /// Writes the settings; with `new_generation` the channel records written before are out of date.
+    /// `new_generation` outdates the channel records.
     pub fn write_settings(&mut self, settings: RetainedSettings, new_generation: bool) {
         self.generation = self.generation.wrapping_add(u32::from(new_generation));
         self.settings = Some(settings);
@@ -239,7 +224,7 @@ impl RetainedRam {
     }
 
     fn write(&mut self, kind: usize, words: impl IntoIterator<Item = u32>) {
-        // There is one slot more than kinds, so at least one holds no newest version.
+        // One slot is always spare.
         let is_newest = |index| self.newest.iter().flatten().any(|(newest, _)| *newest == index);
         let Some(free) = (0..=KINDS).find(|&index| !is_newest(index)) else { return };
         self.version = self.version.wrapping_add(1);
@@ -298,7 +283,7 @@ mod tests {
         }
     }
 
-    /// Sums of up to 96 bits are stored exactly; larger ones, which no counts reach, saturate.
+    /// Up to 96 bits; larger ones saturate.
     #[test]
     fn wide_sums_are_stored_exactly() {
         let memory = memory();
@@ -327,7 +312,6 @@ mod tests {
         assert_eq!(RetainedRam::open(memory).settings(), None);
     }
 
-    /// Samples of other settings of the sensor are not continued, even if the records are of one generation.
     #[test]
     fn statistics_of_another_range_or_rate_are_not_restored() {
         for other in [
@@ -349,7 +333,6 @@ mod tests {
         }
     }
 
-    /// An image of other sources may give the words another meaning.
     #[test]
     fn another_build_finds_no_record() {
         let memory = memory();
@@ -364,7 +347,6 @@ mod tests {
         assert_ne!(BUILD, 0);
     }
 
-    /// A bit flips in any word of the slot written last: the version before is found.
     #[test]
     fn damage_loses_one_version_only() {
         for word in 0..=HEAD + SUMS_WORDS {
@@ -379,7 +361,6 @@ mod tests {
         }
     }
 
-    /// The reset comes after any number of words of the new version.
     #[test]
     fn a_reset_during_a_write_loses_that_version_only() {
         let memory = memory();
@@ -395,7 +376,6 @@ mod tests {
         }
     }
 
-    /// A second crash before a finished epoch was learned from: it may be the cause.
     #[test]
     fn an_epoch_is_not_learned_from_after_two_crashes() {
         let memory = memory();
@@ -412,7 +392,6 @@ mod tests {
         assert!(restored(), "the next epoch");
     }
 
-    /// Three crashes within ten minutes, and three in eleven.
     #[test]
     fn the_third_crash_within_ten_minutes_is_told() {
         let memory = memory();

@@ -1,4 +1,4 @@
-//! The path of every sample: data-ready monitor, burst validation, statistics; and the counters of samples not used.
+//! The path of samples: data-ready monitor, validation, statistics, counters.
 
 use crate::acquisition::{DataReadyMonitor, DrdyEdge, TimedBurst};
 use crate::channel_validity::{is_frame_sound, is_marked, refused_channels};
@@ -11,81 +11,60 @@ use adis16405_driver::{Burst, BurstValidator, ChannelMask, Config, Faults};
 use heapless::spsc;
 use link::{Health, MessageRef};
 
-/// Unusable bursts in a row from which on the sensor is in trouble. Every usable burst makes up for half an unusable one.
+/// Unusable bursts in trouble; a usable one makes up for half.
 const UNUSABLE_BURSTS: u32 = 16;
 
-/// Bursts in a row with equal inertial words, in lengths of the sensor's filter, from which on it is frozen. Neighbours behind
-/// the filter are often equal by chance, but not for so long.
+/// Equal bursts of a frozen sensor, in filter lengths; chance makes fewer.
 const FROZEN_FILTER_LENGTHS: u32 = 4;
-/// The same in bursts, where that is more.
 const FROZEN_BURSTS: u32 = 16;
 
-/// Bursts used since the sensor was probed from which on it is known to work; behind a long filter twice as many as a frozen
-/// sensor delivers before it is found out.
+/// Used bursts of a working sensor; twice a frozen one's behind a long filter.
 const SETTLED_BURSTS: u32 = 100;
 
-/// Time for which the analogue part of a sensor's channel remembers what it saw, in µs. Its two poles at 330 Hz (data sheet
-/// Rev. B, Table 1, taken as two, the slower reading) have a time constant of 0.48 ms; a step by the whole range of ±6,000 counts
-/// has decayed to half a count after x = 12.7 of them, (1 + x)·exp(−x) = 0.5 / 12,000.
+/// Memory of the analogue channel, µs: 12.7 times the 0.48 ms of two poles at 330 Hz (data sheet Rev. B, Table 1).
 const ANALOGUE_SETTLING_US: u64 = 6_200;
 
-/// Samples after a probe that hold something of what was before: of a self-test, which displaces the outputs (data sheet
-/// Rev. B, page 15), of the time before a reset, or of another range or filter. The filter of 2N + 1 taps mixes 2N samples of
-/// before with its newest one (Fig. 15; N = 2^M), and the channel before it settles meanwhile.
+/// Samples after a probe that hold earlier ones: 2N of the filter's 2N + 1 taps (Fig. 15; N = 2^M).
 fn settling_samples(config: Config) -> u32 {
     let analogue = (ANALOGUE_SETTLING_US as f64 * 1e-6 * config.sample_period().hz()) as u32 + 1;
     (2 << config.filter_taps_log2()) + analogue
 }
 
-/// Why the sensor must be probed before its samples are used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(all(target_os = "none", feature = "microcontroller"), derive(defmt::Format))]
 pub(crate) enum SensorTrouble {
-    /// No data-ready edge has come for several periods.
+    /// For several periods.
     NoEdges,
-    /// There was such a silence, or the edges come at another rate.
     EdgeRate,
-    /// Burst after burst was unusable, the latest one for this cause.
     Unusable(&'static str),
 }
 
-/// The estimators of all channels. A sample that never arrived is missing in all of them, one that was refused in a channel
-/// in that channel alone.
-///
-/// The [`Statistics`] are borrowed, so that a board can place them in memory that is zero at the start.
+/// The estimators of all channels; lost samples are missing in all, refused ones in theirs.
 pub struct Estimators<'m> {
     config: Config,
     statistics: &'m mut Statistics,
-    /// Losses of the epoch that was finished last.
     finished_losses: SampleLosses,
     validator: BurstValidator,
     gate: GrossErrorGate,
     monitor: DataReadyMonitor,
-    /// Counters of sampling and estimating; those of the validator are added when they are read.
+    /// The validator's are added on reading.
     health: Health,
-    /// Rises by 2 with every unusable burst, falls by 1 with every usable one.
+    /// +2 per unusable, −1 per usable burst.
     unusable: u32,
-    /// Cause of the latest unusable burst.
     unusable_cause: &'static str,
-    /// Bursts in a row whose inertial words equal those of the burst before.
     repeated: u32,
-    /// Bursts still to come that the sensor's filter mixes with what was before the probe.
+    /// Bursts until the filter has settled.
     settling: u32,
-    /// Bursts still to come from which the gate learns the noise before any is used.
     learning: u32,
-    /// Bursts used since the sensor was probed.
     used_since_probe: u32,
-    /// The latest burst that a sensor can have sent had its error flag set.
     error_flag: bool,
-    /// Bursts taken from the queue; wraps.
     processed: u32,
-    /// Number of the next sample since sampling began at this rate.
     next_sample: u64,
     raw_stream: RawStream,
 }
 
 impl<'m> Estimators<'m> {
-    /// Estimators for a sensor with this configuration; they continue from `statistics`.
+    /// Continue from `statistics`.
     pub fn new(statistics: &'m mut Statistics, config: Config) -> Self {
         Self {
             config,
@@ -108,8 +87,7 @@ impl<'m> Estimators<'m> {
         }
     }
 
-    /// Processes the burst of one data-ready edge; `waiting` is the number of further bursts in the queue. Returns true if a
-    /// message of the raw stream is full now.
+    /// Processes the burst of one edge, `waiting` more being queued; true if a raw message is full.
     pub fn process(&mut self, timed: TimedBurst, waiting: usize) -> bool {
         self.processed = self.processed.wrapping_add(1);
         let health = &mut self.health;
@@ -129,18 +107,18 @@ impl<'m> Estimators<'m> {
         full
     }
 
-    /// Whether the sensor must be probed before its samples are used again.
+    /// True if the sensor must be probed before its samples are used again.
     #[must_use]
     pub fn is_suspect(&self) -> bool {
         self.monitor.is_suspect() || self.unusable >= 2 * UNUSABLE_BURSTS
     }
 
-    /// Whether what samples are divided by is as no damage to the memory leaves it.
+    /// False for damaged memory.
     pub(crate) fn is_intact(&self) -> bool {
         self.monitor.has_period()
     }
 
-    /// Why the sensor must be probed at `now_us`; `None` if it need not be.
+    /// Reason for a probe at `now_us`.
     pub(crate) fn trouble(&self, now_us: u64) -> Option<SensorTrouble> {
         if self.monitor.is_silent_at(now_us) {
             Some(SensorTrouble::NoEdges)
@@ -151,27 +129,22 @@ impl<'m> Estimators<'m> {
         }
     }
 
-    /// Time of the latest data-ready edge, µs; `None` before the first.
     pub(crate) fn last_edge_us(&self) -> Option<u64> {
         self.monitor.last_edge_us()
     }
 
-    /// Whether the sensor has its error flag set.
     pub(crate) fn has_error_flag(&self) -> bool {
         self.error_flag
     }
 
-    /// DIAG_STAT was read, which clears the error flag until its cause comes back.
     pub(crate) fn clear_error_flag(&mut self) {
         self.error_flag = false;
     }
 
-    /// Bursts used since the sensor was probed.
     pub(crate) fn used_since_probe(&self) -> u32 {
         self.used_since_probe
     }
 
-    /// Whether so many bursts were used since the sensor was probed that it is known to work.
     pub(crate) fn is_settled(&self) -> bool {
         self.used_since_probe >= SETTLED_BURSTS.max(2 * self.frozen_after())
     }
@@ -182,10 +155,9 @@ impl<'m> Estimators<'m> {
         self.processed
     }
 
-    /// Clears the suspicion, so that samples are used again as soon as the sensor's filter has settled: the sensor was probed
-    /// and configured at `now_us`.
-    pub fn mark_probed(&mut self, now_us: u64) {
-        self.monitor.mark_probed(now_us);
+    /// After a probe at `now_us`: samples are used once the filter has settled.
+    pub fn accept_samples_after_settling(&mut self, now_us: u64) {
+        self.monitor.restart_at(now_us);
         self.unusable = 0;
         self.settling = settling_samples(self.config);
         self.learning = if self.gate.is_learning() { FIRST_BLOCK } else { 0 };
@@ -193,14 +165,12 @@ impl<'m> Estimators<'m> {
         self.error_flag = false;
     }
 
-    /// Sampling goes on at `now_us` after a pause of the device's own: what the sensor gave meanwhile is lost, and it is not
-    /// suspect.
-    pub(crate) fn mark_resumed(&mut self, now_us: u64) {
-        self.monitor.mark_probed(now_us);
+    /// After the device's own pause: samples are lost, without suspicion.
+    pub(crate) fn restart_rate_check(&mut self, now_us: u64) {
+        self.monitor.restart_at(now_us);
     }
 
-    /// Starts again without samples, for a sensor that has the configuration `config` from now on. The raw stream stays on
-    /// or off.
+    /// Starts again for `config`; the raw stream stays as it is.
     pub fn restart(&mut self, config: Config) {
         self.reset();
         self.config = config;
@@ -212,14 +182,14 @@ impl<'m> Estimators<'m> {
         }
     }
 
-    /// Passes the statistics of the epoch to `take` and starts the next epoch with the next sample; the counters go on.
+    /// The next sample begins an epoch; counters go on.
     pub(crate) fn end_epoch(&mut self, take: impl FnOnce(&Statistics)) {
         take(self.statistics);
         self.finished_losses = self.statistics.losses;
         self.statistics.reset();
     }
 
-    /// Resets statistics and counters. The data-ready monitor and the sample numbers go on.
+    /// Resets statistics and counters, not the data-ready monitor and sample numbers.
     pub fn reset(&mut self) {
         self.statistics.reset();
         self.finished_losses = SampleLosses::NONE;
@@ -227,12 +197,11 @@ impl<'m> Estimators<'m> {
         self.health = Health::default();
     }
 
-    /// Starts or stops the raw stream. Bursts that were not sent yet are dropped.
+    /// Starts or stops the raw stream; unsent bursts are dropped.
     pub fn set_raw_stream(&mut self, on: bool) {
         self.raw_stream.set(on, self.config.sens_avg());
     }
 
-    /// Whether the raw stream is on.
     pub(crate) fn has_raw_stream(&self) -> bool {
         self.raw_stream.is_on()
     }
@@ -243,12 +212,11 @@ impl<'m> Estimators<'m> {
         self.statistics.estimators.get(index)
     }
 
-    /// Has the estimator of [`CHANNELS`]`[index]` continue from sums of before a restart.
+    /// Continues from sums before a restart.
     pub fn restore(&mut self, index: usize, sums: &ChannelSums) {
         self.statistics.restore(index, sums);
     }
 
-    /// Samples lost and refused in the running epoch, or in the finished one.
     pub(crate) fn losses(&self, finished: bool) -> SampleLosses {
         if finished { self.finished_losses } else { self.statistics.losses }
     }
@@ -265,7 +233,7 @@ impl<'m> Estimators<'m> {
         self.monitor.measured_hz()
     }
 
-    /// What turns counts and numbers of samples into units.
+    /// Units of counts and samples.
     #[must_use]
     pub fn scale(&self) -> ReportScale {
         ReportScale::new(self.config, self.measured_hz())
@@ -293,7 +261,6 @@ impl<'m> Estimators<'m> {
         }
     }
 
-    /// Validates a burst and adds its channels to the statistics, except those that are refused.
     fn add_burst(&mut self, burst: Option<&Burst>) {
         let Some(burst) = burst else {
             add(&mut self.health.bus_errors, 1);
@@ -333,7 +300,7 @@ impl<'m> Estimators<'m> {
         add(&mut health.marked, u32::from(is_marked(faults)));
     }
 
-    /// Takes a burst that is not used: the sensor's filter settles, or the gate learns the noise. Not inlined: they are few.
+    /// An unused burst; rare, so not inlined.
     #[inline(never)]
     fn settle(&mut self, burst: &Burst) {
         let counts = estimated_counts(burst);
@@ -345,13 +312,13 @@ impl<'m> Estimators<'m> {
             self.gate.find(&counts, ChannelSet::EMPTY);
         }
         add(&mut self.health.settling, 1);
-        // Before the first sample there is no gap.
+        // No gap before the first sample.
         if self.statistics.has_samples() {
             self.statistics.push([0; CHANNELS.len()], ChannelSet::ALL);
         }
     }
 
-    /// Repetitions from which on the sensor is frozen. The filter is two averages of 2^M samples.
+    /// Two averages of 2^M samples.
     fn frozen_after(&self) -> u32 {
         (FROZEN_FILTER_LENGTHS << (self.config.filter_taps_log2() + 1)).max(FROZEN_BURSTS)
     }
@@ -371,9 +338,7 @@ fn add(counter: &mut u32, more: u32) {
     *counter = counter.saturating_add(more);
 }
 
-/// Processes all queued bursts and sends full messages of the raw stream.
-///
-/// To be called at a priority below sampling and above the main loop.
+/// Processes queued bursts and sends full raw messages, at a priority between sampling and the main loop.
 pub fn estimate(
     estimators: &mut Estimators<'_>,
     transmit_queue: &mut TransmitQueue<'_>,

@@ -1,4 +1,4 @@
-//! What turns counts and numbers of samples into units: the size of a count, and the time between two samples.
+//! Units of counts and sample numbers.
 
 use adis16405_driver::{Channel, Config};
 
@@ -10,8 +10,8 @@ pub struct ReportScale {
 }
 
 impl ReportScale {
-    /// With the measured rate in Hz, or the programmed one where none was measured. The sensor's clock is within 3 % of its
-    /// nominal rate (ADIS16400/ADIS16405 data sheet Rev. B, Table 1), and σ(τ) scales N by the root of that error.
+    /// With the measured rate in Hz, else the programmed one. Clocks are within 3 % (ADIS16400/ADIS16405 data sheet
+    /// Rev. B, Table 1).
     #[must_use]
     pub fn new(config: Config, measured_hz: Option<f64>) -> Self {
         Self { config, rate_hz: measured_hz.unwrap_or(config.sample_period().hz()) }

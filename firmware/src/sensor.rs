@@ -1,4 +1,4 @@
-//! The sensor's bus apart from sampling: serial clock, probing (identify, test, configure), auto-null.
+//! The sensor's bus apart from sampling: clock, probe, auto-null.
 
 use adis16405_driver::{Adis16405, Channel, Config, Diagnosis, DioSignal, Error, GyroBias, Product, Register, Timing};
 use core::fmt;
@@ -10,9 +10,8 @@ pub const BURST_LIMIT_HZ: u32 = 1_000_000;
 /// Largest serial clock in the sensor's low-power mode in Hz (data sheet Rev. B, page 10).
 pub(crate) const LOW_POWER_LIMIT_HZ: u32 = 300_000;
 
-/// The field of an STM32's CR1 that selects the largest serial clock of at most `limit_hz`, or the slowest one if none is slow enough,
-/// and that clock in Hz, rounded up: a divider by `2^(field + 1)` makes it of `bus_hz`. Some HALs round the requested clock up, above the
-/// sensor's limit.
+/// CR1's field for the largest clock of at most `limit_hz`, or the slowest one, and that clock in Hz, rounded up:
+/// `bus_hz` over `2^(field + 1)`. Some HALs round the requested clock up, above the sensor's limit.
 #[must_use]
 pub fn prescaled_clock(bus_hz: u32, limit_hz: u32) -> (u8, u32) {
     let clock_hz = |field: u8| bus_hz.div_ceil(2 << field);
@@ -31,8 +30,7 @@ pub struct ProbeScope {
     pub self_test: bool,
 }
 
-/// The sensor as it is addressed while its power mode may be either: with the stall of low-power mode, at a serial clock of
-/// `sck_hz`.
+/// For either power mode: low-power stall at `sck_hz`.
 pub(crate) fn addressed<SPI: SpiDevice<u8>, D: DelayNs>(
     (bus, delay): (SPI, D),
     config: Config,
@@ -50,8 +48,7 @@ pub struct SensorIdentity {
     pub test: Option<TestOutcome>,
 }
 
-/// How a self-test has ended. None of the outcomes says that samples are of no use: a test fails under motion too (data sheet
-/// Rev. B, page 15: zero motion gives results that are more reliable).
+/// End of a self-test; none makes samples unusable, as motion fails it too (data sheet Rev. B, page 15).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TestOutcome {
     /// It has ended with these flags, those of failed sensors among them.
@@ -63,7 +60,7 @@ pub enum TestOutcome {
 }
 
 impl TestOutcome {
-    /// Whether it has run and no sensor has failed.
+    /// True if it has run and no sensor has failed.
     #[must_use]
     pub fn passed(self) -> bool {
         matches!(self, Self::Ended(diagnosis) if !diagnosis.intersects(Diagnosis::SELF_TEST_FAILURES))
@@ -108,8 +105,8 @@ impl fmt::Display for TestOutcome {
     }
 }
 
-/// Identifies the sensor, by `prod_id` too unless that is 0, runs its self-test, and configures it: range, filter, sample period, and data ready on DIO1,
-/// active high. A negative bias of gyro x is moved from the sensor to the host.
+/// Identifies the sensor (also by `prod_id`, unless 0), tests and configures it: range, filter, period, data ready on
+/// DIO1, active high. A negative bias of gyro x moves to the host.
 ///
 /// # Errors
 /// The bus failed, another product answered, or a register did not take its value. A self-test that fails is none.
@@ -120,13 +117,13 @@ pub fn probe<SPI: SpiDevice<u8>>(
     scope: ProbeScope,
     prod_id: u16,
 ) -> Result<SensorIdentity, Error<SPI::Error>> {
-    // The sensor may be in low-power mode until it is configured.
+    // Perhaps in low-power mode.
     let mut sensor = addressed(bus, config, sck_hz);
     if prod_id != 0 {
         sensor = sensor.with_prod_id(prod_id);
     }
     if scope.pulse {
-        // Ignore errors: `init` below checks that the sensor answers.
+        // `init` checks that the sensor answers.
         let _ = sensor.wake();
     }
     let product = if scope.reset { sensor.software_reset()? } else { sensor.init()? };
@@ -144,8 +141,7 @@ fn self_test<SPI: SpiDevice<u8>>(sensor: &mut Adis16405<SPI, impl DelayNs>) -> R
     }
 }
 
-/// Reads DIAG_STAT, which clears it. `None` if the sensor does not answer: the bus failed, or all bits are set, of which one
-/// is not defined.
+/// Clears DIAG_STAT; `None` if the bus failed or all bits are set, one of which is undefined.
 pub(crate) fn read_diagnosis<SPI: SpiDevice<u8>>(
     (bus, delay): (SPI, impl DelayNs),
     config: Config,
@@ -154,8 +150,8 @@ pub(crate) fn read_diagnosis<SPI: SpiDevice<u8>>(
     (answer != u16::MAX).then(|| Diagnosis::from_bits_truncate(answer))
 }
 
-/// Has the sensor store its present gyro output as the bias; it must be still. Returns the correction: a negative one of x is not
-/// applied.
+/// Has the sensor store its present gyro output as the bias; it must be still. Returns the correction: a negative one
+/// of x is not applied.
 ///
 /// # Errors
 /// The bus failed, or the sensor does not answer afterwards.
@@ -171,7 +167,7 @@ pub fn auto_null<SPI: SpiDevice<u8>>(
 mod tests {
     use super::*;
 
-    /// The fields are those of the reference manual (RM0090 section 28.5.1): 0b000 is a division by 2, 0b111 by 256.
+    /// 0b000 divides by 2, 0b111 by 256 (RM0090 section 28.5.1).
     #[test]
     fn the_clock_does_not_exceed_the_limit() {
         assert_eq!(prescaled_clock(84_000_000, 1_000_000), (0b110, 656_250));

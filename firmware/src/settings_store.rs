@@ -1,8 +1,4 @@
-//! A record in flash memory that survives the loss of power at any time: after a write that was cut short the record before it is
-//! found.
-//!
-//! The pages of the flash are a ring (crate `sequential-storage`): a record is appended, with its checksum, and only then replaces the one
-//! before; a page is erased when the ring comes round to it and nothing in it is needed.
+//! A record in flash that survives a loss of power at any time: appended with a checksum before the old one goes.
 
 use core::future::Future;
 use core::ops::Range;
@@ -12,16 +8,13 @@ use embedded_storage_async::nor_flash::NorFlash;
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage, SerializationError, Value};
 
-/// The first byte of an item that is a record.
 const KEY: u8 = 1;
 /// Most bytes of a record.
 pub const MAX_RECORD: usize = 3072;
-/// The record with its key, aligned to the words of any flash.
 #[repr(align(8))]
 struct RecordBuffer([u8; MAX_RECORD + 8]);
 
-/// An item of the ring. It has its key itself: of an item of no bytes, which damage can leave, `sequential-storage` takes a key of one
-/// byte from the item before, and panics.
+/// An item with its own key: for one of no bytes `sequential-storage` panics.
 struct Item<'a>(&'a [u8]);
 
 impl<'a> Value<'a> for Item<'a> {
@@ -37,7 +30,7 @@ impl<'a> Value<'a> for Item<'a> {
     }
 }
 
-/// Why a record was not written. The one before is still there.
+/// Failure of a write; the record before is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StoreError {
     /// The board has no memory for settings.
@@ -64,7 +57,7 @@ pub struct SettingsStore<F: NorFlash> {
 }
 
 impl<F: NorFlash> SettingsStore<F> {
-    /// A store in `range`, two pages of `flash` at least. `None` if the range is none of whole pages.
+    /// A store in `range`, at least two whole pages; else `None`.
     pub fn new(flash: F, range: Range<u32>) -> Option<Self> {
         let config = MapConfig::try_new(range).ok()?;
         Some(Self { map: MapStorage::new(flash, config, Cache::new_uncached()) })
@@ -78,8 +71,7 @@ impl<F: NorFlash> SettingsStore<F> {
         Some(found.len())
     }
 
-    /// Replaces the record, or erases it if `record` is empty. Memory whose pages hold something else than a ring is erased first.
-    /// What was written is read back.
+    /// Replaces the record, or erases it if `record` is empty; reads it back. Foreign pages are erased first.
     ///
     /// # Errors
     /// The record is too long, or the flash does not take it.
@@ -94,7 +86,7 @@ impl<F: NorFlash> SettingsStore<F> {
         for was_erased in [false, true] {
             let written = complete(self.map.store_item(&mut buffer.0, &(), &Item(record)));
             let found = self.find(&mut buffer);
-            // Flash that takes nothing leaves the record before, or stays blank.
+            // Refusing flash keeps the record, or stays blank.
             let erasing_helps = match written {
                 Some(Ok(())) if found == Some(record) => return Ok(()),
                 Some(Ok(())) => found.is_none() && !self.is_blank(&mut buffer),
@@ -113,7 +105,7 @@ impl<F: NorFlash> SettingsStore<F> {
         complete(self.map.fetch_item::<Item<'b>>(&mut buffer.0, &()))?.ok()?.map(|item| item.0)
     }
 
-    /// Whether all pages are as an erasure leaves them, which need not be erased again: that takes seconds, in which no sample is read.
+    /// Erasing blank pages would take seconds without samples.
     fn is_blank(&mut self, buffer: &mut RecordBuffer) -> bool {
         const CHUNK: usize = 256;
         let (range, chunk) = (self.map.flash_range(), &mut buffer.0[..CHUNK]);
@@ -133,7 +125,7 @@ impl<F: NorFlash> SettingsStore<F> {
     }
 }
 
-/// The result of a future that does not wait, as those of a flash memory that blocks; `None` if it does.
+/// `None` if the future waits.
 fn complete<T>(future: impl Future<Output = T>) -> Option<T> {
     match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
         Poll::Ready(result) => Some(result),

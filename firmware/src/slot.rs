@@ -1,27 +1,23 @@
-//! A record in memory that a warm reset does not clear: words with a checksum, which also covers a key.
-//!
-//! The words are atomic, so that any content after power-on is a valid value.
+//! Words with a checksum and key that a warm reset keeps; atomic, so any content is valid.
 
 use core::iter::repeat;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
-/// Memory for one record of `WORDS` words.
 pub(crate) struct Slot<const WORDS: usize> {
-    /// Of the record; checked first, as the checksum of memory without a record takes milliseconds on a Cortex-M0+.
+    /// Checked first: checksums take milliseconds on a Cortex-M0+.
     key: AtomicU32,
     words: [AtomicU32; WORDS],
     checksum: AtomicU32,
 }
 
 impl<const WORDS: usize> Slot<WORDS> {
-    /// A slot without a record.
     pub(crate) const fn blank() -> Self {
         Self { key: AtomicU32::new(0), words: [const { AtomicU32::new(0) }; WORDS], checksum: AtomicU32::new(0) }
     }
 
-    /// Replaces the record. Words that are missing are 0, which no key is.
+    /// Missing words are 0, which no key is.
     pub(crate) fn write(&self, key: u32, words: impl IntoIterator<Item = u32>) {
         self.key.store(key, Relaxed);
         for (cell, word) in self.words.iter().zip(words.into_iter().chain(repeat(0))) {
@@ -30,23 +26,20 @@ impl<const WORDS: usize> Slot<WORDS> {
         self.checksum.store(self.checksum_with(key), Relaxed);
     }
 
-    /// The words of a record that was written with this key and is intact.
     pub(crate) fn read(&self, key: u32) -> Option<Words<impl Iterator<Item = u32>>> {
         let is_intact = self.key.load(Relaxed) == key && self.checksum.load(Relaxed) == self.checksum_with(key);
         is_intact.then(|| self.words())
     }
 
-    /// The words of a record that is known to be intact.
     pub(crate) fn words(&self) -> Words<impl Iterator<Item = u32>> {
         Words(self.words.iter().map(|cell| cell.load(Relaxed)))
     }
 
-    /// Erases the record.
     pub(crate) fn clear(&self) {
         self.key.store(0, Relaxed);
     }
 
-    /// CRC-32 of the key and the words, each with its least significant byte first.
+    /// CRC-32 of key and words, little endian.
     fn checksum_with(&self, key: u32) -> u32 {
         let mut digest = CRC.digest();
         digest.update(&key.to_le_bytes());
@@ -54,20 +47,18 @@ impl<const WORDS: usize> Slot<WORDS> {
         digest.finalize()
     }
 
-    /// Flips a bit of a word, or of the checksum behind the last word.
     #[cfg(test)]
     pub(crate) fn flip(&self, word: usize, bit: u32) {
         self.words.get(word).unwrap_or(&self.checksum).fetch_xor(1 << bit, Relaxed);
     }
 
-    /// Overwrites the first words, as a write that a reset cuts short.
     #[cfg(test)]
     pub(crate) fn begin_to_write(&self, words: usize) {
         self.words[..words].iter().for_each(|cell| cell.store(!cell.load(Relaxed), Relaxed));
     }
 }
 
-/// The words of a record in order; missing ones are 0.
+/// Missing ones are 0.
 pub(crate) struct Words<I>(pub(crate) I);
 
 impl<I: Iterator<Item = u32>> Words<I> {
@@ -79,7 +70,6 @@ impl<I: Iterator<Item = u32>> Words<I> {
         u64::from(self.word()) | u64::from(self.word()) << 32
     }
 
-    /// A sum of 96 bits.
     pub(crate) fn sum(&mut self) -> u128 {
         u128::from(self.wide()) | u128::from(self.word()) << 64
     }
@@ -89,7 +79,6 @@ impl<I: Iterator<Item = u32>> Words<I> {
     }
 }
 
-/// The words of a number of 64 bits.
 pub(crate) fn halves(wide: u64) -> [u32; 2] {
     [wide as u32, (wide >> 32) as u32]
 }

@@ -1,5 +1,4 @@
-//! Statistics of the running epoch: exact sums for every channel and every pair of channels, and the curve and the baseline
-//! model that are made of one channel's sums.
+//! The running epoch: exact sums of channels and pairs, curve and baseline model.
 
 pub use crate::channels::{CHANNELS, ChannelEstimator, OCTAVES, OVERLAP};
 pub(crate) use crate::channels::{GYROS, INERTIAL};
@@ -21,17 +20,15 @@ pub struct Statistics {
     pub(crate) losses: SampleLosses,
 }
 
-/// Samples missing in [`Statistics`], since these began or, after a restart of the device, since that.
+/// Since the statistics or the device began.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct SampleLosses {
-    /// Samples that never arrived, in all channels.
     pub(crate) lost: u64,
-    /// Samples that arrived and were refused in a channel, for each of [`CHANNELS`].
+    /// Per channel of [`CHANNELS`].
     pub(crate) refused: [u64; CHANNELS.len()],
 }
 
 impl SampleLosses {
-    /// No losses.
     pub(crate) const NONE: Self = Self { lost: 0, refused: [0; CHANNELS.len()] };
 }
 
@@ -46,7 +43,7 @@ impl Statistics {
         }
     }
 
-    /// Takes one sample of every channel, except of those that are `refused`: in these it is missing.
+    /// Except in `refused` channels.
     pub(crate) fn push(&mut self, counts: [i32; CHANNELS.len()], refused: ChannelSet) {
         if refused.is_empty() {
             for (estimator, count) in self.estimators.iter_mut().zip(counts) {
@@ -58,7 +55,6 @@ impl Statistics {
         self.cross_sums.add(&self.estimators, counts, refused);
     }
 
-    /// Not inlined: refused samples are rare.
     #[inline(never)]
     fn push_some(&mut self, counts: [i32; CHANNELS.len()], refused: ChannelSet) {
         let channels = self.estimators.iter_mut().zip(counts).zip(&mut self.losses.refused);
@@ -72,12 +68,10 @@ impl Statistics {
         }
     }
 
-    /// Whether a channel has taken a sample.
     pub(crate) fn has_samples(&self) -> bool {
         self.estimators.iter().any(|estimator| !estimator.is_empty())
     }
 
-    /// A number of samples of all channels never arrived.
     pub(crate) fn lose(&mut self, missing: u32) {
         self.losses.lost = self.losses.lost.saturating_add(u64::from(missing));
         for estimator in &mut self.estimators {
@@ -85,8 +79,7 @@ impl Statistics {
         }
     }
 
-    /// Has the estimator of [`CHANNELS`]`[index]` continue from sums of before a restart, which the sums over pairs do not
-    /// cover.
+    /// Sums over pairs do not cover these.
     pub(crate) fn restore(&mut self, index: usize, sums: &ChannelSums) {
         if let Some(estimator) = self.estimators.get_mut(index) {
             sums.restore(estimator);
@@ -94,7 +87,6 @@ impl Statistics {
         }
     }
 
-    /// Discards all samples.
     pub(crate) fn reset(&mut self) {
         self.estimators.iter_mut().for_each(Cascade::reset);
         self.cross_sums.reset();
@@ -108,9 +100,7 @@ impl Default for Statistics {
     }
 }
 
-/// The exact sums of one channel: a fifth of the estimator's size, and all that reports and models are made of.
-///
-/// Sums of fourth powers are left out, since the device reports nothing that depends on them.
+/// Exact sums of one channel for reports and models: a fifth of the estimator, without fourth powers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ChannelSums {
     /// Samples taken.
@@ -119,7 +109,7 @@ pub struct ChannelSums {
     pub missing: u64,
     /// For every octave the sum of the squared second differences in counts², and their number.
     pub octaves: [(u128, u64); OCTAVES],
-    /// For every octave the gaps that it bridges and the octave before does not.
+    /// Gaps by the first octave that bridges them.
     pub gaps: [Interpolation; OCTAVES],
 }
 

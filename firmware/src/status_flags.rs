@@ -1,19 +1,16 @@
-//! The sensor's status register: when it is read while sampling goes on, and how often each cause was in it.
-//!
-//! A flag of DIAG_STAT stays set, and sets the error flag of every burst, until the register is read.
+//! The sensor's status register, whose flags stay set until a read: reading while sampling, counts of causes.
 
 use adis16405_driver::Diagnosis;
 use core::fmt;
 use link::Health;
 
-/// Time between two reads. A cause that persists sets its flag again with the next sample.
+/// Between reads; a persistent cause is set again.
 const READ_US: u64 = 1_000_000;
-/// Time after which a cause that persists is logged again.
+/// Repeats the log of a persistent cause.
 const LOG_US: u64 = 600_000_000;
 
 type CounterOf = fn(&mut Health) -> &mut u32;
 
-/// The causes with their names and counters.
 const CAUSES: [(Diagnosis, &str, CounterOf); 8] = [
     (Diagnosis::SUPPLY_LOW, "supply_low", |health| &mut health.diag_supply_low),
     (Diagnosis::SUPPLY_HIGH, "supply_high", |health| &mut health.diag_supply_high),
@@ -25,11 +22,10 @@ const CAUSES: [(Diagnosis, &str, CounterOf); 8] = [
     (Diagnosis::ALARM_1.union(Diagnosis::ALARM_2), "alarm", |health| &mut health.diag_alarm),
 ];
 
-/// When DIAG_STAT was read while sampling, and what of it was logged.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StatusFlags {
     next_read_us: u64,
-    /// Flags that were logged since [`LOG_US`] before `forget_us`.
+    /// Since [`LOG_US`] before `forget_us`.
     logged: Diagnosis,
     forget_us: u64,
 }
@@ -39,13 +35,11 @@ impl StatusFlags {
         Self { next_read_us: 0, logged: Diagnosis::empty(), forget_us: 0 }
     }
 
-    /// Whether the register may be read at `now_us`.
     pub(crate) const fn is_due(&self, now_us: u64) -> bool {
         now_us >= self.next_read_us
     }
 
-    /// The register was read at `now_us`, with this content if the sensor has answered. Counts the causes, and returns them if they are
-    /// to be logged.
+    /// Content read at `now_us`, if answered; counts causes and returns those to log.
     pub(crate) fn add(
         &mut self,
         diagnosis: Option<Diagnosis>,
@@ -67,12 +61,10 @@ impl StatusFlags {
     }
 }
 
-/// Adds one to a counter.
 pub(crate) fn count(counter: &mut u32) {
     *counter = counter.saturating_add(1);
 }
 
-/// The causes in a value of DIAG_STAT, displayed as a list of names after the value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct CauseList(Diagnosis);
 
@@ -113,7 +105,7 @@ mod tests {
         }
         let low_bits = [health.diag_supply_low, health.diag_supply_high, health.diag_flash_update, health.diag_spi];
         assert_eq!((low_bits, health.diag_over_range, health.diag_flash_checksum), ([1; 4], 1, 1), "{health:?}");
-        // Bit 5 and the six sensors; two alarms. Bit 7 is not defined.
+        // Bit 5 and six sensors; two alarms; bit 7 is undefined.
         assert_eq!((health.diag_self_test, health.diag_alarm, health.diag_reads), (7, 2, 16));
     }
 

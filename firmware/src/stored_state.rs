@@ -1,4 +1,4 @@
-//! What is kept without power, as bytes: the settings that a person has made, and the models that were fitted to the last epoch.
+//! Bytes kept without power: a person's settings, the last epoch's models.
 
 use crate::channels::CHANNELS;
 use crate::epoch::Regressor;
@@ -7,23 +7,16 @@ use crate::retained::RetainedSettings;
 use crate::statistics::INERTIAL;
 use serde::{Deserialize, Serialize};
 
-/// Version of the layout; a record of another one is not read.
 const FORMAT: u8 = 1;
 
-/// The settings, in the order of their bytes.
+/// In the order of the bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct StoredSettings {
-    /// Value of SMPL_PRD: the rate.
     pub(crate) smpl_prd: u8,
-    /// Value of SENS_AVG: range and filter.
     pub(crate) sens_avg: u16,
-    /// Length of an epoch in s.
     pub(crate) epoch_s: u32,
-    /// Seconds between reports.
     pub(crate) interval_s: u32,
-    /// PROD_ID of a part that is taken for an ADIS16405.
     pub(crate) prod_id: u16,
-    /// The stream of raw bursts is on.
     pub(crate) raw_stream: bool,
 }
 
@@ -33,13 +26,12 @@ impl StoredSettings {
         Self { smpl_prd, sens_avg, epoch_s, interval_s, prod_id, raw_stream }
     }
 
-    /// These settings in the place of those of `others`.
+    /// Replaces settings of `others`.
     pub(crate) fn apply_to(self, others: RetainedSettings) -> RetainedSettings {
         let Self { smpl_prd, sens_avg, epoch_s, interval_s, prod_id, raw_stream: _ } = self;
         RetainedSettings { smpl_prd, sens_avg, epoch_s, interval_s, prod_id, ..others }
     }
 
-    /// Whether samples of `others` are of the same rate, range and filter.
     pub(crate) fn have_sensor_of(self, others: RetainedSettings) -> bool {
         (self.smpl_prd, self.sens_avg) == (others.smpl_prd, others.sens_avg)
     }
@@ -47,20 +39,20 @@ impl StoredSettings {
 
 type Models = [EpochModel; INERTIAL];
 
-/// Writes settings and models to `record` and returns the bytes that they take; `None` if there are too few.
+/// Returns the length; `None` without room.
 pub(crate) fn encode<'r>(settings: &StoredSettings, models: &Models, record: &'r mut [u8]) -> Option<&'r [u8]> {
     postcard::to_slice(&(FORMAT, settings, models), record).ok().map(|bytes| &*bytes)
 }
 
-/// The settings in a record, and its rest, which has the models; `None` if it has another format.
+/// With the rest, the models; `None` for another format.
 pub(crate) fn decode_settings(record: &[u8]) -> Option<(StoredSettings, &[u8])> {
     let (&format, rest) = record.split_first()?;
     (format == FORMAT).then(|| postcard::take_from_bytes(rest).ok())?
 }
 
-/// Overwrites `models` with those in the rest of a record. Returns false, and leaves no model, if they are none.
+/// From the rest; false, and no model, if damaged.
 pub(crate) fn decode_models(mut rest: &[u8], models: &mut Models) -> bool {
-    // One after the other: together they would take some kB of stack several times.
+    // One by one, to save stack.
     let decoded = models.iter_mut().all(|model| match decode_model(rest) {
         Some((decoded, later)) => {
             (*model, rest) = (decoded, later);
@@ -98,8 +90,8 @@ mod tests {
         raw_stream: true,
     };
 
-    /// What format 1 is, by the rules of postcard: integers of more than 8 bits in groups of 7, the lowest first; then the models of the
-    /// channels: that of the first with N, B and K, a term and a regressor, the others without any. Devices in use have it in their flash.
+    /// Format 1 by postcard: groups of 7 bits, lowest first; the first channel with N, B, K, a term and a regressor.
+    /// Devices in use have it in their flash.
     fn kept() -> Vec<u8> {
         let mut bytes = vec![1, 0x81, 0x82, 0x08, 0x90, 0x1C, 0x3C, 0x90, 0x80, 0x01, 1];
         bytes.push(1);
@@ -137,7 +129,7 @@ mod tests {
         let mut models = [const { EpochModel::EMPTY }; INERTIAL];
         let other: Vec<u8> = kept().into_iter().enumerate().map(|(at, byte)| if at == 0 { 2 } else { byte }).collect();
         assert!(decode_settings(&other).is_none() && decode_settings(&[]).is_none());
-        // The covariate of the regressor, which has to be a channel.
+        // The covariate has to be a channel.
         let mut damaged = kept()[11..].to_vec();
         damaged[1 + 24 + 2 + 8 + 1] = CHANNELS.len() as u8;
         assert!(!decode_models(&damaged, &mut models));

@@ -1,24 +1,19 @@
-//! Transmission to the host: the queues that the serial ports empty, and the packing of bursts into raw messages.
+//! Transmission: queues for the ports, and raw messages.
 
 use adis16405_driver::Burst;
 use heapless::{Vec, spsc};
 use link::{Encoder, MAX_FRAME, MAX_RAW_FRAME, MAX_TEXT, MessageRef, RawBurst, RawMessage, TextLine, wire_bytes};
 
-/// Slots of the transmit buffer, one of which stays empty: the longest message, the reserve, and a text line with its
-/// enclosing bytes.
+/// Longest message, reserve, and an enclosed text line; one slot stays empty.
 const BUFFER_SLOTS: usize = MAX_FRAME + RAW_RESERVE + MAX_TEXT + 8;
 
 /// The bytes from the application to a serial port.
 pub type TransmitBuffer = spsc::Queue<u8, BUFFER_SLOTS>;
 
-/// Room in bytes that reports leave for the raw stream: two raw messages.
+/// Reports leave room for two raw messages, bytes.
 const RAW_RESERVE: usize = 2 * MAX_RAW_FRAME;
 
-/// Encodes messages and text lines for the UART, each completely or not at all, and copies them to the USB port of a board that
-/// has one.
-///
-/// The UART, which is always emptied at its baud rate, decides what is sent. A message for which the USB port has no room is
-/// dropped there alone, and counted: a host that does not read costs what it does not read.
+/// Encodes messages and text for the UART, whole or not at all; what USB has no room for is dropped and counted.
 pub struct TransmitQueue<'q> {
     encoder: Encoder,
     uart: spsc::Producer<'q, u8>,
@@ -32,13 +27,13 @@ impl<'q> TransmitQueue<'q> {
         Self { encoder: Encoder::new(), uart, usb: None, usb_dropped: 0 }
     }
 
-    /// Copies everything to a USB port too, if there is one.
+    /// With copies for USB, if any.
     #[must_use]
     pub fn with_usb(self, usb: Option<spsc::Producer<'q, u8>>) -> Self {
         Self { usb, ..self }
     }
 
-    /// Whether there is room for the longest message and, after it, for the raw stream's reserve.
+    /// For the longest message and the raw reserve.
     #[must_use]
     pub fn has_room(&self) -> bool {
         free(&self.uart) >= MAX_FRAME + RAW_RESERVE
@@ -50,8 +45,7 @@ impl<'q> TransmitQueue<'q> {
         self.usb_dropped
     }
 
-    /// Queues a message. Returns false, and drops it, if the longest message of its kind would not fit; the receiver counts
-    /// it as missing by its sequence number.
+    /// Queues a message; false, and dropped, if the longest of its kind would not fit: the receiver sees the sequence.
     pub fn send(&mut self, message: MessageRef<'_>) -> bool {
         let longest = match message {
             MessageRef::Log(_) | MessageRef::Raw(_) => MAX_RAW_FRAME,
@@ -73,7 +67,7 @@ impl<'q> TransmitQueue<'q> {
         fits
     }
 
-    /// Queues a text line. Returns false if it does not fit.
+    /// Queues a line; false if it does not fit.
     pub fn send_text(&mut self, line: &TextLine) -> bool {
         let bytes = wire_bytes(line);
         let fits = free(&self.uart) >= bytes.len();
@@ -91,7 +85,6 @@ fn free(queue: &spsc::Producer<'_, u8>) -> usize {
     queue.capacity() - queue.len()
 }
 
-/// The queue if it has room for `length` bytes; counts what is dropped otherwise.
 fn room<'a, 'q>(
     queue: &'a mut Option<spsc::Producer<'q, u8>>,
     length: usize,
@@ -111,16 +104,14 @@ fn put(buffer: &mut spsc::Producer<'_, u8>, bytes: &[u8]) {
     }
 }
 
-/// Packs bursts, usable or not, into raw messages while the raw stream is on.
+/// Bursts, usable or not, in raw messages.
 pub(crate) struct RawStream {
-    /// The message that is being filled; `None` while the stream is off.
+    /// `None` while off.
     message: Option<RawMessage>,
-    /// Sample number and time of the burst before.
     last: (u64, u64),
 }
 
 impl RawStream {
-    /// A stream that is off.
     pub(crate) const fn off() -> Self {
         Self { message: None, last: (0, 0) }
     }
@@ -129,21 +120,20 @@ impl RawStream {
         self.message.is_some()
     }
 
-    /// Turns the stream off, or on with bursts read at `sens_avg`. Bursts that were not sent yet are dropped.
+    /// Off, or on at `sens_avg`; unsent bursts are dropped.
     pub(crate) fn set(&mut self, on: bool, sens_avg: u16) {
-        // In place: a moved message would take its 560 bytes of stack once more.
+        // In place: 560 bytes of stack.
         self.message = None;
         if on {
             self.message = Some(RawMessage { first: 0, at_us: 0, sens_avg, bursts: Vec::new() });
         }
     }
 
-    /// The message that is being filled, or has just been filled.
     pub(crate) fn message(&self) -> Option<&RawMessage> {
         self.message.as_ref()
     }
 
-    /// Adds the burst of sample `number`. Returns true if that fills the message; the next burst begins a new one.
+    /// Adds a burst; true if the message is full.
     pub(crate) fn push(&mut self, burst: &Burst, number: u64, at_us: u64) -> bool {
         let Some(message) = self.message.as_mut() else { return false };
         if message.bursts.is_full() {

@@ -1,7 +1,5 @@
-//! The USB serial port (CDC-ACM) of a board, over the [`UsbBus`] of any microcontroller.
-//!
-//! Nothing here waits: [`UsbPort::serve`] moves what can be moved and returns. A host that is absent, suspended or does not read
-//! leaves bytes in the transmit queue, whose other end then [drops and counts](crate::TransmitQueue).
+//! The USB serial port (CDC-ACM) over any [`UsbBus`]; an absent host's bytes stay queued, then are [dropped and
+//! counted](crate::TransmitQueue).
 
 use crate::receive::Receiver;
 use heapless::Vec;
@@ -10,20 +8,18 @@ use usb_device::bus::{UsbBus, UsbBusAllocator};
 use usb_device::device::{StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbDeviceState, UsbVidPid};
 use usbd_serial::{SerialPort, USB_CLASS_CDC};
 
-/// Names of the manufacturer and of the product in the descriptors.
+/// Name of the manufacturer in the descriptors.
 pub const MANUFACTURER: &str = "Noise observatory";
-/// The same of the product.
+/// Name of the product in the descriptors.
 pub const PRODUCT: &str = "ADIS16405 noise observatory";
-/// Longest packet of a bulk endpoint at full speed (USB 2.0, section 5.8.3).
+/// Full speed (USB 2.0, section 5.8.3).
 const PACKET: usize = 64;
-/// Current that the device asks for, in mA: 70 for the sensor, which the connector may supply (ADIS16400/ADIS16405 data sheet Rev. B,
-/// Table 1), and the board.
+/// mA: 70 for the sensor (ADIS16400/ADIS16405 data sheet Rev. B, Table 1), and the board.
 const SUPPLY_MA: usize = 250;
 
-/// Time in µs after which a port that is open, and takes nothing of what waits for it, has stalled: the controller of an RP2040 may
-/// hang behind a hub and needs a reset (RP2040 data sheet, erratum RP2040-E15). A terminal that is stopped for so long loses the port, too.
+/// A stalled open port, µs: an RP2040 may hang behind a hub (RP2040 data sheet, erratum RP2040-E15).
 const STALL_US: u32 = 30_000_000;
-/// Time in µs for which the device then stays off the bus, so that the host sees that it is gone.
+/// Off the bus afterwards, µs.
 const OFF_US: u32 = 500_000;
 
 /// Who makes the board, and which one it is.
@@ -43,20 +39,18 @@ pub struct UsbPort<'a, B: UsbBus> {
     serial: SerialPort<'a, B>,
     transmit: Consumer<'a, u8>,
     receive: Receiver<'a>,
-    /// Bytes from the transmit queue that the endpoint has not taken yet.
     waiting: Vec<u8, PACKET>,
-    /// A terminal has opened the port.
     is_open: bool,
-    /// Resets the controller and keeps it off the bus (false), or starts it again (true).
+    /// Controller off the bus (false), or on again (true).
     reconnect: fn(bool),
-    /// When a byte was taken, or none waited, or the device went off the bus.
+    /// Byte taken, none waiting, or off the bus.
     moved_us: u32,
     is_off: bool,
 }
 
 impl<'a, B: UsbBus> UsbPort<'a, B> {
-    /// Connects the device to the bus. `reconnect` resets the controller and keeps it off the bus (false), or starts it again (true). `None`
-    /// if the bus has too few endpoints.
+    /// Connects; `reconnect` takes the controller off the bus (false), or on again (true). `None` with too few
+    /// endpoints.
     pub fn new(
         bus: &'a UsbBusAllocator<B>,
         identity: UsbIdentity<'a>,
@@ -81,8 +75,8 @@ impl<'a, B: UsbBus> UsbPort<'a, B> {
         Some(Self { device, serial, transmit, receive, waiting, is_open: false, reconnect, moved_us: 0, is_off: false })
     }
 
-    /// Answers the host and moves bytes between the endpoints and the queues as far as possible; returns how many received
-    /// bytes were lost. To be called when the bus raises an interrupt, when bytes have been queued, and every second or sooner.
+    /// Answers the host and moves bytes; returns how many received ones were lost. For bus interrupts, queued bytes,
+    /// and at least every second.
     pub fn serve(&mut self, now_us: u32) -> u32 {
         if self.is_off && now_us.wrapping_sub(self.moved_us) < OFF_US {
             return 0;
@@ -94,7 +88,7 @@ impl<'a, B: UsbBus> UsbPort<'a, B> {
         self.device.poll(&mut [&mut self.serial]);
         let lost = self.receive();
         let was_open = core::mem::replace(&mut self.is_open, self.serial.dtr());
-        // Discard output while no host is connected, and when a terminal opens the port: old lines would be misleading.
+        // Old lines would mislead a new terminal.
         let is_absent = matches!(self.device.state(), UsbDeviceState::Default | UsbDeviceState::Addressed);
         if is_absent || self.is_open && !was_open {
             self.waiting.clear();
@@ -112,7 +106,7 @@ impl<'a, B: UsbBus> UsbPort<'a, B> {
 
     fn receive(&mut self) -> u32 {
         let (mut packet, mut lost) = ([0; PACKET], 0);
-        // Also without room in the queue: a packet that is not taken raises the interrupt again and again.
+        // Also without room: untaken packets interrupt again.
         while let Ok(length) = self.serial.read(&mut packet)
             && length > 0
         {
@@ -121,7 +115,7 @@ impl<'a, B: UsbBus> UsbPort<'a, B> {
         lost
     }
 
-    /// Returns whether a byte was taken, or none waits.
+    /// True if a byte was taken or none waits.
     fn transmit(&mut self) -> bool {
         let mut has_moved = false;
         loop {

@@ -1,4 +1,4 @@
-//! The watchdog: it is fed only with proof that every task is alive and that the clock runs, in long waits too.
+//! The watchdog: fed only while all tasks are alive and the clock runs.
 
 use crate::acquisition::SamplingActivity;
 use crate::board::Board;
@@ -8,44 +8,34 @@ use crate::event::event;
 use core::marker::PhantomData;
 use embedded_hal::delay::DelayNs;
 
-/// Time for which a burst may take to arrive, or a queued burst to be processed. Both take less than a millisecond.
+/// For a burst or its processing; usual: below a millisecond.
 const SAMPLING_US: u64 = 2_000_000;
-/// Time for which the transmit queue may be without room while something waits. It empties in 60 ms.
+/// For room in the transmit queue; it empties in 60 ms.
 const REPORT_US: u64 = 10_000_000;
 
-/// A task that has stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(all(target_os = "none", feature = "microcontroller"), derive(defmt::Format))]
 enum StoppedTask {
-    /// The transfer of a burst does not end.
     Sampling,
-    /// Bursts are queued and not processed.
     Estimators,
-    /// Nothing that waits is transmitted.
     Reports,
 }
 
-/// Compares counters of the tasks with those of earlier passes of the main loop.
-///
-/// Edges that do not come at all are not a matter of the tasks but of the sensor, which is then probed and reset.
+/// Compares task counters between passes; missing edges concern the sensor.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TaskMonitor {
     activity: SamplingActivity,
-    /// Since when the present transfer has not ended.
     reading_since_us: Option<u64>,
     processed: u32,
-    /// Transfers ended when `processed` was seen to change.
+    /// At the last change of `processed`.
     ended_then: u32,
-    /// Since when bursts have not been processed.
     behind_since_us: Option<u64>,
-    /// When the transmit queue had room, or nothing to transmit, for the last time.
+    /// Last time with room, or nothing to send.
     transmitted_us: u64,
-    /// The task that was found stopped.
     stopped: Option<StoppedTask>,
 }
 
 impl TaskMonitor {
-    /// A monitor that starts at `now_us`.
     pub(crate) const fn new(now_us: u64) -> Self {
         Self {
             activity: SamplingActivity { started: 0, ended: 0, masked: 0, is_masked: false },
@@ -58,12 +48,11 @@ impl TaskMonitor {
         }
     }
 
-    /// The transmit queue has room, or nothing waits for it.
     pub(crate) fn mark_transmitted(&mut self, now_us: u64) {
         self.transmitted_us = now_us;
     }
 
-    /// Whether sampling, estimators and reports are alive. The first one that is not is logged, once.
+    /// Sampling, estimators and reports; logs the first stop once.
     pub(crate) fn are_alive(&mut self, board: &mut impl Board) -> bool {
         let (now_us, activity) = (board.now_us(), board.sampling_activity());
         let processed = board.estimators(|estimators| estimators.processed());
@@ -76,7 +65,7 @@ impl TaskMonitor {
         stopped.is_none()
     }
 
-    /// The first task that has stopped, by what sampling has done and how many bursts the estimators have processed.
+    /// By sampling activity and processed bursts.
     fn find_stopped(&mut self, now_us: u64, activity: SamplingActivity, processed: u32) -> Option<StoppedTask> {
         if activity.started == activity.ended || activity.started != self.activity.started {
             self.reading_since_us = None;
@@ -106,10 +95,8 @@ pub trait Watchdog: MicrosecondCounter {
     fn feed();
 }
 
-/// Feeds the watchdog only when the microsecond counter has advanced since the last time: without a running counter no wait
-/// would end, and the watchdog must restart the microcontroller.
+/// Feeds only if the microsecond counter has advanced: without it no wait ends.
 pub struct Feeder<M> {
-    /// The counter when the watchdog was fed last.
     fed_at: u32,
     microcontroller: PhantomData<M>,
 }
@@ -130,7 +117,7 @@ impl<M: Watchdog> Feeder<M> {
     }
 }
 
-/// Waits by the microsecond counter and feeds the watchdog meanwhile.
+/// Feeds while waiting.
 pub struct FeedingDelay<'a, M>(pub &'a mut Feeder<M>);
 
 impl<M: Watchdog> DelayNs for FeedingDelay<'_, M> {
@@ -146,11 +133,9 @@ impl<M: Watchdog> DelayNs for FeedingDelay<'_, M> {
     }
 }
 
-/// Prolongs the time of a watchdog that is shorter than a step of the main loop: a periodic interrupt feeds it as long as the
-/// main loop has done so within the last ticks.
+/// A periodic interrupt feeds a short watchdog for some ticks after the main loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WatchdogExtension {
-    /// Feedings by the main loop that have been seen.
     feedings: u32,
     ticks_left: u32,
 }
@@ -159,8 +144,7 @@ impl WatchdogExtension {
     /// Before the first feeding.
     pub const START: Self = Self { feedings: 0, ticks_left: 0 };
 
-    /// To be called at every tick with the number of feedings by the main loop so far. Returns whether the watchdog is to be
-    /// fed: for `ticks` ticks after each of them.
+    /// For each tick, with the main loop's feedings; true to feed, for `ticks` after each.
     pub fn tick(&mut self, feedings: u32, ticks: u32) -> bool {
         self.ticks_left = if feedings == self.feedings { self.ticks_left.saturating_sub(1) } else { ticks };
         self.feedings = feedings;
@@ -176,8 +160,7 @@ mod tests {
     const MS: u64 = 1000;
     const PERIOD_US: u64 = 5 * MS;
 
-    /// Passes of the main loop every 5 ms for 20 s, of which the closure makes activity and processed bursts. Returns the
-    /// first stopped task and the time.
+    /// Passes every 5 ms for 20 s; first stopped task and time.
     fn first_stop(transmitting: bool, at: impl Fn(u32) -> (SamplingActivity, u32)) -> Option<(StoppedTask, u64)> {
         let mut monitor = TaskMonitor::new(0);
         (0..4000_u32).find_map(|pass| {
@@ -199,7 +182,7 @@ mod tests {
         assert_eq!(first_stop(true, |pass| (ended(pass), pass)), None);
         assert_eq!(first_stop(true, |_| (ended(7), 7)), None, "no edges");
         assert_eq!(first_stop(true, |pass| (ended(u32::MAX - 5).after(pass), pass)), None, "counters wrap");
-        // One burst in 10 s, found during its transfer, and after it before it is processed.
+        // One burst in 10 s.
         let slow = |pass: u32| {
             let bursts = pass / 2000;
             match pass % 2000 {
@@ -217,7 +200,6 @@ mod tests {
         }
     }
 
-    /// Each task stops after 5 s.
     #[test]
     fn a_stopped_task_is_found_within_its_time() {
         let stop = 1000;
@@ -250,12 +232,11 @@ mod tests {
         assert_eq!(fed(&mut extension, 3, 1), 1);
     }
 
-    /// A counter that does not advance for its first readings.
     struct StoppedCounter;
 
     const STOPPED_READINGS: u32 = 10_000;
     static READINGS: AtomicU32 = AtomicU32::new(0);
-    /// How often the watchdog is fed while the counter stands still, and afterwards.
+    /// While the counter stands still, and after.
     static FEEDINGS: [AtomicU32; 2] = [const { AtomicU32::new(0) }; 2];
 
     impl MicrosecondCounter for StoppedCounter {

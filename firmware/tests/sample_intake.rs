@@ -102,7 +102,7 @@ fn after_a_silence_samples_are_not_used_before_the_probe() {
         estimators.process(timed(period, Some(burst(k))), 0);
         assert!(estimators.is_suspect());
     }
-    estimators.mark_probed(at_us(101) + 1);
+    estimators.accept_samples_after_settling(at_us(101) + 1);
     let unused = SETTLING + LEARNING;
     for period in 102..=102 + unused {
         estimators.process(timed(period, Some(burst(4))), 0);
@@ -363,7 +363,7 @@ fn samples_that_the_filter_mixes_with_a_self_test_are_a_gap() {
                 filter.push(800.0);
                 period += 1;
             }
-            estimators.mark_probed(at_us(period) - 1);
+            estimators.accept_samples_after_settling(at_us(period) - 1);
             for _ in 0..1638 {
                 let mut counts = AT_REST;
                 // So that the sensor does not look frozen.
@@ -474,7 +474,7 @@ fn random_walk_with_errors(errors: &[(u32, i16)]) -> (FittedTerm, Health) {
     let config = Config::new(GyroRange::Dps300, 0, SamplePeriod::nearest(204.8).unwrap()).unwrap();
     let mut statistics = Statistics::new();
     let mut estimators = Estimators::new(&mut statistics, config);
-    estimators.mark_probed(0);
+    estimators.accept_samples_after_settling(0);
     let mut normal = Normal(5);
     for period in 1..2049_u32 {
         let mut counts = AT_REST;

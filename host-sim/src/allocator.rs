@@ -14,7 +14,7 @@ const PURGE_DELAY: libmimalloc_sys::mi_option_t = 15;
 /// An analysis takes and releases the memory of a series many times a second: 10⁶ rows of six channels take a tenth longer with 10 ms,
 /// and half as much memory again with the 1,000 ms of mimalloc 3.
 const PURGE_DELAY_OF_ANALYSIS_MS: c_long = 60;
-/// What a simulation recorded is released block by block while it is condensed: with 60 ms an hour of it takes a quarter more memory.
+/// The recording of a simulation is released block by block while it is condensed: with 60 ms an hour of it takes a quarter more memory.
 const PURGE_DELAY_OF_SIMULATION_MS: c_long = 10;
 
 /// Before the first allocation, which takes the region.

@@ -212,7 +212,7 @@ fn with_reports(recordings: Vec<(RecordingArguments, PathBuf)>) -> Result<Vec<Wo
             Some(stem) => stem,
         });
         let of_file = || recordings.iter().enumerate().filter(|(_, (other, _))| other.input.file == input.file);
-        // Of several sensors of a file each has its own name, or its number.
+        // Each of several sensors of a file has its own name, or its number.
         let sensor = match (of_file().count(), &input.topic) {
             (1, _) => String::new(),
             (_, Some(topic)) => {

@@ -25,9 +25,9 @@ pub trait Console {
     /// # Errors
     /// The port fails.
     fn next(&mut self, until_s: f64) -> io::Result<Option<Received>>;
-    /// Of the decoder.
+    /// Counters of the decoder.
     fn counters(&self) -> DecoderCounters;
-    /// What has come on a second port since the last call; `None` without one.
+    /// Messages of a second port since the last call; `None` without one.
     fn second_port(&mut self) -> Option<Vec<Received>> {
         None
     }

@@ -10,7 +10,7 @@ use std::path::Path;
 /// Bytes that tell a report.
 const HEAD: u64 = 64;
 
-/// Whether a file begins as the JSON of a report; a pipe is not looked at.
+/// True if a file begins as the JSON of a report; a pipe is not looked at.
 pub(crate) fn is_report(file: &Path) -> bool {
     let mut head = Vec::new();
     let is_file = file.is_file();

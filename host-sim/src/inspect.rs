@@ -97,9 +97,9 @@ pub(crate) fn part_at_rest(recording: &RecordingArguments) -> Option<TimeRange> 
     }
 }
 
-/// What is in a file.
+/// Content of a file.
 struct Contents {
-    /// What the user says.
+    /// Arguments of the user.
     given: RecordingArguments,
     tables: Vec<InspectedTable>,
     /// Topics that were not read.
@@ -113,7 +113,7 @@ impl Contents {
         let InputArguments { columns, units, topic, .. } = &given.input;
         let mut tables = input.inspect(topic.as_deref(), &ColumnSelection::parse(columns, units)?)?;
         for proposal in tables.iter_mut().flat_map(|table| &mut table.proposals) {
-            // What the user says stands.
+            // The user's statement stands.
             proposal.lacks_rate &= given.rate.is_none();
             proposal.topic = topic.clone().or(proposal.topic.take());
             proposal.units.splice(0..0, units.iter().cloned());
@@ -233,7 +233,7 @@ fn write_table(table: &InspectedTable, f: &mut fmt::Formatter<'_>) -> fmt::Resul
     write_steady(table, f)?;
     let mut lines = vec![["column", "unit", "first values", "mean", "noise", "step", "taken for"].map(str::to_owned)];
     let mut reason = "";
-    // Of a wide table, such as of messages with covariances, columns that never change are named alone.
+    // In a wide table, such as one of messages with covariances, columns that never change are named alone.
     let is_constant = |column: &&InspectedColumn| {
         columns.len() > WIDE && column.noise == 0.0 && column.guess.is_none() && !column.mean.is_nan()
     };
@@ -324,7 +324,7 @@ pub(crate) struct Question {
     error: anyhow::Error,
     /// The table and the command, in lines.
     pub(crate) text: String,
-    /// What the option `--yes` does, in a line; empty where that says nothing.
+    /// Effect of the option `--yes`, in a line; empty if there is none.
     pub(crate) hint: &'static str,
 }
 
@@ -336,7 +336,7 @@ impl Display for Question {
 
 impl std::error::Error for Question {}
 
-/// What `read` makes of a recording. Where the file does not say all that is needed, the error shows its columns and the command with the
+/// Result of `read` for a recording. If the file does not say all that is needed, the error shows its columns and the command with the
 /// best guess; with `--yes` the guess is taken, and told, if it is safe.
 pub(crate) fn read_or_ask<R>(
     recording: &RecordingArguments,
@@ -365,7 +365,7 @@ pub(crate) fn read_or_ask<R>(
     Err(Question { error, text: contents.to_string(), hint }.into())
 }
 
-/// Whether a column, a unit, a topic or a rate is missing.
+/// True if a column, a unit, a topic or a rate is missing.
 fn is_answered_by_columns(error: &anyhow::Error) -> bool {
     let by_reason = |error: &InputError| {
         use Reason::{NoSensor, NoTimeUnit, Selection, SeveralTopics, UnequalRows};

@@ -62,7 +62,7 @@ fn take(signal: i32) {
     }
 }
 
-/// Whether the program was started with `signal` ignored, where the system says it.
+/// True if the program was started with `signal` ignored, where the system says it.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Where results go: standard output, files, notes and progress on standard error.
+//! Destinations of results: standard output, files, notes and progress on standard error.
 
 use crate::cli::{ExportTarget, JsonArgument, OutputArguments};
 use crate::output_files::{OutputFiles, is_standard_stream};
@@ -61,7 +61,7 @@ impl From<Report> for Analysed {
 }
 
 impl Analysed {
-    /// Whether the recording was read to its end.
+    /// True if the recording was read to its end.
     #[must_use]
     pub fn is_complete(&self) -> bool {
         self.reading.as_ref().is_none_or(|reading| reading.complete)
@@ -74,7 +74,7 @@ impl Analysed {
 pub(crate) struct Incomplete(pub(crate) String);
 
 impl Incomplete {
-    /// Of one recording.
+    /// An error if the recording was not read to its end.
     pub(crate) fn check(is_complete: bool) -> Result<()> {
         if is_complete { Ok(()) } else { Err(Self("the recording was not read to its end".to_owned()).into()) }
     }

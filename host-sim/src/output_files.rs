@@ -13,12 +13,12 @@ use tempfile::{NamedTempFile, PersistError};
 /// Longest ending of the name of a file that the one beside it keeps, bytes: writers choose the compression by it.
 const LONGEST_ENDING: usize = 32;
 
-/// Whether `-` is given for a file: standard input or standard output.
+/// True if `-` is given for a file: standard input or standard output.
 pub(crate) fn is_standard_stream(file: &Path) -> bool {
     file.as_os_str() == "-"
 }
 
-/// Where a file is or will be, without links.
+/// Place where a file is or will be, without links.
 fn place(file: &Path) -> PathBuf {
     let in_folder = || Some(fs::canonicalize(folder_of(file)).ok()?.join(file.file_name()?));
     fs::canonicalize(file).ok().or_else(in_folder).unwrap_or_else(|| file.to_owned())
@@ -37,7 +37,7 @@ pub(crate) struct OutputFiles {
 }
 
 impl OutputFiles {
-    /// Of a command that reads `inputs`, where `-` is standard input; files that exist are refused unless it `overwrites` them.
+    /// Outputs of a command that reads `inputs`, where `-` is standard input; files that exist are refused unless it `overwrites` them.
     pub(crate) fn new<'a>(inputs: impl IntoIterator<Item = &'a Path>, overwrites: bool) -> Self {
         let place = |file: &Path| if is_standard_stream(file) { file.to_owned() } else { place(file) };
         let files = |input: &Path| [vec![place(input)], files_of_bag(input).unwrap_or_default()].concat();

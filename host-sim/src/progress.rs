@@ -66,7 +66,7 @@ impl Progress {
         Self { monitor, is_over, watcher: Some(watcher) }
     }
 
-    /// What the readers tell how far they are.
+    /// Monitor of the readers.
     pub(crate) fn monitor(&self) -> &ReadMonitor {
         &self.monitor
     }
@@ -89,7 +89,7 @@ impl Drop for Progress {
     }
 }
 
-/// What a recording is read for, beside its bar.
+/// Purpose of the reading of a recording, beside its bar.
 fn purpose(pass: ReadPass) -> &'static str {
     match pass {
         ReadPass::FirstRows => "reading",

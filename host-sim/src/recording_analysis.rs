@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 pub use crate::output::Analysed;
 
-/// Where a recording is.
+/// Source of a recording.
 #[derive(Debug, Clone)]
 pub enum RecordingSource {
     /// In a file of any format.
@@ -36,7 +36,7 @@ pub struct AnalysisOptions {
     pub topic: Option<String>,
     /// Name of a sensor, or its profile file.
     pub sensor: Option<String>,
-    /// Whether curves and models alone are wanted.
+    /// True if curves and models alone are wanted.
     pub is_quick: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What the user probably meant: names that are similar to one that does not exist.
+//! The probable intention of the user: names that are similar to one that does not exist.
 
 use clap::error::{ContextKind, ContextValue};
 use recordings::sample_stream::StreamError;
@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 /// Jaro similarity above which a name is taken for a misspelt one, as the argument parser takes it for options.
 const SIMILAR: f64 = 0.7;
 
-/// What other programs call an option, and the one of this program.
+/// Options as other programs call them, and those of this program.
 const OPTIONS: [(&str, &str); 2] = [("html", "--page"), ("svg", "--pictures")];
-/// What is no command, and how it is asked for.
+/// Words that are no commands, and how they are asked for.
 const COMMANDS: [(&str, &str); 1] = [("explain", "analyze FILE --full")];
 
 /// A name of a sensor that is neither included nor a file: as given, and those that are included.
@@ -55,7 +55,7 @@ pub(crate) fn suggest(error: &mut clap::Error) {
     }
 }
 
-/// What the user probably meant by the name that is the cause of `error`.
+/// The probable meaning of the name that is the cause of `error`.
 pub(crate) fn tip(error: &anyhow::Error) -> Option<String> {
     if let Some(UnknownSensor(name, known)) = error.downcast_ref() {
         return Some(format!("a similar sensor exists: {}", similar_name(name, known)?));
@@ -90,7 +90,7 @@ pub(crate) fn tip(error: &anyhow::Error) -> Option<String> {
     }
 }
 
-/// What was meant by a part of the description of a simulation.
+/// The probable meaning of a part of the description of a simulation.
 fn similar_part(error: &ScenarioTextError) -> Option<String> {
     let similar = match error {
         ScenarioTextError::Kind(kind, known) => similar_name(kind, known.split(", "))?,

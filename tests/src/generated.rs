@@ -17,7 +17,7 @@ pub fn generated(page: &str, name: &str, text: &str) {
 }
 
 /// [`generated`] for measured figures: a part is as it should be if its words are those of `text`, and each number differs by at most
-/// this part of the page's. What is within the tolerance is never written.
+/// this part of the page's. A text within the tolerance is never written.
 ///
 /// # Panics
 /// As [`generated`].
@@ -26,7 +26,7 @@ pub fn generated_within(page: &str, name: &str, text: &str, tolerance: f64) {
     Part { root: workspace(), page, name }.check(text, |old, new| is_within(old, new, tolerance), writes_docs());
 }
 
-/// Whether generated documentation is written instead of compared.
+/// True if generated documentation is written instead of compared.
 pub fn writes_docs() -> bool {
     std::env::var_os("WRITE_DOCS").is_some()
 }
@@ -75,7 +75,7 @@ impl Part<'_> {
     }
 }
 
-/// Whether two texts have the same words, and numbers that differ by at most this part of those of the first.
+/// True if two texts have the same words, and numbers that differ by at most this part of those of the first.
 fn is_within(old: &str, new: &str, tolerance: f64) -> bool {
     let [old, new] = [old, new].map(WordsAndNumbers::of);
     let is_near = |(old, new): (&f64, &f64)| (new - old).abs() <= tolerance * old.abs();
@@ -150,7 +150,7 @@ mod tests {
             std::fs::read_to_string(self.0.join("page.md")).expect("the page")
         }
 
-        /// What is said of a part that is not this text.
+        /// Refusal of a part that is not this text.
         fn refusal(&self, name: &str, text: &str) -> String {
             let check = || self.part(name).check(text, |old, new| old == new, false);
             let panic = catch_unwind(AssertUnwindSafe(check)).expect_err("the part is refused");

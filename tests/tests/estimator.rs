@@ -1,4 +1,4 @@
-//! What the pages of allan-core say of its estimators: bytes, longest averaging times, degrees of freedom. The packaged crate has no
+//! Figures of the pages of allan-core on its estimators: bytes, longest averaging times, degrees of freedom. The packaged crate has no
 //! access to what generates documentation, so that these tests are here.
 
 use allan_core::confidence::edf;
@@ -21,7 +21,7 @@ fn bytes<const OVERLAP: usize>() -> [String; 3] {
 /// The degrees of freedom of white noise in a record of 1000 averaging times, in percent of those with full overlap.
 fn percent_of_freedom(overlap: u32) -> f64 {
     let freedom = |overlap: u32| edf(1_024, 998 * u64::from(overlap) + 1, overlap, VarianceFractions::WHITE);
-    // What an overlap lacks falls with its square, so that 16 lacks a third of what it has more than 8.
+    // The loss of an overlap falls with its square, so that 16 lacks a third of its gain over 8.
     let full = freedom(16) + (freedom(16) - freedom(8)) / 3.0;
     100.0 * freedom(overlap) / full
 }

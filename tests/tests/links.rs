@@ -45,7 +45,7 @@ fn destinations(line: &str) -> impl Iterator<Item = &str> {
     line.split("](").skip(1).filter_map(|rest| rest.split(')').next())
 }
 
-/// What is wrong with the links of a page.
+/// Faults of the links of a page.
 fn broken(page: &Path, read: &mut HashMap<PathBuf, Vec<String>>) -> Vec<String> {
     let text = std::fs::read_to_string(page).expect("UTF-8");
     let mut wrong = Vec::new();

@@ -30,7 +30,7 @@ const LEVELS: &str = "\
 The sensor runs from 5 V and drives its outputs from an internal 3.3 V: connect every signal directly, without a divider or a
 level shifter (data sheet Rev. B, page 5).";
 
-/// What was said of levels, and is wrong.
+/// Sentences on levels that are wrong.
 const WRONG: [&str; 4] = ["5 V tolerant", "tolerate 5 V", "may drive 5 V", "may reach 5 V"];
 
 #[test]

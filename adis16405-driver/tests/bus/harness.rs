@@ -20,7 +20,7 @@ pub(crate) const SLOW_STALL_NS: u32 = 96_667;
 /// Longest delay that every HAL can keep: with cycles in 32 bits 25 s at 168 MHz.
 const LONGEST_DELAY_US: u32 = 1_000_000;
 
-/// What the part and a stop watch see of the driver.
+/// The driver as the part and a stop watch see it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Step {
     /// Chip select falls.
@@ -45,7 +45,7 @@ pub(crate) fn frame(sent: [u8; 2], answer: u16) -> Frames {
     frame_with(STALL_NS, &sent, &answer.to_be_bytes())
 }
 
-/// What the driver still has to do: steps on the bus, and pauses in µs between them.
+/// Steps on the bus that the driver still has to do, and pauses in µs between them.
 #[derive(Clone)]
 pub(crate) struct Bench(Rc<RefCell<(VecDeque<Step>, VecDeque<u32>)>>);
 

@@ -42,7 +42,7 @@ fn print_model(text: &mut String, name: &str, model: &Model, p_value: f64) {
     writeln!(text, "{name} {:016x} {:016x}", p_value.to_bits(), model.avar(64).to_bits()).expect("memory");
 }
 
-/// What `programs/curve.c` prints, computed with the Rust library.
+/// The output of `programs/curve.c`, computed with the Rust library.
 fn expected() -> String {
     let mut text = String::new();
     let (mut large, mut later, mut small) = (Cascade::<24, 8>::new(), Cascade::<24, 8>::new(), Cascade::<20, 4>::new());

@@ -7,7 +7,7 @@ use crate::moments::{rounded, unit_bits};
 const BLOCK: usize = 1024;
 /// Slices with fewer samples are added sample by sample.
 const SHORTEST_BLOCK: usize = 64;
-/// Running sums before a block to which its differences reach back: two averaging times at the largest overlap.
+/// Running sums before a block that its differences reach back to.
 const HISTORY: usize = 2 * 16;
 
 /// Running sums of one level, relative to a common base: first those before the block, then those of the block.
@@ -62,8 +62,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         Some((0, wide))
     }
 
-    /// Sets `sums` to those of the first level. If one does not fit in a word, returns false and leaves the estimator as it
-    /// was.
+    /// Sets `sums` to those of the first level; false, and no change, if one does not fit in a word.
     fn begin<W: Word>(&mut self, block: &[i32], sums: &mut Sums<W>) -> bool {
         sums.base = W::base(self.sum);
         sums.past = self.elapsed;
@@ -135,13 +134,11 @@ impl<W: Word> Sums<W> {
         Self { values: [W::default(); HISTORY + BLOCK], base: 0, past: 0, new: 0, large: 0 }
     }
 
-    /// The same sums in words that hold any value.
     fn widened(&self) -> Sums<i64> {
         let values = self.values.map(|value| self.base.wrapping_add(value.into()));
         Sums { values, base: 0, past: self.past, new: self.new, large: self.large }
     }
 
-    /// The sum of `back` steps before the newest.
     fn before(&self, back: usize) -> i64 {
         self.base.wrapping_add(self.values[HISTORY + self.new - 1 - back].into())
     }
@@ -184,21 +181,17 @@ impl<W: Word> Sums<W> {
 
 /// A word that holds a running sum relative to a base.
 trait Word: Copy + Default + Into<i64> {
-    /// The largest sum that fits.
     const MAX: u64;
 
-    /// A base for sums around `sum`.
     fn base(sum: i64) -> i64;
 
     fn truncated(sum: i64) -> Self;
 
-    /// Sums of the squares and of the fourth powers of the second differences of newest, middle and oldest sums. For the
-    /// fourth powers, differences are rounded by `bits`. `None` if the totals might not fit. `is_large` says that differences of 14
-    /// bits or more are expected, and is set to whether there were some.
+    /// Sums of the squares and, rounded by `bits`, of the fourth powers of the second differences; `None` if they might
+    /// not fit. `is_large` is the expectation that differences have 14 bits or more, and on return whether they did.
     fn powers(sums: [&[Self]; 3], bits: u32, is_large: &mut bool) -> Option<(u128, u128)>;
 }
 
-/// Holds any sum.
 impl Word for i64 {
     const MAX: u64 = u64::MAX;
 
@@ -251,7 +244,6 @@ fn narrow_powers(sums: [&[i32]; 3]) -> Option<(u128, u128)> {
     for (newest, middle, oldest) in zipped(sums) {
         let magnitude = (newest - middle - (middle - oldest)).unsigned_abs();
         digits |= magnitude;
-        // Factors of 15 bits, which the vector multiplication of every x86-64 supports.
         let small = magnitude & 0x7fff;
         let square = u64::from(small * small);
         squares += square;
@@ -260,10 +252,8 @@ fn narrow_powers(sums: [&[i32]; 3]) -> Option<(u128, u128)> {
     (digits < SMALL).then_some((squares.into(), fourths.into()))
 }
 
-/// The sums, and the bits that the differences have. `None` if one has 27 bits or more: the squares of a block of 26-bit
-/// differences fill 62 bits, and so do the products of the two halves of these squares, of which the fourth powers consist.
+/// The sums, and the bits of the differences; `None` if one has 27 bits or more.
 fn middle_powers(sums: [&[i32]; 3]) -> Option<((u128, u128), u32)> {
-    // Factors of 32 bits, which the vector multiplication of every x86-64 supports.
     let product = |one: u64, other: u64| (one & 0xffff_ffff) * (other & 0xffff_ffff);
     let (mut digits, mut squares, mut high, mut middle, mut low) = (0, 0_u64, 0_u64, 0_u64, 0_u64);
     for (newest, middle_sum, oldest) in zipped(sums) {
@@ -293,7 +283,6 @@ fn wide_powers<W: Word>(sums: [&[W]; 3], bits: u32) -> Option<(u128, u128)> {
     (digits < 1 << 28).then_some((squares, fourths))
 }
 
-/// Second differences in 64 bits.
 fn differences<W: Word>(sums: [&[W]; 3]) -> impl Iterator<Item = i64> {
     zipped(sums).map(|(newest, middle, oldest)| second_difference(newest.into(), middle.into(), oldest.into()))
 }

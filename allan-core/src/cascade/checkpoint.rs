@@ -1,5 +1,4 @@
-//! The sums of a cascade as plain data: restored into an estimator, turned into a curve, or serialised with the delay
-//! lines.
+//! The sums of a cascade as plain data: restored, turned into a curve, or serialised.
 
 use super::{Cascade, Octave};
 use crate::confidence::Difference;
@@ -32,8 +31,7 @@ impl OctaveSums {
 impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// The Allan variance, in counts², of every octave that has at least one difference.
     ///
-    /// `sample_period` in seconds. The confidence is that of the power law that the local slope suggests; a
-    /// [`fit`](crate::fit::fit) gives the confidence of the fitted mixture of noises.
+    /// `sample_period` is in seconds; a [`fit`](crate::fit::fit) gives the confidence of the fitted mixture of noises.
     ///
     /// # Cost
     /// | `Cascade::curve` | Cortex-M4F | Cortex-M0+ |
@@ -62,8 +60,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
 
     /// Replaces the state by one with these sums of `samples` samples; `missing` more were missing.
     ///
-    /// `sums` returns the [`octave_sums`](Self::octave_sums) of an octave. The delay lines are empty: no difference will
-    /// contain samples from before and after.
+    /// `sums` returns the [`octave_sums`](Self::octave_sums) of an octave; no difference will contain samples from
+    /// before and after.
     ///
     /// # Cost
     /// | `Cascade::restore` | Cortex-M4F | Cortex-M0+ |
@@ -83,8 +81,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
     }
 
-    /// The Allan variance of one octave, in counts², without what replacing missing samples has added; `None` beyond the last
-    /// octave and without differences.
+    /// The Allan variance of one octave, in counts², as in [`curve`](Self::curve); `None` beyond the last octave and
+    /// without differences.
     ///
     /// # Cost
     /// | `Cascade::allan_variance` | Cortex-M4F | Cortex-M0+ |
@@ -105,10 +103,9 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
 
     /// The [`curve`](Self::curve) without confidence: less flash, and a small part of the instructions.
     ///
-    /// Variances are computed in single precision, with a relative error below 10⁻⁶.
-    /// Its points have no kurtosis, the bounds 0 and infinity, white noise as their noise type, and the number of
-    /// differences that do not overlap, a lower limit, as their degrees of freedom. A [`fit`](crate::fit::fit) computes the
-    /// degrees of freedom itself and gives nearly the same coefficients from both curves.
+    /// Variances have a relative error below 10⁻⁶, bounds of 0 and infinity, no kurtosis, and white noise as their
+    /// type; the degrees of freedom are a lower limit. A [`fit`](crate::fit::fit) gives nearly the same coefficients
+    /// from both curves.
     ///
     /// # Cost
     /// | `Cascade::curve_without_confidence` | Cortex-M4F | Cortex-M0+ |
@@ -150,8 +147,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         curve.fill_without_confidence(sample_period, samples, points);
     }
 
-    /// Makes `curve` the [`curve`](Self::curve) of an estimator with these sums of `samples` samples, without the
-    /// estimator. `sums` returns the sums of an octave.
+    /// Makes `curve` the [`curve`](Self::curve) of `samples` samples with the sums of each octave that `sums` returns.
     pub fn rebuild_curve(
         curve: &mut Curve<OCTAVES>,
         sample_period: f64,
@@ -166,7 +162,6 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         curve.fill(sample_period, samples, points);
     }
 
-    /// The points that `point` makes of an octave, its sums, its overlap, and what replacing missing samples has added.
     fn points<F: Real>(
         samples: u64,
         sums: impl Fn(usize) -> OctaveSums,
@@ -186,7 +181,6 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         })
     }
 
-    /// The gaps that an averaging factor of `n` samples bridges.
     pub(crate) fn bridged_gaps(&self, n: u64) -> BridgedGaps {
         let Moments { squares, .. } = self.octaves[0].moments;
         let mut gaps = BridgedGaps::new(squares.get() as f64 / (2.0 * self.count(0).max(1) as f64));
@@ -211,18 +205,15 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     ///
     /// # Errors
-    /// What is wrong with the state.
+    /// The error says what is wrong with the state.
     pub fn read_serialized<'de, D: serde::Deserializer<'de>>(&mut self, deserializer: D) -> Result<(), D::Error> {
         crate::serialized::deserialize_in_place(deserializer, self)
     }
 
-    /// Whether a serialised state has the version and the size of this type and a correct checksum. It is not kept.
-    ///
-    /// What passes is refused by [`read_serialized`](Self::read_serialized) only if no samples lead to it, that is, if it was
-    /// made on purpose.
+    /// True if a serialised state has the version and the size of this type and a correct checksum.
     ///
     /// # Errors
-    /// What is wrong with the state.
+    /// The error says what is wrong with the state.
     pub fn check_serialized<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
         crate::serialized::check::<Self, D>(deserializer)
     }

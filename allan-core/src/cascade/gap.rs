@@ -5,7 +5,7 @@ use super::{Cascade, Octave, second_difference};
 /// A bridged gap has at most `1/REACH` of the averaging time of the octaves that keep their differences over it.
 const REACH: u64 = 8;
 
-/// The quotient rounded down; 0 for a divisor of 0, which no gap has: a panic would be linked for it otherwise.
+/// The quotient rounded down; 0 for a divisor of 0, without the code for a panic.
 fn quotient(dividend: i64, divisor: i64) -> i64 {
     dividend.checked_div_euclid(divisor).unwrap_or(0)
 }
@@ -15,16 +15,13 @@ struct Bridge {
     /// Time of the last sample before the gap and of the last replaced one.
     start: u64,
     end: u64,
-    /// Running sum at the start.
     sum: i64,
-    /// Sum of the replaced samples.
     replaced: i64,
-    /// What each of them adds to the running sum, rounded down; the last one adds the rest.
+    /// Part of each replaced sample in the running sum, rounded down; the last one adds the rest.
     each: i64,
 }
 
 impl Bridge {
-    /// The running sum at a time within the gap.
     fn sum_at(&self, time: u64) -> i64 {
         let along = if time < self.end { self.each * (time - self.start) as i64 } else { self.replaced };
         self.sum.wrapping_add(along)
@@ -32,8 +29,7 @@ impl Bridge {
 }
 
 impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
-    /// Octave from which on gaps of one sample are bridged. No octave that bridges a gap takes more than one difference
-    /// within it.
+    /// The octave from which on gaps of one sample are bridged, and no gap has more than one difference within it.
     pub(crate) const SHORTEST_BRIDGING: usize =
         if OVERLAP as u64 > REACH { OVERLAP.trailing_zeros() as usize } else { REACH.trailing_zeros() as usize };
 
@@ -59,9 +55,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
     }
 
-    /// Closes the pending gap before `next`, the first sample after it.
-    ///
-    /// Kept out of line: its locals would take the registers of every sample near the start.
+    /// Closes the pending gap before `next`; out of line, as its locals would take the registers of every sample.
     #[cold]
     #[inline(never)]
     pub(super) fn close_gap(&mut self, next: i32) {
@@ -91,7 +85,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.settling = self.settling_time();
     }
 
-    /// What [`settling`](Cascade::settling) is by the gaps of the octaves below [`ROUNDED`](crate::moments::ROUNDED).
+    /// [`settling`](Cascade::settling) by the gaps of the octaves below [`ROUNDED`](crate::moments::ROUNDED).
     pub(super) fn settling_time(&self) -> u32 {
         let complete = |(k, octave): (usize, &Octave<OVERLAP>)| octave.resumed + (2 << k);
         let settled = self.octaves[..Self::FINE + Self::SHORT].iter().enumerate().map(complete).max();
@@ -115,9 +109,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         mean * missing + quotient(rest * missing, samples)
     }
 
-    /// Replaces as many known samples before the gap as are missing, in the same way, and adds the squared error. Where
-    /// the delay lines do not hold the sums for this number, it is rounded to a multiple of a power of two, and no sample
-    /// after the replaced ones is used.
+    /// Replaces about as many known samples before the gap as are missing, and adds the squared error.
     fn test_interpolation(&mut self, missing: u32, bridging: usize) {
         if let Some(octave) = self.octaves.get_mut(bridging) {
             octave.interpolation.add_gap(missing);
@@ -142,8 +134,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
     }
 
-    /// Fills the delay lines with the running sums of the gap, at most `OVERLAP + 1` a line, and adds the differences that
-    /// end in it at the octaves that bridge it.
+    /// Fills the delay lines with the running sums of the gap, and adds the differences that end in it.
     fn bridge(&mut self, gap: &Bridge, bridging: usize) {
         // Not `ilog2`, as the code for its panic is linked although a gap is never empty.
         let highest = (u64::BITS - 1).saturating_sub((gap.start ^ gap.end).leading_zeros()) as usize;

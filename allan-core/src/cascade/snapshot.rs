@@ -6,9 +6,8 @@ use crate::curve::Curve;
 
 /// The sums of a [`Cascade`] at one time, without its delay lines: what a curve is made of.
 ///
-/// It takes `16 + 64·OCTAVES` bytes and is a copy without floating-point arithmetic, where a [`curve`](Cascade::curve) takes
-/// millions of instructions: an estimator that an interrupt fills is copied with the interrupt disabled, and the curve is made with the
-/// interrupt enabled again; see [`guide::interrupts`](crate::guide::interrupts).
+/// `16 + 64·OCTAVES` bytes, copied without floating-point arithmetic: an interrupt's estimator is copied with the
+/// interrupt disabled, and the curve made with it enabled; see [`guide::interrupts`](crate::guide::interrupts).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Snapshot<const OCTAVES: usize, const OVERLAP: usize> {
     samples: u64,
@@ -29,7 +28,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Snapshot<OCTAVES, OVERLAP> {
         self.samples
     }
 
-    /// Whether no sample had been taken.
+    /// True if no sample had been taken.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.samples == 0

@@ -1,9 +1,7 @@
-//! 95 % bounds of fitted parameters, from the sandwich covariance.
+//! 95 % bounds of fitted parameters, from the sandwich covariance of the correlated points.
 //!
-//! The points of a curve are correlated; bounds for independent points would be 1.5 to 1.8 times too narrow. The scatter of
-//! a coefficient also depends on its value, so bounds from the scatter at the estimate would be too narrow where the
-//! estimate came out too small by chance. Coefficients with a large uncertainty are therefore bounded by test inversion: a
-//! bound is the value under which the estimate lies at the 2.5 % or 97.5 % quantile of the distribution for that value.
+//! The scatter of a coefficient depends on its value, so uncertain coefficients are bounded by test inversion: for a
+//! bound as the true value the estimate is the 2.5 % or 97.5 % quantile.
 
 use super::least_squares::{entry, solve, triangle};
 use super::likelihood::{MAX_PARAMETERS, MAX_POINTS, Points, Problem};
@@ -14,15 +12,12 @@ use crate::math::{Real, absf, exp, sqrtf};
 use crate::model::{MAX_TERMS, Model};
 use crate::term::TermSet;
 
-/// Standard deviation over the estimate of an amount below which the scatter at the estimate is used: the error of the
-/// bounds of the coefficient is then a hundredth of their distance.
+/// Relative standard deviation below which the scatter at the estimate is used.
 const SMALL: f32 = 0.02;
-/// The smallest amount that is tested, over the estimate: at 0 a model of one term would have no variance.
+/// The smallest amount that is tested, over the estimate.
 const SMALLEST: f32 = 1e-4;
-/// Largest number of secant steps.
 const SEARCH_ROUNDS: usize = 5;
 
-/// Sets the bounds of all parameters of `model`, which was fitted to the curve.
 pub(crate) fn set<T: TermSet>(curve: CurveView, model: &mut Model) {
     set_free::<T>(curve, model, FreeShapes::AllExcept(&[]));
 }
@@ -81,8 +76,7 @@ pub(crate) fn set_free<T: TermSet>(curve: CurveView, model: &mut Model, free: Fr
     }
 }
 
-/// Sets the bounds of a model whose terms the points do not determine: each coefficient is between 0 and the largest one that
-/// the points allow.
+/// Sets the bounds of a model whose terms the points do not determine: 0 and the largest amount that they allow.
 #[inline(never)]
 fn leave_open<T: TermSet>(points: &Points, problem: &Problem<T>, model: &mut Model) {
     for (term, set) in model.terms_mut().iter_mut().enumerate() {
@@ -91,8 +85,7 @@ fn leave_open<T: TermSet>(points: &Points, problem: &Problem<T>, model: &mut Mod
     }
 }
 
-/// The largest amount of a term that no point excludes: alone it has at one of them the upper 95 % bound of the variance,
-/// `edf/χ²` times what was measured, and less at the others. 0 without a point.
+/// The largest amount of a term alone that is below the upper 95 % bound of every point; 0 without a point.
 fn largest<T: TermSet>(points: &Points, problem: &Problem<T>, term: usize) -> f32 {
     let mut largest = f32::INFINITY;
     for (at, point) in points.measured.iter().enumerate() {
@@ -118,21 +111,18 @@ struct Scatter {
 }
 
 impl Scatter {
-    /// The 97.5 % quantile if `upper`, else the 2.5 % quantile, of the estimate less its expectation: that of the gamma distribution with this standard deviation
-    /// and skewness (Pearson type III).
+    /// The quantile, 97.5 % if `upper`, else 2.5 %, of the estimate less its expectation (Pearson type III).
     fn quantile<T: TermSet>(&self, upper: bool) -> f32 {
         // At lower skewness the distribution is normal to a hundredth of a standard deviation.
         self.deviation * T::gamma_quantile(self.skewness.max(0.02), upper)
     }
 }
 
-/// The scatter of the parameter of a column if the present amounts are the true ones: the sandwich covariance
-/// `H⁻¹·JᵀRJ·H⁻¹`, and the skewness of the points weighted by their contributions to it.
+/// The scatter of a column's parameter under the present amounts: sandwich covariance `H⁻¹·JᵀRJ·H⁻¹`, and skewness.
 #[inline(never)]
 fn scatter<T: TermSet>(points: &Points, problem: &Problem<T>, parameters: usize, column: usize) -> Option<Scatter> {
     let mut weights = [0.0; MAX_POINTS];
     let direction = direction(points, problem, parameters, column, &mut weights)?;
-    // The skewness of χ² with edf degrees of freedom is √(8/edf).
     let mut skewed = weights;
     let mut pull = 0.0;
     for (at, point) in points.measured.iter().enumerate() {
@@ -144,8 +134,7 @@ fn scatter<T: TermSet>(points: &Points, problem: &Problem<T>, parameters: usize,
     Some(Scatter { deviation: sqrtf(variance), skewness, pull, direction })
 }
 
-/// The parameter's column of the inverse information matrix; sets `weights` to those of the standardised residuals in its
-/// estimate. `None` if the matrix is singular.
+/// The parameter's column of the inverse information, with the `weights` of the residuals; `None` if singular.
 #[inline(never)]
 fn direction<T: TermSet>(
     points: &Points,
@@ -189,8 +178,8 @@ impl<T: TermSet> Candidates<'_, '_, T> {
     fn bounds(&mut self, own: &Scatter) -> (f32, f32) {
         let amount = self.estimate[self.term];
         if amount == 0.0 {
-            // The unconstrained estimate is negative. It is limited to one standard deviation below 0, so that the upper
-            // bound does not vanish (power-constrained limits: G. Cowan et al., arXiv:1105.3166).
+            // A negative unconstrained estimate counts as at most one standard deviation (power-constrained limits: G.
+            // Cowan et al., arXiv:1105.3166).
             let observed = own.pull.max(-own.deviation).min(0.0);
             return (0.0, self.high(observed, own));
         }
@@ -219,8 +208,7 @@ impl<T: TermSet> Candidates<'_, '_, T> {
         self.root(false, observed, (observed, -distance), (further, excess))
     }
 
-    /// The value under which this quantile of the estimate is the observed one, by the secant method from two values with
-    /// their differences.
+    /// The value under which this quantile of the estimate is the observed one, by the secant method.
     fn root(&mut self, upper: bool, observed: f32, mut a: (f32, f32), mut b: (f32, f32)) -> f32 {
         for _ in 0..SEARCH_ROUNDS {
             let slope = ((b.1 - a.1) / (b.0 - a.0)).max(0.02);
@@ -251,8 +239,7 @@ mod tests {
     use crate::Curve;
     use crate::term::{AllTerms, NoiseTerm};
 
-    /// White noise of variance 1 at 1 Hz, measured with 20 and 100 degrees of freedom, whose 2.5 % quantiles of χ² are 9.591 and 74.22
-    /// (Abramowitz and Stegun, table 26.8). A random walk of K = 1 has the Allan variance (2n² + 1)/6n: 1/2 and 3/4.
+    /// χ² quantiles 9.591 and 74.22 (Abramowitz and Stegun, table 26.8); a random walk of K = 1 has (2n² + 1)/6n.
     #[test]
     fn no_amount_is_larger_than_the_upper_bound_of_a_point() {
         let curve = Curve::<4>::from_points(1.0, 1000, 4, &[(1, 1.0), (2, 0.5)]).expect("a curve");
@@ -268,7 +255,7 @@ mod tests {
             let square = f64::from(largest(&points, &problem, 1)) * problem.units[1];
             assert!((square / expected - 1.0).abs() < 0.005, "{square}, {expected}");
         }
-        // That of the shorter time is the smaller one.
+        // The bound of the shorter time is the smaller one.
         points.measured.truncate(1);
         let square = f64::from(largest(&points, &problem, 1)) * problem.units[1];
         assert!((square / of_point(1.0, 100.0, 74.22, 0.5) - 1.0).abs() < 0.005, "{square}");

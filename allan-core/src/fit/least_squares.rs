@@ -1,6 +1,4 @@
-//! Non-negative least squares of a few unknowns, from the normal equations.
-//!
-//! Symmetric matrices are stored as their lower triangle, row by row.
+//! Non-negative least squares of a few unknowns; symmetric matrices are their lower triangle, row by row.
 
 use crate::math::Real;
 
@@ -17,7 +15,7 @@ pub(crate) const fn entry(i: usize, j: usize) -> usize {
     if i < j { triangle(j) + i } else { triangle(i) + j }
 }
 
-/// Minimises `½ xᵀAx − bᵀx` over `x ≥ 0` for the first `count` unknowns, starting from the given `x ≥ 0`.
+/// Minimises `½ xᵀAx − bᵀx` over `x ≥ 0` for the first `count` unknowns, from the given `x ≥ 0`.
 ///
 /// The active-set method of C. Lawson and R. Hanson, "Solving Least Squares Problems" (1974), chapter 23.
 pub(crate) fn non_negative<F: Real, const N: usize, const TRIANGLE: usize>(
@@ -32,7 +30,7 @@ pub(crate) fn non_negative<F: Real, const N: usize, const TRIANGLE: usize>(
         Some(set) => free = set,
         None => (*x, free) = ([F::ZERO; N], 0),
     }
-    // Each round lowers the objective, so no set of free unknowns recurs, except by rounding: hence the limit.
+    // No set recurs, except by rounding: hence the limit.
     for _ in 0..4 * N {
         let along = |i: usize| (0..count).map(|j| a[entry(i, j)] * x[j]).sum::<F>();
         let gradient = |i: usize| (b[i] - along(i)) / a[entry(i, i)].sqrt();
@@ -52,8 +50,7 @@ pub(crate) fn non_negative<F: Real, const N: usize, const TRIANGLE: usize>(
     }
 }
 
-/// Moves `x` to the minimum over the unknowns in the bit set `free`, removing from the set each one that would turn
-/// negative. Returns the remaining set; `None` if the matrix is singular.
+/// Moves `x` to the minimum over the unknowns in `free`; returns those that are not negative, `None` if singular.
 fn minimise_free<F: Real, const N: usize, const TRIANGLE: usize>(
     a: &[F; TRIANGLE],
     b: &[F; N],
@@ -80,11 +77,10 @@ fn minimise_free<F: Real, const N: usize, const TRIANGLE: usize>(
     Some(free)
 }
 
-/// Solves `Ax = b` of up to [`MOST`] unknowns for those in the bit set `set`; the others are 0. `x` holds `b` on entry and
-/// the solution on return; `a` is overwritten.
+/// Solves `Ax = b` for the unknowns in the bit set `set`, the others being 0; `x` holds `b`, then the solution, and `a`
+/// is overwritten.
 ///
-/// By Cholesky decomposition of the matrix scaled to a unit diagonal, as the unknowns may differ by orders of magnitude.
-/// `None` if the matrix is singular.
+/// Cholesky decomposition of the matrix scaled to a unit diagonal. `None` if the matrix is singular.
 #[inline(never)] // one copy for all sizes
 pub(crate) fn solve<F: Real>(a: &mut [F], x: &mut [F], set: usize) -> Option<()> {
     let chosen = |i: &usize| set >> i & 1 == 1;
@@ -138,8 +134,7 @@ mod tests {
         (0..N).filter(chosen).all(|i| solution[i] > 0.0).then_some(solution)
     }
 
-    /// The minimum over non-negative unknowns is that over those of some set, with the others 0: all sixteen sets are tried, with
-    /// matrices of neighbours that are alike, from every kind of start.
+    /// All sixteen sets of unknowns are tried from every kind of start.
     #[test]
     fn the_minimum_is_the_least_of_all_sets() {
         let mut state = 1_u64;

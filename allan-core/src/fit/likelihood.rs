@@ -1,9 +1,8 @@
-//! The likelihood of the points of a curve under a sum of terms with given shapes, and the coefficients that maximise it.
+//! The likelihood of the points of a curve under a sum of terms with given shapes, and the coefficients that maximise
+//! it.
 //!
-//! Modelled variances are relative to the measured ones, and each term is scaled so that its largest contribution to a
-//! point is 1 for an amount of 1. Single precision is enough: its rounding of 10⁻⁷ is far below the statistical
-//! uncertainty, 10⁻⁴ at best. Only the normal equations, which square the condition number, use double precision: but for
-//! power laws, whose pivots are above 10⁻⁴ of the diagonal, also where one of them dominates everywhere.
+//! Variances are relative to the measured ones, and an amount of 1 contributes at most 1 to a point. Single precision
+//! is enough, except in the normal equations, where only power laws need no double precision.
 
 use super::least_squares::{MOST, entry, non_negative, triangle};
 use crate::confidence::{pure_octave_correlation, roots};
@@ -18,18 +17,16 @@ use core::f32::consts::LN_2;
 use core::marker::PhantomData;
 use heapless::Vec;
 
-/// Largest number of points that a fit uses: one more than a cascade can have octaves. Of a curve with more points it uses
-/// those at octaves, as its bounds do not hold for the strongly correlated points between them.
+/// Largest number of points that a fit uses: one more than a cascade can have octaves.
 pub const MAX_POINTS: usize = 32;
 
 /// A measured point: its index in the curve and its statistical properties under the present model.
 pub(super) struct Measured {
-    /// Index in the curve.
     at: u16,
     /// `log2 n`.
     octave: f32,
     pub(super) edf: f32,
-    /// Fraction of the scatter without the long-lasting correlations of narrow-band terms, which are common to all points.
+    /// Fraction of the scatter without the long-lasting correlations of narrow-band terms.
     near: f32,
     /// [`roots`] of the variance fractions.
     roots: [f32; 3],
@@ -43,7 +40,7 @@ pub(super) struct Points<'a> {
 }
 
 impl<'a> Points<'a> {
-    /// Without points, to be filled in place: it is too large to be moved over a small stack.
+    /// To be filled in place: too large to be moved over a small stack.
     #[inline(always)]
     pub(super) const fn empty(curve: CurveView<'a>) -> Self {
         Self { curve, measured: Vec::new(), flicker: FlickerCorrelations::EMPTY }
@@ -66,18 +63,15 @@ impl<'a> Points<'a> {
         }));
     }
 
-    /// The measured point at index `at` of [`measured`](Self::measured).
     pub(super) fn point(&self, at: usize) -> &AllanPoint {
         &self.curve.points()[usize::from(self.measured[at].at)]
     }
 
-    /// All measured points in order.
     pub(super) fn all(&self) -> impl Iterator<Item = &AllanPoint> {
         (0..self.measured.len()).map(|at| self.point(at))
     }
 
-    /// Sets the degrees of freedom of a point, with and without the long-lasting correlations of narrow-band terms, and its
-    /// variance fractions.
+    /// Sets the degrees of freedom of a point, with and without narrow-band correlations, and its variance fractions.
     fn set<F: Real>(&mut self, at: usize, (edf, near_edf): (F, F), fractions: VarianceFractions) {
         let measured = &mut self.measured[at];
         measured.edf = edf.single();
@@ -98,7 +92,7 @@ impl<'a> Points<'a> {
     }
 }
 
-/// Correlation of the errors of two points. The long-lasting correlations of narrow-band terms are common to all points.
+/// Correlation of the errors of two points.
 pub(super) fn correlation(a: &Measured, b: &Measured) -> f32 {
     let octaves = (absf(a.octave - b.octave) + 0.5) as usize;
     let product = |noise: usize| a.roots[noise] * b.roots[noise] * pure_octave_correlation(octaves, noise) as f32;
@@ -106,14 +100,11 @@ pub(super) fn correlation(a: &Measured, b: &Measured) -> f32 {
     sqrtf(a.near * b.near) * near + sqrtf((1.0 - a.near).max(0.0) * (1.0 - b.near).max(0.0))
 }
 
-/// Largest number of amounts and shape parameters together.
 pub(super) const MAX_PARAMETERS: usize = MOST;
-/// Largest number of Fisher scoring steps.
 const SCORING_ROUNDS: usize = 40;
-/// A decrease of the deviance below which the iteration ends: the coefficients are then within a thirtieth of their
-/// uncertainty.
+/// Decrease of the deviance below which the iteration ends.
 const CONVERGED: f32 = 1e-3;
-/// The same as a fraction of the deviance, for models that fit badly.
+/// [`CONVERGED`] as a fraction of the deviance, for models that fit badly.
 const CONVERGED_FRACTION: f32 = 1e-6;
 
 /// Mean deviance of a point above which a second start is tried.
@@ -125,14 +116,14 @@ pub(super) struct Problem<T> {
     /// Squared coefficient for an amount of 1.
     pub(super) units: [f64; MAX_TERMS],
     pub(super) amounts: [f32; MAX_TERMS],
-    /// Derivatives, at every point, of the modelled over the measured variance with respect to the amounts of the terms,
-    /// and after [`differentiate`](Self::differentiate) also to the logarithms of their shape parameters.
+    /// Derivatives of modelled over measured variance to amounts, then to [differentiated](Self::differentiate) log
+    /// shapes.
     pub(super) columns: [[f32; MAX_POINTS]; MAX_PARAMETERS],
     terms: PhantomData<T>,
 }
 
 impl<T: TermSet> Problem<T> {
-    /// Without terms, to be filled in place: a problem is too large to be moved over a small stack.
+    /// To be filled in place: too large to be moved over a small stack.
     #[inline(always)]
     pub(super) const fn empty() -> Self {
         Self {
@@ -144,13 +135,12 @@ impl<T: TermSet> Problem<T> {
         }
     }
 
-    /// Sets the terms to the first [`MAX_TERMS`] of `kinds`. Terms that are unchanged keep their columns and amounts.
+    /// Sets the terms to the first [`MAX_TERMS`] of `kinds`; unchanged ones keep their columns.
     #[inline(never)] // here and below: so that stack frames do not add up in the caller
     pub(super) fn set_terms(&mut self, points: &Points, kinds: &[NoiseTerm]) {
         self.set_terms_by(points, kinds, &Self::set_column);
     }
 
-    /// The same with another way to set the contributions of a term.
     #[inline(always)]
     fn set_terms_by(&mut self, points: &Points, kinds: &[NoiseTerm], set: &impl Fn(&mut Self, &Points, usize)) {
         let before = filter_of(&self.kinds);
@@ -172,7 +162,7 @@ impl<T: TermSet> Problem<T> {
         }
     }
 
-    /// The same where the Allan variances of some terms, behind their filter, at some averaging factors are known.
+    /// [`set_terms`](Self::set_terms) with known Allan variances of some terms behind their filter.
     #[cfg(feature = "host")]
     pub(super) fn set_terms_with(
         &mut self,
@@ -187,7 +177,7 @@ impl<T: TermSet> Problem<T> {
         self.set_terms_by(points, kinds, &|own, points, term| own.set_column_by(points, term, &avar));
     }
 
-    /// Sets the terms and the coefficients to those of a model, and the points' confidence to that under it.
+    /// Sets terms, coefficients and the points' confidence to those of a model.
     #[inline(never)]
     pub(super) fn fill_from_model(&mut self, points: &mut Points, model: &Model) {
         self.kinds = model.kinds();
@@ -208,7 +198,6 @@ impl<T: TermSet> Problem<T> {
         }
     }
 
-    /// Sets the points' degrees of freedom and variance fractions from the present mixture of terms.
     #[inline(never)]
     pub(super) fn set_confidence(&self, points: &mut Points) {
         let period = points.curve.sample_period();
@@ -250,7 +239,6 @@ impl<T: TermSet> Problem<T> {
         self.set_column_by(points, term, &|kind, filter, n| T::avar(kind, filter, n, period));
     }
 
-    /// The same by the Allan variance of a term behind a filter at an averaging factor.
     #[inline(always)]
     fn set_column_by(
         &mut self,
@@ -279,7 +267,7 @@ impl<T: TermSet> Problem<T> {
     #[inline(never)]
     pub(super) fn minimise(&mut self, points: &Points) -> f32 {
         let mut deviance = self.deviance(points);
-        // A bad start, as left by a smaller model, may lead to a local minimum: try a step with the measured variances.
+        // A bad start may lead to a local minimum: try a step with the measured variances.
         if deviance > FAR_OFF * points.measured.len() as f32 {
             let start = self.amounts;
             self.amounts = self.scoring_step(points, false);
@@ -302,8 +290,7 @@ impl<T: TermSet> Problem<T> {
         deviance
     }
 
-    /// Moves the amounts towards `proposed`, halving the step until the deviance falls, and returns the new deviance; `None`
-    /// if it does not fall.
+    /// Moves the amounts towards `proposed`, halving the step until the deviance falls; `None` if it does not.
     fn descend(&mut self, points: &Points, proposed: &[f32; MAX_TERMS], deviance: f32) -> Option<f32> {
         let mut length = 1.0;
         for _ in 0..20 {
@@ -338,7 +325,7 @@ impl<T: TermSet> Problem<T> {
         terms.map(|(column, amount)| amount * column[at]).sum()
     }
 
-    /// One step of Fisher scoring: non-negative least squares with weights from the modelled or from the measured variances.
+    /// One step of Fisher scoring, weighted by the modelled or the measured variances.
     #[inline(never)]
     fn scoring_step(&self, points: &Points, modelled: bool) -> [f32; MAX_TERMS] {
         let mut normal = [T::Real::ZERO; triangle(MAX_TERMS)];
@@ -371,7 +358,7 @@ impl<T: TermSet> Problem<T> {
     }
 }
 
-/// Deviance of a point per degree of freedom: `u − ln(1 + u)` with `1 + u` the measured over the modelled variance.
+/// `u − ln(1 + u)` with `1 + u` the measured over the modelled variance.
 fn unit_deviance(modelled: f32) -> f32 {
     let excess = (1.0 - modelled) / modelled;
     if absf(excess) > 0.25 {

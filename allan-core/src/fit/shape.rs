@@ -1,7 +1,5 @@
-//! Shape parameters of terms: which are free, the derivatives of the modelled variances to them, and the search for their
-//! best values.
-//!
-//! The search goes coordinate by coordinate in the logarithm of the parameters and refits the coefficients at each step.
+//! Shape parameters of terms: which are free, derivatives to them, and a coordinate search for their best values in the
+//! logarithm.
 
 use super::likelihood::{MAX_PARAMETERS, MAX_POINTS, Points, Problem};
 use crate::math::{absf, exp, sqrtf};
@@ -9,31 +7,27 @@ use crate::model::{MAX_TERMS, filter_of};
 use crate::term::{MAX_SHAPE, NoiseTerm, TermSet};
 use heapless::Vec;
 
-/// Largest number of rounds over all parameters.
 const ROUNDS: usize = 12;
 /// First step in the logarithm: a factor of about 1.2.
 const FIRST_STEP: f64 = 0.18;
 /// Step, relative to the parameter, below which it counts as converged.
 const LAST_STEP: f64 = 2e-4;
-/// Sum of the rises of the deviance on both sides up to which it is taken for a parabola: the step is then at most a
-/// standard deviation.
+/// Sum of the rises of the deviance on both sides up to which it is taken for a parabola.
 const NEAR: f32 = 2.0;
-/// Smallest decrease of the deviance in a round that makes another round worthwhile: a tenth of a standard deviation.
+/// Smallest decrease of the deviance in a round that makes another one worthwhile.
 const WORTHWHILE: f32 = 0.01;
-/// Lower limit of a Markov correlation time, in samples: shorter correlations are those of a filter.
+/// Lower limit of a Markov correlation time, in samples.
 const SHORTEST: f64 = 1.5;
 
-/// Which shape parameters a fit adjusts.
+/// The shape parameters that a fit adjusts.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum FreeShapes<'a> {
-    /// None.
     None,
-    /// All except the frequencies of the sinusoids in this list, which are known from a spectrum, and the shapes of the filters in it.
+    /// All except the shapes of the sinusoids and filters in this list, which are known from elsewhere.
     AllExcept(&'a [NoiseTerm]),
 }
 
 impl FreeShapes<'_> {
-    /// Whether the shape of this term is adjusted.
     pub(super) fn has<T: TermSet>(self, kind: &NoiseTerm) -> bool {
         let can_be_known = matches!(kind, NoiseTerm::Sinusoid(_) | NoiseTerm::Filtered(_) | NoiseTerm::LowPass(_));
         let is_fixed = |known: &[NoiseTerm]| can_be_known && known.contains(kind);
@@ -41,9 +35,7 @@ impl FreeShapes<'_> {
     }
 }
 
-/// Sets the shapes of all free terms to those with the least deviance at the present degrees of freedom, and returns it.
-///
-/// `keep_on` is called before every step; if it returns false, the search ends where it is.
+/// Sets all free shapes to those with the least deviance, and returns it; ends if `keep_on` returns false.
 #[inline(never)]
 pub(super) fn search<T: TermSet>(
     points: &Points,
@@ -52,7 +44,7 @@ pub(super) fn search<T: TermSet>(
     keep_on: &mut dyn FnMut() -> bool,
 ) -> f32 {
     let mut deviance = problem.minimise(points);
-    // Decided before any shape changes, as known lines are recognised by their frequency.
+    // Before any shape changes, as known lines are recognised by their frequency.
     let mut is_free = [false; MAX_TERMS];
     is_free.iter_mut().zip(&problem.kinds).for_each(|(is_free, kind)| *is_free = free.has::<T>(kind));
     let mut steps = [[FIRST_STEP; MAX_SHAPE]; MAX_TERMS];
@@ -75,8 +67,7 @@ pub(super) fn search<T: TermSet>(
     deviance
 }
 
-/// Searches along one parameter: steps while the deviance falls, then goes to the vertex of a parabola. Returns the
-/// deviance, and whether the minimum is known to a fraction of its uncertainty.
+/// Steps along a parameter, then to the vertex of a parabola; returns the deviance, and true if the minimum is known.
 fn line_search<T: TermSet>(
     points: &Points,
     problem: &mut Problem<T>,
@@ -134,27 +125,25 @@ fn shifted(kind: NoiseTerm, index: usize, shift: f64, sample_period: f64) -> Noi
 
 /// Relative step of the numerical derivative to a shape's parameter.
 const STEP: f64 = 1e-3;
-/// Relative length of the remainder of a direction, orthogonal to the others, that rounding can produce.
+/// Relative length of the remainder of a direction that rounding can produce.
 const ROUNDING: f32 = 1e-4;
 
 /// The parameter to which a column of derivatives belongs.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Parameter {
-    /// The amount of a term.
     Amount(usize),
     /// The logarithm of a shape parameter of a term, by its index.
     Shape(usize, usize),
 }
 
 impl<T: TermSet> Problem<T> {
-    /// Sets the columns of all amounts and of the shape parameters of all terms with a positive amount and a `free` shape, and
-    /// lists the parameters in the order of the columns.
+    /// Sets the columns of all amounts and of `free` shapes with a positive amount, and lists their parameters.
     #[inline(never)]
     pub(super) fn differentiate(&mut self, points: &Points, free: FreeShapes) -> Vec<Parameter, MAX_PARAMETERS> {
         let mut parameters: Vec<_, MAX_PARAMETERS> = (0..self.kinds.len()).map(Parameter::Amount).collect();
         let is_free = |(term, kind): &(usize, &NoiseTerm)| self.amounts[*term] > 0.0 && free.has::<T>(kind);
         for (term, kind) in self.kinds.iter().enumerate().filter(is_free) {
-            // What passes a filter hardly changes with its decimation.
+            // Noise behind a filter hardly changes with its decimation.
             let (square, filter) = (self.square(term), filter_of(&self.kinds));
             for index in T::free_parameters(kind) {
                 let Some(column) = self.columns.get_mut(parameters.len()) else { return parameters };
@@ -173,8 +162,7 @@ impl<T: TermSet> Problem<T> {
         parameters
     }
 
-    /// Replaces the first columns by an orthonormal basis of the directions of the parameters in the space of standardised
-    /// residuals, and returns the number of these directions.
+    /// Replaces the first columns by an orthonormal basis of their directions, and returns its size.
     #[inline(never)]
     pub(super) fn orthonormal(&mut self, points: &Points) -> usize {
         let parameters = self.differentiate(points, FreeShapes::AllExcept(&[]));
@@ -190,7 +178,7 @@ impl<T: TermSet> Problem<T> {
             let (known, rest) = self.columns.split_at_mut(column);
             let Some(direction) = rest.first_mut() else { break };
             direction.iter_mut().zip(&scale).for_each(|(entry, scale)| *entry *= scale);
-            // Normalised before, so that one threshold for the remainder holds for all.
+            // Before, so that one threshold holds for all remainders.
             if !normalise(direction, 0.0) {
                 continue;
             }
@@ -229,8 +217,7 @@ mod tests {
     const SAMPLES: u64 = 1 << 17;
     const MARKOV: NoiseTerm = NoiseTerm::Markov(Markov { time_constant: 8.0 });
 
-    /// Allan variance at 1 Hz of white noise of variance 1 with samples of variance 4 whose correlation is `exp(−k/time_constant)`: half
-    /// the variance of the difference of two means of `n`, term by term.
+    /// Allan variance at 1 Hz of white noise and of a process of variance 4 and correlation `exp(−k/time_constant)`.
     fn avar(n: u64, time_constant: f64) -> f64 {
         let weight = |at: u64| if at < n { -1.0 } else { 1.0 };
         let pairs = |lag: u64| (0..2 * n - lag).map(|at| weight(at) * weight(at + lag)).sum::<f64>();
@@ -251,7 +238,7 @@ mod tests {
         points
     }
 
-    /// From a sixth of the true time constant, and from six times of it. The curve has no scatter, so that its deviance there is 0.
+    /// From a sixth and from six times the true time constant.
     #[test]
     fn the_search_ends_at_the_time_constant_of_the_curve() {
         let curve = curve(20.0);
@@ -290,8 +277,7 @@ mod tests {
         }
     }
 
-    /// Of three terms, one of them absent: the derivative to the logarithm of the time constant, against that of the sums over all
-    /// pairs of samples.
+    /// Against the sums over all pairs of samples; one of the three terms is absent.
     #[test]
     fn the_derivatives_are_those_of_the_variance_to_the_amounts_and_to_the_free_shapes_of_present_terms() {
         let curve = curve(8.0);
@@ -314,7 +300,6 @@ mod tests {
         }
     }
 
-    /// Two amounts and a time constant; the absent walk has no direction.
     #[test]
     fn the_directions_of_present_terms_are_orthonormal() {
         let curve = curve(8.0);

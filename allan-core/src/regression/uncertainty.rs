@@ -5,7 +5,6 @@ use crate::curve::AllanPoint;
 use crate::math::{abs, expm1, ln, sqrt};
 use crate::model::Model;
 
-/// Weight and correlations of one octave.
 pub(super) struct OctaveWeight {
     /// Averaging factor, samples.
     pub(super) n: u64,
@@ -24,8 +23,7 @@ const SHORT: usize = 6;
 /// Residual of one of them, in standard deviations, that marks a poor model.
 const MISFIT: f64 = 6.0;
 
-/// Whether `model` does not describe the shortest octaves of the curve to which it was fitted. These have thousands of
-/// degrees of freedom and dominate the fit, so that the long octaves are described badly too.
+/// True if `model`, fitted to the curve, does not describe its shortest octaves, which dominate the fit.
 pub(super) fn is_poor(model: &Model, points: &[AllanPoint]) -> bool {
     points.iter().take(SHORT).any(|point| {
         let sigmas = (point.avar / model.avar(point.n) - 1.0) * sqrt(model.edf(point) / 2.0);
@@ -47,7 +45,6 @@ impl OctaveWeight {
         })
     }
 
-    /// Correlation of the Allan variances of two octaves that are `lag` octaves apart.
     fn correlation(&self, other: &Self, lag: usize) -> f64 {
         let product =
             |noise: usize| f64::from(self.roots[noise] * other.roots[noise]) * pure_octave_correlation(lag, noise);
@@ -55,8 +52,7 @@ impl OctaveWeight {
     }
 }
 
-/// Variance of a weighted sum over the octaves whose variance at averaging factor `n` is proportional to `common(n)`, the
-/// Allan covariance of two covariates.
+/// Variance of a weighted sum over the octaves, proportional to `common(n)`, the covariance of two covariates.
 pub(super) fn sum_variance<const COUPLED: usize>(octaves: &[OctaveWeight], common: impl Fn(u64) -> f64) -> f64 {
     let mut roots = [0.0; COUPLED];
     for (root, octave) in roots.iter_mut().zip(octaves) {
@@ -67,8 +63,7 @@ pub(super) fn sum_variance<const COUPLED: usize>(octaves: &[OctaveWeight], commo
     quadratic_form(octaves, |k| roots[k])
 }
 
-/// Equivalent degrees of freedom of one sensitivity, from the weights of the octaves, the Allan variance `measured` of the
-/// covariate and the correlations of the octaves.
+/// Equivalent degrees of freedom of one sensitivity, from the octaves and the covariate's variance `measured`.
 pub(super) fn edf(octaves: &[OctaveWeight], measured: impl Fn(u64) -> f64) -> f64 {
     let weighted = |octave: &OctaveWeight| octave.weight * measured(octave.n);
     let sum: f64 = octaves.iter().map(weighted).sum();
@@ -123,8 +118,7 @@ impl Sensitivity {
         (self.value - half_width, self.value + half_width)
     }
 
-    /// Significance: the number of standard deviations of a normal distribution that is exceeded as rarely as this distance
-    /// from 0 by Student's t.
+    /// Significance: normal standard deviations exceeded as rarely as this distance from 0 by Student's t.
     #[must_use]
     pub fn sigmas(&self) -> f64 {
         let widening = student(NORMAL_975, self.degrees_of_freedom) / NORMAL_975;
@@ -137,8 +131,8 @@ impl Sensitivity {
     }
 }
 
-/// The value that Student's t exceeds as rarely as a normal deviate exceeds `normal`, by Wallace's approximation (Ann. Math.
-/// Statist. 30, 1959): within 1.2 % at the 0.975 quantile for 3 or more degrees of freedom.
+/// The value that Student's t exceeds as rarely as a normal deviate exceeds `normal` (Wallace, Ann. Math. Statist. 30,
+/// 1959): within 1.2 % for 3 or more degrees of freedom.
 fn student(normal: f64, degrees_of_freedom: f64) -> f64 {
     if degrees_of_freedom.is_infinite() {
         return normal;
@@ -147,7 +141,6 @@ fn student(normal: f64, degrees_of_freedom: f64) -> f64 {
     sqrt(degrees_of_freedom * expm1(z * z / degrees_of_freedom))
 }
 
-/// The factor of Wallace's approximation.
 fn wallace(degrees_of_freedom: f64) -> f64 {
     (8.0 * degrees_of_freedom + 3.0) / (8.0 * degrees_of_freedom + 1.0)
 }

@@ -1,9 +1,8 @@
-//! Processes with an exponentially decaying autocovariance: the Gauss–Markov process, and the resonance, whose decay rate
-//! is complex.
+//! Processes with an exponentially decaying autocovariance: Gauss–Markov, and the resonance with its complex decay
+//! rate.
 //!
-//! With the autocovariance `r_j = Re z^j`, `z = exp(−λ)`, the variance of a sum of `m` samples is
-//! `Re[m(1+z)/(1−z) − 2z(1−z^m)/(1−z)²]`, from which the Allan variance follows. For slow processes `z` is close to 1, so
-//! the formulas are written in `1 − z`; where this cancels too, a power series in `λ` is used.
+//! With `r_j = Re z^j`, `z = exp(−λ)`, the variance of a sum of `m` samples is `Re[m(1+z)/(1−z) − 2z(1−z^m)/(1−z)²]`,
+//! written in `1 − z`, or in powers of `λ` where that cancels.
 
 use super::process::Process;
 use crate::math::{cos, exp, expm1, sin};
@@ -12,7 +11,7 @@ use core::ops::{Add, Mul, Sub};
 
 /// Exponentially correlated (first-order Gauss–Markov) noise of variance 1: `r(t) = exp(−|t|/T)` (IEEE 952).
 ///
-/// Sampled, it is an AR(1) process, whose Allan variance this is exactly. Random telegraph noise has the same Allan variance.
+/// The Allan variance is exactly that of its samples, an AR(1) process, and also that of random telegraph noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -88,8 +87,8 @@ impl<T: ExponentialAutocovariance> Process for T {
     }
 }
 
-/// `Re (1+z)/(1−z)` and `2z/(1−z)²`: the variance of the sum of `m` samples is the first times `m` less the real part of the second times
-/// `1 − z^m`.
+/// `Re (1+z)/(1−z)` and `2z/(1−z)²`: a sum of `m` samples has the variance `m` times the first less `Re` of the second
+/// times `1 − z^m`.
 #[inline(never)] // linked once
 fn line_and_bend(rate: Complex) -> (f64, Complex) {
     let inverse = rate.one_minus_exp().inverse();
@@ -121,8 +120,7 @@ fn slow_avar(rate: Complex, n: f64) -> f64 {
         - (square * square).re * ((2.0 * n2 * n2 - n2) / 24.0)
 }
 
-/// Sum variances at 0, 1, 2 … strides. `1 − z^m` advances from stride to stride by `1 − zᵃ⁺ᵇ = u + v − uv` with
-/// `u = 1 − zᵃ`, `v = 1 − zᵇ`.
+/// Sum variances at 0, 1, 2 … strides, with `1 − zᵃ⁺ᵇ = u + v − uv` for `u = 1 − zᵃ`, `v = 1 − zᵇ`.
 fn sum_variances(rate: Complex, stride: f64, table: &mut [f64]) {
     if (rate * (stride * table.len() as f64)).square() < 1e-6 {
         // At these strides the process is a random walk, and the differences below would cancel.
@@ -141,8 +139,7 @@ fn sum_variances(rate: Complex, stride: f64, table: &mut [f64]) {
     }
 }
 
-/// A complex number whose real part is the covariance of second differences at a lag of `2n`; at longer lags it is
-/// multiplied by `z` per sample.
+/// A number whose real part is the covariance of second differences at `2n`, to be multiplied by `z` per sample.
 fn covariance_at_2n(rate: Complex, n: f64) -> Complex {
     let (_, bend) = line_and_bend(rate);
     let one_minus_power = (rate * n).one_minus_exp();
@@ -155,7 +152,7 @@ fn squared_covariance_tail(rate: Complex, n: f64, stride: f64) -> f64 {
     squared_tail(covariance_at_2n(rate, n), rate * stride)
 }
 
-/// The same, of covariances whose values are those of `at_2n` at a lag of `2n` and whose rate for a stride is `step`.
+/// As [`squared_covariance_tail`], of covariances with these values at a lag of `2n` and the rate `step` per stride.
 pub(super) fn squared_tail(at_2n: Complex, step: Complex) -> f64 {
     let first = at_2n - at_2n * step.one_minus_exp();
     let steady = first.square() / -expm1(-2.0 * step.re);
@@ -168,7 +165,6 @@ fn lorentzian(decay: f64, angle: f64) -> f64 {
     (1.0 - z * z) / (1.0 - 2.0 * z * cos(angle) + z * z)
 }
 
-/// A complex number with the operations that the formulas above need.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Complex {
     pub(super) re: f64,
@@ -183,13 +179,11 @@ impl Complex {
         Self { re: 2.0 * half * half * (1.0 + shrink) - shrink, im: (1.0 + shrink) * sin(self.im) }
     }
 
-    /// `1/self`.
     pub(super) fn inverse(self) -> Self {
         let square = self.square();
         Self { re: self.re / square, im: -self.im / square }
     }
 
-    /// The square of its magnitude.
     fn square(self) -> f64 {
         self.re * self.re + self.im * self.im
     }

@@ -5,12 +5,11 @@ use super::process::Process;
 use crate::math::{abs, cos, expm1, floor, ln, sin, sqrt};
 use core::f64::consts::PI;
 
-/// One or two cascaded moving averages whose output is read at the same or at a lower rate. Two equal averages have a
-/// triangular (Bartlett) impulse response.
+/// One or two cascaded moving averages whose output is read at the same or a lower rate; two have a triangular
+/// (Bartlett) response.
 ///
-/// At averaging times below the length of the filter the Allan variance rises like that of a random walk. If the output is
-/// read at intervals near that length, only a correlation of neighbouring samples remains. The coefficient is that of the
-/// white noise at frequencies far below both rates.
+/// Below the length of the filter the Allan variance rises like that of a random walk. The coefficient is that of the
+/// white noise far below both rates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -21,8 +20,7 @@ pub struct MovingAverageFilter {
     /// L: number of values that each averages, 1 to 128.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::serialized::taps"))]
     pub taps: u16,
-    /// Filter values per sample that is read, 1 or more. Not an integer where the filter and the reader have independent
-    /// clocks.
+    /// Filter values per sample that is read, 1 or more, not always an integer.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::serialized::at_least_one"))]
     pub decimation: f64,
 }
@@ -40,8 +38,7 @@ impl MovingAverageFilter {
         floor(lags / self.decimation) as u32
     }
 
-    /// Autocorrelation at a lag of `samples`, linear between whole filter values: reading at a random phase of the filter's
-    /// clock.
+    /// Autocorrelation at a lag of `samples`, linear between whole filter values.
     fn autocorrelation(&self, samples: f64) -> f64 {
         let position = samples * self.decimation;
         let below = position as i64;
@@ -52,10 +49,7 @@ impl MovingAverageFilter {
         (1.0 - above) * self.value_autocorrelation(below) + above * self.value_autocorrelation(below + 1)
     }
 
-    /// Autocorrelation of the impulse response at a lag of `j` filter values; it sums to 1 over all lags.
-    ///
-    /// It is the convolution of two box functions for one average and of four for two averages: a finite difference of
-    /// binomial coefficients.
+    /// Autocorrelation of the impulse response at a lag of `j` filter values; it sums to 1.
     fn value_autocorrelation(&self, j: i64) -> f64 {
         let taps = i64::from(self.taps);
         let area = (taps * taps) as f64;
@@ -68,7 +62,7 @@ impl MovingAverageFilter {
         (choose(position) - 4 * choose(position - taps)) as f64 / (area * area)
     }
 
-    /// Length of each of the two equal averages, in s, that smooth as much: their impulse response has the same width, by its variance.
+    /// Length in s of each of two equal averages whose impulse response has the same variance.
     pub(crate) fn smoothing(&self, sample_period: f64) -> f64 {
         f64::from(self.taps) / self.decimation * sample_period * sqrt(f64::from(self.stages) / 2.0)
     }
@@ -87,8 +81,7 @@ impl MovingAverageFilter {
         if self.stages == 1 { square } else { square * square }
     }
 
-    /// Whether averages over `n` samples are so long against the filter that what passes it is the same as before: two averages over L
-    /// samples take `L²/2n²` of the Allan variance of a random walk, 1/2,000, and 1/700 of that of flicker noise.
+    /// True if averages over `n` samples are long against the filter: 1/2,000 of a random walk, 1/700 of flicker noise.
     pub(super) fn is_short_against(&self, n: u64) -> bool {
         n as f64 * self.decimation > LONG * f64::from(self.taps)
     }
@@ -133,18 +126,16 @@ impl MovingAverageFilter {
         })
     }
 
-    /// Allan variance at averaging factor `n` of noise that has passed the filter, by the `sum_variance` of what comes to it: the mean
-    /// of the covariances of two second differences, a lag apart, by the autocorrelation of the impulse response.
+    /// Allan variance at averaging factor `n` of noise that has passed the filter, by the `sum_variance` of what comes
+    /// to it and the autocorrelation of the impulse response.
     ///
-    /// Of a filter that is read slowly, samples are not averages of the values between them: to first order (Euler and Maclaurin) the
-    /// variance of their sum is lower by a twelfth of its second difference, which `sum_variance` has to contain. At `n = 1` and a
-    /// decimation of the number of taps, a thirtieth of the result is missing.
-    ///
-    /// Over `smooth` samples `sum_variance` may bend.
+    /// For a filter that is read slowly, `sum_variance` must be lower by a twelfth of its second difference (Euler and
+    /// Maclaurin); a thirtieth is missing at `n = 1` and a decimation by the number of taps. `sum_variance` may bend
+    /// over `smooth` samples.
     fn avar_of_passed(&self, n: u64, smooth: f64, sum_variance: &dyn Fn(f64) -> f64) -> f64 {
         let (n, taps) = (n as f64, f64::from(self.taps));
         if self.stages == 2 && self.decimation == 1.0 && n < taps {
-            // The autocorrelation of two averages and the fourth difference are products of the same four factors, and change places.
+            // The autocorrelation and the fourth difference, products of the same four factors, change places.
             let changed = Self { taps: n as u16, ..*self };
             return n / taps * n / taps * changed.avar_of_passed(self.taps.into(), smooth, sum_variance);
         }
@@ -186,10 +177,9 @@ fn square_log(m: f64) -> f64 {
 const STEPS_IN_AVERAGE: f64 = 4.0;
 /// Averaging factor over the number of taps from which on the filter does not matter to slow noise.
 const LONG: f64 = 32.0;
-/// The same for noise that is white over many samples, of which two averages over L samples take at most `0.7·L/n`, 1/1,500.
+/// [`LONG`] for noise that is white over many samples.
 const LONG_AGAINST_WHITE: f64 = 1024.0;
-/// Lag over the time constant up to which a Gauss–Markov process is a random walk, to this part of its variance: there the closed form
-/// is a small difference.
+/// Lag over the time constant up to which a Gauss–Markov process is a random walk.
 const WALKS: f64 = 1e-3;
 
 impl Process for MovingAverageFilter {
@@ -199,7 +189,6 @@ impl Process for MovingAverageFilter {
         at_0_and_m[1]
     }
 
-    /// As the provided method, with one pass over the lags.
     fn sum_variances(&self, stride: f64, sample_period: f64, table: &mut [f64]) {
         let at_zero = self.autocorrelation(0.0);
         let mut others = 0.0;
@@ -216,7 +205,6 @@ impl Process for MovingAverageFilter {
         sums(stride, table).for_each(|(m, pairs)| *pairs = (m * at_zero + 2.0 * *pairs) / scale);
     }
 
-    /// As the provided method, with one pass over the lags.
     fn avar(&self, n: u64, sample_period: f64) -> f64 {
         let n = n as f64;
         let at_zero = self.autocorrelation(0.0);
@@ -244,7 +232,6 @@ impl Process for MovingAverageFilter {
 mod tests {
     use super::*;
 
-    /// A filter with the provided Allan variance.
     struct Provided(MovingAverageFilter);
 
     impl Process for Provided {

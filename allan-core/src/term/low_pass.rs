@@ -5,12 +5,12 @@ use super::process::Process;
 use crate::math::{cos, expm1, sin, sqrt};
 use core::f64::consts::PI;
 
-/// White noise of density 1 after a low-pass filter of the second order, `H(s) = ω₀²/(s² + 2ζω₀s + ω₀²)` with `ω₀ = 2πf₀`: an analog
-/// filter, or a digital one whose own rate is high against that of the samples, and which is not averaged before it is sampled.
+/// White noise of density 1 after a low-pass filter of the second order, `H(s) = ω₀²/(s² + 2ζω₀s + ω₀²)`, `ω₀ = 2πf₀`,
+/// which is not averaged before it is sampled.
 ///
-/// Its autocovariance is `ω₀/(4ζ)·exp(−ζω₀|t|)·(cos ω_d t + ζω₀/ω_d·sin ω_d|t|)`, `ω_d = ω₀·√(1 − ζ²)` (A. Papoulis, "Probability, Random
-/// Variables, and Stochastic Processes", on white noise through a resonant circuit). The Allan variance of its samples is exact where
-/// `f₀` is above a thousandth of the sample rate.
+/// Its autocovariance is `ω₀/(4ζ)·exp(−ζω₀|t|)·(cos ω_d t + ζω₀/ω_d·sin ω_d|t|)`, `ω_d = ω₀·√(1 − ζ²)` (A. Papoulis,
+/// "Probability, Random Variables, and Stochastic Processes"). The Allan variance is exact where `f₀` is above a
+/// thousandth of the sample rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -50,7 +50,6 @@ impl LowPass {
         (Complex { re: self.damping * turn, im: damped * turn }, Complex { re: 1.0, im: self.damping / damped })
     }
 
-    /// Variance of a sample.
     fn variance(&self) -> f64 {
         PI * self.frequency / (2.0 * self.damping)
     }

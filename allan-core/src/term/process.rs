@@ -1,13 +1,12 @@
-//! The interface of a process, and the processes with elementary closed forms: the power laws of IEEE Std 952 and the
-//! sinusoid.
+//! The interface of a process, the power laws of IEEE Std 952, and the sinusoid.
 
 use crate::math::{abs, ln, sin};
 use core::f64::consts::{LN_2, PI};
 
 /// A random or deterministic process with a coefficient of 1, sampled every `sample_period` seconds.
 pub trait Process {
-    /// `V(m)`, the variance of the sum of `m` samples in units of the coefficient squared. Terms of `V` to which second
-    /// differences are blind (constant, linear and quadratic in the phase) are left out, so `V` may be negative.
+    /// `V(m)`, the variance of the sum of `m` samples for a coefficient of 1, without terms to which second differences
+    /// are blind.
     ///
     /// The Allan variance is `[4V(n) − V(2n)]/(2n²)`.
     fn sum_variance(&self, m: f64, sample_period: f64) -> f64;
@@ -21,22 +20,19 @@ pub trait Process {
         (4.0 * self.sum_variance(n, sample_period) - self.sum_variance(2.0 * n, sample_period)) / (2.0 * n * n)
     }
 
-    /// Sets `table` to [`sum_variance`](Self::sum_variance) at 0, 1, 2 … strides of `stride` samples, up to a common factor and to
-    /// an error that is negligible for the correlations of second differences at these strides.
+    /// Sets `table` to [`sum_variance`](Self::sum_variance) at 0, 1, 2 … strides, up to a common factor.
     fn sum_variances(&self, stride: f64, sample_period: f64, table: &mut [f64]) {
         for (k, entry) in table.iter_mut().enumerate() {
             *entry = self.sum_variance(k as f64 * stride, sample_period);
         }
     }
 
-    /// Sum of the squares of the halved covariances of second differences at the lags `2n + stride, 2n + 2·stride …`, in
-    /// units of the coefficient to the fourth; 0 for processes whose second differences are uncorrelated there.
+    /// Sum of the squared halved covariances of second differences at lags `2n + stride, 2n + 2·stride …`; 0 if none.
     fn squared_covariance_tail(&self, _n: u64, _stride: f64, _sample_period: f64) -> f64 {
         0.0
     }
 
-    /// Variance, over all phases that the process may begin with, of the mean square of `count` second differences at a distance of
-    /// `stride` samples, over the square of its expectation; 0 for processes without a phase.
+    /// Relative variance over all phases of the mean square of `count` second differences; 0 without a phase.
     fn phase_variance(&self, _count: u64, _stride: f64, _sample_period: f64) -> f64 {
         0.0
     }
@@ -57,8 +53,8 @@ pub struct AngleRandomWalk;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BiasInstability;
 
-/// A random walk of the rate, sampled every `dt` seconds: `σ² = K²·dt·(2n² + 1)/(6n)`, which is 1.5 times the `K²τ/3` of
-/// IEEE 952 at `n = 1` and tends to it at large `n`.
+/// A random walk of the rate, sampled every `dt` seconds: `σ² = K²·dt·(2n² + 1)/(6n)`, the `K²τ/3` of IEEE 952 at large
+/// `n`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RateRandomWalk;
@@ -145,10 +141,8 @@ impl Process for RateRamp {
     }
 }
 
-/// A sinusoid of amplitude 1, sampled every `dt` seconds: `σ² = sin⁴(πf·n·dt)/(n²·sin²(πf·dt))`.
-///
-/// The form for continuous time is `[sin²(πfτ)/(πfτ)]²` (IEEE 952). A frequency above half the sample rate gives the
-/// variance of its alias.
+/// A sinusoid of amplitude 1, sampled every `dt` seconds: `σ² = sin⁴(πf·n·dt)/(n²·sin²(πf·dt))` (IEEE 952:
+/// `[sin²(πfτ)/(πfτ)]²` for continuous time).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -176,12 +170,11 @@ impl Process for Sinusoid {
         ratio * ratio
     }
 
-    /// A difference is `sin(φ + jθ)` at the stride `j`, and its square `½ − ½·cos(2φ + 2jθ)`. The mean of the cosines over `count` strides has
-    /// the amplitude `sin(count·θ)/(count·sin θ)`, Dirichlet's kernel, and so half the square of it as its variance.
+    /// The mean of the cosines `cos(2φ + 2jθ)` over `count` strides is Dirichlet's kernel `sin(count·θ)/(count·sin θ)`.
     fn phase_variance(&self, count: u64, stride: f64, sample_period: f64) -> f64 {
         let step = 2.0 * PI * self.frequency * sample_period * stride;
         let (single, count) = (sin(step), count as f64);
-        // A stride of whole half periods meets every time the same phase.
+        // A stride of whole half periods always meets the same phase.
         let kernel = if abs(single) * count < 1e-6 { 1.0 } else { sin(count * step) / (count * single) };
         kernel * kernel / 2.0
     }

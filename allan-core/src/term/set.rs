@@ -7,44 +7,36 @@ use crate::noise_type::VarianceFractions;
 use core::f64::consts::{LN_2, PI};
 use core::ops::Range;
 
-/// What a fit asks of its terms. A term outside the set contributes nothing.
+/// The methods of terms that a fit needs. A term outside the set contributes nothing.
 pub(crate) trait TermSet {
     /// The numbers of the normal equations and of the correlations.
     type Real: Real;
 
-    /// The terms of `kinds` that are in the set.
     fn contains(kind: &NoiseTerm) -> bool;
 
-    /// [`NoiseTerm::avar_behind`].
     fn avar(kind: &NoiseTerm, filter: Option<&MovingAverageFilter>, n: u64, sample_period: f64) -> f64;
 
     /// [`NoiseTerm::sum_variances`] at strides of `n/overlap` samples.
     fn sum_variances(kind: &NoiseTerm, n: u64, overlap: u32, sample_period: f64, table: &mut [Self::Real]);
 
-    /// [`NoiseTerm::squared_covariance_tail`].
     fn squared_covariance_tail(kind: &NoiseTerm, n: u64, stride: Self::Real, sample_period: f64) -> Self::Real;
 
-    /// [`NoiseTerm::phase_variance`].
     fn phase_variance(kind: &NoiseTerm, count: u64, stride: f64, sample_period: f64) -> Self::Real;
 
-    /// [`NoiseTerm::share`].
     fn share(kind: &NoiseTerm, fraction: f64, n: u64, sample_period: f64) -> VarianceFractions;
 
-    /// Whether a term of the set has shape parameters.
+    /// True if a term of the set has shape parameters.
     const SHAPES: bool;
 
-    /// [`NoiseTerm::free_parameters`].
     fn free_parameters(kind: &NoiseTerm) -> Range<usize>;
 
-    /// The 2.5 % quantile, or the 97.5 % quantile if `upper`, of the gamma distribution (Pearson type III) with this
-    /// skewness, a mean of 0 and a standard deviation of 1.
+    /// The 2.5 % or, if `upper`, 97.5 % quantile of the standardised gamma distribution (Pearson type III).
     fn gamma_quantile(skewness: f32, upper: bool) -> f32;
 
     /// The square root of a squared coefficient.
     fn sqrt(x: f64) -> f64;
 }
 
-/// Every [`NoiseTerm`], with exact quantiles.
 pub(crate) enum AllTerms {}
 
 impl TermSet for AllTerms {
@@ -125,9 +117,7 @@ impl TermSet for PowerLawTerms {
         }
     }
 
-    /// In units of the stride, and for the random walk without the term that is linear in the phase, to which second differences
-    /// are blind. In single precision the error is 10⁻⁵ of the covariance of a difference for flicker noise and a random
-    /// walk, and 10⁻⁴ for a ramp.
+    /// In units of the stride, and for the random walk without the term to which second differences are blind.
     fn sum_variances(kind: &NoiseTerm, _: u64, _: u32, _: f64, table: &mut [f32]) {
         for (k, entry) in (0_u16..).map(f32::from).zip(table) {
             *entry = match kind {
@@ -158,8 +148,7 @@ impl TermSet for PowerLawTerms {
         0..0
     }
 
-    /// By E. Wilson and M. Hilferty (Abramowitz and Stegun, Handbook of Mathematical Functions, 26.4.17): within 0.03
-    /// standard deviations up to a skewness of 2, that of an estimate with 2 degrees of freedom.
+    /// By E. Wilson and M. Hilferty (Abramowitz and Stegun, Handbook of Mathematical Functions, 26.4.17).
     fn gamma_quantile(skewness: f32, upper: bool) -> f32 {
         let normal = if upper { NORMAL_975 as f32 } else { -NORMAL_975 as f32 };
         // With 8/skewness² degrees of freedom, of which the approximation uses 2/9.

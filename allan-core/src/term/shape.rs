@@ -1,40 +1,39 @@
 //! The shape parameters of a term, by name.
 
-/// Largest number of shape parameters of a term.
 pub(crate) const MAX_SHAPE: usize = 2;
 
-/// The shape parameters of a term: their values, or what else `T` says of each, such as its bounds.
+/// The shape parameters of a term: their values, or what `T` says of each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Shape<T = f64> {
     /// A power law has none.
     PowerLaw,
-    /// Of [`NoiseTerm::Filtered`](crate::NoiseTerm::Filtered).
+    /// For [`NoiseTerm::Filtered`](crate::NoiseTerm::Filtered).
     Filtered {
         /// Taps of each of its averages.
         taps: T,
         /// Values of the filter for each sample.
         decimation: T,
     },
-    /// Of [`NoiseTerm::Markov`](crate::NoiseTerm::Markov).
+    /// For [`NoiseTerm::Markov`](crate::NoiseTerm::Markov).
     Markov {
         /// s
         time_constant: T,
     },
-    /// Of [`NoiseTerm::Resonance`](crate::NoiseTerm::Resonance).
+    /// For [`NoiseTerm::Resonance`](crate::NoiseTerm::Resonance).
     Resonance {
         /// Hz
         frequency: T,
         /// Hz
         bandwidth: T,
     },
-    /// Of [`NoiseTerm::Sinusoid`](crate::NoiseTerm::Sinusoid).
+    /// For [`NoiseTerm::Sinusoid`](crate::NoiseTerm::Sinusoid).
     Sinusoid {
         /// Hz
         frequency: T,
     },
-    /// Of [`NoiseTerm::LowPass`](crate::NoiseTerm::LowPass).
+    /// For [`NoiseTerm::LowPass`](crate::NoiseTerm::LowPass).
     LowPass {
         /// Hz
         frequency: T,
@@ -59,7 +58,7 @@ impl<T: Copy> Shape<T> {
         first.into_iter().chain(second)
     }
 
-    /// The same parameters with what `change` makes of each.
+    /// The parameters, each changed by `change`.
     pub fn map<U>(&self, mut change: impl FnMut(T) -> U) -> Shape<U> {
         match *self {
             Self::PowerLaw => Shape::PowerLaw,

@@ -4,10 +4,10 @@ use crate::curve::CurveView;
 use crate::fit::FreeShapes;
 use crate::term::{Markov, MovingAverageFilter, NoiseTerm, Resonance, Sinusoid};
 
-/// Largest number of starting shapes of a family; the search reaches the shapes between them.
+/// Largest number of starting shapes of a family.
 const MAX_SHAPES: usize = 64;
 
-/// Where candidate spectral lines come from.
+/// Source of candidate spectral lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum LineCandidates<'a> {
@@ -18,7 +18,7 @@ pub enum LineCandidates<'a> {
 }
 
 impl<'a> LineCandidates<'a> {
-    /// All shapes are adjusted except frequencies from a spectrum, which are more accurate than those from a curve.
+    /// All shapes are adjusted except frequencies from a spectrum.
     pub(super) fn free(self) -> FreeShapes<'a> {
         FreeShapes::AllExcept(match self {
             Self::Curve => &[],
@@ -27,14 +27,13 @@ impl<'a> LineCandidates<'a> {
     }
 }
 
-/// A family of candidate terms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Family {
     Quantization,
     RateRamp,
-    /// A filter at its own rate, added to the white noise: rounding after the filter remains white.
+    /// A filter at its own rate, added to the white noise.
     Filter,
-    /// A filter whose output is read at a lower rate, in place of the white noise: the curve cannot distinguish the two.
+    /// A filter whose output is read at a lower rate, in place of the white noise.
     DecimatedFilter,
     Markov,
     Sinusoid,
@@ -43,12 +42,10 @@ pub(super) enum Family {
 }
 
 impl Family {
-    /// Whether it replaces a term of the model. Starting shapes of such a family fit much worse than the best shape does.
     pub(super) fn replaces_a_term(self) -> bool {
         matches!(self, Self::DecimatedFilter)
     }
 
-    /// Number of parameters that it adds to the model.
     pub(super) fn parameters(self) -> u32 {
         match self {
             Self::Quantization | Self::RateRamp => 1,
@@ -58,7 +55,6 @@ impl Family {
     }
 }
 
-/// The families of candidates for a curve.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Families<'a> {
     lines: LineCandidates<'a>,
@@ -84,7 +80,7 @@ impl<'a> Families<'a> {
         [Quantization, RateRamp, Filter, DecimatedFilter, Markov].iter().chain(lines).copied()
     }
 
-    /// The starting shapes of a family, one at a time: a list of them would take too much stack.
+    /// The starting shapes of a family, one at a time, as a list would take too much stack.
     pub(super) fn shapes(&self, family: Family) -> impl Iterator<Item = NoiseTerm> {
         (0..MAX_SHAPES).map_while(move |index| self.shape(family, index))
     }
@@ -109,13 +105,12 @@ impl<'a> Families<'a> {
         }
     }
 
-    /// The filter with this index among the candidates of one kind.
     fn filter(&self, is_member: impl Fn(&MovingAverageFilter) -> bool, index: usize) -> Option<NoiseTerm> {
         self.filters.iter().copied().filter(is_member).nth(index).map(NoiseTerm::Filtered)
     }
 }
 
-/// The value with this index of a geometric series from `low` to `high` with `density` values per octave.
+/// Value `index` of a geometric series from `low` to `high` with `density` values per octave.
 fn octaves(low: f64, high: f64, density: f64, index: usize) -> Option<f64> {
     let value = low * crate::math::exp(core::f64::consts::LN_2 / density * index as f64);
     (value <= high).then_some(value)

@@ -17,14 +17,14 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::OutputPin;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 
-/// Time before the first frame after a burst in µs: the sensor's longest stall time, that of its low-power mode.
+/// Before the first frame after a burst, µs: the stall of low-power mode.
 const STALL_US: u32 = 75;
-/// Time in µs for which the sensor's RST line is low, as with the driver of Linux; the data sheet has no least time.
+/// RST low, µs, as with the driver of Linux; the data sheet has no minimum.
 const RESET_US: u32 = 100;
-/// Time in µs after which a burst is abandoned: the longest one, at 164 kHz with gaps of 16 µs, takes 1.5 ms.
+/// Abandons a burst, µs; the longest takes 1.5 ms (164 kHz, gaps of 16 µs).
 const BURST_US: u32 = 5_000;
 
-/// What the main loop shares with the interrupts. Each access disables only the interrupts that share the resource.
+/// Resources of main loop and interrupts; access disables only the interrupts that share them.
 pub trait SharedResources {
     /// The board.
     type Board: BoardSupport;
@@ -91,7 +91,7 @@ impl<S: SharedResources> Board for BoardContext<'_, S> {
         self.shared.uptime(|uptime| uptime.at(Self::counter()))
     }
 
-    /// Returns before the interrupt that ends the sleep is served.
+    /// Returns before the waking interrupt is served.
     fn sleep(&mut self) {
         cortex_m::interrupt::free(|_| {
             let fell_asleep = Self::counter();
@@ -219,7 +219,7 @@ impl<S: SharedResources> Board for BoardContext<'_, S> {
     }
 }
 
-/// The shared bus, locked for one transaction at a time.
+/// Locked for one transaction at a time.
 pub struct LockedBus<'a, S>(&'a mut S);
 
 impl<S: SharedResources> ErrorType for LockedBus<'_, S> {

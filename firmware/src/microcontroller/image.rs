@@ -6,7 +6,7 @@ use core::panic::PanicInfo;
 use cortex_m_rt::ExceptionFrame;
 use link::{Boot, BootCause, ClockSource};
 
-// Sections of RAM that the start-up code does not initialise.
+// Not initialised at the start.
 
 #[unsafe(link_section = ".uninit.retained")]
 static RETAINED: RetainedMemory = blank_memory();
@@ -14,7 +14,7 @@ static RETAINED: RetainedMemory = blank_memory();
 #[unsafe(link_section = ".uninit.crash_record")]
 static CRASH_RECORD: CrashRecord = CrashRecord::blank();
 
-/// The cause of the start with the crash record, and the retained RAM, which is erased after power-on.
+/// Start cause with crash record, and retained RAM, erased after power-on.
 pub fn restore(cause: BootCause, clock: ClockSource) -> (Boot, RetainedRam) {
     let mut retained = RetainedRam::open(&RETAINED);
     if cause == BootCause::PowerOn {
@@ -37,14 +37,14 @@ pub fn restore(cause: BootCause, clock: ClockSource) -> (Boot, RetainedRam) {
 /// Writes the place and the message of a panic into the crash record.
 pub fn record_panic(info: &PanicInfo<'_>) {
     let (path, line) = info.location().map_or(("?", 0), |at| (at.file(), at.line()));
-    // The paths of dependencies are longer than the record.
+    // Paths of dependencies are too long.
     let file = path.rsplit('/').next().unwrap_or(path);
     CRASH_RECORD.write(format_args!("panic at {file}:{line}: {}", info.message()));
-    // Its message, which would be formatted here, is in the crash record.
+    // The message is in the crash record.
     defmt::error!("panic at {=str}:{=u32}", path, line);
 }
 
-/// Writes the place of a fault into the crash record; there is no frame if the stack has overflowed.
+/// No frame after a stack overflow.
 pub fn record_fault(frame: Option<&ExceptionFrame>) {
     match frame {
         Some(frame) => {
@@ -55,7 +55,7 @@ pub fn record_fault(frame: Option<&ExceptionFrame>) {
     }
 }
 
-/// Gives the main loop access to each of its resources, and the interrupts that it requests.
+/// Access to each resource, and interrupt requests.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! shared_resources {
@@ -72,10 +72,9 @@ macro_rules! shared_resources {
 
 /// Defines the image of a board: start-up, interrupts and main loop.
 ///
-/// `board` implements [`BoardSupport`](crate::microcontroller::BoardSupport) for the peripherals of `device`. The interrupts are those of
-/// the data-ready edge, of the end of a burst, of the UART, of USB if the board has it, and, for the estimators, one whose
-/// peripheral is not used. The board's package needs the crates `rtic`, `heapless` and `cortex-m-rt`, and their features
-/// of this one.
+/// `board` implements [`BoardSupport`](crate::microcontroller::BoardSupport) for the peripherals of `device`.
+/// Interrupts: data ready, end of a burst, UART, USB if any, and an unused one for the estimators. The package needs
+/// the crates `rtic`, `heapless` and `cortex-m-rt`, and their features of this one.
 ///
 /// | priority | interrupt |
 /// |---|---|
@@ -246,7 +245,7 @@ macro_rules! observatory {
             fn wake(context: wake::Context) {
                 context.local.blinker.tick();
                 Mcu::extend_watchdog(context.local.extension);
-                // A port that has stalled raises no interrupt.
+                // A stalled port raises no interrupt.
                 $(rtic::pend(Interrupt::$usb_interrupt);)?
             }
         }
@@ -257,7 +256,7 @@ macro_rules! observatory {
             <<$board as $crate::microcontroller::BoardSupport>::Microcontroller as $crate::microcontroller::Microcontroller>::restart()
         }
 
-        /// Passes on the exception frame, or, if the stack has overflowed, none and the stack pointer reset to the stack's start.
+        /// Passes on the exception frame; none after a stack overflow, with the stack pointer reset.
         #[unsafe(naked)]
         #[unsafe(export_name = "HardFault")]
         unsafe extern "C" fn hard_fault() -> ! {

@@ -11,14 +11,13 @@ use link::ClockSource;
 pub static SAMPLING_CYCLES: AtomicU32 = AtomicU32::new(0);
 /// Longest run of the estimators in cycles; written by their interrupt only.
 pub static ESTIMATOR_CYCLES: AtomicU32 = AtomicU32::new(0);
-/// Received bytes that each port has lost; written by its interrupt only.
+/// Per port; written by its interrupt only.
 pub(super) static LOST_BYTES: [AtomicU32; HostPort::COUNT] = [const { AtomicU32::new(0) }; HostPort::COUNT];
 
-/// Rate in Hz at which SysTick wakes the main loop, also without a sensor. At 168 MHz the reload value fits SysTick's 24 bits.
+/// SysTick interrupts a second, which wake the main loop; fits 24 bits at 168 MHz.
 pub const WAKE_HZ: u32 = 16;
 
-/// Runs `work` and stores the cycles that it took in `longest` if they are the most so far. `work` must take less than one
-/// period of SysTick, which counts down.
+/// Runs `work`, shorter than a period of SysTick, and keeps the largest number of cycles in `longest`.
 pub fn measure(longest: &AtomicU32, work: impl FnOnce()) {
     let start = SYST::get_current();
     work();
@@ -35,17 +34,15 @@ pub fn count_lost_bytes(port: HostPort, lost: u32) {
     all.store(all.load(Relaxed).saturating_add(lost), Relaxed);
 }
 
-/// An LED that blinks once a second while the clocks come from the crystal, and eight times a second while they come from the
-/// internal oscillator.
+/// Blinks once a second by the crystal, eight times by the internal oscillator.
 pub struct Blinker<L> {
     led: L,
-    /// Ticks of SysTick for which the LED is on, and then off.
     half_period: u32,
     ticks: u32,
 }
 
 impl<L: OutputPin> Blinker<L> {
-    /// Blinks `led`, whichever of its levels is the bright one.
+    /// Either level may be the bright one.
     pub fn new(led: L, clock: ClockSource) -> Self {
         let half_period = match clock {
             ClockSource::Crystal => WAKE_HZ / 2,
@@ -71,14 +68,13 @@ pub fn start_systick(mut systick: SYST, core_hz: u32) {
     systick.enable_counter();
 }
 
-/// Largest depth and size of the stack in bytes. The start-up code fills the stack with a pattern; the depth is what lies
-/// above the last word that still holds it, counted from the end of the stack.
+/// Largest depth and size of the stack in bytes, by the last word of the start-up pattern.
 pub(super) fn stack() -> (u32, u32) {
     unsafe extern "C" {
         static _stack_start: u32;
         static _stack_end: u32;
     }
-    /// The pattern of cortex-m-rt's feature paint-stack.
+    /// By cortex-m-rt's paint-stack.
     const PAINT: u32 = 0xCCCC_CCCC;
     let (start, end) = (&raw const _stack_start as usize, &raw const _stack_end as usize);
     // SAFETY: the stack lies between these linker symbols and is readable RAM.

@@ -1,4 +1,4 @@
-//! The sensor's bus on any microcontroller: registers byte by byte, bursts by DMA, and chip select with its times.
+//! The sensor's bus: registers by byte, bursts by DMA, times of chip select.
 
 use super::{BurstBus, BurstEnd};
 use crate::board::{BusTiming, FrameTimes, SensorBus};
@@ -9,7 +9,7 @@ use core::sync::atomic::{Ordering, compiler_fence};
 use embedded_hal::digital::OutputPin;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 
-/// The bytes that request a burst. DMA reads them, so they must not be on the stack.
+/// Bytes that request a burst, in static memory for DMA.
 static REQUEST: [u8; BURST_BYTES] = BURST_REQUEST;
 
 /// An SPI peripheral with the two DMA channels that serve it.
@@ -20,12 +20,12 @@ pub trait SpiPeripheral: ByteExchange {
     fn set_clock_limit(&mut self, limit_hz: u32) -> u32;
     /// Resets the peripheral and keeps its settings.
     fn reset(&mut self);
-    /// Waits for a byte under way and drops what was received: a byte left in the receive buffer would shift the next burst.
+    /// Waits for a byte and drops received ones, which would shift the next burst.
     fn drain(&mut self);
-    /// Starts the transfer of bytes, as many as `request` has, whose end raises an interrupt. Both slices must outlive it, and nothing may
-    /// use `received` before it is [stopped](Self::stop).
+    /// Starts a transfer of `request`, with an interrupt at its end. Both slices must outlive it, and nothing may use
+    /// `received` before it is [stopped](Self::stop).
     fn start(&mut self, request: &'static [u8], received: &mut [u8]);
-    /// Stops both channels. Returns whether all bytes were received without an error.
+    /// Stops both channels; true if all bytes were received without an error.
     fn stop(&mut self) -> bool;
 }
 
@@ -33,20 +33,18 @@ pub trait SpiPeripheral: ByteExchange {
 pub struct SensorSpi<P, S> {
     peripheral: P,
     select: ChipSelect<S>,
-    /// In static memory, as DMA does not reach the stack.
     received: &'static mut [u8; BURST_BYTES],
-    /// Bytes of the burst that have been transferred, or are being transferred.
+    /// For the burst, including those under way.
     started: usize,
 }
 
 impl<P: SpiPeripheral, S: OutputPin<Error = Infallible>> SensorSpi<P, S> {
-    /// A bus with the chip select `select`, which must be high. To be called once.
+    /// `select` must be high; once.
     pub fn new(peripheral: P, select: S) -> Self {
         let received = cortex_m::singleton!(: [u8; BURST_BYTES] = [0; BURST_BYTES]).expect("the bus is created once");
-        Self { peripheral, select: ChipSelect::new(select, BusTiming::SAFE), received, started: 0 }
+        Self { peripheral, select: ChipSelect::new(select, BusTiming::USUAL), received, started: 0 }
     }
 
-    /// Transfers the next bytes of the burst: all of them, or one word if there is to be a gap between words.
     fn start_bytes(&mut self) {
         let count = if self.select.timing.word_gap_ns == 0 { BURST_BYTES } else { 2 };
         let from = self.started.min(BURST_BYTES - count);

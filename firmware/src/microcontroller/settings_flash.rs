@@ -1,12 +1,11 @@
-//! The part of a microcontroller's flash memory that keeps the settings: its range, from the board's memory map, over the operations
-//! of the microcontroller.
+//! The part of flash memory for the settings, by the board's memory map.
 
 use crate::settings_store::SettingsStore;
 use core::marker::PhantomData;
 use core::ops::Range;
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 
-/// Why the flash was not read or written.
+/// Failure of a flash operation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FlashError {
     /// The bytes are not of the memory of the settings, or not whole units.
@@ -43,7 +42,7 @@ pub trait FlashMemory {
 }
 
 unsafe extern "C" {
-    // Of the memory map: where the memory of the settings begins, and where it has ended.
+    // By the memory map.
     static _settings_start: u8;
     static _settings_end: u8;
 }
@@ -57,13 +56,12 @@ impl<M: FlashMemory> SettingsFlash<M> {
         SettingsStore::new(Self(PhantomData), Self::range())
     }
 
-    /// The offsets of the settings.
     fn range() -> Range<u32> {
         let [start, end] = [&raw const _settings_start, &raw const _settings_end];
         (start as usize - M::ORIGIN) as u32..(end as usize - M::ORIGIN) as u32
     }
 
-    /// Whether `length` bytes from `offset` on are of the settings, and whole units.
+    /// Whole units within the settings.
     fn check(offset: u32, length: usize, unit: usize) -> Result<(), FlashError> {
         let (begin, end, settings) = (offset as usize, (offset as usize).saturating_add(length), Self::range());
         let is_inside = begin >= settings.start as usize && end <= settings.end as usize;

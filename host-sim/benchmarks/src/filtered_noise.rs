@@ -1,13 +1,11 @@
-//! Benchmark of noise behind the part's filter and nothing else: bias and coverage of N, B and K, and how often something is named.
+//! Benchmark of noise behind the part's filter: bias and coverage of N, B and K, and wrong names.
 //!
 //! ```text
 //! seed ─► white, flicker, walk at 819.2 Hz ─► two averages over 1 … 64 values ─► every 1st … 9th ─► counts ─► analysis ─► table
 //! ```
 //!
-//! The noises are made by their definitions at the sensor's own rate: white noise of the density N², flicker noise of the
-//! one-sided density B²/(πf), a walk of white steps. N is that of the white noise at frequencies far below the rate at which it is
-//! read: where the filter is shorter than the interval, what it lets through above half that rate is folded down and added. The
-//! rounding to counts, at most 0.1 % of N, is not part of it.
+//! Noises by definition at the sensor's own rate: white N², flicker B²/(πf) (one-sided), a walk of white steps. N is
+//! the density far below the reading rate, folded noise included, without rounding (0.1 %).
 
 mod table;
 
@@ -31,30 +29,26 @@ const RESOLUTION: f64 = 0.05;
 const COEFFICIENTS: [f64; 3] = [0.0368, 0.0093, 0.0013];
 /// Taps of each of the two averages.
 pub const TAPS: [usize; 5] = [1, 4, 8, 16, 64];
-/// Which of the values are read.
+/// The values that are read.
 pub const READ_EVERY: [usize; 4] = [1, 2, 4, 9];
-/// The channels of a record.
 const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
 
-/// Which records to simulate.
+/// Records to simulate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FilteredNoisePlan {
     /// Taps of each of the two averages, 1 or more.
     pub taps: Vec<usize>,
-    /// Which of the values are read: 1 for every one, 2 for every second.
     pub every: Vec<usize>,
-    /// Records of each filter and reading, of three gyros each. The same noises are behind all of the filters.
+    /// Records of three gyros per filter and reading; the noises are the same behind all filters.
     pub records: u64,
     /// Length of a record, s.
     pub seconds: f64,
-    /// Seed of the first record.
     pub first_seed: u64,
-    /// Number of threads.
     pub jobs: usize,
 }
 
 impl FilteredNoisePlan {
-    /// Runs the benchmark. `progress` is called with the number of finished records of a filter and of all.
+    /// Runs the benchmark; `progress` gets the numbers of finished and of all records.
     #[must_use]
     pub fn run(&self, progress: impl Fn(usize, usize) + Sync) -> FilteredNoiseTable {
         let seeds = self.first_seed..self.first_seed + self.records;
@@ -71,11 +65,10 @@ impl FilteredNoisePlan {
         FilteredNoiseTable { cells: cells.into_iter().map(cell).collect() }
     }
 
-    /// The channels of one record behind averages over `taps`, for each reading.
+    /// The channels of one record behind averages over `taps`, by reading.
     fn record(&self, seed: u64, taps: usize) -> Vec<Vec<FilteredChannel>> {
         let samples = (self.seconds * INTERNAL_RATE_HZ).round() as usize;
         let filtered = |channel: usize| {
-            // The filter has run before the first sample.
             let noise = noise(samples + 2 * (taps - 1), seed, channel as u64);
             moving_average(&moving_average(&noise, taps), taps)
         };
@@ -98,7 +91,7 @@ impl FilteredChannel {
         let term = |kind: &str| report.refitted.terms.iter().find(|term| term.kind() == kind);
         let filter = term("filter_bandwidth");
         let parameter = |name: &str| filter.map(|term| term.parameters()[name].value);
-        // Behind a filter N is its coefficient.
+        // N is the coefficient of the filtered term.
         let white = filter.or(term("angle_random_walk"));
         let terms = [white, term("bias_instability"), term("rate_random_walk")];
         let coefficient = |at: usize| {
@@ -117,7 +110,7 @@ impl FilteredChannel {
     }
 }
 
-/// White noise, flicker noise and a walk at the sensor's own rate, °/s.
+/// At the sensor's own rate, °/s.
 fn noise(samples: usize, seed: u64, channel: u64) -> Vec<f64> {
     let [n, b, k] = COEFFICIENTS;
     let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -132,7 +125,6 @@ fn noise(samples: usize, seed: u64, channel: u64) -> Vec<f64> {
     values
 }
 
-/// Means of so many neighbouring values; one for each window.
 fn moving_average(values: &[f64], taps: usize) -> Vec<f64> {
     let mut sum: f64 = values[..taps - 1].iter().sum();
     let mean = |at: usize| {
@@ -144,7 +136,6 @@ fn moving_average(values: &[f64], taps: usize) -> Vec<f64> {
     (taps - 1..values.len()).map(mean).collect()
 }
 
-/// Every so many values of the gyros, in counts.
 fn measurement(filtered: &[Vec<f64>], every: usize) -> Measurement {
     let profile = adis16405::profile(RESOLUTION);
     let rate_hz = INTERNAL_RATE_HZ / every as f64;
@@ -168,8 +159,7 @@ fn measurement(filtered: &[Vec<f64>], every: usize) -> Measurement {
     }
 }
 
-/// N, B and K of what is read: N² times `d·Σ r(jd)` for the autocorrelation `r` of the impulse response, of which every `d`-th lag is
-/// read. It is 1 where the nulls of the filter, at multiples of the internal rate over the taps, take what is folded down.
+/// N, B and K of the values read: N² times `d·Σ r(jd)`, with the impulse response's autocorrelation `r`.
 fn truth(taps: usize, every: usize) -> [f64; 3] {
     let [n, b, k] = COEFFICIENTS;
     let box_response = vec![1.0 / taps as f64; taps];
@@ -195,9 +185,7 @@ fn convolution(a: &[f64], b: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Without a filter the white noise of every `d`-th sample has `d` times the density. 8 taps have their nulls at multiples of
-    /// 102.4 Hz, so that reading every 4th value, at 204.8 Hz, folds nothing onto low frequencies. 4 taps read at every 9th value do not
-    /// reach the next one: 9·Σh² = 9·(2·4² + 1)/(3·4³).
+    /// Unfiltered, every `d`-th sample has `d` times the density; 8 taps fold nothing at 204.8 Hz; 9·Σh² of 4 taps.
     #[test]
     fn the_white_noise_that_is_read_has_its_closed_form() {
         let ratio = |taps: usize, every: usize| (truth(taps, every)[0] / COEFFICIENTS[0]).powi(2);
@@ -205,8 +193,7 @@ mod tests {
         assert!((ratio(4, 9) - 9.0 * 33.0 / 192.0).abs() < 1e-12);
     }
 
-    /// White noise of density N² behind the filter has the variance `N²·f·Σh²`; the flicker noise and the walk add less than a hundredth
-    /// in 100 s. 2¹⁶ samples that are correlated over 8: 1 % (1 σ).
+    /// `N²·f·Σh²`; flicker noise and walk add less than a hundredth. 2¹⁶ samples correlated over 8: 1 % (1 σ).
     #[test]
     fn the_noise_behind_the_filter_has_the_variance_of_its_response() {
         let plan_samples = 1 << 16;
@@ -226,7 +213,7 @@ mod tests {
         let table = plan.run(|_, _| ());
         assert_eq!(table.cells.len(), TAPS.len() * READ_EVERY.len());
         assert!(table.cells.iter().all(|cell| cell.channels.len() == GYROS.len()));
-        // N of white noise in half a minute is known to about 1.5 %: 10 % off is another filter or another rate.
+        // Half a minute gives N to 1.5 %: 10 % is another filter or rate.
         let default = table.cells.iter().find(|cell| (cell.taps, cell.every) == (4, 1)).expect("4 taps");
         for channel in &default.channels {
             let n = channel.coefficients[0].expect("N");

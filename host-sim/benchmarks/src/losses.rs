@@ -1,5 +1,4 @@
-//! Benchmark of lost samples: each simulated record is estimated complete and with samples taken out of it, and the two
-//! curves and models are compared.
+//! Benchmark of lost samples: records complete and with losses, compared in curve and model.
 //!
 //! ```text
 //! seed ─► noise ─► complete record ─► Cascade ─► curve, N, B, K ─┐
@@ -22,18 +21,15 @@ use std::convert::Infallible;
 /// How many records to simulate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LossPlan {
-    /// Records of each noise.
     pub records: u64,
     /// Samples of each record; a power of two.
     pub samples: usize,
-    /// Seed of the first record of each noise.
     pub first_seed: u64,
-    /// Number of threads.
     pub jobs: usize,
 }
 
 impl LossPlan {
-    /// Runs the benchmark. `progress` is called with the number of finished records and of all.
+    /// Runs the benchmark; `progress` gets the numbers of finished and of all records.
     #[must_use]
     pub fn run(&self, progress: impl Fn(usize, usize) + Sync) -> LossTable {
         let seeds = self.first_seed..self.first_seed + self.records;
@@ -51,7 +47,7 @@ impl LossPlan {
         LossTable { records: self.records, samples: self.samples, comparisons }
     }
 
-    /// The record of a seed, complete and with each of the losses.
+    /// The record of a seed, complete and with each loss.
     fn record(&self, noise: TestNoise, seed: u64) -> Vec<EstimatedRecord> {
         let record = noise.record(self.samples, seed);
         let losses = LossPattern::ALL.into_iter().map(|pattern| pattern.gaps(self.samples, seed));

@@ -176,7 +176,6 @@ struct LossArguments {
     jobs: Option<NonZeroUsize>,
 }
 
-/// A share of lost samples from 0 to 50 %.
 fn loss_percent(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(percent) if (0.0..=50.0).contains(&percent) => Ok(percent),
@@ -184,7 +183,6 @@ fn loss_percent(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A number above 0.
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
@@ -192,7 +190,7 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Taps of an average of the filter or a distance of the values that are read, as the table of the models allows.
+/// Taps or decimation of a filter.
 fn in_filter(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
         Ok(value @ 1..=128) => Ok(value),
@@ -209,10 +207,10 @@ fn threads(jobs: Option<NonZeroUsize>) -> usize {
 fn main() -> ExitCode {
     match run(Cli::parse()) {
         Ok(()) => ExitCode::SUCCESS,
-        // The reader of standard output has closed it, as `head` does.
+        // Closed by its reader, as `head` does.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            // Where standard error is closed too, the exit code alone shows the error.
+            // If standard error is closed too, the exit code remains.
             let _ = writeln!(io::stderr(), "error: {error:#}");
             ExitCode::FAILURE
         }
@@ -222,7 +220,7 @@ fn main() -> ExitCode {
 fn run(Cli { benchmark, json }: Cli) -> Result<()> {
     let json = json.as_deref();
     if let Some(file) = json.filter(|file| !is_standard_output(file)) {
-        // Before hours of work; a file that exists keeps its content.
+        // Before hours of work; keeps the content of a file.
         OpenOptions::new().append(true).create(true).open(file).with_context(|| file.display().to_string())?;
     }
     let bar = ProgressBar::new(0);
@@ -288,7 +286,6 @@ fn run(Cli { benchmark, json }: Cli) -> Result<()> {
     }
 }
 
-/// Writes a result as JSON into `file`, if there is one, and its tables to standard output, if the JSON is not there.
 fn conclude(
     result: &impl Serialize,
     file: Option<&Path>,

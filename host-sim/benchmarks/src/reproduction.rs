@@ -1,11 +1,10 @@
-//! Reproduction of the paper on simulated hours of its gyro z, whose true coefficients are known.
+//! Reproduction of the paper on simulated hours of its gyro z with known coefficients (L. Hristov, E. Iontchev and R.
+//! Miletiev, "Error modeling of MEMS ADIS 16405").
 //!
 //! ```text
 //! seed ─► published gyro (virtual sensor) ─► slope method and fit ─► bias and scatter over the seeds
 //!                                         └► four methods on the record of the first seed
 //! ```
-//!
-//! Source: L. Hristov, E. Iontchev and R. Miletiev, "Error modeling of MEMS ADIS 16405".
 
 mod bias_and_scatter;
 mod four_methods;

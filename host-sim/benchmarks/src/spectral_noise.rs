@@ -10,9 +10,7 @@ pub(crate) fn flicker_density(b: f64, frequency: f64) -> f64 {
     b * b / (PI * frequency)
 }
 
-/// Noise with the one-sided `density` (a function of the frequency in Hz) at `rate_hz`: the first half or less of a periodic
-/// record, so that its ends do not meet. What lies below one period of that record, at least twice the length that is
-/// returned, is not in it.
+/// Noise of the one-sided `density` (Hz) at `rate_hz`, at most half of a periodic record.
 pub(crate) fn gaussian_noise(
     density: impl Fn(f64) -> f64,
     rate_hz: f64,
@@ -22,8 +20,7 @@ pub(crate) fn gaussian_noise(
     let length = 2 * samples.next_power_of_two();
     let transform = fourier::inverse(length);
     let mut spectrum = transform.make_input_vec();
-    // The inverse transform sums without a factor: a density S at frequency f takes the amplitude √(S·Δf/2)/√2 in each of
-    // the real and the imaginary part, Δf being the distance of the frequencies.
+    // A density S takes the amplitude √(S·Δf/2)/√2 in each part.
     let spacing = rate_hz / length as f64;
     for (k, value) in spectrum.iter_mut().enumerate().skip(1) {
         let amplitude = (density(k as f64 * spacing) * spacing / 4.0).sqrt();
@@ -40,7 +37,6 @@ pub(crate) fn gaussian_noise(
     record
 }
 
-/// A standard normal number.
 pub(crate) fn normal(random: &mut impl Rng) -> f64 {
     StandardNormal.sample(random)
 }
@@ -52,8 +48,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use std::f64::consts::{LN_2, PI};
 
-    /// The Allan variance of flicker noise is (2 ln 2/π)·B² at every averaging time (IEEE Std 952). Averages over 16 to 256 of
-    /// 2¹⁶ samples leave at least 255 pairs: 10 records know the variance to 1/√1275 = 3 % at the worst (1 σ).
+    /// (2 ln 2/π)·B² at every averaging time (IEEE Std 952). At least 255 pairs in each of 10 records: 3 % (1 σ).
     #[test]
     fn flicker_noise_has_the_flat_allan_variance_of_the_standard() {
         for factor in [16, 64, 256] {

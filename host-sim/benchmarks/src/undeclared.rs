@@ -1,12 +1,11 @@
-//! Benchmark of undeclared effects: effects drawn at random are hidden in generated recordings, and the analysis, which
-//! is given the recording only, is scored by whether it names them.
+//! Benchmark of undeclared effects: random effects in generated recordings; the analysis is scored by their names.
 //!
 //! ```text
 //! seed ─► draw (noise, environment, effects; sizes from the detection limit) ─► generator ─► analysis ─► report ─┐
 //!           └──────────────────────────── truth ────────────────────────────────────────────────────► score ─► table
 //! ```
 //!
-//! Development uses the open seeds; the sealed seeds are run only to measure the finished method.
+//! Development uses open seeds; sealed seeds only measure the finished method.
 
 mod block_covariance;
 mod channel_under_test;
@@ -39,41 +38,32 @@ pub use table::{Proportion, STRONG, ScoreTable};
 
 use crate::parallel;
 
-/// Offset of the sealed seeds from the open ones. The method has been changed after those at 2⁴⁰, 2⁴¹, … 2⁶² were run, and those at 2⁴⁰ and
-/// 2⁴¹ were recordings of the virtual sensor; so these are no longer used.
+/// Offset of the sealed seeds; earlier ones, 2⁴⁰ … 2⁶², have been used.
 const SEALED: u64 = 1 << 63;
-/// Number of seeds that are reserved for each group of recordings.
+/// Reserved per group.
 pub const SEEDS_PER_GROUP: u64 = 1 << 20;
 
-/// Which recordings to simulate and score.
+/// Recordings to simulate and score.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UndeclaredPlan {
-    /// Kinds that are hidden as single effects.
     pub kinds: Vec<EffectKind>,
-    /// Number of recordings per kind.
     pub per_kind: u64,
-    /// Number of recordings without an effect.
     pub empty: u64,
-    /// Number of recordings with two effects.
     pub pairs: u64,
-    /// Number of recordings with three effects.
     pub triples: u64,
-    /// Number of recordings of each kind of effect outside the vocabulary.
+    /// Recordings of each kind outside the vocabulary.
     pub outside: u64,
     /// Length of a recording, s.
     pub seconds: f64,
-    /// Share of the measured samples that are lost at random in every recording, beside the hidden effects, %.
+    /// Samples lost at random in every recording, %.
     pub loss_percent: f64,
-    /// First seed of each group; its sum with any number of recordings is below [`SEEDS_PER_GROUP`].
+    /// First seed of each group; all seeds stay below [`SEEDS_PER_GROUP`].
     pub seed: u64,
-    /// Whether the sealed seeds are used instead of the open ones.
     pub sealed: bool,
-    /// Number of threads.
     pub jobs: usize,
 }
 
 impl UndeclaredPlan {
-    /// Group and seed of each recording.
     fn recordings(&self) -> Vec<(RecordingGroup, u64)> {
         let base = self.seed + if self.sealed { SEALED } else { 0 };
         let seed = |group: u64, number: u64| group * SEEDS_PER_GROUP + base + number;
@@ -89,10 +79,10 @@ impl UndeclaredPlan {
         nothing.chain(singles).chain(pairs).chain(triples).chain(outside).collect()
     }
 
-    /// Generates and scores every recording. `progress` is called with the number of finished recordings and of all.
+    /// Generates and scores every recording; `progress` gets the numbers of finished and of all.
     ///
     /// # Errors
-    /// That of the first recording, in the order of the plan, that has no timeline.
+    /// The error of the first recording, in the order of the plan, that has no timeline.
     pub fn run(&self, progress: impl Fn(usize, usize) + Sync) -> Result<ScoreTable, ScoreError> {
         let work = |&(group, seed): &(RecordingGroup, u64)| {
             let drawn = DrawnRecording::from_group(group, self.seconds, seed);

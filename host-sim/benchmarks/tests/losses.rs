@@ -1,5 +1,4 @@
-//! The benchmark of lost samples on few and short records: the longest averaging time is kept, variances and coefficients
-//! agree with those of the complete records.
+//! Lost samples on few short records.
 
 use benchmarks::losses::{LossPattern, LossPlan, TestNoise};
 
@@ -12,8 +11,7 @@ fn lost_samples_bias_neither_variance_nor_coefficients_and_keep_the_longest_aver
         let name = format!("{}, {}", comparison.noise, comparison.loss);
         assert_eq!(comparison.same_longest, RECORDS as usize, "{name}");
         for octave in &comparison.octaves {
-            // 4.5 standard errors of 24 differences: exceeded by chance in 2 of 10,000 octaves, of which there are 510. Beside
-            // that the 0.3 % of what the correction leaves, at a loss of 5 %.
+            // 4.5 standard errors: 2 of 10,000 octaves; and 0.3 % by the correction at 5 % loss.
             let allowed = 4.5 * octave.standard_error + 0.003;
             assert!(octave.bias.abs() <= allowed, "{name}, n = {}: {:+.4} of {allowed:.4}", octave.n, octave.bias);
         }
@@ -31,7 +29,7 @@ fn without_the_correction_the_benchmark_would_see_the_bias() {
     let white =
         table.comparisons.iter().find(|comparison| comparison.loss == LossPattern::Random(0.05)).expect("white, 5 %");
     let octave = white.octaves.iter().find(|octave| octave.n == 64).expect("n = 64");
-    // 1.5 · 5 % · (1 − 2/64) for white noise.
+    // 1.5 · 5 % · (1 − 2/64).
     assert!((octave.uncorrected - 0.0727).abs() < 4.5 * octave.standard_error + 0.003, "{octave:?}");
     assert!(octave.uncorrected > 4.5 * octave.standard_error, "{octave:?}");
 }

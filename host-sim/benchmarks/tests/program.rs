@@ -6,7 +6,6 @@ fn benchmarks(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_benchmarks")).args(arguments).output().expect("the program starts")
 }
 
-/// Without limits each of these ended with a panic, an abort, or threads without number.
 #[test]
 fn benchmarks_have_limits() {
     for arguments in [
@@ -29,7 +28,7 @@ fn benchmarks_have_limits() {
         let output = benchmarks(arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     }
-    // Two recordings of a second; the second is too short to be analysed, which may be the program's answer.
+    // Too short may be the answer.
     let few =
         ["--nothing", "2", "--per-kind", "0", "--pairs", "0", "--triples", "0", "--outside", "0", "--seconds", "1"];
     let [many, one] = ["1000000", "1"].map(|jobs| benchmarks(&[&["undeclared", "--jobs", jobs], &few[..]].concat()));
@@ -57,7 +56,7 @@ fn json_goes_to_a_file_beside_the_tables_or_alone_to_standard_output() {
     assert!(output.stdout.is_empty(), "checked before the work is done");
 }
 
-/// A table without time stamps needs a rate; with one it is hidden in.
+/// Without stamps a rate is needed.
 #[test]
 fn measured_noise_is_read_from_a_table_and_an_unusable_one_is_named() {
     let dir = tempfile::tempdir().expect("a folder");

@@ -1,4 +1,4 @@
-//! Recordings of several sensors, as `benchmarks measured` reads them.
+//! Recordings of several sensors.
 
 use benchmarks::undeclared::NoiseRecording;
 use measurement::{Measurement, Quantity};
@@ -6,15 +6,13 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::fmt::Write;
 
-/// Means of the channels of a quantity, in their unit.
 fn means(of: &Measurement, quantity: Quantity) -> Vec<f64> {
     let mean = |counts: &[i32]| counts.iter().map(|&count| f64::from(count)).sum::<f64>() / counts.len() as f64;
     let channels = of.channels.iter().filter(|channel| channel.profile.quantity == quantity);
     channels.map(|channel| channel.profile.lsb * mean(&channel.counts)).collect()
 }
 
-/// 10,000 rows at 100 Hz, of which the first 3,000 turn: no unit is stated, gravity tells m/s² and so rad/s. At rest are blocks of 128 or 256
-/// rows, without the one beside the motion.
+/// 10,000 rows at 100 Hz, the first 3,000 turning; gravity tells m/s² and rad/s.
 #[test]
 fn units_are_guessed_and_what_moves_is_left_out() {
     let mut random = ChaCha8Rng::seed_from_u64(1);
@@ -35,14 +33,13 @@ fn units_are_guessed_and_what_moves_is_left_out() {
     assert_eq!(name, "table.csv");
     assert!((samples.sample_rate_hz - 100.0).abs() < 1e-3, "{} Hz", samples.sample_rate_hz);
     assert!((7_000 - 2 * 256..=7_000).contains(&samples.len()), "{} samples", samples.len());
-    // 0.01 rad/s; 2,000 samples or more of 1.2 mrad/s know it to 0.03 mrad/s.
+    // 0.01 rad/s, known to 0.03 mrad/s.
     let rates = means(&samples, Quantity::AngularRate);
     assert!((rates[1] - 0.01_f64.to_degrees()).abs() < 0.006 && rates[2].abs() < 0.006, "{rates:?} °/s");
     assert!((means(&samples, Quantity::SpecificForce)[2] - 9.81 / 9.80665).abs() < 1e-3);
 }
 
-/// Rate in Hz, samples and gyroscopes by the descriptions that came with the files; from the PX4 log 8.2 s of motion are left out. The
-/// specific force is gravity within the scale error of a part that was never calibrated, so units are right: rad/s and g or m/s².
+/// Rates, samples and gyroscopes by the files' descriptions. Gravity within the scale error: units are right.
 #[test]
 fn recordings_of_other_sensors_are_read_where_they_are_at_rest() {
     let test = "recordings_of_other_sensors_are_read_where_they_are_at_rest";
@@ -58,11 +55,10 @@ fn recordings_of_other_sensors_are_read_where_they_are_at_rest() {
         let NoiseRecording { name, samples: read } = NoiseRecording::read(&path, None).expect("a recording");
         assert_eq!(name, file);
         assert!((read.sample_rate_hz / rate_hz - 1.0).abs() < 0.01, "{file}: {} Hz", read.sample_rate_hz);
-        // Rows of the phone that equal the one before, 2 % of them, may be taken for one sample that was read twice: its stamps are whole
-        // seconds.
+        // 2 % of the phone's rows may be repeated.
         assert!((read.len() as f64 / f64::from(samples) - 1.0).abs() < 0.03, "{file}: {} samples", read.len());
         let [rates, forces] = [Quantity::AngularRate, Quantity::SpecificForce].map(|quantity| means(&read, quantity));
-        // The earth turns by 0.004 °/s; uncalibrated parts are off by a few °/s.
+        // Uncalibrated: a few °/s.
         assert!(rates.len() == 3 && rates.iter().all(|rate| rate.abs() < 5.0), "{file}: {rates:?} °/s");
         assert_eq!(forces.len(), if has_force { 3 } else { 0 }, "{file}");
         let norm = forces.iter().map(|force| force * force).sum::<f64>().sqrt();

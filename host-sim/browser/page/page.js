@@ -62,7 +62,7 @@ const observatory = (() => {
     }
   }
 
-  // What is done, one after the other: its progress and its error are shown.
+  // Tasks, one after the other, with their progress and errors.
   const thread = new Thread();
   let job = null;
   const call = (name, request, file, total) => thread.run(name, request, file, ({ task, done }) => {

@@ -18,14 +18,14 @@ pub(crate) struct Connection {
     bench: Option<BenchRun>,
 }
 
-/// What the page asks of a connection.
+/// Beside the bytes of the device.
 #[derive(Deserialize)]
 pub(crate) struct ReceiveRequest {
     /// Time since something was received, s.
     silence_s: f64,
 }
 
-/// What has come.
+/// Content of the bytes.
 #[derive(Serialize)]
 struct ReceivedParts {
     /// The live view.
@@ -33,7 +33,7 @@ struct ReceivedParts {
     lines: Vec<String>,
     /// Bursts of the raw stream.
     bursts: usize,
-    /// Whether the answer to the step of the bench is whole.
+    /// True when the answer to the step of the bench is whole.
     is_answered: bool,
 }
 

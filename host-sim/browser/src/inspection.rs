@@ -1,4 +1,4 @@
-//! What is in a recording, as HTML: the table of `imunoise inspect`, and a form with what it proposes, for each sensor.
+//! Content of a recording as HTML: the table of `imunoise inspect`, and a form with what it proposes, for each sensor.
 
 use crate::analysis::Recorded;
 use anyhow::Result;
@@ -52,7 +52,7 @@ pub(crate) fn html(recorded: &Recorded<'_>) -> Result<String> {
 fn columns(table: &InspectedTable) -> Markup {
     let InspectedTable { topic, kind, rows, is_cut, columns, rate, stated_rate_hz, duration_s, missing, gaps, .. } =
         table;
-    // Of a wide table, such as of messages with covariances.
+    // A wide table is one of messages with covariances.
     let is_constant = |column: &InspectedColumn| {
         columns.len() > WIDE && column.noise == 0.0 && column.guess.is_none() && !column.mean.is_nan()
     };

@@ -24,7 +24,7 @@ use simulation::Simulation;
 use std::cell::RefCell;
 use std::sync::Arc;
 
-/// What the page has given, and what it is given.
+/// Requests of the page, and answers to it.
 #[derive(Default)]
 struct Exchange {
     request: Vec<u8>,
@@ -65,7 +65,7 @@ pub extern "C" fn reserve_file(bytes: usize) -> *mut u8 {
     })
 }
 
-/// Where the answer begins.
+/// First byte of the answer.
 #[unsafe(no_mangle)]
 pub extern "C" fn answer_pointer() -> *const u8 {
     with(|exchange| exchange.answer.as_ptr())
@@ -81,7 +81,7 @@ pub extern "C" fn answer_length() -> usize {
 #[derive(Deserialize)]
 struct RecordingRequest {
     name: String,
-    /// Whether it is the first of those to be compared.
+    /// True for the first of those to be compared.
     #[serde(default, rename = "isFirst")]
     is_first: bool,
     #[serde(flatten)]
@@ -95,7 +95,7 @@ impl RecordingRequest {
     }
 }
 
-/// What is in a recording: HTML with a form for each sensor.
+/// Content of a recording: HTML with a form for each sensor.
 #[unsafe(no_mangle)]
 pub extern "C" fn inspect() -> u32 {
     answer(|request: RecordingRequest| inspection::html(&request.recorded()?))
@@ -141,7 +141,7 @@ pub extern "C" fn keep() -> u32 {
     })
 }
 
-/// Whether the recordings that were kept have the same noise.
+/// Compares the noise of the recordings that were kept.
 #[unsafe(no_mangle)]
 pub extern "C" fn compare() -> u32 {
     answer(|(): ()| {

@@ -54,7 +54,7 @@ class Page {
   send(method, params = {}) {
     const id = this.#next++;
     const message = { id, method, params };
-    // Of the browser, not of the page.
+    // The browser is asked, not the page.
     if (this.#session && !/^(Target|Browser|SystemInfo)\./.test(method)) message.sessionId = this.#session;
     this.#browser.stdio[3].write(`${JSON.stringify(message)}\0`);
     return new Promise((resolve, reject) => this.#calls.set(id, { resolve, reject, method }));

@@ -31,7 +31,7 @@ fn page() -> PathBuf {
 }
 
 /// Runs `script` of this folder with Chromium, the page's address and a folder for what it saves, and `input` on its standard input.
-/// Whether it ran: false, with a note, without Chromium or Node.js.
+/// False, with a note, without Chromium or Node.js.
 pub(crate) fn drive(test: &str, script: &str, page_file: &str, folder: &Path, input: &str) -> bool {
     let chromium = CHROMIUM.into_iter().find(|name| runs(name)).filter(|_| runs("node"));
     let Some(chromium) = chromium else {

@@ -9,7 +9,7 @@ use system_tests::{host_sim, recorded_samples};
 /// Largest relative difference of two numbers in the reports of a file. The page computes elementary functions by Rust's `libm`, the command by
 /// the system's library: of the values of `exp`, `ln`, `sin`, `cos` and `powf` at random places 3 to 10 % differ by one unit in the last place.
 const TOLERANCE: f64 = 1e-6;
-/// The same in those of a simulation. The baseline model is fitted in single precision, as on the device: where what is fitted differs in the
+/// Largest difference in those of a simulation. The baseline model is fitted in single precision, as on the device: where what is fitted differs in the
 /// last place of double precision, a squared coefficient may differ by four units of 2⁻²³, 5·10⁻⁷. A deviance is quadratic in what the model is
 /// off by, 2.8 % of the variance of the supply, and differs by twice the ratio of the two.
 pub(crate) const TOLERANCE_OF_SIMULATION: f64 = 2.0 * 4.0 * f32::EPSILON as f64 / 0.028;
@@ -17,7 +17,7 @@ pub(crate) const TOLERANCE_OF_SIMULATION: f64 = 2.0 * 4.0 * f32::EPSILON as f64 
 const OPTIONS: [(&str, &str); 5] =
     [("--columns", "columns"), ("--units", "units"), ("--rate", "rate"), ("--sensor", "sensor"), ("--topic", "topic")];
 
-/// What two values differ in: kinds, order, words and integers are equal, numbers to a relative `tolerance`. A small probability is the
+/// Lists the differences of two values: kinds, order, words and integers are equal, numbers to a relative `tolerance`. A small probability is the
 /// exponential of a statistic: its relative error is that of the statistic times its own logarithm.
 fn differences(path: &str, one: &Value, other: &Value, tolerance: f64, found: &mut Vec<String>) {
     match (one, other) {
@@ -42,7 +42,7 @@ fn differences(path: &str, one: &Value, other: &Value, tolerance: f64, found: &m
     }
 }
 
-/// What the report `of_page`, a file, differs in from that of the command with these arguments.
+/// Differences of the report `of_page`, a file, from that of the command with these arguments.
 pub(crate) fn differences_from_command(arguments: &[String], of_page: &Path, tolerance: f64) -> Vec<String> {
     let of_command = of_page.with_extension("of-command");
     let output = Command::new(host_sim()).args(arguments).arg("--quiet").arg("--json").arg(&of_command).output();

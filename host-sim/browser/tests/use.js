@@ -15,7 +15,7 @@ const text = (id) => `document.getElementById("${id}").innerText`;
 const isShown = (id) => `!document.getElementById("${id}").hidden`;
 const simulate = (seconds) => `document.querySelector("#simulate [name=seconds]").value = ${seconds};
   document.getElementById("simulate").requestSubmit()`;
-// What of the page's policy refuses a request.
+// The directive of the page's policy that refuses a request.
 const refused = (act) => `new Promise((resolve) => {
   document.addEventListener("securitypolicyviolation", (event) => resolve(event.effectiveDirective), { once: true });
   ${act};

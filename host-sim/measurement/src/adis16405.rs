@@ -7,9 +7,9 @@ use crate::profile::{
     HOST_CLOCK_ERROR, LARGEST_SENSITIVITY_MULTIPLE, Quantity, SAMPLE_RATE_ERROR, SensorProfile,
 };
 
-/// Rate of the sample clock with SMPL_PRD = 0x0001, which the part has after reset, Hz.
+/// Sample clock after reset (SMPL_PRD = 0x0001), Hz.
 const INTERNAL_RATE_HZ: f64 = 819.2;
-/// Time base of the sample period, 1/0.61035 ms, Hz. The slow time base, 18.921 ms, is 31 of these periods.
+/// Time base of the sample period, Hz; the slow one is 31 of its periods.
 const TIME_BASE_HZ: f64 = 1638.4;
 const SLOW_TIME_BASE: u32 = 31;
 /// Initial bias error (1 σ): deg/s, g.
@@ -45,7 +45,7 @@ const fn deviation(tau_s: f64, mean: f64, low: f64, high: f64) -> DataSheetDevia
     DataSheetDeviation { tau_s, mean, low, high }
 }
 
-/// Figure 7, page 9: mean and ±1 σ over parts, °/s, as the corners of the drawn lines have them (three digits).
+/// Figure 7, page 9: mean and ±1 σ over parts, °/s, at the corners of the drawn lines.
 const GYRO_CURVE: [DataSheetDeviation; 18] = [
     deviation(0.1, 0.0937, 0.0879, 0.099),
     deviation(1.0, 0.0312, 0.0292, 0.033),
@@ -66,7 +66,7 @@ const GYRO_CURVE: [DataSheetDeviation; 18] = [
     deviation(1000.0, 0.00699, 0.00456, 0.00948),
     deviation(2000.0, 0.0082, 0.00431, 0.0122),
 ];
-/// Figure 8, page 9: mean and ±1 σ over parts, g. The mean has no corner between 3 and 9 s.
+/// Figure 8, page 9: mean and ±1 σ over parts, g; the mean has no corner from 3 to 9 s.
 const ACCELEROMETER_CURVE: [DataSheetDeviation; 17] = [
     deviation(0.1, 912.0e-6, 856.0e-6, 974.0e-6),
     deviation(1.0, 351.0e-6, 311.0e-6, 393.0e-6),
@@ -94,8 +94,7 @@ pub const NAME: &str = "ADIS16405";
 /// Size of a gyroscope's count in the largest range, 300 deg/s: deg/s.
 pub const GYRO_LSB_300: f64 = 0.05;
 
-/// The profile of the part; `gyro_lsb` is the size of a gyroscope's count in deg/s in the range that was set: 0.05, 0.025
-/// or 0.0125.
+/// The profile of the sensor; `gyro_lsb` is a gyroscope's count in deg/s: 0.05, 0.025 or 0.0125.
 #[must_use]
 pub fn profile(gyro_lsb: f64) -> SensorProfile {
     let channel = |name, quantity, axis, unit, lsb, initial_bias_error| ChannelProfile {
@@ -109,7 +108,7 @@ pub fn profile(gyro_lsb: f64) -> SensorProfile {
         data_sheet: DataSheetNoise::default(),
         sensitivities: DataSheetSensitivities::default(),
     };
-    // 14 bits: the range that the register can express, not the one that is specified.
+    // The range of 14 bits, not the specified one.
     let full_scale = |lsb: f64| Some(lsb * FULL_SCALE_COUNTS);
     let gyro = |name, axis| ChannelProfile {
         range: full_scale(gyro_lsb),
@@ -155,8 +154,7 @@ pub fn profile(gyro_lsb: f64) -> SensorProfile {
     }
 }
 
-/// Every rate that SMPL_PRD can set: its lower seven bits are a divisor less one, bit 7 selects the slow time base; 0x00
-/// would be an external clock.
+/// All rates of SMPL_PRD: bits 0 to 6 are the divisor less one, bit 7 the slow time base; 0x00 is an external clock.
 fn native_rates_hz() -> Vec<f64> {
     let fast = (2..=128).map(|divisor| TIME_BASE_HZ / f64::from(divisor));
     let slow = (1..=128).map(|divisor| TIME_BASE_HZ / f64::from(SLOW_TIME_BASE * divisor));
@@ -186,7 +184,7 @@ mod tests {
         }
     }
 
-    /// Between the random walk and the stability of Table 1 and the mean of the drawn curves lies at most a sixth, as in the sheet.
+    /// They differ by at most a sixth, as in the sheet.
     #[test]
     fn the_drawn_curves_are_those_of_the_stated_noise() {
         let profile = profile(0.05);
@@ -203,7 +201,7 @@ mod tests {
         }
     }
 
-    /// 819.2 Hz read at 100 Hz is every 8.192th value; 2 × 4 taps reach over 7 values, so that the samples do not correlate.
+    /// Every 8.192th value; 2 × 4 taps reach over 7, so samples do not correlate.
     #[test]
     fn filters_are_read_at_the_rate_of_the_recording() {
         let profile = profile(0.05);

@@ -1,19 +1,17 @@
-//! A recording that is read in blocks, because it need not fit into memory.
+//! A recording that is read in blocks.
 
 use crate::{ChannelProfile, MeasuredChannel, Measurement, SensorProfile};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// What is known of a recording before its samples are used.
+/// Description of a recording before its samples are used.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordingDescription {
-    /// What is known of the sensor.
     pub profile: SensorProfile,
     /// Sample rate in Hz, as the user states it or as the time stamps show it.
     pub sample_rate_hz: f64,
-    /// Usable samples.
     pub samples: u64,
-    /// Sample periods from the first sample to the last, both included, with or without a sample.
+    /// Sample periods from the first to the last sample, inclusive.
     pub periods: u64,
     /// The channels that were recorded, in the order of the sensor's burst.
     pub channels: Vec<ChannelProfile>,
@@ -54,9 +52,9 @@ impl From<&Measurement> for RecordingDescription {
 /// Consecutive usable samples of a recording.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SampleBlock {
-    /// Sample period in which each was taken, counted from the first sample of the recording; strictly increasing.
+    /// Sample period of each, from the recording's first sample; strictly increasing.
     pub slots: Vec<u64>,
-    /// The channels, in the order of [`RecordingDescription::channels`]. Positions of refused samples are those in the block.
+    /// In the order of [`RecordingDescription::channels`]; positions of refused samples are those in the block.
     pub channels: Vec<MeasuredChannel>,
 }
 
@@ -70,7 +68,7 @@ impl SampleBlock {
 }
 
 impl Measurement {
-    /// The samples in blocks of `rows`, the last of which may be shorter.
+    /// Blocks of `rows` samples; the last may be shorter.
     pub fn blocks(&self, rows: usize) -> impl Iterator<Item = SampleBlock> {
         (0..self.len()).step_by(rows).map(move |from| {
             let positions = from..(from + rows).min(self.len());

@@ -1,10 +1,10 @@
-//! A channel of a measurement, and a value for each of its channels.
+//! Channels of a measurement, and a value for each.
 
 use crate::{MeasuredChannel, Measurement, Quantity};
 use std::ops::{Index, IndexMut};
 use std::slice;
 
-/// One channel of a measurement, and of every other measurement with the same channels in the same order, such as a part of it.
+/// A channel of all measurements with the same channels in the same order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ChannelId(usize);
 
@@ -52,7 +52,7 @@ impl<T> PerChannel<T> {
         self.0
     }
 
-    /// What `of` makes of each value.
+    /// The results of `of`, by channel.
     #[must_use]
     pub fn map<U>(&self, of: impl FnMut(&T) -> U) -> PerChannel<U> {
         self.0.iter().map(of).collect()

@@ -1,9 +1,5 @@
-//! What flows from a recording into its analysis: the samples of a sensor on a uniform time base, and the profile of the
-//! sensor.
-//!
-//! A reader of recordings produces a [`Measurement`], the noise analysis consumes it; neither knows the other. Everything
-//! that is specific to one sensor lies in its [`SensorProfile`]: [`adis16405`], one of a [file](profile_file), or
-//! [that of any sensor](SensorProfile::generic).
+//! The samples of a sensor on a uniform time base, and the sensor's profile: [`adis16405`], a [file](profile_file), or
+//! [any sensor](SensorProfile::generic).
 
 pub mod adis16405;
 mod block;
@@ -24,19 +20,17 @@ pub use repetition::repeated_fraction;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// The samples of a sensor, all channels taken at the same times.
+/// Samples of all channels at the same times.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurement {
-    /// What is known of the sensor.
     pub profile: SensorProfile,
     /// Sample rate in Hz, as the user states it or as the time stamps show it.
     pub sample_rate_hz: f64,
     /// Sample rate in Hz that the user states, if any.
     pub stated_rate_hz: Option<f64>,
-    /// Sample period in which each sample was taken, counted from the first; strictly increasing. A step of more than 1 is
-    /// a gap.
+    /// Sample period of each sample, from the first; strictly increasing, with gaps as steps above 1.
     pub slots: Vec<u64>,
-    /// Time stamp of each sample in s, where every sample has one.
+    /// Time stamps, s, if every sample has one.
     pub times_s: Option<Vec<f64>>,
     /// The channels that were recorded, in the order of the sensor's burst.
     pub channels: Vec<MeasuredChannel>,
@@ -49,12 +43,10 @@ pub struct Measurement {
 /// The samples of one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredChannel {
-    /// Name, unit and scale.
     pub profile: ChannelProfile,
-    /// One register count for each slot. That of a refused sample has no meaning.
+    /// A register count per slot; meaningless if refused.
     pub counts: Vec<i32>,
-    /// Samples of this channel alone that arrived and cannot be used, by cause: their positions in `counts`, in ascending
-    /// order. They are missing in this channel and in no other.
+    /// Refused samples of this channel alone: positions in `counts`, ascending, by cause.
     pub refused: BTreeMap<&'static str, Vec<usize>>,
 }
 
@@ -65,7 +57,7 @@ impl MeasuredChannel {
         Self { profile, counts, refused: BTreeMap::new() }
     }
 
-    /// Positions of the samples that were refused for any cause, in ascending order.
+    /// In ascending order.
     #[must_use]
     pub fn refused_positions(&self) -> Vec<usize> {
         let mut positions: Vec<usize> = self.refused.values().flatten().copied().collect();
@@ -74,7 +66,7 @@ impl MeasuredChannel {
         positions
     }
 
-    /// The sample period and the count of each sample that is not refused; `slots` are the sample periods of all of them.
+    /// Sample period and count of each sample that is not refused; `slots` are those of all.
     pub fn used_samples<'a>(&'a self, slots: &'a [u64]) -> impl Iterator<Item = (u64, i32)> + 'a {
         let mut refused = self.refused_positions().into_iter().peekable();
         let samples = slots.iter().copied().zip(self.counts.iter().copied()).enumerate();
@@ -97,14 +89,14 @@ impl MeasuredChannel {
         }
     }
 
-    /// Whether the sample at `position` was refused for any cause.
+    /// True if refused for any cause.
     #[must_use]
     pub fn is_refused(&self, position: usize) -> bool {
         self.refused.values().any(|positions| positions.binary_search(&position).is_ok())
     }
 }
 
-/// The part of the samples that is missing, of `samples` in so many sample periods; 0 of no period.
+/// Missing part of `samples` in `periods` sample periods; 0 without a period.
 #[must_use]
 pub fn lost_part(samples: u64, periods: u64) -> f64 {
     periods.saturating_sub(samples) as f64 / periods.max(1) as f64
@@ -117,7 +109,7 @@ impl Measurement {
         self.slots.len()
     }
 
-    /// Whether there is no sample.
+    /// True if there is no sample.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.slots.is_empty()
@@ -129,22 +121,20 @@ impl Measurement {
         1.0 / self.sample_rate_hz
     }
 
-    /// Sample periods without a sample just before the sample at `position`; 0 for the first sample.
+    /// Empty sample periods before the sample at `position`; 0 for the first sample.
     #[must_use]
     pub fn missing_before(&self, position: usize) -> u32 {
         let previous = position.checked_sub(1).map(|previous| self.slots[previous]);
         previous.map_or(0, |previous| u32::try_from(self.slots[position] - previous - 1).unwrap_or(u32::MAX))
     }
 
-    /// The sample period that begins the second half of the recording by time; the first half has the periods before it.
+    /// First sample period of the second half by time.
     #[must_use]
     pub fn middle(&self) -> u64 {
         self.periods() / 2
     }
 
-    /// The recording as it would be had it ended before the sample period `slot`. Of the samples that never arrived, it has
-    /// the share of the sample periods without a sample; the other causes of `dropped` and `flagged`, whose times are not
-    /// known, are left out.
+    /// The recording as if it had ended before the sample period `slot`, with its share of samples that never arrived.
     #[must_use]
     pub fn before(&self, slot: u64) -> Self {
         let count = self.slots.partition_point(|&of| of < slot);
@@ -173,7 +163,7 @@ impl Measurement {
         }
     }
 
-    /// Sample periods from the first sample to the last, both included, with or without a sample.
+    /// Sample periods from the first to the last sample, inclusive.
     #[must_use]
     pub fn periods(&self) -> u64 {
         self.slots.last().map_or(0, |&last| last + 1)
@@ -190,7 +180,7 @@ impl Measurement {
         self.channels.iter().map(|channel| channel.profile)
     }
 
-    /// The samples of a recorded channel; `None` where it was not recorded.
+    /// `None` if it was not recorded.
     #[must_use]
     pub fn channel(&self, profile: &ChannelProfile) -> Option<&MeasuredChannel> {
         self.channels.iter().find(|channel| channel.profile.name == profile.name)

@@ -1,4 +1,4 @@
-//! What is known of a sensor before it is measured.
+//! Known properties of a sensor.
 
 use allan_core::term::MovingAverageFilter;
 use serde::{Deserialize, Serialize};
@@ -7,33 +7,23 @@ use serde::{Deserialize, Serialize};
 pub const HOST_CLOCK_ERROR: f64 = 20e-6;
 /// Relative standard deviation of the sample rate: by the clock of a host whose crystal is good to ±100 ppm (2 σ).
 pub(crate) const SAMPLE_RATE_ERROR: f64 = 5e-5;
-/// The data sheet states what is typical; single parts, and their mounting, are up to ten times worse. Half an order of
-/// magnitude beyond that, √10·10, no such part is known.
+/// Largest factor on a typical sensitivity: single parts reach 10, and none is known at √10·10.
 pub(crate) const LARGEST_SENSITIVITY_MULTIPLE: f64 = 31.622_776_601_683_79;
-/// The largest variance that rounding makes of noise of 0.45 counts: that of a mean halfway between two counts, by the normal
-/// distribution (0.27 of a mean at a count). Larger noise rounds like white noise of a twelfth of a count², to 3 % of its deviation,
-/// wherever its mean is. A fourth is no limit: halfway between two counts the smallest noise has it.
+/// Largest variance of rounded noise of 0.45 counts, halfway between two counts; larger noise is rounded as if white.
 pub(crate) const DITHERED_AVAR_COUNTS2: f64 = 0.3;
-/// Ratio of the sensor's nominal clock to a sample rate up to which both may be the same clock: a crystal-less oscillator is
-/// off by some percent.
+/// Ratio of nominal clock to sample rate up to which both may be one clock: oscillators are off by percents.
 const SAME_CLOCK: f64 = 1.1;
-/// Relative distance from a whole number up to which the clocks of sensor and reader may differ.
+/// Relative distance from a whole ratio of the clocks of sensor and reader.
 const WHOLE: f64 = 0.01;
 
 /// Physical quantity that a channel measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
-    /// Angular rate about an axis: a gyroscope.
     AngularRate,
-    /// Specific force along an axis: an accelerometer.
     SpecificForce,
-    /// Magnetic field along an axis.
     MagneticField,
-    /// Temperature of the sensor.
     Temperature,
-    /// Supply voltage.
     SupplyVoltage,
-    /// Voltage at an auxiliary input.
     AuxiliaryVoltage,
 }
 
@@ -79,7 +69,7 @@ impl Quantity {
         matches!(self, Self::AngularRate | Self::SpecificForce)
     }
 
-    /// Temperature and supply: conditions that move slowly and that other channels may follow.
+    /// Temperature and supply, which other channels may follow.
     #[must_use]
     pub fn is_environment(self) -> bool {
         matches!(self, Self::Temperature | Self::SupplyVoltage)
@@ -91,7 +81,6 @@ impl Quantity {
 pub struct ChannelProfile {
     /// Name in reports and file headers, such as `gyro_x`.
     pub name: &'static str,
-    /// What it measures.
     pub quantity: Quantity,
     /// Axis, `x`, `y` or `z`; empty for a quantity without one.
     pub axis: &'static str,
@@ -99,19 +88,16 @@ pub struct ChannelProfile {
     pub unit: &'static str,
     /// Size of one count, in `unit`.
     pub lsb: f64,
-    /// Initial bias error (1 σ over parts), in `unit`: the distance by which the biases of two parts differ. `None` where
-    /// it is not known.
+    /// 1 σ over parts, in `unit`; `None` if unknown.
     pub initial_bias_error: Option<f64>,
-    /// Largest magnitude that the channel can measure, in `unit`; `None` where it is not known.
+    /// Largest magnitude, in `unit`; `None` if unknown.
     pub range: Option<f64>,
-    /// Noise by the data sheet.
     pub data_sheet: DataSheetNoise,
-    /// Sensitivities by the data sheet.
     pub sensitivities: DataSheetSensitivities,
 }
 
 impl ChannelProfile {
-    /// A channel of which nothing is known but its name and quantity: counts of 1 unit, the axis by the end of the name.
+    /// Name and quantity alone: counts of 1 unit, the axis by the name's end.
     #[must_use]
     pub fn generic(name: &'static str, quantity: Quantity) -> Self {
         let axis = ["x", "y", "z"].into_iter().find(|axis| name.rsplit('_').next() == Some(axis));
@@ -129,45 +115,42 @@ impl ChannelProfile {
     }
 }
 
-/// Typical noise of a channel by its data sheet; `None` where it says nothing.
+/// Typical noise by the data sheet; `None` if not stated.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DataSheetNoise {
     /// Angle or velocity random walk: the channel's unit times √s.
     pub angle_random_walk: Option<f64>,
-    /// In-run bias stability: the Allan deviation at the minimum of its curve, in the channel's unit.
+    /// Allan deviation at the minimum, in the channel's unit.
     pub in_run_bias_stability: Option<f64>,
     /// Rate random walk: the channel's unit per √s.
     pub rate_random_walk: Option<f64>,
-    /// The drawn curve of the Allan deviation, by averaging time; empty where there is none.
+    /// Drawn Allan deviation by averaging time; may be empty.
     pub curve: &'static [DataSheetDeviation],
 }
 
-/// Allan deviation of a channel in the figure of a data sheet, in the channel's unit.
+/// Drawn Allan deviation in the channel's unit, with ±1 σ over parts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DataSheetDeviation {
     /// Averaging time, s.
     pub tau_s: f64,
-    /// Mean over parts.
     pub mean: f64,
-    /// Mean less the standard deviation over parts.
     pub low: f64,
-    /// Mean plus the standard deviation over parts.
     pub high: f64,
 }
 
-/// Typical sensitivities of the bias of a channel by its data sheet, magnitudes; `None` where it says nothing.
+/// Magnitudes of typical sensitivities by the data sheet; `None` if not stated.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DataSheetSensitivities {
     /// To temperature, in the channel's unit per °C.
     pub temperature: Option<f64>,
     /// To the supply voltage, in the channel's unit per V.
     pub supply: Option<f64>,
-    /// Of a gyroscope to specific force, in the channel's unit per g.
+    /// For a gyroscope to specific force, in the channel's unit per g.
     pub specific_force: Option<f64>,
 }
 
 impl DataSheetSensitivities {
-    /// To a quantity that was measured beside the channel.
+    /// To a measured quantity.
     #[must_use]
     pub fn to(&self, quantity: Quantity) -> Option<f64> {
         match quantity {
@@ -182,7 +165,6 @@ impl DataSheetSensitivities {
 /// A sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorProfile {
-    /// Name of the part.
     pub name: &'static str,
     /// Every output, in the order of a burst.
     pub channels: Vec<ChannelProfile>,
@@ -190,27 +172,22 @@ pub struct SensorProfile {
     pub internal_rate_hz: f64,
     /// Rates at which the sensor can be set to sample, Hz.
     pub native_rates_hz: Vec<f64>,
-    /// Low-pass filters that the sensor may have put before its samples, every value of which is read, the shortest first.
+    /// Possible low-pass filters of the sensor, all values read, the shortest first.
     pub filters: Vec<MovingAverageFilter>,
-    /// Whether a low-pass filter of the second order may be in their place, in the part or in what reads it.
+    /// True if a second-order low-pass may take their place.
     pub may_be_low_pass: bool,
-    /// Allan variance of a channel at the shortest octaves, in counts², above which rounding to counts adds white noise and
-    /// nothing else.
+    /// Allan variance at the shortest octaves, counts², above which rounding is white noise.
     pub dithered_avar_counts2: f64,
-    /// Largest plausible multiple of a sensitivity of the data sheet: a larger one is no sensitivity of the sensor.
+    /// Largest plausible factor on a data sheet's sensitivity.
     pub largest_sensitivity_multiple: f64,
     /// Relative standard deviation of the clock of the host that stamps the samples.
     pub host_clock_error: f64,
-    /// Relative standard deviation of the sample rate as the analysis is given it: the error of a line's frequency.
+    /// Relative standard deviation of the sample rate, and so of a line's frequency.
     pub sample_rate_error: f64,
 }
 
 impl SensorProfile {
-    /// Any inertial sensor, of which no data sheet is known: three gyroscopes, accelerometers and magnetometers, temperature,
-    /// supply and an auxiliary voltage.
-    ///
-    /// The trace tries moving averages and Bartlett windows of 2 to 64 taps a stage at the rate of the samples, and no native
-    /// rate is known.
+    /// Any inertial sensor: three gyroscopes, accelerometers and magnetometers, temperature, supply and ADC.
     #[must_use]
     pub fn generic() -> Self {
         const CHANNELS: [(&str, Quantity); 12] = [
@@ -236,7 +213,7 @@ impl SensorProfile {
             native_rates_hz: Vec::new(),
             filters: taps().map(moving_average).chain(taps().map(MovingAverageFilter::bartlett)).collect(),
             may_be_low_pass: true,
-            // Rounding is white where the noise reaches from one count to the next, whatever the part.
+            // Independent of the sensor.
             dithered_avar_counts2: DITHERED_AVAR_COUNTS2,
             largest_sensitivity_multiple: LARGEST_SENSITIVITY_MULTIPLE,
             host_clock_error: HOST_CLOCK_ERROR,
@@ -250,9 +227,7 @@ impl SensorProfile {
         self.channels.iter().copied().find(|channel| channel.name == name)
     }
 
-    /// The filters as they appear in samples at `rate_hz`: each with every value read, and, where the sensor's own clock is
-    /// faster than the reader, each that is longer than the sample period read once in `internal_rate_hz/rate_hz` values. That
-    /// decimation is the start of a search: neither clock is known exactly.
+    /// The filters in samples at `rate_hz`, every value read or one in `internal_rate_hz/rate_hz`.
     #[must_use]
     pub fn filters_read_at(&self, rate_hz: f64) -> Vec<MovingAverageFilter> {
         let decimation = self.internal_rate_hz / rate_hz;
@@ -264,8 +239,7 @@ impl SensorProfile {
         self.filters.iter().copied().chain(slow).collect()
     }
 
-    /// Values of the sensor's clock from one sample to the next where a reader at `rate_hz` takes each so many-th; 1 where that is no
-    /// whole number to [`WHOLE`].
+    /// Sensor values per sample of a reader at `rate_hz`; 1 unless whole to [`WHOLE`].
     #[must_use]
     pub fn read_every(&self, rate_hz: f64) -> u32 {
         let decimation = self.internal_rate_hz / rate_hz;
@@ -273,7 +247,7 @@ impl SensorProfile {
         if is_whole { (decimation.round() as u32).max(1) } else { 1 }
     }
 
-    /// The native rate that is nearest to `rate_hz`, Hz; `None` where the profile names none.
+    /// Hz; `None` if the profile names none.
     #[must_use]
     pub fn nearest_native_rate_hz(&self, rate_hz: f64) -> Option<f64> {
         let distance = |native: &f64| (native - rate_hz).abs();

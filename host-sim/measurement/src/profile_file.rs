@@ -1,4 +1,4 @@
-//! Sensor profiles from TOML files, and those that are included.
+//! Sensor profiles from TOML files, included ones and others.
 
 use crate::adis16405;
 use crate::profile::{ChannelProfile, DataSheetNoise, DataSheetSensitivities, Quantity, SensorProfile};
@@ -6,7 +6,7 @@ use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::sync::{Mutex, PoisonError};
 
-/// The profiles that are included: the name by which one is asked for, and its file.
+/// Name and file.
 const INCLUDED: [(&str, &str); 3] = [
     ("adis16470", include_str!("../profiles/adis16470.toml")),
     ("bmi088", include_str!("../profiles/bmi088.toml")),
@@ -20,33 +20,24 @@ const GENERIC: &str = "generic";
 /// Why a profile cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ProfileError {
-    /// The text is no TOML, or a field is missing, unknown or of another type.
     #[error("{0}")]
     Syntax(String),
-    /// A value without a meaning.
     #[error("channel {channel}: {field} is {value}; it must be positive and finite")]
     NotPositive {
         /// Name of the channel; empty for the sensor.
         channel: String,
-        /// Name of the field.
         field: &'static str,
-        /// As read.
         value: f64,
     },
-    /// A unit other than that of the quantity.
     #[error("channel {channel}: the unit is {unit:?}; that of its quantity is {expected}")]
     Unit {
         /// Name of the channel.
         channel: String,
-        /// As read.
         unit: String,
-        /// Unit of the quantity.
         expected: &'static str,
     },
-    /// Two channels of one name.
     #[error("two channels are named {0}")]
     DuplicateChannel(String),
-    /// No channel at all.
     #[error("no channel")]
     NoChannel,
 }
@@ -65,7 +56,7 @@ struct ProfileFile {
     channels: Vec<ChannelGroup>,
 }
 
-/// Channels that differ in nothing but their names.
+/// Channels that differ only in their names.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ChannelGroup {
@@ -105,7 +96,7 @@ pub fn included(name: &str) -> Option<SensorProfile> {
     parse(text).ok()
 }
 
-/// Reads a profile. Names of the sensor and its channels are kept until the program ends: each distinct one once.
+/// Reads a profile; names are kept until the program ends.
 ///
 /// # Errors
 /// The text is no TOML, a field is missing or unknown, or a value has no meaning.
@@ -191,8 +182,7 @@ fn positive(channel: &str, field: &'static str, value: f64) -> Result<(), Profil
     Err(ProfileError::NotPositive { channel: channel.to_owned(), field, value })
 }
 
-/// `text` for as long as the program runs. Profiles are `Copy` in the hot path, so their names are not owned; equal texts
-/// share their memory, so that reading a profile again takes none.
+/// Leaks each distinct text once: profiles are `Copy`.
 fn intern(text: &str) -> &'static str {
     static KNOWN: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
     let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -208,9 +198,8 @@ fn intern(text: &str) -> &'static str {
 mod tests {
     use super::{by_name, included, parse, sensor_names};
 
-    /// Values of the data sheets, written down again: ADIS16470 0.34 °/√h and 8 °/h; one-sided densities of 100 µg/√Hz
-    /// (ADIS16470), 0.014 °/s/√Hz, 160 and 190 µg/√Hz (BMI088), 0.005 °/s/√Hz and 400 µg/√Hz (MPU-6050), of which N is
-    /// 1/√2: white noise of the one-sided density S has the Allan variance S/(2τ).
+    /// ADIS16470 0.34 °/√h, 8 °/h, 100 µg/√Hz; BMI088 0.014 °/s/√Hz, 160 and 190 µg/√Hz; MPU-6050 0.005 °/s/√Hz, 400
+    /// µg/√Hz. N is 1/√2 of a one-sided density.
     #[test]
     fn the_included_profiles_state_the_data_sheets() {
         let one_sided = std::f64::consts::FRAC_1_SQRT_2;
@@ -227,7 +216,7 @@ mod tests {
             let stated = profile.data_sheet.angle_random_walk.expect("stated");
             assert!((stated / noise - 1.0).abs() < 4e-4, "{name} {channel}: {stated} for {noise}");
         }
-        // Full scale of 16 bits; of the ADIS16470 the counts reach beyond it.
+        // Full scale of 16 bits; the ADIS16470 counts beyond.
         for (name, channel, counts) in
             [("bmi088", "accl_x", 32_768.0), ("bmi088", "gyro_x", 32_768.0), ("mpu6050", "accl_x", 32_768.0)]
         {

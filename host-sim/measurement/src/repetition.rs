@@ -1,7 +1,6 @@
-//! How many samples equal the one before because that was read again, and how many by chance.
+//! Repeated samples against chance equality.
 
-/// The fraction f of the samples that are repeated, where the fraction `all` of them equals the one before in all channels
-/// and the fractions `shares` in each: the solution of `all = f + (1 − f)·Π (share − f)/(1 − f)`.
+/// The fraction f of repeated samples: `all = f + (1 − f)·Π (share − f)/(1 − f)` for fractions of equal ones.
 #[must_use]
 pub fn repeated_fraction(all: f64, shares: &[f64]) -> f64 {
     let (mut low, mut high) = (0.0, all);
@@ -17,7 +16,7 @@ pub fn repeated_fraction(all: f64, shares: &[f64]) -> f64 {
 mod tests {
     use super::repeated_fraction;
 
-    /// Three channels, each of which equals the one before in 0.3 of the samples, of which none or half are read again.
+    /// 0.3 by chance, and none or half read again.
     #[test]
     fn equal_samples_are_told_from_those_that_are_read_again() {
         let by_chance = 0.3_f64.powi(3);

@@ -239,10 +239,7 @@ impl Assessed {
         // Means tell nothing of the averaging times that are shorter than they are.
         let shorter = whole.record.samples_per_mean.ilog2() as usize;
         by_spectrum.splice(0..0, vec![None; shorter]);
-        let samples = &whole.record.channels[channel].samples;
-        let spectrum = samples.spectrum_within(0..u64::MAX);
-        let spectrum = spectrum.as_ref().map(|spectrum| (spectrum, samples.resolution));
         let unseen = by_first_half.from(whole.measurement().middle());
-        Self { assessment: Assessment::new(own, &unseen, spectrum, models), by_spectrum }
+        Self { assessment: Assessment::new(own, &unseen, models), by_spectrum }
     }
 }

@@ -127,4 +127,9 @@ impl Parameter {
     pub fn new(value: f64, low: f64, high: f64, unit: impl Into<String>) -> Self {
         Self { value, low, high, unit: unit.into() }
     }
+
+    /// Without the unit.
+    pub(crate) const fn estimate(&self) -> BoundedEstimate {
+        BoundedEstimate::new(self.value, self.low, self.high)
+    }
 }

@@ -1,4 +1,4 @@
-//! Detectors of effects in the samples of one channel, which the Allan curve shows badly or not at all.
+//! Detectors of effects in the samples of one channel that the Allan curve hardly shows.
 //!
 //! ```text
 //! Series ─┬► noise_levels ─┬► knocks ─► knock_search       stretches that are louder than those around them
@@ -13,7 +13,7 @@
 //! UniformSeries ─► random_telegraph                        jumps to and fro between two levels
 //! ```
 //!
-//! Each returns the effect with its parameters, and the correction that removes it from the samples where there is one.
+//! Each returns the effect with its parameters and, if there is one, the correction that removes it from the samples.
 
 pub(crate) mod bias;
 pub(crate) mod bias_response;

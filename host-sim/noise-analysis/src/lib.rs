@@ -11,7 +11,7 @@
 //! | `samples` | series on a time base, and the estimators that are fed with them |
 //! | `detectors`, `spectra` | what samples and their spectra show, without a model |
 //! | `record` | a recording, condensed to means, preprocessed, in curves |
-//! | `effects` | every kind of effect, one file each, as numbers; the crate `reports` has the words |
+//! | `effects` | every kind of effect, by theme, as numbers; the crate `reports` has the words |
 //! | `fit` | the noise model of one channel, how it is edited, and the filter that all channels share |
 //! | `rivals` | what is proposed for a channel, the [table](rivals::table) that tells what stands, and which findings are one cause |
 //! | `halves` | the fit of a part: the whole, and the first half with its errors on the second |

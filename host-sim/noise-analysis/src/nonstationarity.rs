@@ -1,4 +1,5 @@
-//! Non-stationarity: what changes while a record is made, and the errors on the second half of models that allow for the change.
+//! Non-stationarity: changes of the noise over a record, and the errors on the second half of models that allow for
+//! them.
 //!
 //! ```text
 //! Series ─► EpochCurves ─► Stationarity ─► FittedPart: which part of the first half the model of a channel is fitted to
@@ -12,9 +13,8 @@
 //! all channels ─► CommonModeRegression
 //! ```
 //!
-//! The record is cut in the middle, by time. Tests and models use the first half alone, with two exceptions: tracking uses each
-//! epoch of the second half after it was predicted, and a related line uses the second half of another channel. Their
-//! errors are reported apart from the others.
+//! Tests and models use the first half alone. Tracking uses each epoch of the second half after its prediction, and a
+//! related line uses the second half of another channel; their errors are reported apart.
 
 mod common_mode_regression;
 mod epochs;
@@ -43,28 +43,25 @@ use prediction::{beyond_drift, expected_drift, select_tracked, track};
 use serde::Serialize;
 use tracked_parameters::{EpochEstimate, TrackedModel};
 
-/// How the noise of a channel changes in the course of the record.
+/// The change of a channel's noise over the record.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Nonstationarity {
-    /// Comparison of the two quarters of the first half; absent where no octave can be compared.
+    /// The two quarters of the first half compared; absent if no octave can be compared.
     pub quarters: Option<Stationarity>,
-    /// The part of the first half that the model `after` is fitted to.
     pub fitted_to: FittedPart,
-    /// The parameters that move among the epochs of the first half.
+    /// The parameters that change among the epochs of the first half.
     pub tracked: TrackedSet,
-    /// Length of an epoch, s.
     pub epoch_s: f64,
     /// The parameters in each epoch of the record.
     pub epochs: Vec<EpochParameters>,
-    /// Deviance per point of `after` on the second half, beyond the drift that the epochs of the first half let expect.
+    /// Deviance per point of `after` on the second half, beyond the drift expected from the first half.
     pub beyond_drift: f64,
-    /// Errors of the prediction epoch by epoch.
     pub tracking: TrackingErrors,
-    /// The same without added terms.
+    /// Predictions without added terms.
     pub baselines: Baselines,
     /// Prediction intervals of each epoch's octaves.
     pub intervals: IntervalCoverage,
-    /// A line of another channel that moves with this channel's.
+    /// A line of another channel whose frequency moves with this channel's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub related_line: Option<RelatedLine>,
 }
@@ -76,35 +73,31 @@ pub struct EpochParameters {
     pub from_s: f64,
     /// Variance of the white noise over that of `after`.
     pub white_noise_ratio: f64,
-    /// Its standard deviation.
     pub white_noise_error: f64,
-    /// Frequency of the line that moves, Hz; absent where none does.
+    /// Frequency of the moving line, Hz; absent without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line_hz: Option<f64>,
-    /// Its standard deviation, Hz.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line_error_hz: Option<f64>,
 }
 
-/// The curves of a channel's epochs, and which part of the first half its model is fitted to.
 pub(crate) struct ChannelEpochs {
     curves: EpochCurves,
     quarters: Option<Stationarity>,
     part: FittedPart,
 }
 
-/// A channel of a recording whose noise may change.
 pub(crate) struct TracedChannel<'a> {
     pub name: &'static str,
-    /// The samples, without what the rules of the first half exclude.
+    /// Without the samples that the rules of the first half exclude.
     pub series: &'a Series,
-    /// Where `series` has means of samples, what is known of these.
+    /// Curves of the samples, if `series` has means.
     pub samples: &'a SampleCurves,
-    /// `None` of a record that is too short for epochs.
+    /// `None` if the record is too short for epochs.
     pub epochs: Option<&'a ChannelEpochs>,
     /// The baseline model of the first half.
     pub baseline: &'a Model,
-    /// The model of the first half with the added terms, as fitted to the part that `epochs` names.
+    /// Model of the first half with the added terms, fitted to the part that `epochs` names.
     pub model: &'a Model,
 }
 
@@ -115,20 +108,17 @@ impl ChannelEpochs {
         Self { part: FittedPart::select(quarters), quarters, curves }
     }
 
-    /// The curves of the two quarters of the first half, the earlier first.
     pub(crate) fn quarter_curves(&self) -> &[Curve<OCTAVES>; 2] {
         &self.curves.quarters
     }
 
-    /// The curve that a model of what follows is fitted to, if it is not that of the whole first half: of noise that changes,
-    /// the later quarter is nearer in time to the second half.
+    /// The curve of the later quarter, if the noise changes: it is nearer in time to the second half.
     pub(crate) fn recent_curve(&self) -> Option<Curve<OCTAVES>> {
         (self.part == FittedPart::LaterQuarter).then(|| self.curves.median_curve())
     }
 }
 
-/// How the noise of the channel at position `of` changes; `None` where the record is too short for epochs, or the channel does not change for a
-/// whole epoch.
+/// Describes the noise of channel `of`; `None` if the record is too short, or the channel constant for an epoch.
 pub(crate) fn describe<'a>(channels: &[TracedChannel<'a>], of: usize) -> Option<Nonstationarity> {
     let TracedChannel { series, epochs, baseline, model, .. } = channels[of];
     let ChannelEpochs { curves, quarters, part } = epochs.filter(|of| of.curves.changes_in_second_half())?;
@@ -140,7 +130,7 @@ pub(crate) fn describe<'a>(channels: &[TracedChannel<'a>], of: usize) -> Option<
         FittedPart::LaterQuarter => curves.latest_epochs().len(),
     };
     let drift = expected_drift(&tracked_model, tracked, epochs[0], epochs_used, epochs[1].len());
-    // The parameters over time show the level even where it does not move.
+    // Show the level over time even if it does not change.
     let shown = if tracked == TrackedSet::Nothing { TrackedSet::Level } else { tracked };
     let parameters = |(range, epoch): (&std::ops::Range<u64>, &Curve<OCTAVES>)| {
         let EpochEstimate { parameters: [level, line], error, .. } = tracked_model.estimate(epoch, shown);

@@ -1,4 +1,4 @@
-//! A recording as it is analysed: condensed to means, preprocessed, and in curves.
+//! A recording as it is analysed: condensed to means, preprocessed, in curves.
 
 pub mod condensed_record;
 pub(crate) mod estimators;

@@ -1,4 +1,4 @@
-//! Samples on a time base: the series of a channel, with and without gaps, and the estimators that are fed with them.
+//! Samples on a time base: series of a channel, with and without gaps, and their estimators.
 
 pub(crate) mod epoch_ranges;
 pub(crate) mod exclusion;

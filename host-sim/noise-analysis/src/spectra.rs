@@ -1,7 +1,7 @@
 //! Spectral analysis of one channel or of several.
 //!
-//! All densities are one-sided, in unit²/Hz: their integral over 0 … fs/2 is the variance. White noise N has the density
-//! `2N²`, flicker noise B `B²/(πf)`, a random walk K `K²/(2π²f²)`: twice the two-sided densities of IEEE Std 952.
+//! All densities are one-sided, in unit²/Hz: twice those of IEEE Std 952. White noise N has `2N²`, flicker noise B
+//! `B²/(πf)`, a random walk K `K²/(2π²f²)`.
 //!
 //! ```text
 //! UniformSeries ─► Periodogram ─► Background ─► lines    sinusoids and resonances, from the whole record at once
@@ -15,14 +15,11 @@
 //!               ├► force_regression                      what of a rate follows the specific force
 //!               ├► cosine_spectrum                       a Markov process that the curve does not tell from a walk
 //!               ├► SampleSpectrum ─► sample_likelihood   the coefficients of a model by all samples
-//!               ├► Welch ─► white_noise                  N, independent of the Allan variance
-//!               │        ├► equation_5                   the Allan deviation, by equation (5) of the paper
-//!               │        └► SpectralShape                a smooth curve through the spectrum
-//!               └► autocorrelation                       correlation time of a Markov process
+//!               └► Welch ─► equation_5                   the Allan deviation, by equation (5) of the paper
+//!                        └► SpectralShape                a smooth curve through the spectrum
 //! ```
 
 mod alternation;
-mod autocorrelation;
 mod coherent_track;
 pub(crate) mod common_mode;
 pub(crate) mod cosine_spectrum;
@@ -49,11 +46,9 @@ pub(crate) mod spectral_lines;
 pub(crate) mod stacked_spectrum;
 mod transforms;
 mod welch;
-mod white_noise;
 mod whitened_spectrum;
 mod whittle;
 
-pub use autocorrelation::correlation_time;
 pub use equation_5::allan_deviations_by_spectrum;
 pub use line_envelope::Modulation;
 pub use lines::find_lines;
@@ -63,6 +58,5 @@ pub(crate) use sample_likelihood::SpectrumBehindFilter;
 pub use sample_spectrum::SampleSpectrum;
 pub use smooth_shape::SpectralShape;
 pub use welch::Welch;
-pub use white_noise::{FilterSpectrum, KnownShapes, WhiteNoiseFit, fit_white_noise};
 pub use whitened_spectrum::SpectralLine;
 pub use whittle::SpectralBand;

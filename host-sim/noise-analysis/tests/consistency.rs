@@ -80,7 +80,7 @@ fn contradictions(report: &Report) -> Vec<String> {
     found
 }
 
-/// N of the model of the whole record, in the coefficients and by the spectrum.
+/// N of the model of the whole record, in the coefficients.
 fn white_noise(channel: &ChannelReport, add: &mut impl FnMut(String)) {
     let Some(fitted) = angle_random_walk(&channel.refitted) else { return };
     let practice = &channel.assessment;
@@ -91,11 +91,6 @@ fn white_noise(channel: &ChannelReport, add: &mut impl FnMut(String)) {
         && contradict(&fitted, &of.value)
     {
         add(format!("N of the coefficients {:?}, of the model {fitted:?}", of.value));
-    }
-    if let (Some(of), None) = (&practice.angle_random_walk_by_spectrum, &practice.angle_random_walk_by_spectrum_note)
-        && contradict(&fitted, of)
-    {
-        add(format!("N by the spectrum {of:?}, of the model {fitted:?}"));
     }
 }
 

@@ -67,7 +67,7 @@ impl BenchRun {
         is_last
     }
 
-    /// What came on a second port while the bursts were counted.
+    /// States the messages of a second port while the bursts were counted.
     pub fn set_second_port(&mut self, received: Option<Vec<Received>>) {
         self.transcript.second_port = received;
     }

@@ -39,7 +39,7 @@ pub struct LatestMessages {
     validations: BTreeMap<u8, ValidationMessage>,
     /// The last line of text.
     text: String,
-    /// What the device says of a sensor that it does not sample.
+    /// Why the sensor is not sampled.
     trouble: Option<String>,
 }
 
@@ -81,7 +81,7 @@ impl LatestMessages {
         }
     }
 
-    /// What is shown after a time without a message.
+    /// The live view after a time without a message.
     #[must_use]
     pub fn view(&self, silence: Duration) -> LiveView {
         let (mut view, name) = (self.report(), &self.name);
@@ -171,8 +171,7 @@ impl LatestMessages {
         self.channels.values().filter_map(inertial).collect()
     }
 
-    /// What the models have beyond N, B and K of channels that are sampled every `period_s` s; what several channels share is one
-    /// finding.
+    /// Terms beyond N, B and K, of channels sampled every `period_s` s; those of several channels are one finding.
     fn findings(&self, period_s: f64) -> Vec<Finding> {
         let mut findings: Vec<Finding> = Vec::new();
         for report in self.learned.values() {
@@ -288,7 +287,7 @@ fn of_term(channel: Channel, added: &ReportedAddedTerm, period_s: f64) -> Option
     })
 }
 
-/// Whether one cause explains both: the part's filter, or lines at one frequency.
+/// True for effects of one cause: the part's filter, or lines at one frequency.
 fn is_shared(one: &Effect, other: &Effect) -> bool {
     let is_near =
         |one: BoundedEstimate, other: BoundedEstimate| (one.value - other.value).abs() <= SAME_FREQUENCY * one.value;

@@ -12,7 +12,7 @@ use std::time::Duration;
 /// Silence after which it is said that nothing comes: a device reports every ten seconds.
 pub const LONG_SILENCE: Duration = Duration::from_secs(15);
 
-/// What a long silence means.
+/// Causes of a long silence.
 pub const SILENCE: &str = "another port or baud rate, no image on the board, or its reports are off; try `bench`";
 
 /// Numbers of messages received, missing and damaged, in one line.
@@ -263,7 +263,7 @@ fn effect(effect: &ReportedAddedTerm) -> String {
     text + &format!("; {percent:+.1} % at n = {n} ({sigmas:.0} sigma), score {:.0}", effect.score)
 }
 
-/// What the model and the regression of the epoch before are worth on this epoch: without and with them.
+/// Errors on this epoch without and with the model and the regression of the epoch before.
 fn checked(report: &ValidationMessage, sample_rate_hz: Option<f64>) -> String {
     let mut text = format!("   {}, epoch {}, unseen:", name(report.channel), report.epoch);
     let points = |error: Option<ReportedModelError>| {

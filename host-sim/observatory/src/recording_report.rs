@@ -52,7 +52,7 @@ pub struct OpenOptions {
 pub struct OpenStream {
     /// The samples on their time base.
     pub stream: SampleStream,
-    /// Of the bytes of the file; a log of the bus has none.
+    /// Hash of the file; a log of the bus has none.
     pub hash: Option<FileHash>,
     /// Sentences on the file.
     pub notes: Vec<String>,
@@ -107,7 +107,7 @@ impl OpenRecording {
     }
 }
 
-/// What the driver reads of a log or of counts, and sentences on the log.
+/// Samples that the driver reads in a log or in counts, and sentences on the log.
 ///
 /// # Errors
 /// As [`simulation::replay`].
@@ -135,7 +135,7 @@ pub fn named(error: StreamError, file: &Path) -> Error {
 pub enum ReadSamples {
     /// All of them.
     Whole(Measurement),
-    /// What is kept of a long recording.
+    /// Condensed form of a long recording.
     Condensed(CondensedRecord<'static>),
 }
 
@@ -164,7 +164,7 @@ impl ReadSamples {
     }
 }
 
-/// What was read of the recording in `file`, with `options` as they are typed for the command and sentences for the user. It has no hash.
+/// Record of the reading of `file`, without a hash; `options` are as typed for the command, `notes` sentences for the user.
 #[must_use]
 pub fn reading_record(stream: &SampleStream, file: String, options: Vec<String>, notes: Vec<String>) -> ReadingRecord {
     let read = stream.rows_read();

@@ -20,13 +20,13 @@ pub fn curves(stream: &mut SampleStream) -> Result<CurveEstimators, StreamError>
     read(stream, |stream| CurveEstimators::new(stream.description().clone()), CurveEstimators::push)
 }
 
-/// What is kept of a long recording.
+/// Condensed form of a long recording.
 pub(crate) fn long_record(stream: &mut SampleStream) -> Result<CondensedRecord<'static>, StreamError> {
     let begin = |stream: &SampleStream| LongRecordReader::new(stream.description().clone(), stream.beginning());
     Ok(read(stream, begin, LongRecordReader::push)?.finish())
 }
 
-/// What `push` makes of all samples of `stream`, from what `begin` makes of its description.
+/// Pushes all samples of `stream` into the value that `begin` makes of its description.
 fn read<T: Send>(
     stream: &mut SampleStream,
     begin: impl Fn(&SampleStream) -> T,

@@ -32,7 +32,7 @@ impl Interruption {
         Arc::new(Self { raised: Mutex::new((Instant::now(), None)) })
     }
 
-    /// Whether a signal ends the work. Python takes signals on its main thread alone.
+    /// True if a signal ends the work. Python takes signals on its main thread alone.
     fn is_raised(&self) -> bool {
         let mut raised = self.raised.lock().unwrap_or_else(PoisonError::into_inner);
         if raised.1.is_none() && raised.0.elapsed() > INTERVAL {

@@ -241,13 +241,13 @@ type NumpyArray<'py> = (String, Vec<(Bound<'py, PyAny>, Option<PyReadonlyArray1<
 #[pyclass(frozen, module = "imunoise._native")]
 pub(crate) struct Arrays {
     pub(crate) table: Arc<MemoryTable>,
-    /// What the user should know, one sentence each.
+    /// Notes for the user, one sentence each.
     pub(crate) notes: Vec<String>,
 }
 
 #[pymethods]
 impl Arrays {
-    /// Of arrays of NumPy.
+    /// The recording in arrays of NumPy.
     #[staticmethod]
     fn of_numpy(arrays: Vec<NumpyArray>) -> PyResult<Self> {
         let array = |(name, columns, unit): NumpyArray| {
@@ -262,7 +262,7 @@ impl Arrays {
         Ok(Self { table: Arc::new(MemoryTable { arrays }), notes: Vec::new() })
     }
 
-    /// Of the table that `__arrow_c_stream__` gives.
+    /// The recording in the table that `__arrow_c_stream__` gives.
     #[staticmethod]
     fn of_stream(py: Python, stream: &Bound<PyCapsule>) -> PyResult<Self> {
         let pointer = stream.pointer_checked(Some(c"arrow_array_stream"))?.cast::<FFI_ArrowArrayStream>();

@@ -121,7 +121,7 @@ impl Estimator {
         py.detach(|| with_cascade!(&*self.lock(), cascade => (cascade.len(), cascade.missing(), cascade.replaced())))
     }
 
-    /// Whether a sum of squares is full.
+    /// True if a sum of squares is full.
     fn is_saturated(&self, py: Python) -> bool {
         py.detach(|| with_cascade!(&*self.lock(), cascade => cascade.is_saturated()))
     }

@@ -1,4 +1,4 @@
-//! What Python passes on: arrays of samples, read where they are, and their counts.
+//! Input from Python: arrays of samples, read where they are, and their counts.
 
 use allan_core::{Quantizer, SampleError};
 use numpy::ndarray::{ArrayView1, Axis, Slice};
@@ -99,7 +99,7 @@ pub(crate) struct Counts {
     first: u64,
 }
 
-/// What the samples after some counts are.
+/// The samples after some counts.
 pub(crate) enum Rest {
     /// There are none.
     End,

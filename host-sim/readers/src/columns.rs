@@ -1,4 +1,4 @@
-//! Columns of a recording of any sensor: how the user names and chooses them, and their units.
+//! Columns of a recording: names, choice, units.
 
 pub(crate) mod axes;
 pub(crate) mod column_selection;

@@ -1,4 +1,4 @@
-//! Files of any sensor, by format.
+//! Formats of files.
 
 mod ardupilot_log;
 mod array_topics;

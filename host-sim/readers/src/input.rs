@@ -1,4 +1,4 @@
-//! Bytes and lines of a recording as they are read, and what is wrong with them.
+//! Bytes and lines as they are read, and their errors.
 
 pub(crate) mod budget;
 pub mod delimited_text;

@@ -1,4 +1,4 @@
-//! What is in a file without an analysis: columns, rates, gaps, what its columns are taken for, and the options with which it is analysed.
+//! Content of a file without an analysis: columns, rates, gaps, guesses, options.
 
 mod column_facts;
 mod sensor_guess;
@@ -25,25 +25,19 @@ pub use crate::inspection::steady_part::SteadyPart;
 /// A column of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InspectedColumn {
-    /// Its name, or its number.
     pub name: String,
-    /// Its unit, where the file says it.
     pub unit: Option<&'static str>,
-    /// The first values.
     pub first: Vec<f64>,
     /// Mean of the finite values; NaN where there is none.
     pub mean: f64,
-    /// Standard deviation of the noise, by the differences of neighbours.
+    /// By neighbours' differences.
     pub noise: f64,
-    /// Step that all values are multiples of, where there is one.
     pub step: Option<f64>,
-    /// What it is taken for.
     pub guess: Option<ColumnGuess>,
 }
 
-/// Largest part of the rows at rest with which a sensor was moved.
+/// Largest part at rest of a moved sensor.
 const MOVED: f64 = 0.9;
-/// First values of a column that are shown.
 const SHOWN: usize = 3;
 
 impl InspectedColumn {
@@ -60,41 +54,35 @@ impl InspectedColumn {
     }
 }
 
-/// The rows of a file, or of a topic in it.
+/// Rows of a file or topic.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InspectedTable {
-    /// Topic, message or group of arrays, where a file has several; else empty.
+    /// May be empty.
     pub topic: String,
-    /// Its type in the file; empty where there is none.
+    /// May be empty.
     pub kind: String,
-    /// Number of rows.
     pub rows: usize,
-    /// Whether the file has more rows, which were not looked at.
+    /// More rows were not examined.
     pub is_cut: bool,
-    /// The columns, in their order.
     pub columns: Vec<InspectedColumn>,
-    /// The rate by the time stamps, if there are any.
     pub rate: Option<RateEstimate>,
-    /// The rate that the file states beside its rows, Hz.
+    /// Stated, Hz.
     pub stated_rate_hz: Option<f64>,
-    /// From the first time stamp to the last, s.
+    /// By time stamps, s.
     pub duration_s: Option<f64>,
-    /// Samples that are missing by the time stamps or the index, and the gaps in which they are.
     pub missing: u64,
     /// See [`missing`](Self::missing).
     pub gaps: usize,
-    /// The longest part in which the sensor was steady; `None` where no column is taken for one of an inertial sensor.
+    /// Longest steady part; `None` without inertial columns.
     pub steady: Option<SteadyPart>,
-    /// Its time from the first row, where times, an index or a rate tell it.
+    /// If times, index or rate tell it.
     pub steady_s: Option<TimeRange>,
-    /// How each sensor in it is analysed.
     pub proposals: Vec<Proposal>,
-    /// What the user should know, one sentence each.
     pub notes: Vec<String>,
 }
 
 impl InspectedTable {
-    /// Looks at the rows; `sensor` says how large counts are, `selection` what the user says of the columns.
+    /// `sensor` gives counts, `selection` the user's choice.
     pub(crate) fn new(table: WholeTable, sensor: &SensorProfile, selection: &ColumnSelection) -> Self {
         let (table, before) = without_padding(table);
         let facts: Vec<ColumnFacts> = table.columns.iter().map(ColumnFacts::new).collect();
@@ -122,10 +110,10 @@ impl InspectedTable {
             inspected.notes.push(format!("{back} rows whose time goes back"));
         }
         let times_s = times.as_ref().map(|times| times.seconds.as_slice());
-        // An index counts where it goes with the times that are left.
+        // An index has to fit the times.
         let indices = indices.filter(|indices| times_s.is_none_or(|times| times.len() == indices.len()));
         let rows = times_s.map_or(inspected.rows, <[f64]>::len);
-        // Without times the length of a period does not matter here.
+        // Without times the period does not matter.
         let stated_hz = table.rate_hz.or(Some(1.0).filter(|_| times_s.is_none()));
         if let Ok(placed) = PlacedTable::new(rows, times_s, indices.as_deref(), stated_hz) {
             inspected.rate = placed.stamps.as_ref().and_then(|stamps| stamps.rate);
@@ -152,7 +140,7 @@ impl InspectedTable {
         inspected
     }
 
-    /// The longest part in which the sensor was at rest, where it is one of a table that was looked at as a whole.
+    /// If the whole table was examined.
     #[must_use]
     pub fn part_at_rest(&self) -> Option<TimeRange> {
         let SteadyPart { rows, is_rest } = self.steady.as_ref()?;
@@ -160,21 +148,20 @@ impl InspectedTable {
         self.steady_s.filter(|_| is_part)
     }
 
-    /// Whether the part at rest is so short that the sensor was moved, and not touched alone.
     fn is_moved(&self) -> bool {
         self.steady.as_ref().is_some_and(|steady| (steady.rows.len() as f64) < MOVED * self.rows as f64)
     }
 
-    /// Whether a column is taken for `channel`, which is a channel's name, `time` or `sample`.
+    /// Guessed as channel, `time` or `sample`.
     #[must_use]
     pub fn has(&self, channel: &str) -> bool {
         self.columns.iter().any(|column| column.guess.as_ref().is_some_and(|guess| guess.channel == channel))
     }
 }
 
-/// The table without the rows at either end that are padding, and how many of them are before its first row.
+/// And the padding rows in front.
 fn without_padding(mut table: WholeTable) -> (WholeTable, usize) {
-    // Times may go on where the values do not.
+    // Times may go on.
     let is_value = |values: &&[f64]| values.windows(2).any(|pair| pair[1] < pair[0]);
     let values: Vec<&[f64]> = table.columns.iter().map(|column| column.values.as_slice()).filter(is_value).collect();
     let mut finder = PaddingFinder::default();
@@ -194,7 +181,6 @@ fn without_padding(mut table: WholeTable) -> (WholeTable, usize) {
     (table, before)
 }
 
-/// The rows of a table on their time base.
 struct PlacedTable {
     stamps: Option<StampQuality>,
     missing: u64,
@@ -232,8 +218,7 @@ impl PlacedTable {
     }
 }
 
-/// The time of `rows` among `all` from the first of these, as [`TimeRange`] takes it: by the times of the rows, else by their index or
-/// number and the rate. `None` where it is not known.
+/// For `rows` from the first of `all`, by times, or index and rate; `None` if unknown.
 fn time_of(
     rows: &Range<usize>,
     all: usize,
@@ -242,7 +227,7 @@ fn time_of(
     rate_hz: Option<f64>,
 ) -> Option<TimeRange> {
     let period_s = rate_hz.map(f64::recip);
-    // Rows whose time goes back have no place among the times.
+    // Times that go back have no place.
     let times_s = times_s.filter(|times| times.len() == all);
     let indices = indices.filter(|indices| indices.len() == all);
     let at = |row: usize| match (times_s, indices) {
@@ -250,7 +235,7 @@ fn time_of(
         (None, Some(indices)) => Some((indices.get(row)? - indices.first()?) as f64 * period_s?),
         (None, None) => Some(row as f64 * period_s?),
     };
-    // The last row lasts for a period.
+    // The last row lasts a period.
     let to_s = if rows.end < all { at(rows.end)? } else { at(all.checked_sub(1)?)? + period_s? };
     Some(TimeRange { from_s: at(rows.start)?, to_s })
 }

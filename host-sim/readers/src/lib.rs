@@ -1,9 +1,7 @@
-//! Readers of recordings of inertial sensors: tables of text, NumPy, MATLAB, HDF5, bags of ROS, MCAP, flight logs.
+//! Readers of recordings of inertial sensors: text, NumPy, MATLAB, HDF5, ROS bags, MCAP, flight logs.
 //!
-//! [`InputFile`] recognises a format by its content, of a file, of a pipe or of bytes in memory. Every format becomes batches of columns
-//! ([`FileRows`]), with the names and units that the file says, or what the user says ([`ReadOptions`]), and notes on what was left out.
-//! What a file may cost is bounded. A row that cannot be used is an [`InputError`] with the file, the line and the reason, or is left out and
-//! counted.
+//! [`InputFile`] recognises a format by content; every format becomes batches of columns ([`FileRows`]) as the file or
+//! the user ([`ReadOptions`]) says.
 
 mod columns;
 mod formats;

@@ -1,4 +1,4 @@
-//! What every format becomes: rows, batches of columns, and all columns of a file as they are.
+//! Rows, batches, and whole columns.
 
 pub(crate) mod any_sensor;
 pub(crate) mod batch;

@@ -1,4 +1,4 @@
-//! Batches of a file of any format, or of a recording in memory, with what the burst validator says of register counts.
+//! Batches of a file or of memory, with the verdicts of the burst validator.
 
 use crate::recording::{NOT_RECORDED, RecordedSample, Recorder, Recording, TimeStamp, Verdict};
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
@@ -12,33 +12,28 @@ use std::sync::mpsc::sync_channel;
 use std::thread;
 use time_base::{TimeBaseError, TimeRange};
 
-/// The register of a channel, as readers know it.
 pub(crate) fn field(channel: Channel) -> RegisterField {
     RegisterField { place: channel as usize, limits: channel.limits() }
 }
 
-/// The channel whose register counts a column has.
 pub(crate) fn channel(column: &ValueColumn) -> Option<Channel> {
     column.register.and_then(|register| Channel::ALL.get(register.place).copied())
 }
 
-/// A recording as batches of columns, which can be read again.
 pub(crate) enum BatchSource<'a> {
-    /// A file of any format; of register counts with their validator.
+    /// Register counts have a validator.
     File(FileRows<'a>, Option<Recorder>),
-    /// Samples in memory.
     Recording(RecordedRows<'a>),
 }
 
 impl<'a> BatchSource<'a> {
-    /// Of numbers of any sensor, or of register counts of an ADIS16405 whose rates were taken in `range`.
+    /// Any sensor, or an ADIS16405's counts in `range`.
     pub(crate) fn file(rows: FileRows<'a>, range: Option<GyroRange>) -> Self {
         let channels: Option<Vec<Channel>> = rows.columns().iter().map(channel).collect();
         let validator = range.zip(channels).map(|(range, channels)| Recorder::new(channels, range));
         Self::File(rows, validator)
     }
 
-    /// The channels that are read.
     pub(crate) fn columns(&self) -> &[ValueColumn] {
         match self {
             Self::File(rows, _) => rows.columns(),
@@ -46,7 +41,7 @@ impl<'a> BatchSource<'a> {
         }
     }
 
-    /// The rate that the file states beside its rows, Hz, where it has no time stamps: they say more.
+    /// Stated rate, Hz, if there are no time stamps.
     pub(crate) fn rate_hz(&self) -> Option<f64> {
         match self {
             Self::File(rows, _) => rows.rate_hz(),
@@ -54,10 +49,7 @@ impl<'a> BatchSource<'a> {
         }
     }
 
-    /// Reads all rows as [`for_each_batch`] does.
-    ///
-    /// # Errors
-    /// As [`for_each_batch`].
+    /// See [`for_each_batch`].
     pub(crate) fn for_each_batch(
         &mut self,
         wanted: WantedRows,
@@ -81,10 +73,7 @@ impl<'a> BatchSource<'a> {
     }
 }
 
-/// Calls `take` with each batch that `read` gives, which reads on another thread where there may be one.
-///
-/// # Errors
-/// The file is damaged, the part has no row, or `take` fails.
+/// Calls `take` with each batch of `read`, on another thread if possible; an error of the file, the part or `take`.
 pub(crate) fn for_each_batch<B: Send>(
     read: impl FnOnce(&mut dyn FnMut(B) -> bool) -> Result<RowsRead, StreamError> + Send,
     mut take: impl FnMut(B) -> Result<(), StreamError>,
@@ -106,7 +95,7 @@ pub(crate) fn for_each_batch<B: Send>(
     })
 }
 
-/// What the burst validator says of register counts, which fit their fields; one that is missing is as if it had not been recorded.
+/// Verdicts on register counts within their fields; missing ones count as not recorded.
 fn verdicts(validator: &mut Recorder, batch: &Batch) -> Vec<Verdict> {
     let verdict = |row: usize| {
         let mut counts = NOT_RECORDED;
@@ -120,7 +109,6 @@ fn verdicts(validator: &mut Recorder, batch: &Batch) -> Vec<Verdict> {
     (0..batch.rows).map(verdict).collect()
 }
 
-/// Samples in memory.
 pub(crate) struct RecordedRows<'a> {
     recording: &'a Recording,
     columns: Vec<ValueColumn>,
@@ -148,7 +136,6 @@ impl<'a> RecordedRows<'a> {
         }
     }
 
-    /// Which samples are in a part.
     pub(crate) fn inside(&self, part: TimeRange, stated_hz: Option<f64>) -> Result<Vec<bool>, TimeBaseError> {
         let wanted = WantedRows { part: Some(part), ..WantedRows::all(stated_hz) };
         let mut filter = PartFilter::new(wanted, None);

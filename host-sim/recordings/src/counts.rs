@@ -1,4 +1,4 @@
-//! Recordings of an ADIS16405 in register counts: tables, logs of the SPI bus, and the serial port.
+//! ADIS16405 recordings in register counts: tables, bus logs, serial port.
 
 pub mod count_table_writer;
 pub mod frame_log;

@@ -1,4 +1,4 @@
-//! What is in a file: register counts and bus logs of an ADIS16405, in their own formats, or numbers of any sensor.
+//! Formats: ADIS16405 counts and bus logs, or any sensor.
 
 use crate::batch_source::{BatchSource, field};
 use crate::counts::{count_table_writer, frame_log, serial, spi_export};
@@ -26,12 +26,11 @@ pub enum RecordedFormat {
     FrameLog,
     /// An export of a logic analyzer's SPI decoder.
     SpiExport,
-    /// Numbers of any sensor.
     File(FileFormat),
 }
 
 impl RecordedFormat {
-    /// What it is called in a sentence.
+    /// Name for messages.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -41,25 +40,24 @@ impl RecordedFormat {
         }
     }
 
-    /// Whether the file is text: a table or a log that may be replayed.
+    /// True for a table or replayable log.
     #[must_use]
     pub fn is_text(self) -> bool {
         matches!(self, Self::CountTable | Self::FrameLog | Self::SpiExport | Self::File(FileFormat::TextTable))
     }
 }
 
-/// A recording that can be read more than once: a file, of which this knows more than the format.
+/// A re-readable recording of known format.
 #[derive(Debug)]
 pub struct RecordedInput {
     file: InputFile,
     format: RecordedFormat,
-    /// What a device sent while its raw stream was on, of which the file is the frame log.
+    /// The raw stream behind a frame log.
     capture: Option<FileBytes>,
 }
 
 impl RecordedInput {
-    /// Opens `name`, `-` for standard input, and recognises its format, as [`InputFile::open`]. Bytes that a device sent while its raw
-    /// stream was on become a frame log.
+    /// Opens `name`, `-` for standard input, as [`InputFile::open`]; a raw stream becomes a frame log.
     ///
     /// # Errors
     /// The file cannot be read or copied, or it has none of the formats.
@@ -67,8 +65,7 @@ impl RecordedInput {
         Self::open_monitored(name, &ReadMonitor::default())
     }
 
-    /// As [`open`](Self::open); `monitor` counts the bytes that are read of the recording, and may stop the reading of a pipe, of
-    /// text and of an array.
+    /// As [`open`](Self::open); `monitor` counts bytes and may stop pipes, text and arrays.
     ///
     /// # Errors
     /// As [`open`](Self::open).
@@ -84,7 +81,7 @@ impl RecordedInput {
         Self::in_memory_monitored(name, bytes, &ReadMonitor::default())
     }
 
-    /// As [`in_memory`](Self::in_memory), with `monitor` as [`open_monitored`](Self::open_monitored).
+    /// [`in_memory`](Self::in_memory) with a monitor.
     ///
     /// # Errors
     /// As [`in_memory`](Self::in_memory).
@@ -125,16 +122,13 @@ impl RecordedInput {
         Ok(Self { file, format, capture })
     }
 
-    /// What was recognised.
+    /// The recognised format.
     #[must_use]
     pub fn format(&self) -> RecordedFormat {
         self.format
     }
 
     /// Begins to make the hash of the bytes, as they were given.
-    ///
-    /// # Errors
-    /// The file cannot be opened.
     pub fn begin_hash(&self) -> io::Result<FileHash> {
         match &self.capture {
             Some(capture) => FileHash::begin(std::slice::from_ref(capture)),
@@ -142,19 +136,13 @@ impl RecordedInput {
         }
     }
 
-    /// The rows of any sensor, or of register counts of an ADIS16405.
-    ///
-    /// # Errors
-    /// The file is damaged, its topic or columns cannot be chosen, or it is a log of the SPI bus.
+    /// Rows of any sensor, or register counts; an error for damage, a failed choice, or a log of the SPI bus.
     pub(crate) fn rows(&self, options: &ReadOptions, are_registers: bool) -> Result<FileRows<'_>, InputError> {
         self.check_columns()?;
         rows(&self.file, options, are_registers)
     }
 
-    /// The same with what the burst validator says of register counts, whose rates were taken in `range`.
-    ///
-    /// # Errors
-    /// As [`rows`](Self::rows).
+    /// [`rows`](Self::rows) with the validator's verdicts, for rates in `range`.
     pub(crate) fn batches(
         &self,
         options: &ReadOptions,
@@ -163,7 +151,6 @@ impl RecordedInput {
         Ok(BatchSource::file(self.rows(options, range.is_some())?, range))
     }
 
-    /// Refuses a log of the SPI bus, which has no columns.
     fn check_columns(&self) -> Result<(), InputError> {
         match self.format {
             RecordedFormat::FrameLog | RecordedFormat::SpiExport => {
@@ -173,8 +160,7 @@ impl RecordedInput {
         }
     }
 
-    /// What is in the file without an analysis, of the topic that is named or of all that have an inertial sensor; `selection` is what the
-    /// user says of the columns.
+    /// Content without an analysis, of the named topic or all inertial sensors; `selection` is the user's.
     ///
     /// # Errors
     /// The file is damaged, has no rows of numbers, or is a log of the SPI bus, which has no columns.
@@ -207,7 +193,7 @@ impl Deref for RecordedInput {
     }
 }
 
-/// The frame log of what a device sent, in a temporary file where the system has files.
+/// Frame log of a raw stream, in a temporary file where the system has files.
 fn log_of_capture(name: &Path, capture: &FileBytes) -> io::Result<FileBytes> {
     let capture = BufReader::new(capture.open()?);
     if cfg!(target_family = "wasm") {
@@ -220,7 +206,6 @@ fn log_of_capture(name: &Path, capture: &FileBytes) -> io::Result<FileBytes> {
     Ok(FileBytes::in_temporary_file(name, log))
 }
 
-/// The rows of a file of numbers, or of register counts.
 pub(crate) fn rows<'a>(
     file: &'a InputFile,
     options: &ReadOptions,
@@ -233,7 +218,6 @@ pub(crate) fn rows<'a>(
     file.rows(options, &register)
 }
 
-/// How a table of register counts of an ADIS16405 is read whose rates were taken in `range`.
 pub(crate) fn options_of_counts(range: GyroRange) -> ReadOptions {
     ReadOptions::of_sensor(adis16405::profile(range.lsb()))
 }

@@ -1,9 +1,7 @@
-//! Recordings of inertial sensors, and the time base of the samples: of an ADIS16405 as tables of register counts, SPI frame
-//! logs and from the serial port; of any sensor in the formats that [`readers`] knows.
+//! Recordings of inertial sensors on their time base: the ADIS16405 as tables, SPI logs and from the serial port,
+//! others in the formats of [`readers`].
 //!
-//! [`sample_stream`] places the rows in time and turns them into counts. A row that cannot be used is an [`InputError`] with the file, the
-//! line and the reason, or is left out and counted. [`time_base::measurement`] does the same with a
-//! [`Recording`](recording::Recording) in memory.
+//! [`sample_stream`] reads files, [`time_base::measurement`] a [`Recording`](recording::Recording) in memory.
 
 mod batch_source;
 mod counts;

@@ -1,4 +1,4 @@
-//! From a file to the samples that are analysed, and to what is written anew: batches of columns, their time base, and counts.
+//! From a file to samples on a time base.
 
 pub(crate) mod column_survey;
 pub mod count_table;

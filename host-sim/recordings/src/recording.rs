@@ -1,43 +1,37 @@
-//! Samples in memory, each with its time stamp and its faults.
-//!
-//! [`Recorder`] takes the rows of a table and the bursts from the bus alike and checks both with the driver's
-//! [`BurstValidator`], so that the same words give the same recording either way.
+//! Samples in memory with time stamps and faults, checked by [`BurstValidator`] in a [`Recorder`].
 
 use adis16405_driver::{Burst, BurstValidator, Channel, ChannelMask, Counts, Faults, GyroRange};
 
 pub use readers::MAX_SAMPLES;
 
-/// Counts that stand for the channels that a table lacks: 0, and a supply of 5 V (2068 counts of 2.418 mV).
+/// Counts for missing channels: 0, and a supply of 5 V (2068 counts of 2.418 mV).
 pub const NOT_RECORDED: [i16; 12] = {
     let mut counts = [0; 12];
     counts[Channel::Supply as usize] = 2068;
     counts
 };
 
-/// When a sample was taken, as far as the recording says it.
+/// Time of a sample, as far as recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TimeStamp {
-    /// Running number of the sample; grows by one a sample, by more across a gap.
+    /// Running number; larger steps are gaps.
     pub index: Option<u64>,
-    /// The host's time at which the sample was read, s.
+    /// Host time of the reading, s.
     pub time_s: Option<f64>,
 }
 
 impl TimeStamp {
-    /// The time stamp of a sample without an index that was read at `time_s`, in s.
+    /// No index; `time_s` in s.
     pub fn from_time(time_s: f64) -> Self {
         Self { index: None, time_s: Some(time_s) }
     }
 }
 
-/// What the burst validator says of a row of register counts.
+/// Verdict on a row of register counts.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Verdict {
-    /// Why no channel of the row is used; `None` if one is.
     pub(crate) loss: Option<&'static str>,
-    /// Faults that the row and the rows before it show.
     pub(crate) faults: Faults,
-    /// Channels whose words are not to be used.
     pub(crate) refused: ChannelMask,
 }
 
@@ -51,18 +45,14 @@ impl Verdict {
 /// One sample of all channels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RecordedSample {
-    /// When it was taken.
     pub time_stamp: TimeStamp,
-    /// Register counts; those of channels outside [`Recording::channels`] are [`NOT_RECORDED`].
+    /// Unrecorded channels have [`NOT_RECORDED`].
     pub counts: Counts,
-    /// Faults that the burst and the bursts before it show.
     pub faults: Faults,
-    /// Channels whose words are not to be used for these faults.
     pub refused: ChannelMask,
 }
 
 impl RecordedSample {
-    /// What the faults say of the sample.
     pub(crate) fn verdict(&self) -> Verdict {
         Verdict::new(self.faults, self.refused)
     }
@@ -71,11 +61,9 @@ impl RecordedSample {
 /// Samples in the order in which they were read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
-    /// The channels that were recorded, in the order of the burst.
     pub channels: Vec<Channel>,
-    /// Range of the gyroscopes, which sets the size of their counts.
+    /// Sets the size of gyroscope counts.
     pub range: GyroRange,
-    /// All samples, those with faults included.
     pub samples: Vec<RecordedSample>,
 }
 
@@ -84,7 +72,6 @@ pub struct Recording {
 pub struct Recorder {
     recording: Recording,
     validator: BurstValidator,
-    /// Faults that can be detected with the channels that are recorded.
     detectable: Faults,
 }
 
@@ -92,8 +79,7 @@ impl Recorder {
     /// Starts an empty recording of `channels`.
     pub fn new(mut channels: Vec<Channel>, range: GyroRange) -> Self {
         channels.sort();
-        // A sample that was read twice and a frozen output are detected by equal counts of all six inertial channels; fewer
-        // channels may be equal by chance.
+        // Equal counts of all six inertial channels mark repeats and frozen outputs; fewer may be chance.
         let detectable = if Channel::INERTIAL.iter().all(|c| channels.contains(c)) {
             Faults::all()
         } else {
@@ -106,15 +92,14 @@ impl Recorder {
         }
     }
 
-    /// Takes the memory of so many samples at once, if it is there; without, it grows with them.
+    /// Reserves memory, if there is enough.
     #[must_use]
     pub fn with_capacity(mut self, samples: u64) -> Self {
-        // Samples that need more memory than there is fail when they come.
+        // Otherwise it fails when samples come.
         let _ = self.recording.samples.try_reserve_exact(usize::try_from(samples).unwrap_or(0));
         self
     }
 
-    /// The channels that are recorded, in the order of the burst.
     pub(crate) fn channels(&self) -> &[Channel] {
         &self.recording.channels
     }
@@ -125,13 +110,13 @@ impl Recorder {
         self.recording.samples.push(RecordedSample { time_stamp, counts: burst.counts(), faults, refused });
     }
 
-    /// What the burst validator says of the next burst, which is not added.
+    /// Verdict on the next burst, which is not added.
     pub(crate) fn judge(&mut self, burst: &Burst) -> Verdict {
         let validity = self.validator.validate(burst);
         Verdict::new(validity.faults & self.detectable, validity.refused)
     }
 
-    /// Sets the gyroscopes' range of the whole recording, bursts that were added before included.
+    /// For all bursts, also earlier ones.
     pub fn set_range(&mut self, range: GyroRange) {
         self.recording.range = range;
     }

@@ -1,5 +1,4 @@
-//! Clocks that jump, wander or change their rate, stamps that are whole periods with samples lost between them, and samples that
-//! come in bursts: the rate and the losses that are found, on records whose truth is known.
+//! The rate and the losses found on records whose truth is known: clocks that jump, wander or change, and bursts.
 
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
 use measurement::SensorProfile;
@@ -51,7 +50,6 @@ fn a_clock_that_was_set_far_ahead_is_no_lower_rate() {
     assert!((rate_hz / 100.0 - 1.0).abs() < 1e-9, "{rate_hz}");
 }
 
-/// The number of lost samples is known exactly: every stamp is that of its sample.
 #[test]
 fn stamps_of_whole_periods_show_every_random_loss() {
     for loss in [0.03, 0.1, 0.15, 0.22, 0.25, 0.4, 0.5, 0.7, 0.9] {
@@ -83,7 +81,6 @@ fn a_clock_that_wanders_loses_nothing() {
             let stamps = stamps.expect("stamps");
             let name = format!("{part} in {period_s} s");
             assert_eq!((measurement.dropped["gap"], stamps.late), (0, 0), "{name}");
-            // The stamps are microseconds, a ten-thousandth of a period.
             assert_eq!(stamps.tick_s, None, "{name}");
             assert!((measurement.sample_rate_hz * span / 39_999.0 - 1.0).abs() < 1e-5, "{name}");
             if part > 0.02 {
@@ -117,7 +114,6 @@ fn a_rate_that_changes_is_no_loss() {
         assert!((rate.low_hz / ends[0] - 1.0).abs() < 1e-3 && (rate.high_hz / ends[1] - 1.0).abs() < 1e-3, "{rate:?}");
         assert!(stamps.notes().iter().any(|note| note.contains("changes from")), "{part}: {:?}", stamps.notes());
     }
-    // Losses beside a change of the rate are still found.
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let kept: Vec<u32> = (0..60_000).filter(|row| row % 59_999 == 0 || rng.random_range(0..1000) > 0).collect();
     let time = |&row: &u32| {
@@ -127,7 +123,6 @@ fn a_rate_that_changes_is_no_loss() {
     assert_eq!(found(kept.iter().map(time)).1, 60_000 - kept.len() as u64);
 }
 
-/// Rate and missing samples of the same stamps in a table, and what is noted.
 fn streamed(times: &[f64]) -> (f64, u64, Vec<String>) {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("counts.csv");
@@ -154,7 +149,6 @@ fn late_stamps(rows: u32, period_s: impl Fn(u32) -> f64) -> Vec<f64> {
     (0..rows).map(&mut stamp).collect()
 }
 
-/// Rows that are read in blocks, whose rate changes in the rows that are read first or after them.
 #[test]
 fn a_rate_that_changes_is_followed_in_blocks() {
     for (first, part) in [(36_360, 0.05), (36_360, -0.1), (50_001, 0.1), (8_000, 0.05)] {
@@ -163,11 +157,9 @@ fn a_rate_that_changes_is_followed_in_blocks() {
         assert_eq!(missing, 0, "{part} from row {first}");
         assert!((rate_hz * times[72_719] / 72_719.0 - 1.0).abs() < 1e-5, "{part} from row {first}: {rate_hz} Hz");
         assert!(notes.iter().any(|note| note.contains("changes from")), "{part} from row {first}: {notes:?}");
-        // Every 1000th sample is lost.
         let kept: Vec<f64> = times.iter().enumerate().filter(|(row, _)| row % 1000 != 500).map(|(_, t)| *t).collect();
         assert_eq!(streamed(&kept).1, 73, "{part} from row {first}");
     }
-    // One that wanders by 5 % in a minute, and one that does not change.
     let wandering = |row| 0.01 * (1.0 + 0.05 * (std::f64::consts::TAU * f64::from(row) / 6000.0).sin());
     assert_eq!(streamed(&late_stamps(60_000, wandering)).1, 0);
     let (rate_hz, missing, notes) = streamed(&late_stamps(60_000, |_| 0.01));
@@ -182,7 +174,6 @@ fn bursts(seed: u64, lost: impl Fn(u32) -> bool) -> Vec<f64> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (mut poll, mut now) = (0.0f64, 0.0f64);
     let mut times = Vec::new();
-    // The polls wander by some periods in minutes, as those of a busy host do.
     let mut lag = 0.0f64;
     for sample in 0..65_000 {
         let taken = f64::from(sample) / RATE_HZ;
@@ -208,7 +199,6 @@ fn samples_in_bursts_are_late_and_not_lost() {
         let (rate_hz, missing, _) = found(bursts(seed, |_| false));
         assert!((rate_hz / 99.3 - 1.0).abs() < 1e-3, "seed {seed}: {rate_hz} Hz");
         assert_eq!(missing, 0, "seed {seed}, {rate_hz}");
-        // An outage is longer than the bursts differ.
         let (rate_hz, missing, _) = found(bursts(seed, |sample| (30_000..30_300).contains(&sample)));
         assert!((rate_hz / 99.3 - 1.0).abs() < 1e-3, "seed {seed}: {rate_hz} Hz");
         assert!(missing.abs_diff(300) <= 8, "seed {seed}: {missing}");
@@ -257,7 +247,6 @@ fn counters_that_begin_anew_go_on() {
         ("t_ms", 604_800_000, 10),
         ("t_us", 86_400_000_000, 10_000),
     ] {
-        // The counter begins anew a third into the record; one of 16 bits several times.
         let stamps: Vec<String> =
             (0..ROWS).map(|row| ((modulus - step * ROWS / 3 % modulus + row * step) % modulus).to_string()).collect();
         let (samples, rate_hz, missing, notes) = read_stamps(heading, &stamps);
@@ -267,7 +256,6 @@ fn counters_that_begin_anew_go_on() {
     }
 }
 
-/// One stamp that is wrong costs one row, wherever it is.
 #[test]
 fn one_wrong_stamp_costs_one_row() {
     const ROWS: usize = 20_000;
@@ -291,13 +279,11 @@ fn one_wrong_stamp_costs_one_row() {
 fn a_clock_that_was_set_back_goes_on() {
     const ROWS: usize = 12_000;
     for (name, time) in [
-        // A leap second, and a time server.
         (
             "a second",
             (|row: usize| 1000.0 + row as f64 / 100.0 - if row >= 6000 { 1.0 } else { 0.0 }) as fn(usize) -> f64,
         ),
         ("half a minute", |row| 1000.0 + row as f64 / 100.0 - if row >= 6000 { 30.0 } else { 0.0 }),
-        // A logger that was started three times.
         ("to the start", |row| (row % 4000) as f64 / 100.0),
     ] {
         let stamps: Vec<String> = (0..ROWS).map(|row| format!("{:.3}", time(row))).collect();

@@ -1,5 +1,4 @@
-//! The rate and the losses that time stamps show, where the stamps are coarser than the sample period, jitter, come late, in
-//! bursts, from a clock that drifts, or with rows that repeat. The truth is known: the generator takes the samples.
+//! The rate and the losses that coarse, late, drifting or repeated time stamps show, against a known truth.
 
 use adis16405_driver::{Burst, Channel, Counts, GyroRange};
 use rand::{Rng, SeedableRng};
@@ -17,9 +16,7 @@ struct Host {
     tick_s: f64,
     /// A read is late by 0 to this, uniform, s.
     jitter_s: f64,
-    /// Probability that a sample is lost.
     loss: f64,
-    /// Probability that a sample is read twice.
     repeats: f64,
     /// Seconds between stalls, in which the samples of 20 to 60 periods queue up; 0 for none.
     stall_every_s: f64,
@@ -41,7 +38,6 @@ const HOST: Host = Host {
     drift: 0.0,
 };
 
-/// The recording that the host makes, and the number of samples that it lost between its first and its last.
 fn record(host: Host, seed: u64) -> (Recording, u64) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut recorder = Recorder::new(Channel::ALL.to_vec(), GyroRange::Dps300);
@@ -57,14 +53,12 @@ fn record(host: Host, seed: u64) -> (Recording, u64) {
         if host.stall_every_s > 0.0 && sample % every(host.stall_every_s) == every(host.stall_every_s) / 3 {
             busy_until = taken + rng.random_range(20.0..60.0) / host.rate_hz;
         }
-        // The draws are made for every sample: with and without a fault the other faults are the same.
         let (late, lost, again): (f64, f64, f64) = (rng.random(), rng.random(), rng.random());
         let differing: u64 = rng.random();
         let counts: [i16; 12] = std::array::from_fn(|channel| (differing >> (5 * channel) & 63) as i16 - 32);
         if lost < host.loss || sample < outage_until {
             continue;
         }
-        // A queue is read at a tenth of a period a sample.
         let read = (taken + late * host.jitter_s).max(busy_until).max(last + 0.1 / host.rate_hz);
         last = read;
         let clock = read + host.drift * 100.0 / std::f64::consts::TAU * (read * std::f64::consts::TAU / 100.0).sin();
@@ -82,7 +76,6 @@ fn record(host: Host, seed: u64) -> (Recording, u64) {
     (recorder.finish(), newest - first.expect("a sample") + 1 - kept)
 }
 
-/// What the time base says of a recording.
 struct Found {
     rate_hz: f64,
     quality: StampQuality,
@@ -151,9 +144,7 @@ fn usual_ticks_show_no_loss() {
     }
 }
 
-/// The share of the losses that is found depends on how many ticks of the stamps lie between two of them. With ten or more
-/// it is all but a few in a hundred; with fewer the report says that losses and rounding are not told apart. The rate lies in
-/// its interval in any case.
+/// Ten or more ticks between losses find all but a few in a hundred; fewer are reported as not told apart.
 #[test]
 fn losses_are_found_and_none_is_invented() {
     for rate_hz in [50.0, 819.2] {
@@ -168,7 +159,6 @@ fn losses_are_found_and_none_is_invented() {
                 let error = (found.rate_hz / rate_hz - 1.0).abs();
                 let off = found.lost.abs_diff(lost);
                 if periods < 0.6 {
-                    // Every interval is that of whole periods.
                     assert!(off == 0 && error < 1e-6 && found.quality.resolved, "{context}");
                 } else if periods * loss < 0.03 {
                     assert!(off <= 1 + lost / 50 && error < 5e-4 && found.quality.resolved, "{context}");
@@ -182,7 +172,6 @@ fn losses_are_found_and_none_is_invented() {
     }
 }
 
-/// A clock that is wrong by up to 100 ppm, stalls, outages and rows that repeat, alone and together.
 #[test]
 fn bursts_stalls_repeats_and_a_drifting_clock_are_told_apart() {
     for periods in [0.0, 0.1, 0.82, 1.22, 4.1, 8.19, 20.3] {
@@ -203,14 +192,12 @@ fn bursts_stalls_repeats_and_a_drifting_clock_are_told_apart() {
             let found = examine(&recording);
             let context =
                 format!("{name}, {periods}: {} of {lost} lost, {} of {repeats} repeats", found.lost, found.repeated);
-            // Coarse stamps hide a repeated row beside a loss, and tell the length of an outage to a sample at best.
             let off = match (periods < 1.0, name) {
                 (true, _) => 0,
                 (false, "all") => 8,
                 (false, _) => 1,
             };
             assert!(found.lost.abs_diff(lost) <= off && found.repeated.abs_diff(repeats) <= off, "{context}");
-            // Over a part of the clock's sine the mean rate is off by its share.
             let error = found.rate_hz / host.rate_hz - 1.0;
             assert!(error.abs() < if name == "all" { 3e-4 } else { 1e-5 }, "{context}: {error}");
             let stalls = if host.stall_every_s > 0.0 { 500 } else { 0 };
@@ -235,15 +222,13 @@ fn logged(rate_hz: f64, decimals: usize, few: bool) -> Vec<f64> {
 
 #[test]
 fn losses_between_exact_time_stamps_are_certain() {
-    // The period itself divides all intervals, but scattered losses are not rounding; nor are few ones where the last decimal
-    // shows that stamps are finer.
+    // Scattered losses are not rounding; nor are few ones where the last decimal shows that stamps are finer.
     for (rate_hz, decimals, few) in
         [(204.8, 6, false), (200.0, 6, false), (100.0, 2, false), (204.8, 6, true), (819.2, 9, true)]
     {
         let times = logged(rate_hz, decimals, few);
         let mut recorder = Recorder::new(Channel::ALL.to_vec(), GyroRange::Dps300);
         for (at, &time) in times.iter().enumerate() {
-            // No two neighbours are equal.
             let mut counts = [(at % 100) as i16; 12];
             counts[Channel::Supply as usize] = 2068;
             recorder.push(TimeStamp::from_time(time), &Burst::from_counts(&Counts::new(counts)));
@@ -256,7 +241,6 @@ fn losses_between_exact_time_stamps_are_certain() {
     }
 }
 
-/// So many losses lie within a tick of each other that they look like fewer. The interval of the rate holds the truth all the same.
 #[test]
 fn losses_that_lie_within_a_tick_of_each_other_widen_the_interval_of_the_rate() {
     for periods in [1.22, 2.45] {

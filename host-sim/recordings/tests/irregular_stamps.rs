@@ -28,7 +28,6 @@ fn lost(measured: &Measurement) -> u64 {
     measured.dropped.get("gap").copied().unwrap_or(0)
 }
 
-/// A loop that sleeps, asks, and works more or less: no interval is near two, and no sample is lost. An outage is.
 #[test]
 fn a_loop_loses_what_its_long_intervals_hold_and_no_more() {
     for seed in 0..16 {
@@ -51,7 +50,7 @@ fn a_loop_loses_what_its_long_intervals_hold_and_no_more() {
         }
         let (measured, base) = examine(&times, seed);
         let found = lost(&measured);
-        // Of a long outage the loop itself does not know how many samples it would have taken.
+        // The loop itself does not know how many samples of a long outage it would have taken.
         assert!(found.abs_diff(truth) <= truth / 8, "{seed}: {found} of {truth} lost");
         let span = times[times.len() - 1] - times[0];
         let hz = (times.len() as u64 - 1 + truth) as f64 / span;
@@ -60,7 +59,6 @@ fn a_loop_loses_what_its_long_intervals_hold_and_no_more() {
     }
 }
 
-/// Stamps in so few digits that the tick grows tenfold, or twofold in single precision, on the way.
 #[test]
 fn stamps_in_few_digits_lose_nothing_when_their_tick_grows() {
     let digits =
@@ -83,7 +81,6 @@ fn stamps_in_few_digits_lose_nothing_when_their_tick_grows() {
     }
 }
 
-/// Ticks of many samples, as of a clock in whole seconds, minutes, or since 1970 in single precision.
 #[test]
 fn ticks_of_many_samples_show_the_rate_and_what_is_missing_from_one() {
     for seed in 0..12 {
@@ -98,7 +95,6 @@ fn ticks_of_many_samples_show_the_rate_and_what_is_missing_from_one() {
         let (measured, base) = examine(&times, seed);
         let (found, truth) = (lost(&measured), hole.end - hole.start);
         assert!((measured.sample_rate_hz / hz - 1.0).abs() < 2e-3, "{seed}: {} Hz, true {hz}", measured.sample_rate_hz);
-        // A hole over the edge of a tick is in two of them.
         assert!(found.abs_diff(truth) <= 6, "{seed}: {found} of {truth} lost: {:?}", base.stamps);
     }
 }

@@ -15,7 +15,6 @@ use tempfile::TempDir;
 /// Nothing is one measurement in memory.
 const STREAMED: KeptInMemory = KeptInMemory { rows: 0, rows_with_losses: 0, most_lost: 1.0 };
 
-/// What a reading gives.
 #[derive(Debug, PartialEq)]
 struct Result {
     description: RecordingDescription,
@@ -27,7 +26,6 @@ struct Result {
 #[derive(Debug, Clone, PartialEq, Default)]
 struct Channel {
     counts: Vec<i32>,
-    /// Positions that are refused, with the cause.
     refused: Vec<(usize, &'static str)>,
 }
 
@@ -62,7 +60,6 @@ fn read(file: &Path, units: &[&str], reading: Reading) -> Result {
     Result { description: stream.description().clone(), slots, channels, notes: stream.notes().to_vec() }
 }
 
-/// A measurement in memory in the same form.
 fn held(measurement: &Measurement, notes: &[String]) -> Result {
     let channel = |of: &measurement::MeasuredChannel| {
         let refused = of.refused.iter().flat_map(|(cause, at)| at.iter().map(move |at| (*at, *cause)));
@@ -130,7 +127,6 @@ impl Table {
             if full < self.full_scale {
                 values[0] = Some(32_767);
             }
-            // A row that waits behind another one is not before it.
             stamp = stamp.max(rows.last().map_or(0, |(before, _)| *before));
             if self.back_every > 0 && row % self.back_every == self.back_every / 2 {
                 stamp -= 40_000;
@@ -186,7 +182,6 @@ fn any_size_of_batches_gives_the_same_samples_notes_and_counts() {
     }
 }
 
-/// Tables that are drawn, split before each of their rows.
 #[test]
 fn a_table_is_the_same_wherever_it_is_split() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -214,7 +209,6 @@ fn a_table_is_the_same_wherever_it_is_split() {
     }
 }
 
-/// The same rows in another form: separators, order and unit of the columns, unit of the times, compression, format.
 #[test]
 fn a_table_in_another_form_has_the_same_samples() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -270,7 +264,6 @@ fn a_table_in_another_form_has_the_same_samples() {
     }
 }
 
-/// Rows in the opposite order, by a clock that runs backwards.
 #[test]
 fn a_reversed_recording_has_as_many_losses_and_the_same_rate() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -299,7 +292,6 @@ fn a_reversed_recording_has_as_many_losses_and_the_same_rate() {
     }
 }
 
-/// Samples in the unit of their channel; NaN where there is none.
 struct Samples {
     slots: Vec<u64>,
     rate_hz: f64,
@@ -319,7 +311,6 @@ fn samples(file: &Path, units: &[&str]) -> Samples {
     Samples { slots, rate_hz: description.sample_rate_hz, dropped: description.dropped, channels }
 }
 
-/// An array of NumPy with names.
 fn array(rows: &[(u64, [Option<i32>; 3])]) -> Vec<u8> {
     let mut header =
         "{'descr': [('time', '<u8'), ('gx', '<f8'), ('gy', '<f8'), ('gz', '<f8')], 'fortran_order': False, \
@@ -337,7 +328,6 @@ fn array(rows: &[(u64, [Option<i32>; 3])]) -> Vec<u8> {
     bytes
 }
 
-/// More rows than those that tell the clock, and more than any recording that is one measurement has.
 #[test]
 fn a_longer_recording_is_read_as_a_shorter_one() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -352,7 +342,6 @@ fn a_longer_recording_is_read_as_a_shorter_one() {
             assert_eq!((*samples, of(dropped, "gap")), (rows, Some(0)), "{rows} rows, noise {noise}");
             assert_eq!(of(dropped, "repeated").unwrap_or(0), is_again, "{rows} rows, noise {noise}");
             let saturated = table.rows().iter().filter(|(_, values)| values[0] == Some(32_767)).count() as u64;
-            // A row that was read twice counts twice.
             assert_eq!(of(flagged, "saturated"), Some(saturated), "{rows} rows, noise {noise}");
             assert!((result.description.sample_rate_hz / RATE_HZ - 1.0).abs() < 1e-6);
             let words =
@@ -363,7 +352,6 @@ fn a_longer_recording_is_read_as_a_shorter_one() {
     }
 }
 
-/// The index of a table of counts, and time stamps of another clock beside it, which leaps.
 #[test]
 fn counts_with_an_index_are_the_same_in_batches_of_any_size() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -388,7 +376,6 @@ fn counts_with_an_index_are_the_same_in_batches_of_any_size() {
     }
 }
 
-/// A part of a recording is the filter of its rows, in batches of any size.
 #[test]
 fn a_part_is_the_same_in_batches_of_any_size() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,4 +1,4 @@
-//! What a recording over a serial link does where the device restarts, hangs up, or the log cannot be written.
+//! A recording over a serial link: the device restarts or hangs up, or the log cannot be written.
 
 use link::{Encoder, MessageRef, RawBurst, RawMessage};
 use recordings::frame_log::FrameLogReader;
@@ -47,7 +47,6 @@ fn messages(encoder: &mut Encoder, first: u64, at_us: u64, count: u64) -> VecDeq
     bytes
 }
 
-/// The times of the bursts of a log, s.
 fn times(log: &Path) -> Vec<f64> {
     let mut reader = FrameLogReader::open(log).expect("a log");
     let mut times = Vec::new();
@@ -91,7 +90,6 @@ fn what_came_until_a_device_hung_up_is_a_recording() {
     let summary = record(&mut link, &log, 5.0, || false).expect("a hundred bursts");
     assert_eq!((summary.bursts, summary.interrupted, summary.lost_after), (100, true, Some(100)));
     assert_eq!(times(&log).len(), 100);
-    // Without a burst there is nothing.
     let mut link = SerialLink::new(Port { answers: Default::default(), sent: &mut sent });
     let error = record(&mut link, &log, 5.0, || false).expect_err("it hung up");
     assert!(matches!(error, SerialRecordingError::Disconnected(0)), "{error}");
@@ -102,14 +100,12 @@ fn the_device_is_told_where_the_log_cannot_be_written() {
     let mut sent = Vec::new();
     let answers = messages(&mut Encoder::default(), 0, 0, 100);
     let mut link = SerialLink::new(Port { answers, sent: &mut sent });
-    // Every write to it fails: the disk is full.
     let error = record(&mut link, Path::new("/dev/full"), 0.5, || false).expect_err("a full disk");
     assert!(matches!(error, SerialRecordingError::Log(_)), "{error}");
     assert_eq!(sent, b"w 1\rw 0\r");
 }
 
-/// Lines stay in memory for a second at most while others follow, and 4 MiB of them. Then all of them are in the file, also of a program that
-/// is killed.
+/// Lines stay in memory for a second at most while others follow, and 4 MiB of them.
 #[test]
 fn an_unfinished_log_can_be_read() {
     const BUFFERED: u32 = 4 << 20;
@@ -127,7 +123,6 @@ fn an_unfinished_log_can_be_read() {
             assert!(written < BUFFERED / (4 * 26 + 10), "{name}: nothing is in the file");
             std::thread::sleep(std::time::Duration::from_millis(1));
         }
-        // The program is killed: nothing more is written.
         std::mem::forget(writer);
         assert_eq!(times(&log).len() as u32, written, "{name}");
     }

@@ -99,7 +99,7 @@ fn coarse_time_stamps_are_no_losses_where_the_rate_is_given() {
     // 819.2 samples per second, read by a host whose clock ticks once a millisecond: intervals of 1 and 2 ms.
     let times: Vec<f64> = (0..5000).map(|i| (f64::from(i) / 819.2 * 1000.0).floor() / 1000.0).collect();
     let measured = measurement(&timed(&times), Some(819.2)).expect("a time base");
-    // Of the last 64 samples a late one cannot be told from a loss.
+    // A late sample among the last 64 cannot be told from a loss.
     assert!(gaps(&measured).iter().all(|(after, _)| *after > 5000 - 64), "{:?}", gaps(&measured));
 }
 
@@ -228,9 +228,7 @@ fn the_measured_burst_recording_lost_15_samples_in_one_gap() {
     assert_eq!(recording.samples.len(), 49_425);
     assert_eq!(recording.channels, Channel::ALL);
     let measured = measurement(&recording, None).expect("a time base");
-    // Counted by another program: 45 rows whose six inertial counts equal those of the row above, each a period apart (about
-    // as many as the rates of equal neighbours in single channels predict); one interval of 16 periods after which no rows
-    // follow faster. Each other long interval (3 to 7 periods) is followed by as many rows in quick succession.
+    // Counted by another program: 45 equal rows a period apart, and one interval of 16 periods without faster rows.
     assert_eq!(measured.dropped, [("gap", 15)].into());
     assert_eq!(measured.flagged["repeated"], 45);
     // 49,425 rows and 15 lost samples in the time between the first and the last row; the ends jitter by under 1 ms.
@@ -252,7 +250,6 @@ fn the_measured_long_recording_is_complete() {
     assert_eq!(measured.gaps(), 0);
 }
 
-/// Samples that the sensor refused arrived at their times: however many they are, they are no losses, and the rate is seen.
 #[test]
 fn many_refused_samples_hide_neither_the_rate_nor_the_losses() {
     let mut recorder = Recorder::new(Channel::ALL.to_vec(), GyroRange::Dps300);

@@ -1,11 +1,11 @@
-//! What a reader of N, B and K has to know of how they were estimated, in sentences of the whole report.
+//! Notes on how N, B and K were estimated, for the whole report.
 
 use crate::finding_text::channel_list;
 use crate::rounding::significant;
 use noise_analysis::report::assessment::CoefficientsFrom;
 use noise_analysis::report::{ChannelReport, Report};
 
-/// The sentences; none where the coefficients are as a reader expects.
+/// Empty if the coefficients are as a reader expects.
 #[must_use]
 pub fn coefficient_notes(report: &Report) -> Vec<String> {
     let named = |is_one: &dyn Fn(&ChannelReport) -> bool| -> Vec<String> {

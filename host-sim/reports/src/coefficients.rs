@@ -1,11 +1,10 @@
-//! A coefficient of a model, whose white noise may have two terms; and the rows of the coefficient tables on the terminal and on
-//! the page: by the slope method, beside the fit.
+//! Coefficients of a model, whose white noise may have two terms, and the rows of their tables by slope method and fit.
 
 use noise_analysis::bounds::BoundedEstimate;
 use noise_analysis::report::assessment::sum_of_white_noise;
 use noise_analysis::report::{ChannelReport, Parameter, SlopeMethodValue, TermReport};
 
-/// N of a model: that of all its white noise together, as each term has it with its unit.
+/// N of all white noise of a model together.
 pub(crate) fn white_noise(terms: impl Iterator<Item = (BoundedEstimate, String)>) -> Option<(BoundedEstimate, String)> {
     let (estimates, units): (Vec<BoundedEstimate>, Vec<String>) = terms.unzip();
     Some((sum_of_white_noise(&estimates), units.into_iter().next()?))
@@ -21,17 +20,16 @@ pub const SLOPES: [(&str, &str, &str); 3] = [
 /// A coefficient by both methods.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoefficientRow<'a> {
-    /// Name in the JSON schema.
     pub kind: &'static str,
     /// Letter in formulas; empty for a term that is not of the baseline model.
     pub symbol: &'static str,
-    /// The slope, and where the coefficient is read; empty for a term that has no slope.
+    /// Slope, and where the coefficient is read; empty for a term without a slope.
     pub slope: &'static str,
-    /// Unit of both values; empty where there is neither.
+    /// Unit of both values; empty without either.
     pub unit: String,
-    /// By the slope method; absent where the slope does not occur.
+    /// By the slope method; absent without such a slope.
     pub slope_value: Option<&'a SlopeMethodValue>,
-    /// By the fit of the baseline model to the first half; absent where the model lacks the term.
+    /// By the fit of the baseline model to the first half; absent if the model lacks the term.
     pub fit: Option<Parameter>,
 }
 

@@ -1,4 +1,4 @@
-//! Two reports, or a report and the data sheet, coefficient by coefficient: rows for programs, and a table for the terminal.
+//! Two reports, or a report and the data sheet, compared coefficient by coefficient.
 
 use crate::formatting::number;
 use crate::rounding::{probability, significant};
@@ -10,8 +10,7 @@ use std::io::{self, Write};
 
 /// Coefficients that are compared, by their names in a report.
 const KINDS: [&str; 3] = ["angle_random_walk", "bias_instability", "rate_random_walk"];
-/// Channels of the conditions under which a sensor is recorded: two records differ in them whatever the sensor is, and the
-/// rounding of a temperature to counts, which are larger than its noise, is no white noise.
+/// Channels of the conditions: they differ between records of any sensor, and rounded temperatures have no white noise.
 const CONDITIONS: [&str; 2] = ["temp", "supply"];
 /// The lowest point of the measured Allan deviation, which data sheets call in-run bias stability.
 const LOWEST: &str = "lowest_allan_deviation";
@@ -20,20 +19,15 @@ const LOWEST: &str = "lowest_allan_deviation";
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ComparisonError {
-    /// A channel has other units.
     #[error("{channel} is in {first} in one report and in {second} in the other")]
     Units {
         /// Such as `gyro_x`.
         channel: String,
-        /// Its unit in the first report.
         first: String,
-        /// And in the second.
         second: String,
     },
-    /// There is no coefficient that both have.
     #[error("no coefficient of a channel is in both")]
     Nothing,
-    /// The report was made without the profile of a sensor, or with one that states no noise.
     #[error(
         "the report has no values of a data sheet: analyse the recording with --sensor, and the name or the profile of the sensor"
     )]
@@ -43,24 +37,18 @@ pub enum ComparisonError {
 /// A comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// One row a coefficient.
     pub coefficients: Vec<ComparedCoefficient>,
 }
 
 /// One coefficient in both.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ComparedCoefficient {
-    /// Such as `gyro_x`.
     pub channel: String,
-    /// Such as `angle_random_walk`.
     pub kind: String,
-    /// Unit of both.
     pub unit: String,
-    /// What the second is compared with.
     pub first: Bounded,
-    /// What is compared.
     pub second: Bounded,
-    /// Whether the second has less noise.
+    /// Sign of the difference, if significant.
     pub verdict: Verdict,
     /// Probability that estimates of one truth differ as much.
     pub p_value: f64,
@@ -69,11 +57,8 @@ pub struct ComparedCoefficient {
 /// An estimate with its 95 % bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Bounded {
-    /// Estimate.
     pub value: f64,
-    /// Lower bound.
     pub low: f64,
-    /// Upper bound.
     pub high: f64,
 }
 
@@ -83,10 +68,9 @@ impl From<BoundedEstimate> for Bounded {
     }
 }
 
-/// A coefficient before its verdict: channel, kind, unit, first, second.
 type Pair = (String, &'static str, String, BoundedEstimate, BoundedEstimate);
 
-/// Compares the final models of `second` with those of `first`, but those of temperature and supply.
+/// Compares the final models of two reports, without temperature and supply.
 ///
 /// # Errors
 /// A channel has different units, or nothing is in both.
@@ -110,7 +94,7 @@ pub fn of_reports(first: &SavedReport, second: &SavedReport) -> Result<Compariso
     compared(pairs)
 }
 
-/// Compares a report with the data sheet of its sensor, whose values are typical ones without an interval.
+/// Compares a report with typical values of its sensor's data sheet, which have no interval.
 ///
 /// # Errors
 /// The report has no values of a data sheet, or they say nothing of what was measured.
@@ -134,13 +118,11 @@ pub fn with_data_sheet(report: &SavedReport) -> Result<Comparison, ComparisonErr
     compared(pairs)
 }
 
-/// A coefficient with its unit.
 fn coefficient(channel: &SavedChannel, kind: &str) -> Option<(BoundedEstimate, String)> {
     let of = channel.coefficient(kind)?;
     Some((BoundedEstimate { value: of.value, low: of.low, high: of.high }, of.unit))
 }
 
-/// The lowest point of the curve. Of many points the lowest is lower than its truth by chance; its interval is that of one.
 fn lowest(channel: &SavedChannel) -> Option<BoundedEstimate> {
     let positive = channel.curve.iter().filter(|point| point.adev > 0.0);
     let SavedPoint { adev, low, high, .. } = positive.min_by(|a, b| a.adev.total_cmp(&b.adev))?;
@@ -167,9 +149,6 @@ fn compared(pairs: Vec<Pair>) -> Result<Comparison, ComparisonError> {
 
 impl Comparison {
     /// Writes a table, whose columns of values are headed `first` and `second`.
-    ///
-    /// # Errors
-    /// As `out` does.
     pub fn write(&self, first: &str, second: &str, out: &mut impl Write) -> io::Result<()> {
         let mut table = comfy_table::Table::new();
         table.load_preset(comfy_table::presets::NOTHING);
@@ -195,7 +174,6 @@ impl Comparison {
     }
 }
 
-/// `value [low, high]`, or the value alone where it is exact.
 fn bounded(Bounded { value, low, high }: Bounded) -> String {
     if low == value && high == value {
         number(value)

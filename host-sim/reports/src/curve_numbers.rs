@@ -1,11 +1,10 @@
-//! The measured curve beside the models in numbers: the rows of one table of the terminal and of the page.
+//! The measured curve and the models in numbers.
 
 use crate::formatting::{count, number};
 use crate::rounding::{NONE, Scale, significant, supported_digits};
 use noise_analysis::report::ChannelReport;
 
-/// Headings, with the unit of the deviations, and one row a point. Deviations have the digits that the interval of the measured one
-/// supports.
+/// Headings and one row per point; deviations have the digits of the measured interval.
 pub(crate) fn curve_numbers(channel: &ChannelReport) -> (Vec<String>, Vec<Vec<String>>) {
     let is_same = channel.after == channel.before;
     let scale = Scale::new(channel.curve.iter().map(|point| point.adev), &channel.unit);

@@ -1,4 +1,4 @@
-//! What an effect was told by, in words: what was measured, against which threshold, and the usual causes.
+//! The evidence of an effect in words: measured value, threshold, usual causes.
 
 use crate::formatting::enumerated;
 use crate::rounding::{probability, quantity_digits, significant};
@@ -12,20 +12,17 @@ use noise_analysis::report::Finding;
 /// A sentence on the evidence, in two parts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct EvidenceText {
-    /// What was measured.
     pub measured: String,
-    /// What else is said of it, with the sign between the two; may be empty.
+    /// The rest with the sign between; may be empty.
     pub rest: String,
 }
 
 impl EvidenceText {
-    /// For an effect of one channel.
     pub(crate) fn of_effect(effect: &Effect) -> Self {
         let Self { measured, rest } = of_kind(effect);
         Self { measured: displayed(&measured), rest: displayed(&rest) }
     }
 
-    /// For a finding, which may be in several channels.
     pub(crate) fn of_finding(finding: &Finding) -> Self {
         let Self { measured, rest } = Self::of_effect(&finding.effect);
         match finding.channels.len() {
@@ -37,7 +34,6 @@ impl EvidenceText {
         }
     }
 
-    /// The whole sentence.
     pub(crate) fn sentence(&self) -> String {
         format!("{}{}", self.measured, self.rest)
     }
@@ -52,48 +48,43 @@ fn seconds(tau: f64) -> String {
     if tau < 0.1 { format!("{tau:.4}") } else { format!("{tau:.3}") }
 }
 
-/// Where the curve departs from the model.
 fn excess(curve: &CurveEvidence) -> String {
     format!("{:+.1} % at τ = {} s ({:.0} σ)", 100.0 * curve.excess, seconds(curve.tau_s), curve.sigmas.abs())
 }
 
-/// A term that was added, with what it usually is.
+/// A term that was added, with its usual cause.
 fn added(curve: &CurveEvidence, meaning: &str) -> EvidenceText {
     let gain = curve.gain_sigmas;
     text(excess(curve), format!(" before it was added, which takes {gain:.0} σ off the fit; {meaning}"))
 }
 
-/// Such as `1 run` and `2 runs`.
 fn counted(count: u64, one: &str) -> String {
     format!("{count} {one}{}", if count == 1 { "" } else { "s" })
 }
 
-/// Names and signs of the sentences below, and those of the screen and the page.
+/// Names and signs of the evidence, and of screen and page.
 const DISPLAYED: [(&str, &str); 4] = [("gyro_", "gyro "), ("accl_", "accel "), ("magn_", "magn "), (" -", " −")];
 
-/// What a Markov process usually is.
+/// Usual cause of a Markov process.
 const CORRELATED: &str = "a correlated fluctuation: thermal or electronic";
 
-/// Times as likely from which a sentence says no number.
+/// Likelihood ratio from which no number is given.
 const MILLION: f64 = 1e6;
 
-/// A probability, without an exponent.
 fn chance(p_value: f64) -> String {
     probability(p_value).replace('<', "below")
 }
 
-/// How many times as likely a description is whose logarithm of the likelihood is larger by `gain`.
+/// Likelihood ratio exp(`gain`).
 fn likelier(gain: f64) -> String {
     if gain > MILLION.ln() { "more than a million".to_owned() } else { significant(gain.exp(), 2) }
 }
 
-/// A sentence with the names and symbols of its readers.
 fn displayed(text: &str) -> String {
     let text = text.strip_prefix('-').map_or_else(|| text.to_owned(), |number| format!("−{number}"));
     DISPLAYED.iter().fold(text, |text, (name, shown)| text.replace(name, shown))
 }
 
-/// A number with its unit.
 fn amount(value: f64, unit: &str) -> String {
     quantity_digits(value, unit, 3)
 }
@@ -420,7 +411,6 @@ fn of_kind(effect: &Effect) -> EvidenceText {
     }
 }
 
-/// A line by itself.
 fn modulated(of: &ModulatedLine) -> EvidenceText {
     let (frequency_hz, period_s) = (of.frequency_hz.value, of.period_s.value);
     match &of.evidence {
@@ -478,7 +468,7 @@ fn of_line(line: &LineEvidence) -> EvidenceText {
     }
 }
 
-/// A line that may be one of several of one signal.
+/// A line, perhaps one of several of one signal.
 fn harmonic(multiples: Option<&Multiples>, line: &LineEvidence) -> EvidenceText {
     match multiples {
         None => of_line(line),
@@ -527,7 +517,7 @@ fn unexplained(of: &Unexplained) -> EvidenceText {
     }
 }
 
-/// What contradicts a term that fits an octave of the curve.
+/// Contradiction of a term that fits an octave of the curve.
 fn refutation(by: &Refutation) -> String {
     let forgets = |time_constant_s: f64| {
         format!("with the spectrum of a process that forgets within {} s", seconds(time_constant_s))
@@ -573,7 +563,6 @@ fn filter_meaning(of: &OutputFilter) -> String {
     )
 }
 
-/// Such as `harmonics 1, 3 and 5 with 2 sidebands`.
 fn harmonics(of: &Multiples) -> String {
     let numbers: Vec<String> = of.harmonics.iter().map(u32::to_string).collect();
     let harmonics = match numbers.len() {

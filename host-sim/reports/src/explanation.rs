@@ -1,5 +1,4 @@
-//! How the noise of a channel changes in the course of the record, what the channels have in common, and what a model of the first half
-//! leaves on the second, in sentences.
+//! Sentences on changes of the noise, the common mode, and the errors on the second half.
 
 use crate::finding_text::channel_list;
 use crate::formatting::{capital, count, words};
@@ -8,11 +7,10 @@ use crate::summary::off_percent;
 use noise_analysis::nonstationarity::{FittedPart, RelatedLine, TrackedSet};
 use noise_analysis::report::{ChannelReport, CommonModeRegression, ModelErrorReport, Nonstationarity, Report};
 
-/// Averaging times at which the common mode is told, s: the octave nearest to each.
+/// Averaging times of the common mode, s: the nearest octaves are told.
 const COMMON_MODE_TAU_S: [f64; 3] = [0.01, 40.0, 160.0];
 
-/// What the channels say together: how often the predictions held, and what they have in common. Nothing of a record in which none is
-/// followed.
+/// Coverage of the predictions, and the common mode; empty if no channel is followed.
 pub(crate) fn all_channels(report: &Report) -> Vec<String> {
     let followed = || report.channels.iter().filter_map(|channel| channel.nonstationarity.as_ref());
     let Some(first) = followed().next() else { return Vec::new() };
@@ -20,18 +18,15 @@ pub(crate) fn all_channels(report: &Report) -> Vec<String> {
     [coverage(followed(), first.epoch_s)].into_iter().chain(common).collect()
 }
 
-/// `text` with a capital and a full stop.
 fn sentence(text: &str) -> String {
     let stop = if text.ends_with('.') { "" } else { "." };
     format!("{}{stop}", capital(text))
 }
 
-/// Two significant digits of a deviance per point.
 fn per_point(deviance: f64) -> String {
     significant(deviance, 2)
 }
 
-/// Such as `chance explains it once in 8·10¹² times`.
 fn chance(p_value: f64) -> String {
     match 1.0 / p_value {
         odds if odds >= 1e15 => "chance does not explain it".to_owned(),
@@ -40,7 +35,7 @@ fn chance(p_value: f64) -> String {
     }
 }
 
-/// How the noise of a channel changes in the course of the record; nothing where the record is too short for it.
+/// Changes of a channel's noise; empty for short records.
 pub(crate) fn course(channel: &ChannelReport) -> Vec<String> {
     let Some(changes) = &channel.nonstationarity else { return Vec::new() };
     let related = changes.related_line.as_ref().map(|related| related_line(&channel.name, related));
@@ -51,7 +46,6 @@ pub(crate) fn course(channel: &ChannelReport) -> Vec<String> {
         .collect()
 }
 
-/// The terms, and the errors on the second half.
 pub(crate) fn model(channel: &ChannelReport) -> String {
     let off = |error: &ModelErrorReport| {
         error.rms_percent.map_or_else(|| NONE.to_owned(), |of| format!("{} %", off_percent(of)))
@@ -80,7 +74,6 @@ pub(crate) fn model(channel: &ChannelReport) -> String {
     )
 }
 
-/// What the first half says of its own two quarters.
 fn stationarity(changes: &Nonstationarity) -> String {
     let Some(quarters) = changes.quarters else {
         return "The first half is too short to compare its two quarters.".to_owned();
@@ -102,7 +95,6 @@ fn stationarity(changes: &Nonstationarity) -> String {
     format!("{difference} {part}")
 }
 
-/// The range of the parameters over the record.
 fn movement(changes: &Nonstationarity) -> String {
     let range = |values: &mut dyn Iterator<Item = f64>| {
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
@@ -128,7 +120,7 @@ fn movement(changes: &Nonstationarity) -> String {
     }
 }
 
-/// Errors of the prediction stretch by stretch, and how often the intervals held.
+/// Errors of the prediction by stretch, and the coverage.
 fn tracking(changes: &Nonstationarity) -> String {
     let moved = match changes.tracked {
         TrackedSet::Nothing => "With nothing to follow, the model leaves",
@@ -157,7 +149,6 @@ fn share(part: usize, whole: usize) -> String {
     if whole == 0 { NONE.to_owned() } else { format!("{:.1} %", 100.0 * part as f64 / whole as f64) }
 }
 
-/// A line of another channel that moves with the channel's.
 fn related_line(name: &str, related: &RelatedLine) -> String {
     let own = channel_list(&[name.to_owned()]);
     let other = channel_list(std::slice::from_ref(&related.channel));
@@ -179,7 +170,6 @@ fn related_line(name: &str, related: &RelatedLine) -> String {
     )
 }
 
-/// How often the prediction intervals of all channels held.
 fn coverage<'a>(channels: impl Iterator<Item = &'a Nonstationarity>, epoch_s: f64) -> String {
     let (octaves, within) = channels.fold((0, 0), |(octaves, within), changes| {
         (octaves + changes.intervals.octaves, within + changes.intervals.within)
@@ -192,7 +182,6 @@ fn coverage<'a>(channels: impl Iterator<Item = &'a Nonstationarity>, epoch_s: f6
     )
 }
 
-/// What the channels have in common, and what subtracting it gains.
 fn common_mode(of: &CommonModeRegression) -> Vec<String> {
     let names = |at: usize| channel_list(std::slice::from_ref(&of.channels[at]));
     let list = |values: &[f64], text: &dyn Fn(f64) -> String| -> String {

@@ -1,7 +1,4 @@
-//! The noise of a sensor in the file formats of calibration, navigation and simulation programs.
-//!
-//! Every format says in a comment whether its numbers belong to the continuous process or to samples at the record's rate.
-//! The page `docs/exports.md` has the source of each.
+//! The noise of a sensor in the file formats of other programs; `docs/exports.md` has the sources.
 
 mod exported_file;
 mod filters;
@@ -48,7 +45,6 @@ pub enum ExportFormat {
 /// See [`ExportError`].
 pub fn export(report: &SavedReport, format: ExportFormat, axes: AxisChoice) -> Result<Export, ExportError> {
     check(report)?;
-    // Densities belong to no rate.
     let is_of_samples =
         !matches!(format, ExportFormat::Kalibr | ExportFormat::OpenVins | ExportFormat::OrbSlam3 | ExportFormat::Csv);
     if is_of_samples && let Some(other) = report.other_rates_hz.first() {
@@ -69,7 +65,7 @@ pub fn export(report: &SavedReport, format: ExportFormat, axes: AxisChoice) -> R
     Ok(Export { text: warned(export.text, report, format), ..export })
 }
 
-/// `text` with a comment after its first line on the models that fail on the unseen half.
+/// `text` with a comment on failing models after the first line.
 fn warned(text: String, report: &SavedReport, format: ExportFormat) -> String {
     let error = |channel: &SavedChannel| channel.unseen_error.filter(|of| *of > HIGH_DEVIANCE);
     let is_inertial = |channel: &&SavedChannel| ["gyro_", "accl_"].iter().any(|of| channel.name.starts_with(of));
@@ -88,7 +84,6 @@ fn warned(text: String, report: &SavedReport, format: ExportFormat) -> String {
     );
     let after_first_line = |comment: String| text.replacen('\n', &format!("\n{comment}\n"), 1);
     match format {
-        // A table has no comments.
         ExportFormat::Csv => text,
         ExportFormat::Basalt => text.replacen("\"comment\": \"", &format!("\"comment\": \"{warning}; "), 1),
         ExportFormat::Gazebo => after_first_line(format!("<!-- {warning} -->")),
@@ -97,12 +92,12 @@ fn warned(text: String, report: &SavedReport, format: ExportFormat) -> String {
     }
 }
 
-/// Largest coefficient: far above any noise, and far below what overflows in a change of units.
+/// Largest coefficient; larger ones overflow in a change of units.
 const MAX_COEFFICIENT: f64 = 1e30;
 /// Terms whose coefficients are deviations.
 const NOISES: [&str; 3] = ["angle_random_walk", "bias_instability", "rate_random_walk"];
 
-/// Refuses what a file of another program cannot hold as what it is.
+/// Refuses what a file of another program cannot represent.
 fn check(report: &SavedReport) -> Result<(), ExportError> {
     let name = |text: &String| {
         let is_name = text.chars().all(|c| c.is_alphanumeric() || " _-./^*()[]%°".contains(c));
@@ -127,13 +122,11 @@ fn check(report: &SavedReport) -> Result<(), ExportError> {
     Ok(())
 }
 
-/// Every parameter of every channel's final model.
 fn table(report: &SavedReport) -> String {
     let mut text = String::from("channel,term,parameter,value,low,high,unit\n");
     for channel in &report.channels {
         for term in &channel.refitted.terms {
             for (name, of) in &term.parameters {
-                // Writing to a string cannot fail.
                 let _ = writeln!(
                     text,
                     "{},{},{name},{:e},{:e},{:e},{}",
@@ -151,7 +144,6 @@ mod tests {
     use crate::saved_report::SavedReport;
     use clap::ValueEnum;
 
-    /// A report with one term of every axis.
     fn report(value: &str, name: &str) -> SavedReport {
         let term = format!(
             r#"{{"kind":"angle_random_walk","parameters":{{"value":{{"value":{value},"low":0.0,"high":null,"unit":"deg/sqrt(s)"}}}}}}"#
@@ -167,7 +159,6 @@ mod tests {
             .expect("a report")
     }
 
-    /// Whoever has the file alone knows of it.
     #[test]
     fn a_model_that_fails_is_named_in_the_file() {
         let mut failing = report("0.01", "gyro_w");
@@ -184,7 +175,7 @@ mod tests {
         }
     }
 
-    /// As on the screen: where the interval begins at zero, nothing but its end is known.
+    /// If the interval begins at zero.
     #[test]
     fn a_coefficient_whose_interval_begins_at_zero_is_an_upper_bound() {
         let mut known = report("0.01", "gyro_w");
@@ -202,12 +193,12 @@ mod tests {
         assert!(text.contains("# m/s^2/sqrt(Hz), worst axis of"), "{text}");
     }
 
-    /// A report may have been changed by hand. What no file can hold as what it is ends in an error of every format.
+    /// A report may have been changed by hand.
     #[test]
     fn impossible_numbers_and_names_are_refused_by_every_format() {
         for format in ExportFormat::value_variants() {
             let written = |value: &str, name: &str| export(&report(value, name), *format, AxisChoice::Rms);
-            // A format may ask for terms that are not there.
+            // A format may ask for missing terms.
             let sound = written("0.01", "gyro_w");
             let is_refused = matches!(sound, Err(ExportError::NoCoefficient { .. } | ExportError::NoName(_)));
             assert!(!is_refused, "{format:?}");

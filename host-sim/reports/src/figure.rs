@@ -1,5 +1,4 @@
-//! The figures of a report as SVG: the gyros together, and of each channel the Allan deviation, the spectrum and the bias over
-//! time; of each finding a picture of its evidence.
+//! The figures of a report as SVG: overviews, three per channel (Allan deviation, spectrum, bias), and one per finding.
 
 mod axis;
 mod channel;
@@ -17,7 +16,7 @@ use noise_analysis::report::{ChannelReport, DataSheetReport, Report};
 pub(crate) use plot::Plot;
 use plot::{LEFT, Line, Look, Panel, RIGHT, frames, heights, places};
 
-/// The curves of the channels whose names begin with `prefix`, while they grow; `None` without a point.
+/// Growing curves of the channels with `prefix`; `None` without a point.
 pub(crate) fn live(curves: &[LiveCurve], prefix: &str) -> Option<Plot> {
     let is_shown = |&(tau, deviation): &(f64, f64)| has_logarithm(tau) && has_logarithm(deviation);
     let shown = curves.iter().filter(|curve| curve.channel.starts_with(prefix) && curve.points.iter().any(is_shown));
@@ -41,7 +40,7 @@ pub(crate) fn live(curves: &[LiveCurve], prefix: &str) -> Option<Plot> {
     })
 }
 
-/// Colours of a class on a light and on a dark ground: its lines and text are at least 4.5:1 apart from the ground.
+/// Colours of a class on light and dark ground: contrast of at least 4.5:1.
 const COLOURS: [(&str, &str, &str); 8] = [
     ("measured", "#1f5fa8", "#6cb2ff"),
     ("second", "#a8480d", "#ffab5e"),
@@ -113,7 +112,6 @@ pub fn pictures(report: &Report) -> Vec<Picture> {
     overview.chain(channels).chain(findings).map(|plot| standalone(&plot)).collect()
 }
 
-/// The figures of one channel.
 pub(crate) fn channel_plots(report: &Report, channel: &ChannelReport) -> Vec<Plot> {
     [Some(allan_deviation_plot(report, channel)), spectrum_plot(report, channel), bias_plot(channel)]
         .into_iter()
@@ -127,8 +125,7 @@ pub fn allan_deviation(report: &Report, channel: &ChannelReport) -> String {
     standalone(&allan_deviation_plot(report, channel)).svg
 }
 
-/// The channel whose error on the unseen half its effects lower most, by their ratio: measured, the model before, the model after.
-/// Where no error is lowered, that with the largest error of the baseline model. `None` where there is no error.
+/// The channel whose effects lower its error on the unseen half most, else that of the largest error; or `None`.
 pub(crate) fn story(report: &Report) -> Option<Plot> {
     let errors: Vec<(&ChannelReport, [f64; 2])> = summary::inertial(report)
         .filter_map(|channel| match summary::unseen_errors(channel) {
@@ -143,14 +140,14 @@ pub(crate) fn story(report: &Report) -> Option<Plot> {
     shown.map(|&(channel, errors)| channel::story_plot(report, channel, errors))
 }
 
-/// The picture of the finding that is told first; without one, that of the curves beside the data sheet.
+/// The picture of the first finding, or else of the curves beside the data sheet.
 pub(crate) fn strongest(report: &Report) -> Option<Plot> {
     let first = summary::finding_order(report).first().and_then(|&index| evidence(report, index, 1));
     let plot = first.or_else(|| overviews(report).into_iter().next())?;
     Some(Plot { id: "strongest".to_owned(), ..plot })
 }
 
-/// The curves of the gyros and those of the accelerometers, each with its model, beside the data sheet's.
+/// Curves of the gyros and of the accelerometers with models and data sheet.
 pub(crate) fn overviews(report: &Report) -> Vec<Plot> {
     [("gyro_", "gyros"), ("accl_", "accelerometers")]
         .into_iter()
@@ -158,7 +155,7 @@ pub(crate) fn overviews(report: &Report) -> Vec<Plot> {
         .collect()
 }
 
-/// One picture of the channels whose names begin with `prefix`; `None` without any.
+/// The channels whose names begin with `prefix`; `None` without any.
 fn overview(report: &Report, prefix: &str, name: &str) -> Option<Plot> {
     let has_curve = |channel: &&ChannelReport| channel.curve.iter().any(|point| has_logarithm(point.adev));
     let of_prefix = report.channels.iter().filter(|channel| channel.name.starts_with(prefix));
@@ -198,7 +195,7 @@ fn overview(report: &Report, prefix: &str, name: &str) -> Option<Plot> {
     })
 }
 
-/// The curve that a data sheet draws, with the standard deviation over parts; else what it states, at the averaging times `taus`.
+/// The data sheet's drawn curve with its scatter over parts, or the stated values at `taus`.
 fn data_sheet_line(sheet: &DataSheetReport, taus: &[f64]) -> Line {
     if sheet.curve.is_empty() {
         return Line::new("data sheet", Look::Reference, stated_curve(sheet, taus));
@@ -208,7 +205,7 @@ fn data_sheet_line(sheet: &DataSheetReport, taus: &[f64]) -> Line {
     Line::new("data sheet, mean and ±1 σ over parts", Look::Reference, points).with_bounds(bounds)
 }
 
-/// The curve of what a data sheet states: its random walk and the minimum, and its rate random walk where it names one.
+/// The stated random walk, minimum, and rate random walk.
 fn stated_curve(sheet: &DataSheetReport, taus: &[f64]) -> Vec<(f64, f64)> {
     let of = |tau: f64| {
         let square = |value: Option<f64>| value.map_or(0.0, |value| value * value);

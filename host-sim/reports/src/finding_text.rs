@@ -1,5 +1,4 @@
-//! Each finding in words: one sentence of physics and one of advice, made of its parameters. `docs/findings.md` explains every
-//! sentence.
+//! Each finding in words, a sentence of physics and one of advice (`docs/findings.md`).
 
 mod amounts;
 mod channel_names;
@@ -18,34 +17,30 @@ use noise_analysis::report::{Finding, Report, Validation};
 pub use shown_effect::{ShownEffect, shown_effects};
 use std::f64::consts::SQRT_2;
 
-/// Frequency of a line below which nothing that turns or hums makes it, Hz.
+/// Hz; below it nothing that turns or hums makes a line.
 const SLOW_HZ: f64 = 0.2;
-/// Advice for such a line.
 const CYCLING: &str =
     "Look for what cycles at this period, such as a thermostat, an air conditioner or a load on the supply";
 
-/// What is said of a finding.
+/// A finding in words.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FindingText {
     /// The channels that show it, such as `gyro z` or `accel x y`.
     pub channels: String,
-    /// How many these are.
     pub channel_count: usize,
-    /// What it is, with the size in each channel.
+    /// The cause, with the size in each channel.
     pub physics: String,
-    /// The same without intervals and details, for one line of a narrow screen.
+    /// For one line of a narrow screen, without intervals and details.
     pub brief: String,
-    /// What to do about it, or what to look for.
+    /// Remedy, or what to look for.
     pub advice: String,
-    /// The first of that, as a sentence; `None` where nothing is left to do.
+    /// First step of the advice; `None` if nothing is left to do.
     pub step: Option<String>,
-    /// How much of the variance it makes, and whether the second half confirms it; empty where neither is known.
+    /// Share of the variance, and confirmation by the second half; empty if unknown.
     pub weight: String,
 }
 
-/// What to do about a finding.
 struct Advice {
-    /// Without a full stop.
     first: &'static str,
     /// With the sign that ends the first.
     rest: String,
@@ -54,11 +49,11 @@ struct Advice {
 
 #[derive(PartialEq)]
 enum AdviceKind {
-    /// The analysis or the part has done it.
+    /// Done by the analysis or the sensor.
     Done,
-    /// Something to look for or to change.
+    /// Something to find or to change.
     Look,
-    /// Numbers of the finding are to be subtracted: only if the second half confirms them.
+    /// Subtraction of the finding's numbers, if the second half confirms them.
     Compensate,
 }
 
@@ -75,7 +70,7 @@ impl Advice {
         Self { kind: AdviceKind::Compensate, ..Self::new(first, rest) }
     }
 
-    /// What does not make the second half worse, if that contradicts the numbers.
+    /// Replaces a subtraction that the second half contradicts.
     fn checked(self, validated: Validation) -> Self {
         if self.kind == AdviceKind::Compensate && validated == Validation::No {
             return Self::new(
@@ -87,13 +82,13 @@ impl Advice {
     }
 }
 
-/// The words for the finding at `index` of `report`; `None` where there is none.
+/// The finding at `index` of `report`; `None` without one.
 #[must_use]
 pub fn describe_in(report: &Report, index: usize) -> Option<FindingText> {
     Some(describe(report.findings.get(index)?, &shown_effects(report, index)))
 }
 
-/// The words for `finding`, which its channels show as in `shown`; without these its own numbers are those of its clearest channel.
+/// `shown` has each channel's numbers; without it, those of the clearest channel are used.
 #[must_use]
 pub fn describe(finding: &Finding, shown: &[ShownEffect]) -> FindingText {
     let clearest = finding.channels.get(finding.clearest).map_or("", String::as_str);
@@ -114,7 +109,7 @@ pub fn describe(finding: &Finding, shown: &[ShownEffect]) -> FindingText {
     }
 }
 
-/// The largest share of the variance, and what the second half says; empty where neither is known.
+/// Largest share of the variance, and the second half's confirmation; empty if unknown.
 fn weight(finding: &Finding) -> String {
     let largest = finding.share_percent.values().copied().filter(|share| share.is_finite()).fold(0.0, f64::max);
     let share = (largest >= 0.5).then(|| format!("up to {} % of σ²", significant(largest.min(100.0), 2)));
@@ -126,17 +121,16 @@ fn weight(finding: &Finding) -> String {
     share.into_iter().chain(held).collect::<Vec<_>>().join("; ")
 }
 
-/// By how much σ falls without a part of the variance, %, of the channel with the largest share; `None` where it is not known.
+/// Reduction of σ, %, in the channel with the largest share; `None` if unknown.
 fn gain(finding: &Finding) -> Option<String> {
     let share = finding.share_percent.values().copied().fold(0.0, f64::max) / 100.0;
     (share > 0.0 && share < 1.0).then(|| significant(100.0 * (1.0 - (1.0 - share).sqrt()), 2))
 }
 
-/// Stands on either side of what the brief form of a sentence leaves out.
+/// Encloses what the brief form leaves out.
 const DETAIL: char = '|';
 
-/// The sentence of physics, with its details between two [`DETAIL`]s, and the advice. What the part or its environment has once, such as
-/// a frequency, is that of the clearest channel; sizes are those of each channel.
+/// The sentence of physics, with details between two [`DETAIL`]s, and the advice; common values are the clearest's.
 fn sentences(finding: &Finding, amounts: &Amounts) -> (String, Advice) {
     let off = || {
         gain(finding)
@@ -188,7 +182,7 @@ fn sentences(finding: &Finding, amounts: &Amounts) -> (String, Advice) {
         Effect::SinusoidalLine(of) if of.is_at_half_rate() => (
             format!(
                 "Every second sample is off by {}|: a line at half of the sample rate, {}|.",
-                // The deviation of the line is half of the offset.
+                // Half of the offset.
                 amounts.each_scaled("amplitude", SQRT_2),
                 hertz(of.frequency_hz)
             ),
@@ -266,7 +260,7 @@ fn sentences(finding: &Finding, amounts: &Amounts) -> (String, Advice) {
             Advice::new("Look for a load on the supply or a heater that switches at this rate", format!(".{}", off())),
         ),
         Effect::TelegraphNoise(of) => (
-            // Between two jumps of a symmetrical telegraph signal lie two correlation times on average.
+            // Two correlation times between jumps.
             format!(
                 "The bias jumps between two levels {} apart|, on average every {}: a time constant of {}|.",
                 each("amplitude"),
@@ -408,7 +402,6 @@ fn sentences(finding: &Finding, amounts: &Amounts) -> (String, Advice) {
             };
             let axes = [("x", "sensitivity_x"), ("y", "sensitivity_y"), ("z", "sensitivity_z")];
             let axes: Vec<String> = axes.into_iter().filter_map(along).collect();
-            // A line of the screen has room for one axis.
             let axes =
                 axes.iter().enumerate().map(|(at, axis)| if at == 0 { axis.clone() } else { format!("|; {axis}|") });
             (
@@ -538,7 +531,7 @@ fn sentences(finding: &Finding, amounts: &Amounts) -> (String, Advice) {
     }
 }
 
-/// What is not to be subtracted, as nothing more than a bound on it is known; empty where there is nothing of the kind.
+/// A remark on sizes of which only a bound is known.
 fn bounds_alone(amounts: &Amounts, name: &'static str) -> String {
     let bounded = amounts.with_bound_alone(name);
     if bounded.is_empty() {
@@ -547,17 +540,14 @@ fn bounds_alone(amounts: &Amounts, name: &'static str) -> String {
     format!(" Subtract nothing in {}: the record gives a limit only.", channel_list(&bounded))
 }
 
-/// Advice for a drift that channels have in common.
 const RECORD_CONDITIONS: &str = "Record temperature and supply beside the channels";
-/// Advice for rounding.
 const FINER: &str = "Read the part with more bits or in a smaller range";
 
-/// A part of the samples in percent.
 fn part_in_percent(fraction: BoundedEstimate) -> String {
     format!("{} %", significant(100.0 * fraction.value, 2))
 }
 
-/// By how much and where the data departs from every model; `percent` has the excess of σ in each channel, if it is known.
+/// Amount and place of a departure from every model; `percent` is the excess of σ per channel.
 pub(crate) fn departure(of: &Unexplained, percent: &[f64]) -> String {
     let place = match of.place {
         UnexplainedPlace::LineOfCurve { tau_s, frequency_hz } => {
@@ -581,7 +571,7 @@ pub(crate) fn departure(of: &Unexplained, percent: &[f64]) -> String {
     }
 }
 
-/// A relative difference in percent, in ppm below 0.01 %.
+/// Percent, or ppm below 0.01 %.
 fn relative(difference: f64) -> String {
     if difference.abs() < 1e-4 {
         format!("{} ppm", signed(1e6 * difference, 2))
@@ -614,7 +604,7 @@ mod tests {
         }
     }
 
-    /// What a report says of the examples of a kind, one row for each piece of advice.
+    /// One row for each piece of advice.
     fn rows_of(kind: &str, examples: &[Effect]) -> String {
         let texts = examples
             .iter()
@@ -643,7 +633,7 @@ mod tests {
             rows
         });
         let mut rows: Vec<String> = rows.collect();
-        // Two kinds share a name where the noise model and the samples show the same.
+        // The noise model and the samples share kinds.
         rows.dedup();
         let table = format!("| kind | the report says | what to do |\n|---|---|---|\n{}", rows.concat());
         system_tests::generated("docs/findings.md", "kinds", &table);
@@ -657,7 +647,7 @@ mod tests {
         }
     }
 
-    /// Beside the number and the channels a screen of 80 columns has 63.
+    /// 80 columns leave 63.
     #[test]
     fn a_brief_sentence_fits_a_line_of_the_narrowest_screen() {
         for effect in &examples() {
@@ -688,7 +678,7 @@ mod tests {
 
     #[test]
     fn sizes_in_words_are_those_of_their_definitions() {
-        // A symmetrical telegraph signal with the covariance (A/2)²·exp(−t/T) jumps every 2 T on average.
+        // The covariance (A/2)²·exp(−t/T): a jump every 2 T.
         let telegraph = TelegraphNoise {
             time_constant_s: BoundedEstimate::new(20.0, 15.0, 27.0),
             amplitude: BoundedEstimate::new(0.3, 0.29, 0.31).in_unit("deg/s"),
@@ -696,7 +686,7 @@ mod tests {
         };
         let physics = describe(&finding(telegraph), &[]).physics;
         assert!(physics.contains("0.300 ± 0.010 °/s apart, on average every 40 s: a time constant of 20"), "{physics}");
-        // The amplitude of a square wave is half the distance of its levels.
+        // Half the distance of the levels.
         let square = SquareWave {
             frequency_hz: BoundedEstimate::exact(0.5),
             amplitude: BoundedEstimate::new(9e-4, 8e-4, 1e-3).in_unit("g"),
@@ -751,7 +741,6 @@ mod tests {
             )
         };
         assert_eq!(of_step, format!("the level changes by −31.0 µg {}", rest("below 0.001")));
-        // Nothing is said of a weight that is not known.
         assert_eq!(describe(&finding(step), &[]).weight, "");
         let mut in_two = finding(step);
         in_two.channels.insert(0, "accl_x".to_owned());
@@ -763,7 +752,7 @@ mod tests {
         );
     }
 
-    /// The page has no names of the JSON, and one run is no "runs".
+    /// No names of the JSON, and no "1 runs".
     #[test]
     fn the_evidence_of_the_page_has_names_symbols_and_numbers_as_its_readers_write_them() {
         for effect in &examples() {

@@ -7,8 +7,7 @@ use noise_analysis::report::assessment::{Innovations, RecordLength};
 use noise_analysis::report::{ChannelReport, MissingSamples, ModelErrorReport, ModelReport};
 use std::fmt;
 
-/// `value` with four significant digits; [`NONE`] for what is not finite. An exponent has only what is too large or too small to be
-/// a result, such as the deviance of a model that is zero. Values with a unit have a prefix in it: [`Scale`](crate::rounding::Scale).
+/// Four significant digits; [`NONE`] if not finite.
 pub fn number(value: f64) -> String {
     let is_usual = value == 0.0 || (1e-9..1e15).contains(&value.abs());
     if is_usual || !value.is_finite() { significant(value, 4) } else { format!("{value:.3e}") }
@@ -37,8 +36,7 @@ pub fn count(value: u64) -> String {
     out
 }
 
-/// What a channel lacks, in one sentence: samples that were lost, refused by cause, and how many of them were replaced. Empty
-/// where nothing is missing.
+/// Lost, refused and replaced samples of a channel in one sentence; empty without any.
 pub fn missing_samples(missing: &MissingSamples) -> String {
     let refused: Vec<String> =
         missing.refused.iter().map(|(cause, samples)| format!("{} {}", words(cause), count(*samples))).collect();
@@ -56,9 +54,9 @@ pub fn missing_samples(missing: &MissingSamples) -> String {
     parts.join("; ")
 }
 
-/// `seconds` in days, hours, minutes and seconds, such as `2 h 46 min 40 s`; below a minute with four digits.
+/// Such as `2 h 46 min 40 s`; four digits below a minute.
 pub fn duration(seconds: f64) -> String {
-    // Beyond 2^53 s the whole seconds are no longer exact.
+    // Exact up to 2^53.
     if !(59.5..9.0e15).contains(&seconds) {
         return quantity_digits(seconds, "s", 4);
     }
@@ -82,14 +80,13 @@ pub fn interval(low: f64, high: f64) -> String {
     format!("{} … {}", number(low), number(high))
 }
 
-/// `text` with a capital at its beginning; `σ` stays a small letter.
+/// Capitalised, except `σ`.
 #[must_use]
 pub fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| [first.to_ascii_uppercase()].into_iter().chain(letters).collect())
 }
 
-/// `a`, `a and b`, `a, b and c`.
 pub(crate) fn enumerated(parts: &[String]) -> String {
     match parts {
         [] => String::new(),
@@ -103,8 +100,7 @@ pub fn words(name: &str) -> String {
     name.replace('_', " ")
 }
 
-/// A parameter's name as words, without the unit that stands beside it: `frequency_hz` becomes `frequency`, and
-/// `value` becomes nothing.
+/// Without its unit: `frequency_hz` becomes `frequency`, `value` becomes nothing.
 pub fn parameter_name(name: &str) -> String {
     let bare = name.strip_suffix("_hz").or(name.strip_suffix("_s")).unwrap_or(name);
     match bare {
@@ -114,11 +110,10 @@ pub fn parameter_name(name: &str) -> String {
     }
 }
 
-/// Smallest p-value of the whiteness test at which innovations are called white.
+/// p-value from which innovations are white.
 const WHITE: f64 = 0.01;
 
-/// Whether a Kalman filter of the model is consistent: its innovations' variance against the expected one, and their
-/// whiteness.
+/// Consistency of a Kalman filter by the variance and whiteness of its innovations.
 pub fn filter_consistency(innovations: &Innovations) -> &'static str {
     let white = innovations.whiteness_p >= WHITE;
     if innovations.normalised > innovations.high {
@@ -140,11 +135,10 @@ pub fn filter_consistency(innovations: &Innovations) -> &'static str {
     }
 }
 
-/// Standard deviations from which a model's largest deviation is told in words. Of twenty octaves of a true model one is
-/// farther off once in 800 records.
+/// Deviation that is told, standard deviations; one in 800 records of a true model.
 const FAR_OFF: f64 = 4.0;
 
-/// Where a model is farther off than chance explains, in words; `None` where it is not. `data` is what it was compared with.
+/// The largest deviation of a model beyond chance from `data`; `None` without one.
 pub fn worst_deviation(error: &ModelErrorReport, data: &str) -> Option<String> {
     let (sigma, tau, ratio) = (error.worst_sigma?, error.worst_tau_s?, error.worst_ratio?);
     let times = |factor: f64| match factor {
@@ -159,7 +153,7 @@ pub fn worst_deviation(error: &ModelErrorReport, data: &str) -> Option<String> {
     (sigma.abs() > FAR_OFF).then(|| format!("{text} ({} sigma)", number(sigma)))
 }
 
-/// Where the models of a channel are farther off than chance explains, one text for each half; empty where they are not.
+/// Deviations of the channel's models beyond chance, by half.
 pub fn worst_deviations(channel: &ChannelReport) -> Vec<String> {
     let (before, after) = (&channel.before, &channel.after);
     let same = before == after;
@@ -173,7 +167,7 @@ pub fn worst_deviations(channel: &ChannelReport) -> Vec<String> {
     if same { after } else { of("before", before).into_iter().chain(after).collect() }
 }
 
-/// How much longer to record for a coefficient with an interval of ±20 %.
+/// Recording time for a coefficient within ±20 %.
 pub fn recording_advice(record: &RecordLength) -> String {
     let kind = words(&record.kind);
     match record.more_hours {
@@ -183,17 +177,16 @@ pub fn recording_advice(record: &RecordLength) -> String {
     }
 }
 
-/// `text` in lines of at most `width` columns; those after the first are indented by two.
+/// Lines of at most `width` columns, indented by two after the first.
 pub fn wrap(text: &str, width: usize) -> String {
     broken(text, width, "  ").join("\n")
 }
 
-/// A table with a frame of box characters, as wide as its cells. It is written by its `Display`, without a line break
-/// at the end.
+/// A table in a frame of box characters. `Display` writes no final line break.
 pub struct TextTable(Table);
 
 impl TextTable {
-    /// A table whose first `left` columns are aligned left (text) and the others right (numbers).
+    /// `left` columns are aligned left, the others right.
     pub fn new<H: Into<String>>(
         header: impl IntoIterator<Item = H>,
         left: usize,
@@ -212,7 +205,7 @@ impl TextTable {
         Self(table)
     }
 
-    /// The same table, at most `width` columns wide: longer cells are broken into lines.
+    /// At most `width` columns wide; longer cells are broken.
     pub fn within(mut self, width: u16) -> Self {
         self.0.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
         self

@@ -1,4 +1,4 @@
-//! Every table of a report as text: at most 100 columns, the same in a terminal and in a file.
+//! Every table of a report as text of at most 100 columns.
 
 use crate::coefficient_notes::coefficient_notes;
 use crate::coefficients::{self, CoefficientRow};
@@ -10,7 +10,7 @@ use crate::formatting::{
     TextTable, capital, count, duration, filter_consistency, interval, missing_samples, number, optional,
     parameter_name, percent, recording_advice, words, worst_deviations, wrap,
 };
-use crate::rounding::{NONE, Scale, bounded_quantity, p_value, parameter_magnitude, quantity_digits, unit};
+use crate::rounding::{NONE, Scale, p_value, parameter_magnitude, quantity_digits, unit};
 use crate::summary;
 use noise_analysis::report::assessment::navigation::CALIBRATION_S;
 use noise_analysis::report::assessment::{Assessment, Coefficient, NavigationDrift};
@@ -18,13 +18,9 @@ use noise_analysis::report::{ChannelEffect, ChannelReport, Report, TermReport};
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
-/// Columns of the longest line.
 const WIDTH: u16 = 100;
 
-/// Writes the whole report, with the name of the recording if it has one.
-///
-/// # Errors
-/// `out` cannot be written.
+/// Writes the whole report with the recording's name.
 pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io::Result<()> {
     let title = format!("{} noise report", summary::part_name(report));
     match source {
@@ -74,7 +70,7 @@ pub fn write(report: &Report, source: Option<&str>, out: &mut impl Write) -> io:
     )
 }
 
-/// Everything that the one screen tells, without its limits.
+/// The content of the screen, without its limits.
 fn verdict(report: &Report, out: &mut impl Write) -> io::Result<()> {
     let paragraph = |out: &mut dyn Write, text: &str| writeln!(out, "{}", wrap(text, WIDTH.into()));
     writeln!(out)?;
@@ -107,7 +103,6 @@ fn verdict(report: &Report, out: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-/// Numbers of samples by cause, as a list.
 fn by_cause(counts: &BTreeMap<String, u64>) -> String {
     if counts.values().all(|&samples| samples == 0) {
         return "none".to_owned();
@@ -157,7 +152,6 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "{}", curve_table(channel))
 }
 
-/// A table whose first `left` columns are text and the others numbers.
 fn table(header: &[&str], left: usize, rows: impl IntoIterator<Item = Vec<String>>) -> TextTable {
     TextTable::new(header.iter().copied(), left, rows).within(WIDTH)
 }
@@ -236,7 +230,6 @@ fn curve_table(channel: &ChannelReport) -> TextTable {
     table(&headings.iter().map(String::as_str).collect::<Vec<_>>(), 0, rows)
 }
 
-/// What the model is good for: other units, drift, a filter's innovations, longer records.
 fn write_assessment(assessment: &Assessment, out: &mut impl Write) -> io::Result<()> {
     if !assessment.coefficients.is_empty() {
         writeln!(out, "{}", unit_table(&assessment.coefficients))?;
@@ -255,19 +248,6 @@ fn write_assessment(assessment: &Assessment, out: &mut impl Write) -> io::Result
             filter_consistency(innovations)
         );
         writeln!(out, "{}", wrap(&text, WIDTH.into()))?;
-    }
-    let by_spectrum = assessment.angle_random_walk_by_spectrum.as_ref().map(bounded_quantity);
-    let told = match (by_spectrum, &assessment.angle_random_walk_by_spectrum_note) {
-        (Some(value), Some(note)) => Some(format!("{value}; {note}")),
-        (Some(value), None) => Some(value),
-        (None, Some(note)) => Some(format!("none, {note}")),
-        (None, None) => None,
-    };
-    if let Some(told) = told {
-        writeln!(out, "{}", wrap(&format!("• N by the spectrum: {told}."), WIDTH.into()))?;
-    }
-    if let Some(time) = &assessment.markov_time_by_autocorrelation {
-        writeln!(out, "• Markov time by the autocorrelation: {}.", bounded_quantity(time))?;
     }
     assessment.record.iter().try_for_each(|record| writeln!(out, "• {}.", recording_advice(record)))
 }

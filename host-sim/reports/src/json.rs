@@ -1,5 +1,4 @@
-//! The JSON of a report, schema 2. Effects and findings have names for their kinds and their parameters, and the figures of their
-//! evidence; the rest is as in [`Report`].
+//! The JSON of a report, schema 2: effects and findings with names of kinds and parameters; the rest as in [`Report`].
 
 use crate::finding_text::shown_effects;
 use crate::reading::ReadingRecord;
@@ -32,7 +31,6 @@ pub struct ReportJson<'a> {
     channels: Vec<ChannelJson<'a>>,
 }
 
-/// A [`Finding`].
 #[derive(Debug, Serialize)]
 struct FindingJson<'a> {
     kind: &'static str,
@@ -45,7 +43,6 @@ struct FindingJson<'a> {
     share_percent: &'a BTreeMap<String, f64>,
 }
 
-/// A [`ChannelReport`].
 #[derive(Debug, Serialize)]
 struct ChannelJson<'a> {
     name: &'a str,
@@ -70,7 +67,6 @@ struct ChannelJson<'a> {
     figure_data: &'a FigureData,
 }
 
-/// A [`ChannelEffect`].
 #[derive(Debug, Serialize)]
 struct EffectJson<'a> {
     kind: &'static str,
@@ -80,7 +76,7 @@ struct EffectJson<'a> {
 }
 
 impl<'a> ReportJson<'a> {
-    /// The same with what was read for it.
+    /// Adds the record of the reading.
     #[must_use]
     pub fn with_reading(self, reading: Option<&'a ReadingRecord>) -> Self {
         Self { reading, ..self }

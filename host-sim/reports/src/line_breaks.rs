@@ -3,11 +3,9 @@
 /// Units that are letters alone.
 const SIMPLE_UNITS: [&str; 11] = ["s", "ms", "min", "h", "d", "Hz", "kHz", "g", "mg", "V", "mV"];
 
-/// `text` broken between words into lines of at most `width` columns; all but the first begin with `indent`. Spaces at the beginning
-/// and between words are kept, a number stays with its unit and its bound, and a longer word is broken.
+/// `text` in lines of at most `width` columns, all but the first with `indent`; longer words are broken.
 pub(crate) fn broken(text: &str, width: usize, indent: &str) -> Vec<String> {
     let width = width.max(1);
-    // What is narrower than the indent has none.
     let indent = if indent.chars().count() < width { indent } else { "" };
     let mut lines: Vec<String> = Vec::new();
     let mut line: String = text.chars().take_while(|letter| *letter == ' ').collect();
@@ -35,7 +33,7 @@ pub(crate) fn broken(text: &str, width: usize, indent: &str) -> Vec<String> {
     lines
 }
 
-/// What stays on one line: a word, or a number with its bound and its unit.
+/// Pieces that stay on one line: a word, or a number with bound and unit.
 fn pieces(text: &str) -> Vec<String> {
     let mut pieces: Vec<String> = Vec::new();
     for word in text.split(' ') {
@@ -50,7 +48,6 @@ fn pieces(text: &str) -> Vec<String> {
     pieces
 }
 
-/// Whether `piece` ends with a number and `word` is its unit.
 fn is_unit_of(piece: &str, word: &str) -> bool {
     let word = word.trim_end_matches([',', ';', '.', ':', ')']);
     let is_unit = SIMPLE_UNITS.contains(&word) || word.contains(['%', '°', 'µ', 'σ', '/', '√']);

@@ -1,5 +1,4 @@
-//! A record while it grows, on a terminal's whole screen: the verdict of the report, the curves, the findings, and the health
-//! of the source. Drawn by ratatui.
+//! The live view of a growing record: verdict, curves, findings, health of the source.
 
 use crate::finding_text::FindingText;
 use crate::summary::{self, CoefficientTable};
@@ -12,34 +11,29 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Borders, Chart, Dataset, GraphType, Paragraph, Wrap};
 
-/// Columns of the tables; text is broken at the edge of the screen.
 const TABLE_COLUMNS: usize = 80;
-/// Rows of the screen from which on the tables have the data sheet's row.
+/// Least rows of a screen with the data sheet's row.
 const ROWS_FOR_SHEET: u16 = 30;
 
 /// One curve: the Allan deviation over the averaging time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LiveCurve {
-    /// Name of the channel, such as `gyro_z`.
     pub channel: String,
-    /// Unit of the deviation.
     pub unit: String,
-    /// Averaging time in s and deviation.
+    /// Averaging time, s, and deviation.
     pub points: Vec<(f64, f64)>,
 }
 
-/// Which curves are drawn.
+/// The curves that are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum CurveGroup {
-    /// Those of the gyros.
     #[default]
     Gyros,
-    /// Those of the accelerometers.
     Accelerometers,
 }
 
 impl CurveGroup {
-    /// The group that is not this one.
+    /// The other group.
     #[must_use]
     pub fn other(self) -> Self {
         match self {
@@ -56,31 +50,26 @@ impl CurveGroup {
     }
 }
 
-/// What is shown of a growing record.
+/// The content of the live view.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LiveView {
     /// Part, source, samples, length.
     pub headline: String,
-    /// The record in sentences.
     pub sentences: String,
     /// Coefficients of the gyros and of the accelerometers.
     pub tables: Vec<CoefficientTable>,
-    /// The curves.
     pub curves: Vec<LiveCurve>,
-    /// What was found.
     pub findings: Vec<FindingText>,
-    /// What nothing explains.
+    /// Departures without an explanation.
     pub unexplained: Vec<String>,
-    /// Where the record departs from the model, and what to do.
+    /// Departures from the model, and advice.
     pub advice: Vec<String>,
-    /// Counters of the source.
     pub health: String,
-    /// What the source does now.
     pub status: String,
 }
 
 impl LiveView {
-    /// What a report says; `health` and `status` are those of its source.
+    /// From a report; `health` and `status` are those of its source.
     #[must_use]
     pub fn from_report(report: &Report, source: Option<&str>, health: String, status: String) -> Self {
         let curve = |channel: &noise_analysis::report::ChannelReport| LiveCurve {
@@ -103,7 +92,7 @@ impl LiveView {
         }
     }
 
-    /// Draws the view on the whole frame, which 80 columns and 24 rows suffice for; in colour if that is wanted.
+    /// Draws on the whole frame, at least 80 columns by 24 rows.
     pub fn draw(&self, frame: &mut Frame<'_>, group: CurveGroup, in_colour: bool) {
         let area = frame.area();
         let text_rows = rows_of(&self.sentences, area.width).min(3);
@@ -133,7 +122,7 @@ impl LiveView {
         frame.render_widget(Paragraph::new(status_text).style(reversed), status);
     }
 
-    /// The tables, without the data sheet's rows on a low screen.
+    /// Without the data sheet's rows on a low screen.
     fn table_text(&self, area: Rect, in_colour: bool) -> Vec<Line<'static>> {
         let columns = usize::from(area.width).clamp(TABLE_COLUMNS, 120);
         let mut lines = Vec::new();
@@ -161,7 +150,6 @@ impl LiveView {
         lines
     }
 
-    /// Findings, what is unexplained, and advice.
     fn found_text(&self, in_colour: bool) -> Vec<Line<'_>> {
         let warning = if in_colour { Style::new().fg(Color::Yellow) } else { Style::new() };
         let mut lines: Vec<Line<'_>> =
@@ -174,7 +162,7 @@ impl LiveView {
         lines
     }
 
-    /// The curves of a group on logarithmic axes; each point is the letter of its axis, so that no colour is needed.
+    /// Logarithmic axes; the points are the letters of the axes.
     fn draw_curves(&self, frame: &mut Frame<'_>, area: Rect, group: CurveGroup, in_colour: bool) {
         let logarithmic = |curve: &LiveCurve| -> Vec<(f64, f64)> {
             let positive = curve.points.iter().filter(|(tau, deviation)| *tau > 0.0 && *deviation > 0.0);
@@ -222,7 +210,6 @@ impl LiveView {
     }
 }
 
-/// Both ends of an axis of logarithms.
 fn powers_of_ten(bounds: [f64; 2]) -> [String; 2] {
     bounds.map(|exponent| match exponent {
         exponent if (-3.0..=4.0).contains(&exponent) => format!("{}", 10f64.powf(exponent)),
@@ -230,7 +217,7 @@ fn powers_of_ten(bounds: [f64; 2]) -> [String; 2] {
     })
 }
 
-/// Rows of a text that is broken at `columns`: as many as its length needs, and one for words that are moved down.
+/// Upper bound of the rows of a text at `columns`.
 fn rows_of(text: &str, columns: u16) -> u16 {
     let wrapped = crate::formatting::wrap(text, usize::from(columns.max(1)));
     u16::try_from(wrapped.lines().count()).unwrap_or(u16::MAX)

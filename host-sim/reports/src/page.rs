@@ -1,5 +1,4 @@
-//! The report as one HTML file that needs no other: style, script, figures and their values are inside, and a policy in it forbids
-//! every request. The same report gives the same bytes.
+//! The report as one HTML file without requests, reproducible byte by byte.
 
 mod tables;
 
@@ -25,7 +24,7 @@ use std::path::{Path, PathBuf};
 pub const STYLE: &str = include_str!("page/style.css");
 /// The script of the page, as it stands in its element.
 pub const SCRIPT: &str = include_str!("page/script.js");
-/// Only what is in the file itself; a figure that is saved as PNG is an image of its own text.
+/// Only the file itself; a figure saved as PNG is an image of its text.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
 
 /// Name of the page in its folder.
@@ -37,19 +36,18 @@ pub fn html(report: &Report, source: Option<&str>) -> String {
     render(report, source, None, Extent::Whole).into_string()
 }
 
-/// The same with what was read for it.
+/// With the record of the reading.
 #[must_use]
 pub fn html_with_reading(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>) -> String {
     render(report, source, reading, Extent::Whole).into_string()
 }
 
-/// The first screen of that page alone: what was found, the curves, and what to do.
+/// The first screen of that page.
 #[must_use]
 pub fn first_screen(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>) -> String {
     render(report, source, reading, Extent::FirstScreen).into_string()
 }
 
-/// How much of the page is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Extent {
     Whole,
@@ -90,9 +88,7 @@ pub fn figure_styles() -> [String; 2] {
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write the page {}: {reason}", path.display())]
 pub struct PageError {
-    /// The file.
     pub path: PathBuf,
-    /// The error of the operating system.
     pub reason: std::io::Error,
 }
 
@@ -160,7 +156,7 @@ fn render(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>
     }
 }
 
-/// The file, and what of it is no sample.
+/// The file, and rows that are no samples.
 fn what_was_read(reading: &ReadingRecord) -> Markup {
     html! {
         section id="file" aria-label="What was read" {
@@ -170,7 +166,7 @@ fn what_was_read(reading: &ReadingRecord) -> Markup {
     }
 }
 
-/// Gyros, accelerometers, then the conditions.
+/// Gyros, accelerometers, conditions.
 fn in_reading_order(report: &Report) -> impl Iterator<Item = &ChannelReport> {
     let rank = |channel: &ChannelReport| {
         let known = SENSED.iter().position(|prefix| channel.name.starts_with(prefix));
@@ -181,7 +177,6 @@ fn in_reading_order(report: &Report) -> impl Iterator<Item = &ChannelReport> {
     channels.into_iter()
 }
 
-/// Links to every section.
 fn contents(report: &Report) -> Markup {
     html! {
         nav aria-label="Sections" {
@@ -195,7 +190,7 @@ fn contents(report: &Report) -> Markup {
     }
 }
 
-/// The answer whether the recording can be trusted, N, B and K, and what to do.
+/// Trust, N, B and K, next steps.
 fn verdict(report: &Report) -> Markup {
     let answer = summary::answer(report);
     html! {
@@ -218,12 +213,12 @@ fn verdict(report: &Report) -> Markup {
     }
 }
 
-/// `text` whose per cent signs stay on the line of their numbers.
+/// Keeps per cent signs beside their numbers.
 fn unparted(text: &str) -> String {
     text.replace(" %", "\u{a0}%")
 }
 
-/// Advice with links to its findings, and how many places have no explanation.
+/// Advice with links to its findings, and the number of unexplained places.
 fn what_to_do(report: &Report) -> Markup {
     html! {
         @let (advice, for_filter) = (summary::advice(report), summary::for_filter(report));
@@ -248,7 +243,6 @@ fn what_to_do(report: &Report) -> Markup {
     }
 }
 
-/// The places where data and model disagree.
 fn disagreements(report: &Report) -> Markup {
     let contradictions = summary::contradictions(report);
     html! {
@@ -261,7 +255,7 @@ fn disagreements(report: &Report) -> Markup {
     }
 }
 
-/// A figure with its values for the pointer and the keyboard.
+/// With values for pointer and keyboard.
 fn drawing(plot: &Plot) -> Markup {
     html! {
         figure id=(plot.id) tabindex="0" aria-label={ (plot.title) ". Arrow keys read the values." } {
@@ -274,7 +268,6 @@ fn drawing(plot: &Plot) -> Markup {
     }
 }
 
-/// Every finding as a card.
 fn findings(report: &Report) -> Markup {
     html! {
         section id="findings" {
@@ -287,7 +280,6 @@ fn findings(report: &Report) -> Markup {
     }
 }
 
-/// The finding at `index`, which is told as `number`: its words, its picture, its parameters and the analysis' evidence.
 fn finding_card(report: &Report, index: usize, number: usize) -> Markup {
     let finding = &report.findings[index];
     let text = summary::finding_text(report, index);
@@ -307,7 +299,6 @@ fn finding_card(report: &Report, index: usize, number: usize) -> Markup {
     }
 }
 
-/// The parameters of the finding at `index` as each channel has them.
 fn parameters(report: &Report, index: usize) -> Markup {
     let shown = finding_text::shown_effects(report, index);
     html! {
@@ -322,7 +313,6 @@ fn parameters(report: &Report, index: usize) -> Markup {
     }
 }
 
-/// All gyros and all accelerometers beside the data sheet.
 fn curves(report: &Report) -> Markup {
     let plots = figure::overviews(report);
     html! {
@@ -334,7 +324,6 @@ fn curves(report: &Report) -> Markup {
     }
 }
 
-/// Every channel, folded.
 fn channels(report: &Report) -> Markup {
     html! {
         section.channels aria-label="Channels" {
@@ -357,7 +346,7 @@ fn channels(report: &Report) -> Markup {
     }
 }
 
-/// One channel with its figures and tables; of a condition its course alone.
+/// A condition has its bias only.
 fn channel_section(report: &Report, channel: &ChannelReport) -> Markup {
     let missing = missing_samples(&channel.missing);
     html! {
@@ -402,7 +391,6 @@ fn channel_section(report: &Report, channel: &ChannelReport) -> Markup {
     }
 }
 
-/// What the model of a channel is good for.
 fn assessment(assessment: &Assessment) -> Markup {
     html! {
         @if !assessment.coefficients.is_empty() { (tables::units(&assessment.coefficients)) }
@@ -415,21 +403,11 @@ fn assessment(assessment: &Assessment) -> Markup {
                         " for a true model), whiteness " (p_value(innovations.whiteness_p)) }
                 }
             }
-            @if let Some(spectrum) = &assessment.angle_random_walk_by_spectrum {
-                li { b { "N by the spectrum" } ": " (bounded_quantity(spectrum))
-                    @if let Some(note) = &assessment.angle_random_walk_by_spectrum_note { span.parameter { (note) } } }
-            } @else if let Some(note) = &assessment.angle_random_walk_by_spectrum_note {
-                li { b { "N by the spectrum" } ": none, " (note) "." }
-            }
-            @if let Some(time) = &assessment.markov_time_by_autocorrelation {
-                li { b { "Markov time by the autocorrelation" } ": " (bounded_quantity(time)) }
-            }
             @for record in &assessment.record { li { (unparted(&recording_advice(record))) } }
         }
     }
 }
 
-/// What the words and numbers of the page mean.
 fn definitions() -> Markup {
     html! {
         section.definitions id="reading" {

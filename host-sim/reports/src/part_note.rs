@@ -1,17 +1,15 @@
-//! What a record does not tell of the part's clock and filter, in sentences.
+//! Unknown properties of the sensor's clock and filter, in sentences.
 
 use crate::finding_text::channel_list;
 use crate::formatting::{capital, enumerated};
 use crate::rounding::{estimate, plain, quantity, significant};
 use noise_analysis::report::PartNote;
 
-/// Beginning of the sentence where no filter was found.
 const NOT_CORRELATED: &str =
     "No low-pass filter found: consecutive samples are uncorrelated, so N is valid from one sample on.";
-/// What a wrong sample rate makes.
 const SCALES: &str = "Every τ and N scale with it.";
 
-/// What the record does not tell, and why: for the page, `--full` and the JSON.
+/// For the page, `--full` and the JSON.
 pub(crate) fn sentence(note: &PartNote) -> String {
     match note {
         PartNote::NotSought => "A quick report does not look for the part's clock and filter.".to_owned(),
@@ -40,7 +38,7 @@ pub(crate) fn sentence(note: &PartNote) -> String {
              it is the stated {} Hz. {SCALES}",
             plain(*sample_rate_hz, 6)
         ),
-        // Of a part without a data sheet no clock is known.
+        // Without a data sheet no clock is known.
         PartNote::NoTimeStamps { nominal_hz, stated_hz, .. } if *nominal_hz <= 0.0 => {
             format!("Without time stamps the sample rate is the stated {} Hz. {SCALES}", plain(*stated_hz, 6))
         }
@@ -69,8 +67,7 @@ pub(crate) fn sentence(note: &PartNote) -> String {
     }
 }
 
-/// The notes in short, for the screen, without what that does without: a stated sample rate is told where the nominal clock contradicts
-/// it.
+/// In short, for the screen; a stated rate only if it contradicts the nominal clock.
 pub(crate) fn in_short(notes: &[PartNote]) -> Vec<String> {
     let of = |note: &PartNote| match note {
         PartNote::CountsTooCoarse => {

@@ -1,36 +1,31 @@
-//! What was read for a report, and what was not: in the JSON, on the screen and on the page.
+//! The record of the reading: rows read and rows left out.
 
 use crate::formatting::count;
 use crate::formatting::words;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What was read of a recording.
+/// The reading of a recording.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ReadingRecord {
-    /// Name of the file, without its folder.
     pub file: String,
-    /// Of its bytes, in hexadecimal digits; absent where it could not be made.
+    /// Hexadecimal; absent if unknown.
     pub sha256: Option<String>,
-    /// The program that read it, and its version.
     pub program: String,
-    /// See `program`.
     pub version: String,
-    /// The options that say how it was read.
     pub options: Vec<String>,
-    /// Rows that were read.
     pub rows: u64,
     /// Rows that are no samples, by cause.
     pub left_out: BTreeMap<String, u64>,
-    /// Whether it was read to its end.
+    /// False for a part of the file.
     pub complete: bool,
-    /// Why it was not, where it is damaged.
+    /// Reason, if the file is damaged.
     pub damage: Option<String>,
-    /// What a reader of the report should know of the file, one sentence each.
+    /// Remarks on the file, one sentence each.
     pub notes: Vec<String>,
 }
 
-/// Rows that are no samples, by cause: those that were `dropped`, those outside of the part that is read, and padding. A gap has no rows.
+/// Rows that are no samples, by cause: `dropped`, outside of the part, and padding.
 #[must_use]
 pub fn rows_left_out(dropped: &BTreeMap<&'static str, u64>, outside_part: u64, padding: u64) -> BTreeMap<String, u64> {
     let dropped = dropped.iter().filter(|(cause, _)| **cause != "gap").map(|(cause, rows)| (*cause, *rows));
@@ -38,10 +33,9 @@ pub fn rows_left_out(dropped: &BTreeMap<&'static str, u64>, outside_part: u64, p
     causes.filter(|(_, rows)| *rows > 0).map(|(cause, rows)| (cause.to_owned(), rows)).collect()
 }
 
-/// The options that say how a recording is read.
+/// Options of the reading.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ReadingOptions<'a> {
-    /// Topic, message or array of a file with several.
     pub topic: Option<&'a str>,
     /// Each as in `gyro_x=wx`.
     pub columns: &'a [String],
@@ -60,7 +54,7 @@ pub struct ReadingOptions<'a> {
 }
 
 impl ReadingOptions<'_> {
-    /// As they are typed for the command; an option that is not given is left out.
+    /// As typed on the command line.
     #[must_use]
     pub fn words(&self) -> Vec<String> {
         let list = |texts: &[String]| Some(texts.join(",")).filter(|text| !text.is_empty());
@@ -80,14 +74,14 @@ impl ReadingOptions<'_> {
 }
 
 impl ReadingRecord {
-    /// A sentence for the screen, where the recording was not read to its end.
+    /// For the screen, if the reading ended early.
     #[must_use]
     pub fn incomplete(&self) -> Option<String> {
         let why = self.damage.clone().unwrap_or_else(|| "the reading was stopped".to_owned());
         (!self.complete).then(|| format!("Not read to its end: {why}."))
     }
 
-    /// Lines on what was read.
+    /// Lines for the page.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let options =

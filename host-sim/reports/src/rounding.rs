@@ -1,16 +1,16 @@
-//! Estimates as they are printed: rounded to what their interval supports, in units with an SI prefix.
+//! Estimates rounded to their intervals, in units with SI prefixes.
 
 use noise_analysis::report::Parameter;
 
-/// Shown in the place of a number that is absent or not finite.
+/// Stands for an absent number or one that is not finite.
 pub const NONE: &str = "–";
 
-/// Widest relative half-width at which an interval is written as `± half`, if it is also as wide on either side.
+/// Widest relative half-width of an interval written `± half`.
 const SYMMETRIC: f64 = 0.25;
-/// Largest ratio of the wider to the narrower side of such an interval.
+/// Largest ratio of both sides of such an interval.
 const SKEW: f64 = 1.3;
 
-/// A unit of the JSON schema as it is printed: `deg/sqrt(s)` becomes `°/√s`.
+/// As printed: `deg/sqrt(s)` becomes `°/√s`.
 pub fn unit(name: &str) -> String {
     let symbols = [("degC", "°C"), ("deg", "°"), ("sqrt(Hz)", "√Hz"), ("sqrt(s)", "√s"), ("sqrt(h)", "√h")];
     let powers = [("^2", "²"), ("^3", "³")];
@@ -18,7 +18,6 @@ pub fn unit(name: &str) -> String {
     if spelled.starts_with("ug") { spelled.replacen("ug", "µg", 1) } else { spelled }
 }
 
-/// `value` with so many decimals, its thousands separated.
 fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let (sign, digits) = text.strip_prefix('-').map_or(("", text.as_str()), |digits| ("−", digits));
@@ -36,8 +35,7 @@ fn fixed(value: f64, decimals: usize) -> String {
     fraction.map_or_else(|| format!("{sign}{grouped}"), |fraction| format!("{sign}{grouped}.{fraction}"))
 }
 
-/// Decimals with which a number is written whose uncertainty is `half_width`: two digits of it are shown where it begins with
-/// 1 or 2, else one, so that rounding changes it by at most a sixth.
+/// Decimals for an uncertainty: two digits if it begins with 1 or 2, else one.
 fn decimals(half_width: f64) -> usize {
     if !half_width.is_finite() || half_width <= 0.0 {
         return 3;
@@ -45,7 +43,6 @@ fn decimals(half_width: f64) -> usize {
     place(half_width).clamp(0, 9) as usize
 }
 
-/// Decimals that an uncertainty supports; below 0 left of the decimal point.
 fn place(half_width: f64) -> i32 {
     let exponent = half_width.log10().floor();
     let leading = half_width / 10f64.powf(exponent);
@@ -53,7 +50,7 @@ fn place(half_width: f64) -> i32 {
     (digits - exponent) as i32
 }
 
-/// `value` rounded to whole multiples of the place that `half_width` supports, left of the decimal point too.
+/// `value` rounded to the place that `half_width` supports.
 fn at_place(value: f64, half_width: f64) -> f64 {
     if half_width >= 29.5 && half_width.is_finite() {
         let unit = 10f64.powi(-place(half_width));
@@ -62,8 +59,7 @@ fn at_place(value: f64, half_width: f64) -> f64 {
     value
 }
 
-/// An estimate with its 95 % bounds: `2.43 ± 0.01`, `24.3 (21 … 27)`, `< 190` where only an upper bound is known, `–` without an
-/// estimate.
+/// With 95 % bounds: `2.43 ± 0.01`, `24.3 (21 … 27)`, `< 190` for an upper bound, `–` without an estimate.
 #[must_use]
 pub fn estimate(value: f64, low: f64, high: f64) -> String {
     if !value.is_finite() {
@@ -82,19 +78,19 @@ pub fn estimate(value: f64, low: f64, high: f64) -> String {
         let decimals = decimals(half);
         return format!("{} ± {}", fixed(at_place(value, half), decimals), fixed(at_place(half, half), decimals));
     }
-    // As many digits as keep the three numbers apart; an interval that six digits do not show is none.
+    // Digits that keep the three apart, six at most.
     let written = |digits| [value, low, high].map(|of| significant(of, digits));
     let apart = (2..6).map(written).find(|[value, low, high]| value != low && value != high);
     let [value, low, high] = apart.unwrap_or_else(|| written(2));
     if low == high { value } else { format!("{value} ({low} … {high})") }
 }
 
-/// Whether only the upper bound of an estimate is known.
+/// Only the upper bound is known.
 pub(crate) fn is_upper_bound(value: f64, low: f64) -> bool {
     low <= 0.0 && value >= 0.0
 }
 
-/// `value` with so many significant digits, without an exponent.
+/// Without an exponent.
 #[must_use]
 pub fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
@@ -113,20 +109,20 @@ pub fn significant(value: f64, digits: i32) -> String {
     fixed(value, usize::try_from(digits - 1 - exponent).unwrap_or(0))
 }
 
-/// The same with its sign: `+2.1`, `−3.6`.
+/// With sign: `+2.1`, `−3.6`.
 #[must_use]
 pub fn signed(value: f64, digits: i32) -> String {
     format!("{}{}", if value < 0.0 { "−" } else { "+" }, significant(value.abs(), digits))
 }
 
-/// The same without zeros at the end: `100`, `8`, `91.4`.
+/// Without trailing zeros: `100`, `8`, `91.4`.
 #[must_use]
 pub fn plain(value: f64, digits: i32) -> String {
     let text = significant(value, digits);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// A probability with two digits; `< 0.001` for all below.
+/// Two digits; `< 0.001` below.
 #[must_use]
 pub fn probability(p: f64) -> String {
     match p {
@@ -136,30 +132,27 @@ pub fn probability(p: f64) -> String {
     }
 }
 
-/// The same in a sentence: `p = 0.21`, `p < 0.001`.
+/// In a sentence: `p = 0.21`, `p < 0.001`.
 #[must_use]
 pub fn p_value(p: f64) -> String {
     let text = probability(p);
     if text.starts_with('<') { format!("p {text}") } else { format!("p = {text}") }
 }
 
-/// Prefixes and their factors.
 const PREFIXES: [(&str, f64); 7] =
     [("M", 1e6), ("k", 1e3), ("", 1.0), ("m", 1e-3), ("µ", 1e-6), ("n", 1e-9), ("p", 1e-12)];
 
-/// The prefix with which `magnitude` is between 1 and 1,000, as far as there is one, and its factor. Prefixes above 1 are
-/// not used where `enlarging` is false: k°/h is not a usual unit.
+/// Prefix that brings `magnitude` to 1 … 1,000, and its factor. None above 1 unless `enlarging`: k°/h is unusual.
 fn prefix(magnitude: f64, enlarging: bool) -> (&'static str, f64) {
     let mut usable = PREFIXES.iter().filter(|(_, factor)| enlarging || *factor <= 1.0);
     let fitting = usable.clone().find(|(_, factor)| magnitude >= 0.995 * factor);
     fitting.or(usable.next_back()).copied().filter(|_| magnitude > 0.0 && magnitude.is_finite()).unwrap_or(("", 1.0))
 }
 
-/// A unit with the prefix that fits `magnitude`, and the factor by which values are divided for it. A unit that has a prefix already
-/// gets another one: `ug` is `g` times 10⁻⁶.
+/// A unit with a prefix for `magnitude`, and the divisor of its values. A prefix is replaced: `ug` is `g` times 10⁻⁶.
 fn prefixed(magnitude: f64, name: &str) -> (String, f64) {
     let spelled = unit(name);
-    // A tenth of a degree is written 0.1 °; µ and m come below that.
+    // A tenth of a degree is 0.1 °.
     let takes_no_prefix = spelled.starts_with(|first: char| first.is_ascii_digit())
         || matches!(spelled.as_str(), "" | "%" | "°C" | "min" | "h");
     let (bare, of_name) = match spelled.strip_prefix('µ') {
@@ -175,13 +168,13 @@ fn prefixed(magnitude: f64, name: &str) -> (String, f64) {
     (format!("{prefix}{bare}"), factor / of_name)
 }
 
-/// A quantity with two significant digits and a prefix in its unit: `0.012 °/s` is `12 m°/s`, `2.2e-5 g` is `22 µg`.
+/// Two digits and a prefix: `0.012 °/s` is `12 m°/s`.
 #[must_use]
 pub fn quantity(value: f64, name: &str) -> String {
     quantity_digits(value, name, 2)
 }
 
-/// The same with so many significant digits.
+/// With `digits` significant digits.
 #[must_use]
 pub fn quantity_digits(value: f64, name: &str, digits: i32) -> String {
     if !value.is_finite() {
@@ -191,7 +184,7 @@ pub fn quantity_digits(value: f64, name: &str, digits: i32) -> String {
     format!("{} {unit}", significant(value / factor, digits)).trim_end().to_owned()
 }
 
-/// Significant digits of `value` that its interval supports: two at least, four at most.
+/// Significant digits, two to four, that the interval supports.
 #[must_use]
 pub fn supported_digits(value: f64, low: f64, high: f64) -> i32 {
     let half_width = (high - low) / 2.0;
@@ -202,37 +195,36 @@ pub fn supported_digits(value: f64, low: f64, high: f64) -> i32 {
     }
 }
 
-/// The same for a parameter, with the digits that its interval supports, but without the interval.
+/// With the digits of its interval, without the interval.
 #[must_use]
 pub fn rounded_quantity(parameter: &Parameter) -> String {
     let &Parameter { value, low, high, ref unit } = parameter;
     quantity_digits(value, unit, supported_digits(value, low, high))
 }
 
-/// The same for a parameter, with the precision that its interval supports: `20.70 ± 0.10 Hz`.
+/// With its interval: `20.70 ± 0.10 Hz`.
 #[must_use]
 pub fn bounded_quantity(parameter: &Parameter) -> String {
     let scale = Scale::new([parameter_magnitude(parameter)], &parameter.unit);
     format!("{} {}", scale.estimate(parameter), scale.unit).trim_end().to_owned()
 }
 
-/// What of a parameter is printed: its value, or its upper bound where that is all that is known.
+/// The printed value or upper bound.
 #[must_use]
 pub fn parameter_magnitude(parameter: &Parameter) -> f64 {
     let &Parameter { value, low, high, .. } = parameter;
     if is_upper_bound(value, low) { high } else { value }
 }
 
-/// One unit, with its prefix, for all the numbers of a row or a column.
+/// One unit with a prefix for a row or a column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scale {
-    /// The unit as it is printed.
     pub unit: String,
     factor: f64,
 }
 
 impl Scale {
-    /// The prefix fits the largest of `values`, which are in the unit `name` of the JSON schema.
+    /// Fits the largest of `values`, in the unit `name`.
     #[must_use]
     pub fn new(values: impl IntoIterator<Item = f64>, name: &str) -> Self {
         let finite = values.into_iter().map(f64::abs).filter(|value| value.is_finite());
@@ -259,7 +251,7 @@ impl Scale {
     }
 }
 
-/// The prefix for a column of a table by the largest of its `values`, and its factor; none from 0.1 on.
+/// Prefix and factor for the largest of a column's `values`; none from 0.1 on.
 #[must_use]
 pub fn column_prefix(values: impl Iterator<Item = f64>) -> (&'static str, f64) {
     let largest = values.filter(|value| value.is_finite()).fold(0.0, f64::max);

@@ -1,5 +1,4 @@
-//! A report as rows of one flat table, for programs that ask many reports at once: one row for the recording, one for each
-//! coefficient of each channel, and one for each parameter of each finding in each of its channels.
+//! A report as rows of a flat table: the recording, coefficients by channel, and parameters by finding and channel.
 
 use crate::coefficients::SLOPES;
 use crate::finding_text::shown_effects;
@@ -8,51 +7,46 @@ use crate::saved_report::{SavedChannel, SavedParameter};
 use noise_analysis::report::{Finding, Parameter, Report, Validation};
 use serde::{Deserialize, Serialize};
 
-/// A row of the table. Fields that a row does not have are absent.
+/// Absent fields do not apply.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ReportRow {
-    /// How the recording is called: its path, or its name.
     pub recording: String,
-    /// Of its bytes, in hexadecimal digits.
     pub sha256: Option<String>,
-    /// Version of the program.
     pub version: Option<String>,
-    /// `complete`; `incomplete` where the recording was not read to its end; `failed` where there is no report.
+    /// `complete`, `incomplete` (ended early) or `failed` (no report).
     pub status: String,
-    /// Why it is not complete.
     pub reason: Option<String>,
-    /// What a reader should know of the recording, one sentence a line.
+    /// Remarks, one sentence a line.
     pub notes: Option<String>,
     /// Name of the sensor's profile.
     pub sensor: Option<String>,
     /// Hz.
     pub rate_hz: Option<f64>,
-    /// Length of the recording.
     pub hours: Option<f64>,
     /// `recording`, `coefficient` or `finding`.
     pub row: String,
     /// Such as `gyro_z`.
     pub channel: Option<String>,
-    /// Of a coefficient such as `angle_random_walk`, of a finding such as `sinusoid`.
+    /// Such as `angle_random_walk` or `sinusoid`.
     pub kind: Option<String>,
-    /// Of a finding such as `frequency`.
+    /// Such as `frequency`.
     pub parameter: Option<String>,
     /// In `unit`.
     pub value: Option<f64>,
     /// Lower 95 % bound.
     pub low: Option<f64>,
-    /// Upper 95 % bound; absent where there is none.
+    /// Upper 95 % bound, if there is one.
     pub high: Option<f64>,
     /// Such as `deg/sqrt(s)`.
     pub unit: Option<String>,
-    /// Of a finding: `yes`, `no` or `untestable` on the second half of the recording.
+    /// For a finding on the second half: `yes`, `no` or `untestable`.
     pub validated: Option<String>,
-    /// Of a finding its number in the report, from 0.
+    /// Number of the finding in the report, from 0.
     pub finding: Option<u64>,
 }
 
 impl ReportRow {
-    /// The only row of a recording that has no report.
+    /// The only row of a recording without a report.
     #[must_use]
     pub fn failed(recording: &str, reason: &str, version: &str) -> Self {
         Self {
@@ -71,7 +65,7 @@ impl ReportRow {
     }
 }
 
-/// The rows of a report on the recording that is called `recording`.
+/// The rows of a report on `recording`.
 #[must_use]
 pub fn rows(report: &Report, recording: &str, reading: Option<&ReadingRecord>) -> Vec<ReportRow> {
     let is_complete = reading.is_none_or(|reading| reading.complete);

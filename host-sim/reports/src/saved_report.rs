@@ -1,5 +1,4 @@
-//! The part of a report that other programs need: sample rate, and each channel's curve and final model. It is read from the
-//! JSON of schema 2 or taken from a report in memory.
+//! The part of a report that other programs need: sample rate, curves, final models; from JSON (schema 2) or memory.
 
 use crate::coefficients::{self, SLOPES};
 use noise_analysis::bounds::BoundedEstimate;
@@ -7,17 +6,16 @@ use noise_analysis::report::{ChannelReport, DataSheetReport, Parameter, Report, 
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
 
-/// N below the corner of a process that stands in the place of white noise, as a parameter of its term.
+/// Parameter: N below the corner of a process that replaces white noise.
 const BELOW_CORNER: &str = "white_noise";
 
-/// What a report says of the noise of a sensor.
+/// The noise of a sensor by a report.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct SavedReport {
     /// Hz.
     pub sample_rate_hz: f64,
-    /// In the order of the burst.
     pub channels: Vec<SavedChannel>,
-    /// Of a sensor whose parts were analysed one by one, the rates of the others that differ from it, Hz.
+    /// Different rates, Hz, of joined reports.
     #[serde(skip)]
     pub other_rates_hz: Vec<f64>,
 }
@@ -31,13 +29,13 @@ pub struct SavedChannel {
     pub unit: String,
     /// The measured Allan deviation, octave by octave.
     pub curve: Vec<SavedPoint>,
-    /// The model that was fitted to the whole record.
+    /// Fitted to the whole record.
     #[serde(rename = "final")]
     pub refitted: SavedModel,
-    /// Deviance a point of the model of the first half on the second, 1 for a true model; absent where the record is too short.
+    /// Deviance per point of the first half's model on the second, 1 for a true model; absent for short records.
     #[serde(default, rename = "after", deserialize_with = "unseen_error")]
     pub unseen_error: Option<f64>,
-    /// Typical noise by the data sheet of the sensor; absent where that is not known.
+    /// Typical noise by the data sheet, if known.
     pub data_sheet: Option<DataSheetReport>,
 }
 
@@ -52,7 +50,7 @@ pub struct SavedPoint {
     pub adev: f64,
     /// Lower bound of `adev`.
     pub low: f64,
-    /// Upper bound of `adev`; infinite where the report has none.
+    /// Upper bound of `adev`; infinite if unknown.
     #[serde(deserialize_with = "unbounded")]
     pub high: f64,
     /// Equivalent degrees of freedom.
@@ -62,9 +60,8 @@ pub struct SavedPoint {
 /// A fitted model.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct SavedModel {
-    /// Its terms.
     pub terms: Vec<SavedTerm>,
-    /// The model's Allan deviation at each point of the curve, in the channel's unit.
+    /// In the channel's unit, at each point of the curve.
     pub adev: Vec<f64>,
 }
 
@@ -80,54 +77,44 @@ pub struct SavedTerm {
 /// An estimate with its 95 % bounds.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct SavedParameter {
-    /// Estimate.
     pub value: f64,
-    /// Lower bound.
     pub low: f64,
-    /// Upper bound; infinite where the report has none.
+    /// Upper bound; infinite if unknown.
     #[serde(deserialize_with = "unbounded")]
     pub high: f64,
-    /// Unit of all three.
     pub unit: String,
 }
 
-/// Why a file is not a report that this program can use.
+/// Reasons to refuse a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SavedReportError {
-    /// It is no JSON object, or has no field `schema`.
     #[error("no JSON report of this program: {0}")]
     NoReport(serde_json::Error),
-    /// It has another schema.
     #[error("schema {0}, where this program reads schema {SCHEMA}")]
     Schema(u64),
-    /// A field is missing or has another type.
     #[error("{path}: {reason}")]
     Field {
-        /// Where, such as `channels[3].final`.
+        /// Such as `channels[3].final`.
         path: String,
-        /// What was expected.
         reason: serde_json::Error,
     },
-    /// It says two things that cannot both be true, or a number that is none.
     #[error("{0}: the report contradicts itself; make it anew with `analyze --json`")]
     Contradiction(String),
-    /// Reports that are no parts of one sensor.
     #[error("{0} is in both reports; those of one sensor's parts have different channels")]
     SameChannel(String),
 }
 
-/// Whether rates differ by no more than two clocks do.
+/// Equal within the error of two clocks.
 fn is_same_rate(one: f64, other: f64) -> bool {
     (one / other - 1.0).abs() < 0.01
 }
 
-/// JSON has no infinity: the report writes `null`.
+/// JSON has `null` for infinity.
 fn unbounded<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
 }
 
-/// The deviance of a model of the JSON on unseen data.
 fn unseen_error<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
     #[derive(Deserialize)]
     struct Error {
@@ -141,7 +128,7 @@ fn unseen_error<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64
 }
 
 impl SavedReport {
-    /// Reads the JSON that `analyze --json` writes.
+    /// Reads the JSON of `analyze --json`.
     ///
     /// # Errors
     /// The text is no JSON, has another schema, or lacks a field; the error names the field.
@@ -163,7 +150,7 @@ impl SavedReport {
         })
     }
 
-    /// Checks what another program will rely on: a rate, a name for each channel, and coefficients inside of their intervals.
+    /// Checks rate, names, and that coefficients are inside of their intervals.
     ///
     /// # Errors
     /// Names the first contradiction.
@@ -180,7 +167,7 @@ impl SavedReport {
                 let Some(SavedParameter { value, low, high, .. }) = term.parameters.get("value") else { continue };
                 let is_number = |of: &f64| *of == 0.0 || of.is_normal() || *of == f64::INFINITY;
                 let are_numbers = [value, low, high].into_iter().all(is_number);
-                // Numbers that were rounded to be read.
+                // Rounding.
                 let margin = 1e-6 * value.abs();
                 if !are_numbers || *low > value + margin || *high < value - margin {
                     let (name, kind) = (&channel.name, &term.kind);
@@ -191,7 +178,7 @@ impl SavedReport {
         Ok(())
     }
 
-    /// The parts of one sensor, which were analysed one by one, as one report; its rate is that of the first.
+    /// Joins reports on parts of one sensor; the rate is the first one's.
     ///
     /// # Errors
     /// Two of them have a channel in common.
@@ -219,8 +206,7 @@ impl SavedReport {
 }
 
 impl SavedChannel {
-    /// The coefficient of the term `kind`. N is that of all white noise: after a filter, behind it, and below the corner of a process that
-    /// stands in its place.
+    /// The coefficient of the term `kind`; N of all white noise, also below the corner of a process that replaces it.
     #[must_use]
     pub fn coefficient(&self, kind: &str) -> Option<SavedParameter> {
         if kind != SLOPES[0].0 {
@@ -236,13 +222,12 @@ impl SavedChannel {
 }
 
 impl SavedTerm {
-    /// N of a term that is white noise, behind a filter or not; otherwise `None`.
+    /// N of white noise, filtered or not.
     fn angle_random_walk(&self) -> Option<&SavedParameter> {
         let is_white = ["angle_random_walk", "filter_bandwidth", "low_pass"].contains(&self.kind.as_str());
         self.parameters.get(if is_white { "value" } else { BELOW_CORNER })
     }
 
-    /// Whether it is a process that stands in the place of white noise.
     pub(crate) fn is_in_place_of_white_noise(&self) -> bool {
         self.parameters.contains_key(BELOW_CORNER)
     }
@@ -303,7 +288,7 @@ mod tests {
         )
     }
 
-    /// A process of 1 °/s behind whose corner the density is 0.3 °/√s, in white noise of 0.4 °/√s: N is the root of the sum of the squares.
+    /// 0.3 °/√s below the corner, 0.4 °/√s of white noise: N is the root sum of squares.
     #[test]
     fn n_has_the_process_that_stands_in_the_place_of_white_noise() {
         let parameter = |name: &str, value: f64, unit: &str| {
@@ -325,7 +310,6 @@ mod tests {
         assert_eq!(n(process(String::new())), Some(0.4));
     }
 
-    /// A report may have been changed by hand.
     #[test]
     fn a_report_that_contradicts_itself_is_none() {
         let term = |value: &str, low: &str, high: &str| {

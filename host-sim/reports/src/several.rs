@@ -1,4 +1,4 @@
-//! Several recordings of one sensor in the terminal: whether they show the same noise, and the inflation while a machine runs.
+//! Several recordings of one sensor: agreement, and inflation while a machine runs.
 
 use crate::formatting::number;
 use crate::rounding::probability;
@@ -6,10 +6,7 @@ use comfy_table::{Table, presets};
 use noise_analysis::report::several::{NoiseAgreement, NoiseInflation};
 use std::io::{self, Write};
 
-/// Writes one row a channel: the verdict, its p-value, where the recordings differ most, and the joint coefficients.
-///
-/// # Errors
-/// As `out` does.
+/// One row per channel: verdict, p-value, largest difference, joint coefficients.
 pub fn write_agreement(agreement: &NoiseAgreement, out: &mut impl Write) -> io::Result<()> {
     let samples: Vec<String> = agreement.samples.iter().map(u64::to_string).collect();
     writeln!(
@@ -51,10 +48,7 @@ pub fn write_agreement(agreement: &NoiseAgreement, out: &mut impl Write) -> io::
     writeln!(out, "{table}")
 }
 
-/// Writes one row a channel and octave.
-///
-/// # Errors
-/// As `out` does.
+/// One row per channel and octave.
 pub fn write_inflation(inflation: &NoiseInflation, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "\ninflation: Allan deviation while running over that at rest, with 95 % bounds")?;
     let mut table = table(["channel", "averaging time", "at rest", "running", "unit", "factor"]);

@@ -1,5 +1,4 @@
-//! What a report says in short, for the terminal's screen, the page's first screen and the live view: whether the record can be trusted,
-//! the coefficients in the units of their users, where data and model disagree, and what to do next.
+//! The summary of a report: trust, coefficients, contradictions, next steps.
 
 use crate::coefficients;
 use crate::finding_text::{ALL_CHANNELS, FindingText, SENSED, channel_list, departure, describe, shown_effects};
@@ -20,22 +19,20 @@ use noise_analysis::report::{DataSheetReport, TermReport};
 use noise_analysis::units::conversions;
 use time_base::TimeRange;
 
-/// Deviance a point on the unseen half above which a model is marked: a true model scores about 1, and what changes from one
-/// half to the other leaves up to 3.
+/// Deviance per point on the unseen half above which a model is marked; a true model has about 1.
 pub(crate) const HIGH_DEVIANCE: f64 = 3.0;
-/// Most records with true models of which the same sentence says that the data contradicts the model of some channel.
+/// Largest part of records with true models that are told to be contradicted.
 const CHANCE: f64 = 0.01;
-/// Variance of what the fit to another half does not know of an octave, over that of the octave in the unseen half: it has as many
-/// samples.
+/// Variance of a fit to another half, over an octave's own.
 const FITTED_TO_HALF: f64 = 1.0;
-/// The same of the fit to the medians of the later quarter: half as many samples, and the median scatters by a fourth more than the mean.
+/// Variance of a fit to the medians of a quarter: half the samples, a fourth more scatter.
 const FITTED_TO_QUARTER: f64 = 2.0 * 1.25 * 1.25;
-/// Part of the record that has to be at rest for "throughout".
+/// Least part at rest for "throughout".
 const THROUGHOUT: f64 = 0.999;
 /// Minimum of the Allan deviation over B: `sqrt(2 ln 2/π)`.
 const MINIMUM_OVER_B: f64 = 0.664;
 
-/// Kind, letter and full name of the coefficients of the baseline model.
+/// Kind, letter and name of the baseline coefficients.
 const LETTERS: [(&str, &str); 3] = [("angle_random_walk", "N"), ("bias_instability", "B"), ("rate_random_walk", "K")];
 
 /// A group of inertial channels with their units.
@@ -43,7 +40,6 @@ const LETTERS: [(&str, &str); 3] = [("angle_random_walk", "N"), ("bias_instabili
 pub struct CoefficientTable {
     /// `gyro` or `accel`.
     pub title: &'static str,
-    /// What N, B and K are called in this group.
     pub names: [&'static str; 3],
     /// Units of N, B and K, prefixes included.
     pub units: [String; 3],
@@ -51,25 +47,25 @@ pub struct CoefficientTable {
     pub rows: Vec<CoefficientTableRow>,
 }
 
-/// One channel.
+/// The row of one channel.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CoefficientTableRow {
     /// The axis, or `sheet`.
     pub label: String,
-    /// Name of the channel in the report; empty for the data sheet.
+    /// Name in the report; empty for the data sheet.
     pub channel: String,
-    /// N, B and K of the model `final`, with their bounds; `–` where the model lacks them.
+    /// N, B and K of the model `final` with bounds; `–` if absent.
     pub coefficients: [String; 3],
-    /// By how much σ is off on the unseen half, without and with what was found.
+    /// Error of σ on the unseen half, without and with effects.
     pub error: String,
-    /// Whether that of the model with its effects is far above what chance makes.
+    /// True if the error with effects is far above chance.
     pub is_high: bool,
 }
 
-/// Symbol of a unit, the unit that `conversions` knows, and the factor from that to the symbol's.
+/// Symbol, unit for `conversions`, factor to the symbol's.
 type UnitOfColumn = (&'static str, &'static str, f64);
 
-/// A group of inertial channels: title, prefix of their names, names and units of N, B and K.
+/// Title, prefix, names and units of N, B and K.
 type Group = (&'static str, &'static str, [&'static str; 3], [UnitOfColumn; 3]);
 
 const GROUPS: [Group; 2] = [
@@ -87,18 +83,18 @@ const GROUPS: [Group; 2] = [
     ),
 ];
 
-/// N, B and K of a channel in its unit and seconds, and what is said of its model.
+/// N, B and K of a channel in its unit and seconds, with its errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelCoefficients {
-    /// Name of the channel, such as `gyro_z`.
+    /// Such as `gyro_z`.
     pub name: String,
-    /// Its unit, such as `deg/s`.
+    /// Such as `deg/s`.
     pub unit: String,
-    /// N, B and K, as far as the model has them.
+    /// N, B and K; absent ones are `None`.
     pub coefficients: [Option<Parameter>; 3],
-    /// [`ModelErrorReport::rms_percent`] on unseen data of the model without and with its effects.
+    /// [`ModelErrorReport::rms_percent`] on unseen data, without and with effects.
     pub rms_percent: [Option<f64>; 2],
-    /// Deviance a point on unseen data of the model with its effects.
+    /// Deviance per point on unseen data, with effects.
     pub deviance: Option<f64>,
 }
 
@@ -114,7 +110,7 @@ impl ChannelCoefficients {
     }
 }
 
-/// The tables of the gyros and of the accelerometers, without those of which there is no channel.
+/// Tables of gyros and accelerometers, if there are any.
 #[must_use]
 pub fn coefficient_tables(report: &Report) -> Vec<CoefficientTable> {
     let channels: Vec<ChannelCoefficients> = report.channels.iter().map(ChannelCoefficients::from_report).collect();
@@ -125,8 +121,7 @@ pub fn coefficient_tables(report: &Report) -> Vec<CoefficientTable> {
     tables_of(&channels, report.sample_rate_hz, sheet)
 }
 
-/// N, B and K of a gyro or an accelerometer with their letters and units, without intervals, such as `N 2.424 °/√h`; the letter alone of what
-/// has no number in the table.
+/// N, B and K with units, without intervals, such as `N 2.424 °/√h`; a letter alone without a number.
 pub(crate) fn coefficients_in_short(report: &Report, channel: &str) -> [String; 3] {
     let tables = coefficient_tables(report);
     let row = tables.iter().find_map(|table| Some((table, table.rows.iter().find(|row| row.channel == channel)?)));
@@ -142,13 +137,13 @@ pub(crate) fn coefficients_in_short(report: &Report, channel: &str) -> [String; 
     })
 }
 
-/// The same tables of channels sampled at `sample_rate_hz`, without a row for the data sheet.
+/// For channels at `sample_rate_hz`, without a data sheet.
 #[must_use]
 pub fn tables_of_channels(channels: &[ChannelCoefficients], sample_rate_hz: f64) -> Vec<CoefficientTable> {
     tables_of(channels, sample_rate_hz, |_| None)
 }
 
-/// `sheet` has N, B and K of the data sheet for the channels whose names begin so.
+/// `sheet` has the data sheet's N, B, K by prefix of names.
 fn tables_of(
     all: &[ChannelCoefficients],
     sample_rate_hz: f64,
@@ -204,8 +199,7 @@ fn tables_of(
     GROUPS.iter().filter_map(table).collect()
 }
 
-/// N, B and K of a data sheet in the channel's unit and seconds. The in-run bias stability is the minimum of the curve, B is that over
-/// 0.664.
+/// N, B and K of a data sheet in the channel's unit and seconds; B is the in-run bias stability over 0.664.
 #[must_use]
 pub fn sheet_coefficients(sheet: &DataSheetReport) -> [Option<f64>; 3] {
     [
@@ -215,8 +209,7 @@ pub fn sheet_coefficients(sheet: &DataSheetReport) -> [Option<f64>; 3] {
     ]
 }
 
-/// A coefficient of the model to use. N is that of all white noise: after the part's filter, behind it, and below the corner of a process that
-/// stands in its place.
+/// A coefficient of the model to use; N of all white noise, also below the corner of a process that replaces it.
 #[must_use]
 pub fn coefficient(channel: &ChannelReport, kind: &str) -> Option<Parameter> {
     let terms = || channel.refitted.terms.iter();
@@ -229,12 +222,12 @@ pub fn coefficient(channel: &ChannelReport, kind: &str) -> Option<Parameter> {
     Some(Parameter::new(value, low, high, unit))
 }
 
-/// Deviance a point of the models `before` and `after` on the unseen half as recorded, as the table has them.
+/// For the models `before` and `after` on the unseen half as recorded.
 pub(crate) fn unseen_errors(channel: &ChannelReport) -> [Option<f64>; 2] {
     [&channel.before, &channel.after].map(|model| model.unseen.deviance_per_point)
 }
 
-/// By how much σ is off, before and after; nothing where no model has met unseen data yet.
+/// Error of σ before and after; empty without unseen data.
 fn error_change(rms_percent: [Option<f64>; 2]) -> String {
     let [before, after] = rms_percent.map(|of| of.map_or_else(|| NONE.to_owned(), off_percent));
     match (rms_percent, before == after) {
@@ -244,10 +237,10 @@ fn error_change(rms_percent: [Option<f64>; 2]) -> String {
     }
 }
 
-/// Largest percentage that is told. Beyond it the model is no model, and by how much says nothing.
+/// Largest percentage that is told.
 const MOST_PERCENT: f64 = 1000.0;
 
-/// By how much σ is off by a root mean square of the logarithm of its ratio, in percent: a factor of 2 is 100 %.
+/// Error of σ by the rms logarithm of its ratio: a factor of 2 is 100 %.
 pub(crate) fn off_percent(rms_percent: f64) -> String {
     match 100.0 * (rms_percent / 100.0).exp_m1() {
         off if off > MOST_PERCENT => "> 1,000".to_owned(),
@@ -255,7 +248,6 @@ pub(crate) fn off_percent(rms_percent: f64) -> String {
     }
 }
 
-/// A deviance a point with the digits that every place of the report gives it.
 pub(crate) fn deviance_per_point(of: f64) -> String {
     match of {
         of if of < 9.95 => format!("{of:.1}"),
@@ -264,22 +256,21 @@ pub(crate) fn deviance_per_point(of: f64) -> String {
     }
 }
 
-/// Whether the model with its effects fails on the unseen half.
+/// The model with effects fails on the unseen half.
 fn is_high(channel: &ChannelReport) -> bool {
     channel.after.unseen.deviance_per_point.is_some_and(|of| of > HIGH_DEVIANCE)
 }
 
-/// Gyros and accelerometers.
 pub(crate) fn inertial(report: &Report) -> impl Iterator<Item = &ChannelReport> {
     report.channels.iter().filter(|channel| ["gyro_", "accl_"].iter().any(|prefix| channel.name.starts_with(prefix)))
 }
 
-/// Is true of a gyro, an accelerometer and a magnetometer.
+/// Gyro, accelerometer or magnetometer.
 pub(crate) fn is_sensed(channel: &ChannelReport) -> bool {
     SENSED.iter().any(|prefix| channel.name.starts_with(prefix))
 }
 
-/// Name of the part; of one without a profile what it is.
+/// Name of the part, or a description without a profile.
 #[must_use]
 pub fn part_name(report: &Report) -> &str {
     if ["", "generic"].contains(&report.part.name.as_str()) { "Inertial sensor" } else { &report.part.name }
@@ -299,28 +290,25 @@ pub fn headline(report: &Report, source: Option<&str>) -> Vec<String> {
         .collect()
 }
 
-/// Cause of a sample that was read twice: it has the time of the one before.
+/// Cause of a sample read twice.
 const REPEATED: &str = "repeated";
-/// Cause of a sample of a channel that has no value in the recording.
+/// Cause of a sample without a value in one channel.
 const MISSING: &str = "missing";
 
-/// Sample periods of the record with its gaps.
 fn periods(report: &Report) -> u64 {
     let missing = report.dropped.iter().filter(|(cause, _)| *cause != REPEATED);
     missing.fold(report.samples, |sum, (_, &of)| sum.saturating_add(of))
 }
 
-/// Length of the record with its gaps, s.
 fn report_length_s(report: &Report) -> f64 {
     let length = periods(report) as f64 / report.sample_rate_hz;
     if length.is_finite() { length } else { 0.0 }
 }
 
-/// What a report of the curves alone does not look for.
 const QUICK: &str = "Quick report, of the curves alone: spectra, spikes, steps, motion, temperature and other causes that channels \
                      have in common, and changes of the noise were not looked for.";
 
-/// What is said where nothing was found, and of which channels.
+/// The sentence for no finding, with its channels.
 #[must_use]
 pub fn nothing_found(report: &Report) -> String {
     let sensed = || report.channels.iter().filter(|channel| is_sensed(channel) && !is_constant(channel));
@@ -346,14 +334,13 @@ pub fn nothing_found(report: &Report) -> String {
     }
 }
 
-/// Whether the record can be trusted, in sentences: the answer, rest and losses, how good the model is on the unseen half, what the
-/// length is good for, and the errors without spikes and knocks.
+/// Trust, rest and losses, error on the unseen half, use of the length, errors without spikes and knocks.
 #[must_use]
 pub fn record_sentences(report: &Report) -> Vec<String> {
     answer(report).into_iter().chain(record_in_detail(report)).collect()
 }
 
-/// The first of these sentences: the answer, rest and losses, and how good the model is on the unseen half.
+/// Trust, rest and losses, error on the unseen half.
 pub(crate) fn answer(report: &Report) -> Vec<String> {
     let mut sentences = vec![trust(report), rest(report), losses(report)];
     sentences.extend(report.quick.then(|| QUICK.to_owned()));
@@ -362,17 +349,17 @@ pub(crate) fn answer(report: &Report) -> Vec<String> {
     sentences
 }
 
-/// The others: what the length is good for, to which part the models were fitted, and the errors without spikes and knocks.
+/// Use of the length, fitted part, errors without spikes and knocks.
 pub(crate) fn record_in_detail(report: &Report) -> Vec<String> {
     let LengthAdvice { known, except, longer, limits } = length_advice(report);
     let length = known.into_iter().chain(except).chain(longer).chain(limits);
     length.chain(recent_fit(report)).chain(without_events(report)).collect()
 }
 
-/// Part of the samples that may be missing before that is held against a record.
+/// Least part of missing samples that is told against a record.
 const MANY_LOST: f64 = 0.01;
 
-/// Whether the record can be trusted, and what speaks against it. Nothing where no channel was looked at.
+/// Trust, and reasons against it; empty without a channel.
 fn trust(report: &Report) -> String {
     if inertial(report).next().is_none() {
         return String::new();
@@ -395,8 +382,7 @@ fn trust(report: &Report) -> String {
     }
 }
 
-/// By how much the models of the first half are off on the second, over the gyros and accelerometers; `None` without a model that met
-/// unseen data.
+/// Error of the first half's models on the second; `None` without unseen data.
 fn unseen_half(report: &Report) -> Option<String> {
     let range = |of: &dyn Fn(&ChannelReport) -> Option<f64>| {
         let each: Vec<f64> = inertial(report).filter_map(of).collect();
@@ -414,13 +400,12 @@ fn unseen_half(report: &Report) -> Option<String> {
     Some(format!("On the second half, which the model had not seen, σ is off by {with}{halves}{without}."))
 }
 
-/// Samples from which on neighbours that are correlated by 0.15 or more are so by five standard errors.
+/// Samples for a correlation of 0.15 at five standard errors.
 const SAMPLES_FOR_FILTER: u64 = 1000;
 
-/// The part's notes, without that of no filter where none could have shown or where one was found in some channels.
+/// Without "no filter" if none could show, or if some channels have one.
 fn told_notes(report: &Report) -> Vec<PartNote> {
     let is_filter = |finding: &Finding| matches!(finding.effect, Effect::OutputFilter(_) | Effect::LowPassFilter(_));
-    // The filter is that of the gyros and accelerometers.
     if inertial(report).next().is_none() {
         return Vec::new();
     }
@@ -429,13 +414,13 @@ fn told_notes(report: &Report) -> Vec<PartNote> {
     report.part.notes.iter().filter(is_told).cloned().collect()
 }
 
-/// What the record does not tell of the part's clock and filter, and why.
+/// Unknown properties of the sensor's clock and filter, with reasons.
 #[must_use]
 pub fn part_notes(report: &Report) -> Vec<String> {
     told_notes(report).iter().map(part_note::sentence).collect()
 }
 
-/// The record in sentences for the screen: with the part's notes that it has room for, without what its table shows.
+/// For the screen: fewer notes, nothing of its table.
 #[must_use]
 pub fn record_sentences_in_short(report: &Report) -> Vec<String> {
     let LengthAdvice { known, longer, .. } = length_advice(report);
@@ -443,7 +428,6 @@ pub fn record_sentences_in_short(report: &Report) -> Vec<String> {
     answer(report).into_iter().chain(known).chain(longer).chain(notes).chain(recent_fit(report)).collect()
 }
 
-/// A departure of the data from every model.
 struct Departure<'a> {
     of: &'a Unexplained,
     channels: Vec<String>,
@@ -460,14 +444,13 @@ impl Departure<'_> {
     }
 }
 
-/// Where the data departs from every model. Channels that depart at the same place, to the same side, are one, and what a channel
-/// shows twice at one place is told once.
+/// Departures from every model; equal places of one sign are merged, and told once per channel.
 fn departures(report: &Report) -> Vec<Departure<'_>> {
     let mut departures: Vec<Departure<'_>> = Vec::new();
     for (number, finding) in report.findings.iter().enumerate() {
         let Effect::Unexplained(of) = &finding.effect else { continue };
         let excess = of.excess_percent.map(|of| of.value);
-        // Each channel has its own excess at the place of the finding.
+        // Each channel's own excess.
         let own = shown_effects(report, number).into_iter().filter_map(|shown| match shown.effect {
             Effect::Unexplained(of) => Some(of.excess_percent?.value),
             _ => None,
@@ -497,32 +480,31 @@ fn departures(report: &Report) -> Vec<Departure<'_>> {
     departures
 }
 
-/// Where and by how much the data departs from every model, one text each, in the order of the report.
+/// One text per departure.
 #[must_use]
 pub fn unexplained(report: &Report) -> Vec<String> {
     departures(report).iter().map(Departure::text).collect()
 }
 
-/// How many departures there are, and the largest of them; `None` where there is none.
+/// Number and largest of the departures; `None` without any.
 pub(crate) fn unexplained_in_short(report: &Report) -> Option<String> {
     let departures = departures(report);
     let largest = departures.iter().max_by(|a, b| a.largest().total_cmp(&b.largest()))?;
     Some(counted(departures.len(), &largest.text()))
 }
 
-/// How many places there are where data and model disagree, and the most serious of them; `None` where there is none.
+/// Number and most serious of the contradictions; `None` without any.
 pub(crate) fn contradictions_in_short(report: &Report) -> Option<String> {
     let contradictions = contradictions(report);
     let first = contradictions.first()?;
     Some(counted(contradictions.len(), first.split(" (").next().unwrap_or(first)))
 }
 
-/// `text`, with the number of all before it where it is one of several.
 fn counted(all: usize, text: &str) -> String {
     if all == 1 { text.to_owned() } else { format!("{all} places; {text}") }
 }
 
-/// The longest part at rest: by the file, where it was looked at, and else the longest without a motion.
+/// By the file if examined, else without a motion.
 #[must_use]
 pub fn longest_at_rest(report: &Report) -> Option<Stretch> {
     let stretches = || inertial(report).flat_map(|channel| &channel.at_rest);
@@ -530,28 +512,27 @@ pub fn longest_at_rest(report: &Report) -> Option<Stretch> {
     report.longest_at_rest.or_else(longest)
 }
 
-/// The options for a part of a recording, in tenths of a second within it.
+/// Options for a part of a recording, in tenths of a second inside of it.
 #[must_use]
 pub fn time_options(from_s: f64, to_s: f64) -> String {
     let TimeRange { from_s, to_s } = TimeRange { from_s, to_s }.whole_tenths();
     format!("--from {from_s} --to {to_s}")
 }
 
-/// The least time at rest of a channel, s; `None` where no channel was looked at.
+/// Least over the channels, s; `None` without any.
 fn least_at_rest(report: &Report) -> Option<f64> {
     let still = |channel: &ChannelReport| channel.at_rest.iter().map(|of| of.to_s - of.from_s).sum::<f64>();
     let least = inertial(report).filter(|channel| !channel.at_rest.is_empty()).map(still).fold(f64::INFINITY, f64::min);
     least.is_finite().then_some(least)
 }
 
-/// Whether the platform moved.
 fn has_moved(report: &Report) -> bool {
     let is_motion = |of: &Finding| matches!(of.effect, Effect::MotionInterval(_));
     least_at_rest(report)
         .is_some_and(|least| report.findings.iter().any(is_motion) || least < THROUGHOUT * report_length_s(report))
 }
 
-/// Whether the platform was at rest; with a knock or a motion it was not throughout.
+/// Rest of the platform, not throughout with a knock or motion.
 fn rest(report: &Report) -> String {
     let length = report_length_s(report);
     let Some(least) = least_at_rest(report) else { return String::new() };
@@ -574,7 +555,7 @@ fn losses(report: &Report) -> String {
     let lost = report.dropped.get("gap").copied().unwrap_or(0);
     let percent = significant(100.0 * lost as f64 / periods(report).max(1) as f64, 2);
     if lost > 0 && report.dropped.get(REPEATED) == Some(&lost) {
-        // As many times without a value as values that were read twice.
+        // Values read twice account for the missing ones.
         return format!("{} samples ({percent} %) are missing: the one before was read again instead.", count(lost));
     }
     let refused: Vec<String> = report
@@ -589,7 +570,7 @@ fn losses(report: &Report) -> String {
     if refused.is_empty() { format!("{lost}.") } else { format!("{lost}, refused: {}.", refused.join(", ")) }
 }
 
-/// How many samples of some channels have no value, to be added to a sentence; empty without one.
+/// Missing values of some channels, as a part of a sentence.
 fn missing_values(report: &Report) -> String {
     let missing = |channel: &ChannelReport| channel.missing.refused.get(MISSING).copied().unwrap_or(0);
     let with_missing: Vec<&ChannelReport> = report.channels.iter().filter(|channel| missing(channel) > 0).collect();
@@ -599,27 +580,25 @@ fn missing_values(report: &Report) -> String {
     format!(", {up_to}{} values missing in {}", count(most), channel_list(&names))
 }
 
-/// Largest relative half-width of an interval that is told as ±20 %.
+/// Largest relative half-width called ±20 %.
 const KNOWN: f64 = 0.205;
-/// Largest time to record on, in lengths of the record, that its model can foretell.
+/// Largest extrapolation, in record lengths.
 const FARTHEST: f64 = 10.0;
 
-/// What a record tells of a coefficient of a channel.
 enum Knowledge {
-    /// Its interval is within ±20 %.
+    /// Within ±20 %.
     Known,
-    /// It is wider; the time that the record should be longer by the information in it, s, which may be infinite.
+    /// Wider; the additional recording time, s, may be infinite.
     Wide(f64),
-    /// There is only an upper limit.
     Bounded,
 }
 
-/// Farther end of the interval from the value, relative to it.
+/// Larger side of the interval, relative.
 fn relative_error(of: &Parameter) -> f64 {
     (of.high - of.value).max(of.value - of.low) / of.value
 }
 
-/// What the record tells of the coefficient `kind`, with the names of the channels that have it.
+/// For the coefficient `kind`, with the channels.
 fn knowledge(report: &Report, kind: &str) -> Vec<(String, Knowledge)> {
     let of = |channel: &ChannelReport| {
         let value = coefficient(channel, kind)?;
@@ -635,10 +614,10 @@ fn knowledge(report: &Report, kind: &str) -> Vec<(String, Knowledge)> {
     inertial(report).filter(|channel| !channel.assessment.record.is_empty()).filter_map(of).collect()
 }
 
-/// Length of a record, s, below which one without B and K is called too short for them. From longer ones of a good part they are absent.
+/// Shortest record, s, that may lack B and K without a remark.
 const SHORT_S: f64 = 600.0;
 
-/// Whether a record is too short for a noise model: of B and K most channels show no more than an upper limit.
+/// Too short: most channels have only limits for B and K.
 fn is_short(report: &Report) -> bool {
     let shows = |channel: &ChannelReport| {
         let of =
@@ -651,7 +630,6 @@ fn is_short(report: &Report) -> bool {
     }
 }
 
-/// What a record is good for that is too short for a noise model.
 fn use_of_short_record(report: &Report) -> String {
     let length = span(report_length_s(report));
     let is_known = |(_, n): &(String, Parameter)| !is_upper_bound(n.value, n.low) && relative_error(n).is_finite();
@@ -670,7 +648,7 @@ fn use_of_short_record(report: &Report) -> String {
     )
 }
 
-/// Which coefficients a record gives to ±20 %, how much longer it should be for the others, and of which it gives a limit only.
+/// Coefficients within ±20 %, recording time for others, and limits.
 #[derive(Default)]
 struct LengthAdvice {
     known: Option<String>,
@@ -679,7 +657,7 @@ struct LengthAdvice {
     limits: Option<String>,
 }
 
-/// What the length of a record is good for. Nothing without an inertial channel that says it.
+/// Empty without an inertial channel.
 fn length_advice(report: &Report) -> LengthAdvice {
     if is_short(report) {
         return LengthAdvice { known: Some(use_of_short_record(report)), ..LengthAdvice::default() };
@@ -728,7 +706,7 @@ fn length_advice(report: &Report) -> LengthAdvice {
     LengthAdvice { known, except, longer, limits }
 }
 
-/// Which models of the first half are those of its later quarter; `None` where none is.
+/// Channels fitted to the later quarter; `None` without any.
 fn recent_fit(report: &Report) -> Option<String> {
     let recent: Vec<String> =
         inertial(report).filter(|channel| is_fitted_to_later_quarter(channel)).map(|of| of.name.clone()).collect();
@@ -740,7 +718,7 @@ fn recent_fit(report: &Report) -> Option<String> {
     })
 }
 
-/// What the errors are without spikes and knocks; `None` where there are none.
+/// `None` without spikes and knocks.
 fn without_events(report: &Report) -> Option<String> {
     let excluding = inertial(report).filter_map(|channel| {
         let [before, after] = [&channel.before, &channel.after].map(|model| model.unseen_excluding.as_ref());
@@ -751,13 +729,12 @@ fn without_events(report: &Report) -> Option<String> {
     (!excluding.is_empty()).then(|| format!("Without spikes and knocks σ is off by: {}.", excluding.join(", ")))
 }
 
-/// Whether the model `after` of a channel is fitted to the later quarter of the first half instead of to all of it.
+/// Fitted to the later quarter of the first half.
 #[must_use]
 pub fn is_fitted_to_later_quarter(channel: &ChannelReport) -> bool {
     channel.nonstationarity.as_ref().is_some_and(|of| of.fitted_to == FittedPart::LaterQuarter)
 }
 
-/// Hours with two digits.
 fn hours(hours: f64) -> String {
     match hours {
         hours if hours < 1.0 => span(3600.0 * hours),
@@ -767,7 +744,7 @@ fn hours(hours: f64) -> String {
     }
 }
 
-/// Magnetometers, temperature and supply: conditions, one text each.
+/// Magnetometers, temperature, supply: one text each.
 #[must_use]
 pub fn conditions(report: &Report) -> Vec<String> {
     let moved = |name: &str, label: &str| {
@@ -793,20 +770,19 @@ pub fn conditions(report: &Report) -> Vec<String> {
         .collect()
 }
 
-/// Whether all samples of a channel are the same, by a curve that is 0. The means of blocks of one value may differ by the rounding of
-/// their sums.
+/// All samples equal, up to rounding of block means.
 fn is_constant(channel: &ChannelReport) -> bool {
     !channel.curve.is_empty() && channel.curve.iter().all(|point| point.adev == 0.0)
 }
 
-/// Range of the means of blocks that white noise of the channel's N exceeds in fewer than [`CHANCE`] of all records; 0 without N.
+/// Range of block means that white noise exceeds in fewer than [`CHANCE`] of all records; 0 without N.
 fn range_of_white_noise(channel: &ChannelReport, bias: &BiasOverTime) -> f64 {
     let deviation = coefficient(channel, LETTERS[0].0).map_or(0.0, |n| n.high / bias.block_s.sqrt());
-    // The highest and the lowest mean, each beyond its bound in half as many.
+    // Highest and lowest mean, half each.
     2.0 * quantile(CHANCE / 2.0 / bias.mean.len().max(1) as f64) * deviation
 }
 
-/// N of the magnetometers, and those without one: a bound on N by a model that fails says nothing.
+/// N of magnetometers; a failing model's bound is left out.
 fn magnetometers(report: &Report) -> Vec<String> {
     let all = report.channels.iter().filter(|channel| channel.name.starts_with("magn_"));
     let (failed, described): (Vec<&ChannelReport>, Vec<&ChannelReport>) = all.partition(|channel| is_high(channel));
@@ -828,8 +804,7 @@ fn magnetometers(report: &Report) -> Vec<String> {
     told
 }
 
-/// Positions of the findings in the order in which they are numbered: a motion, causes in gyros and accelerometers, those in channels that
-/// are conditions, then what nothing explains; of each the one first that makes the largest part of the variance of a channel.
+/// Order of the findings: motion, causes in inertial channels, in conditions, unexplained; then by share of variance.
 pub(crate) fn finding_order(report: &Report) -> Vec<usize> {
     let is_inertial = |name: &String| name.starts_with("gyro_") || name.starts_with("accl_");
     let rank = |&index: &usize| {
@@ -846,13 +821,11 @@ pub(crate) fn finding_order(report: &Report) -> Vec<usize> {
     order
 }
 
-/// Positions of the findings that an effect explains, in the order in which they are numbered.
 fn named_findings(report: &Report) -> Vec<usize> {
     let is_named = |&index: &usize| !matches!(report.findings[index].effect, Effect::Unexplained(_));
     finding_order(report).into_iter().filter(is_named).collect()
 }
 
-/// The finding at `index` in words.
 pub(crate) fn finding_text(report: &Report, index: usize) -> FindingText {
     let finding = &report.findings[index];
     let mut text = describe(finding, &shown_effects(report, index));
@@ -862,7 +835,7 @@ pub(crate) fn finding_text(report: &Report, index: usize) -> FindingText {
     text
 }
 
-/// The findings in words, in the order in which they are numbered, those that nothing explains apart.
+/// Findings in words in their order, and the unexplained ones.
 #[must_use]
 pub fn findings(report: &Report) -> (Vec<FindingText>, Vec<FindingText>) {
     let named = named_findings(report).len();
@@ -872,11 +845,10 @@ pub fn findings(report: &Report) -> (Vec<FindingText>, Vec<FindingText>) {
     (texts, unexplained)
 }
 
-/// Largest difference of the frequency of a finding from that of a line that is followed, as a part of it: half of the distance to
-/// the next whole ratio that is tried.
+/// Largest relative difference of a finding's and a followed line's frequency: half the step of the ratios.
 const SAME_LINE: f64 = 0.1;
 
-/// The line of another channel that moves with the line of a finding; `None` where none does.
+/// A line of another channel that moves with the finding's.
 fn related_line(report: &Report, finding: &Finding) -> Option<String> {
     let frequency = finding.effect.frequency_hz()?.value;
     let of = finding.channels.iter().find_map(|name| {
@@ -893,7 +865,7 @@ fn related_line(report: &Report, finding: &Finding) -> Option<String> {
     Some(format!("a line of {other} moves with it, {at}"))
 }
 
-/// What the data contradicts, one text each, the most serious first.
+/// One text each, the most serious first.
 #[must_use]
 pub fn contradictions(report: &Report) -> Vec<String> {
     let mut told = Vec::new();
@@ -926,23 +898,6 @@ pub fn contradictions(report: &Report) -> Vec<String> {
             significant(sigma.abs(), 2)
         ));
     }
-    for channel in inertial(report) {
-        let Some((spectrum, fit)) =
-            channel.assessment.angle_random_walk_by_spectrum.as_ref().zip(coefficient(channel, LETTERS[0].0))
-        else {
-            continue;
-        };
-        if spectrum.low > fit.high || spectrum.high < fit.low {
-            let percent = 100.0 * (spectrum.value / fit.value - 1.0);
-            let name = channel_list(std::slice::from_ref(&channel.name));
-            told.push(if is_upper_bound(fit.value, fit.low) {
-                format!("{name}: the spectrum gives N, the fit only an upper limit below it")
-            } else {
-                let side = if percent < 0.0 { "lower" } else { "higher" };
-                format!("{name}: the spectrum gives N {} % {side} than the fit", significant(percent.abs(), 2))
-            });
-        }
-    }
     let is_unsure = |of: &Innovations| channels * of.chance_of_small_claim() < CHANCE;
     let unsure: Vec<String> = inertial(report)
         .filter(|channel| channel.assessment.innovations.as_ref().is_some_and(is_unsure))
@@ -957,7 +912,7 @@ pub fn contradictions(report: &Report) -> Vec<String> {
     told
 }
 
-/// The advice of the findings in their order, each with the numbers of its findings. Of a part that moved the part at rest is the first.
+/// Advice in the order of the findings, with their numbers; rest comes first.
 pub(crate) fn advice(report: &Report) -> Vec<(String, Vec<usize>)> {
     let is_motion = |index: usize| matches!(report.findings[index].effect, Effect::MotionInterval(_));
     let at_rest = longest_at_rest(report);
@@ -979,17 +934,17 @@ pub(crate) fn advice(report: &Report) -> Vec<(String, Vec<usize>)> {
     steps
 }
 
-/// Pieces of advice of the findings.
+/// Most pieces of advice by findings.
 const MOST_STEPS: usize = 3;
 
-/// What to do next, the most useful first.
+/// The most useful first.
 #[must_use]
 pub fn next_steps(report: &Report) -> Vec<String> {
     let steps = advice(report).into_iter().map(|(step, _)| step);
     steps.chain(for_filter(report)).collect()
 }
 
-/// The advice of the findings with the numbers of these: `Look for a fan, a motor or the mains (2, 5).`
+/// With numbers of findings: `Look for a fan, a motor or the mains (2, 5).`
 pub(crate) fn numbered_steps(report: &Report) -> Vec<String> {
     let numbered = |(step, numbers): (String, Vec<usize>)| {
         let numbers: Vec<String> = numbers.iter().map(usize::to_string).collect();
@@ -998,16 +953,14 @@ pub(crate) fn numbered_steps(report: &Report) -> Vec<String> {
     advice(report).into_iter().map(numbered).collect()
 }
 
-/// How to come to the model of a filter; `None` without a gyro or an accelerometer.
+/// `None` without a gyro or accelerometer.
 pub(crate) fn for_filter(report: &Report) -> Option<String> {
     inertial(report).next()?;
     let how = if is_short(report) { "record at rest for hours" } else { "add --export kalibr=imu.yaml" };
     Some(format!("For a filter: {how}."))
 }
 
-/// What speaks against the models that fail on the unseen half. Where the error without spikes and knocks does not, these make it. Where
-/// the first half's own curve fails too, no model of the first half can hold: the noise has changed. Where it does not, the model lacks
-/// something.
+/// Reasons why models fail on the unseen half: spikes and knocks, a change of the noise, or a lack of the model.
 fn failures(report: &Report) -> Vec<String> {
     let own_curve = |channel: &ChannelReport| channel.first_half_curve.deviance_per_point;
     let excluding = |channel: &ChannelReport| channel.after.unseen_excluding.as_ref()?.deviance_per_point;

@@ -1,5 +1,4 @@
-//! The report on one screen: at most [`MOST_LINES`] lines. Styles are ANSI sequences, which the writer removes where they are not
-//! wanted.
+//! The report on one screen of at most [`MOST_LINES`] lines, with ANSI styles.
 
 use crate::finding_text::FindingText;
 use crate::formatting::capital;
@@ -9,22 +8,21 @@ use anstyle::{AnsiColor, Style};
 use noise_analysis::report::Report;
 use std::io::{self, Write};
 
-/// Lines of the screen at most.
+/// Most lines.
 pub const MOST_LINES: usize = 30;
-/// Columns of the narrowest and of the widest screen. Text is not wider than [`TEXT`].
+/// Columns of the narrowest and the widest screen; text is at most [`TEXT`] wide.
 const NARROWEST: usize = 80;
 const WIDEST: usize = 200;
-/// Columns of a line of text that is read with ease.
 const TEXT: usize = 110;
-/// Columns of the channel's label, and of the error.
+/// Columns of label and error.
 const LABEL: usize = 7;
 const ERROR: usize = 17;
-/// Lines of the sentences about the record, and of the conditions, at most.
+/// Most lines of sentences on the record, and on conditions.
 const SENTENCES: usize = 5;
 const CONDITIONS: usize = 2;
-/// Lines of what to do at most: with room for all findings, and where they need the room.
+/// Most lines of advice, with and without room.
 const STEPS: [usize; 2] = [4, 2];
-/// Columns of the channels of a finding, with its number.
+/// Columns of a finding's number and channels.
 const CHANNELS: usize = 17;
 
 const HEADING: Style = Style::new().bold();
@@ -34,19 +32,14 @@ const WARNING: Style = AnsiColor::Yellow.on_default().bold();
 /// The screen of a report.
 #[derive(Debug, Clone, Copy)]
 pub struct Screen<'a> {
-    /// The report.
     pub report: &'a Report,
     /// Name of the recording, if it has one.
     pub source: Option<&'a str>,
-    /// Columns of the terminal.
     pub columns: usize,
 }
 
 impl Screen<'_> {
     /// Writes the screen.
-    ///
-    /// # Errors
-    /// `out` cannot be written.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         for line in self.lines() {
             writeln!(out, "{line}")?;
@@ -62,7 +55,7 @@ impl Screen<'_> {
         self.columns().min(TEXT)
     }
 
-    /// The lines, with styles. The findings come first: the blocks below them are cut where one of them would have no line.
+    /// Lines with styles; blocks below the findings are cut to give each finding a line.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let mut lines = self.above();
@@ -81,8 +74,7 @@ impl Screen<'_> {
         lines
     }
 
-    /// The findings in at most `room` lines: each in one, and with intervals and weight, from the first on, as far as there is
-    /// room for that.
+    /// Findings in `room` lines: one each, and details from the first on as far as there is room.
     fn findings(&self, found: &[FindingText], room: usize) -> Vec<String> {
         let shown = if found.len() > room { room.saturating_sub(1) } else { found.len() };
         let mut left = room.saturating_sub(found.len());
@@ -102,18 +94,17 @@ impl Screen<'_> {
         lines
     }
 
-    /// One finding in one line: number, channels, physics without intervals.
+    /// Number, channels, physics without intervals.
     fn brief_finding(&self, number: usize, finding: &FindingText) -> String {
         let FindingText { channels, channel_count, brief, .. } = finding;
         let label = format!("{number:>2}  {channels}");
         let length = label.chars().count();
-        // Out of line with the others where both fit.
+        // Out of line if both fit.
         let is_long = length >= CHANNELS && length + 1 + brief.chars().count() > self.columns();
         let label = if is_long { format!("{number:>2}  {channel_count} channels") } else { label };
         format!("{}{}", padded(&label, CHANNELS), within(brief, self.columns() - CHANNELS))
     }
 
-    /// Verdict, coefficients and conditions.
     fn above(&self) -> Vec<String> {
         let report = self.report;
         let mut lines = vec![styled(HEADING, &self.headline())];
@@ -136,7 +127,6 @@ impl Screen<'_> {
         table_lines(table, is_first, self.columns()).into_iter().map(|(style, line)| styled(style, &line)).collect()
     }
 
-    /// One finding: number, channels, physics and weight.
     fn finding(&self, number: usize, finding: &FindingText) -> Vec<String> {
         let text = if finding.weight.is_empty() {
             finding.physics.clone()
@@ -144,7 +134,7 @@ impl Screen<'_> {
             format!("{} {}.", finding.physics, capital(&finding.weight))
         };
         let label = format!("{number:>2}  {}", finding.channels);
-        // A long list of channels has lines of its own beside the text.
+        // A long list has lines of its own.
         let labels = broken(&label, CHANNELS - 1, "    ");
         let texts = broken(&text, self.text_columns() - CHANNELS, "");
         (0..labels.len().max(texts.len()))
@@ -156,7 +146,7 @@ impl Screen<'_> {
             .collect()
     }
 
-    /// What no effect explains and where data and model disagree, in a line each, and what to do in `most` lines.
+    /// Unexplained and contradictions in a line each, advice in `most`.
     fn below(&self, most: usize) -> Vec<String> {
         let columns = self.text_columns() - CHANNELS;
         let mut lines = Vec::new();
@@ -173,12 +163,12 @@ impl Screen<'_> {
         lines
     }
 
-    /// `items` in lines beside a heading, `most` of them.
+    /// `most` of the `items` beside a heading.
     fn list(&self, items: &[String], most: usize) -> Vec<String> {
         capped(items, "; ", "", (self.text_columns() - CHANNELS, most))
     }
 
-    /// Part, recording, samples and length; of a long name its end.
+    /// Part, recording, samples, length; a long name is cut in front.
     fn headline(&self) -> String {
         let name = self.source.unwrap_or_default();
         let others = summary::headline(self.report, Some("")).join("   ").chars().count();
@@ -189,7 +179,6 @@ impl Screen<'_> {
         summary::headline(self.report, self.source.map(|_| name.as_str())).join("   ")
     }
 
-    /// A heading with lines beside it.
     fn block(&self, heading: &str, texts: &[String], style: Style) -> Vec<String> {
         let labelled = |(index, text): (usize, &String)| {
             let label = if index == 0 { heading } else { "" };
@@ -201,8 +190,7 @@ impl Screen<'_> {
     }
 }
 
-/// `items` with `separator` between them and `last` after them, in lines of so many columns: as many items as so many lines have room
-/// for, one at least, and how many more there are.
+/// `items` with `separator` and `last`, in so many lines and columns, and the number of the rest.
 fn capped(items: &[String], separator: &str, last: &str, (columns, most): (usize, usize)) -> Vec<String> {
     let lines = |shown: usize| {
         let more = items.len() - shown;
@@ -220,12 +208,11 @@ fn capped(items: &[String], separator: &str, last: &str, (columns, most): (usize
     lines
 }
 
-/// `text` in one line of so many columns: of a longer one the first words.
 fn within(text: &str, columns: usize) -> String {
     if text.chars().count() <= columns { text.to_owned() } else { format!("{} …", broken(text, columns - 2, "")[0]) }
 }
 
-/// The rows of a table in `columns` columns, each with its style; `is_first` has the heading of the errors.
+/// Rows with styles; `is_first` adds the heading of the errors.
 pub(crate) fn table_lines(table: &CoefficientTable, is_first: bool, columns: usize) -> Vec<(Style, String)> {
     let width = ((columns - LABEL - ERROR) / 3).min(26);
     let widths = [width + 2, width - 1, width];
@@ -247,7 +234,7 @@ pub(crate) fn table_lines(table: &CoefficientTable, is_first: bool, columns: usi
         let error = format!(" {error}");
         let mut line = row(&of.label, of.coefficients.each_ref().map(String::as_str), &error);
         if line.chars().count() > total {
-            // Of numbers as large as those of raw counts the values alone.
+            // Raw counts have values alone.
             line = row(&of.label, of.coefficients.each_ref().map(|of| of.split(" (").next().unwrap_or(of)), &error);
         }
         lines.push(match (of.is_high, of.channel.is_empty()) {
@@ -263,7 +250,7 @@ fn styled(style: Style, text: &str) -> String {
     format!("{style}{text}{style:#}")
 }
 
-/// `text` with spaces after it up to `width` columns, at least one.
+/// Padded to `width`, at least one space.
 fn padded(text: &str, width: usize) -> String {
     let space = width.saturating_sub(text.chars().count()).max(usize::from(!text.is_empty()));
     format!("{text}{}", " ".repeat(space))

@@ -7,7 +7,7 @@ use virtual_sensor::{MAX_SCK_BURST_HZ, MAX_SCK_NORMAL_HZ, MIN_READ_RATE_NORMAL_N
 /// runs, not shorter.
 const TOLERANCE: f64 = 0.01;
 
-/// What the times of a captured bus show. Without the ends of transactions nothing is counted.
+/// Times of a captured bus. Without the ends of transactions nothing is counted.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct CapturedBusTiming {
     /// Transactions whose begin and end are known.
@@ -51,7 +51,7 @@ impl CapturedBusTiming {
         }
     }
 
-    /// What the user should know, one sentence each; none where the times are not known.
+    /// Notes for the user, one sentence each; none where the times are not known.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         if self.timed > 0 {

@@ -64,7 +64,7 @@ struct SimulatedBoard {
     /// Data-ready edges that have raised an interrupt.
     edges: u64,
     audit: SampleAudit,
-    /// What is kept without power.
+    /// Record that is kept without power.
     record: Option<Vec<u8>>,
     meter_readings: u32,
 }
@@ -124,7 +124,7 @@ impl Device {
         self.board.usable_us
     }
 
-    /// What became of the samples since the last call.
+    /// Fate of the samples since the last call.
     pub fn take_audit(&mut self) -> SampleAudit {
         std::mem::take(&mut self.board.audit)
     }
@@ -349,9 +349,9 @@ impl Board for SimulatedBoard {
     }
 
     fn set_bus_timing(&mut self, timing: BusTiming) -> bool {
-        if timing == BusTiming::CAREFUL {
+        if timing == BusTiming::SLOW {
             let mut faults = self.bus.faults().borrow_mut();
-            faults.frames = faults.frames.filter(|(_, end)| *end != FaultEnd::CarefulBus);
+            faults.frames = faults.frames.filter(|(_, end)| *end != FaultEnd::SlowBus);
         }
         true
     }

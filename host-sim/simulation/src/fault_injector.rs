@@ -35,7 +35,7 @@ pub enum FrameFault {
     Shifted,
     /// The data line is stuck low or high, for all frames.
     Stuck {
-        /// Whether it reads ones.
+        /// True if it reads ones.
         high: bool,
     },
     /// Every burst has the words of the first one, with new data.
@@ -48,7 +48,7 @@ pub enum FrameFault {
     StuckBit {
         /// 0 for the last one.
         bit: u8,
-        /// Whether it reads one.
+        /// True if it reads one.
         high: bool,
     },
     /// Every bit of all frames comes one clock late, as with another SPI mode.
@@ -71,7 +71,7 @@ pub enum FaultEnd {
     /// With a pulse on the RST line.
     ResetLine,
     /// With longer times on the bus.
-    CarefulBus,
+    SlowBus,
     /// Not by itself.
     Never,
 }
@@ -98,7 +98,7 @@ pub struct InjectedFaults {
 }
 
 impl InjectedFaults {
-    /// Whether the random fault has the transfer of a burst fail.
+    /// True if the random fault has the transfer of a burst fail.
     pub(crate) fn fails_transfer(&mut self) -> bool {
         self.random.as_mut().is_some_and(|random| random.meets(LineFault::Failed))
     }
@@ -109,7 +109,7 @@ impl InjectedFaults {
         if self.no_data_ready || meets(LineFault::LostEdge) { 0 } else { 1 + u32::from(meets(LineFault::DoubledEdge)) }
     }
 
-    /// Whether an observer who knew everything could not use the sensor's present samples.
+    /// True if an observer who knew everything could not use the sensor's present samples.
     pub(crate) fn hide_samples(&self) -> bool {
         let harmless = |fault| fault == FrameFault::LowSupply;
         self.no_data_ready

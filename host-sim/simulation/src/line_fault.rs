@@ -4,7 +4,7 @@ use adis16405_driver::BURST_BYTES;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// What happens on the lines. Bits are inverted in every frame, each with the same probability; the others meet bursts.
+/// Faults of the lines. Bits are inverted in every frame, each with the same probability; the others meet bursts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LineFault {
     /// Bits of the sensor's answers are inverted.
@@ -15,7 +15,7 @@ pub enum LineFault {
     AnswerRun,
     /// From a bit on the answer is low or high.
     StuckFrom {
-        /// Whether it reads ones.
+        /// True if it reads ones.
         high: bool,
     },
     /// The sensor sees a clock less, and the bits that follow come early.
@@ -54,7 +54,7 @@ impl LineFault {
         Self::DoubledEdge,
     ];
 
-    /// Whether it meets bits; the others meet bursts.
+    /// True if it meets bits; the others meet bursts.
     pub fn is_of_bits(self) -> bool {
         matches!(self, Self::AnswerBits | Self::RequestBits)
     }
@@ -83,7 +83,7 @@ impl RandomFault {
         self.fault
     }
 
-    /// Whether it meets, if it is `fault`.
+    /// True if it meets, if it is `fault`.
     pub(crate) fn meets(&mut self, fault: LineFault) -> bool {
         self.fault == fault && self.random.random_bool(self.probability)
     }

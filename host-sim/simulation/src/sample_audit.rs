@@ -1,4 +1,4 @@
-//! What became of the samples, against the counts that the sensor had.
+//! Fate of the samples, against the counts that the sensor had.
 
 use adis16405_driver::Burst;
 use firmware::{CHANNELS, Estimators};
@@ -8,7 +8,7 @@ use firmware::{CHANNELS, Estimators};
 pub struct SampleAudit {
     /// Words that the device has received.
     pub words: u64,
-    /// Of them, those that are not the sensor's count, or that of a sample received before.
+    /// Those of them that are not the sensor's count, or that of a sample received before.
     pub wrong: u64,
     /// Wrong, and used.
     pub undetected: u64,
@@ -61,7 +61,7 @@ pub(crate) struct Received {
     /// The counts that the sensor had, and the number of the sample.
     pub(crate) sent: [i16; 12],
     pub(crate) sample: u64,
-    /// What has arrived.
+    /// The burst that has arrived.
     pub(crate) burst: Burst,
     /// Samples that each channel had taken before.
     pub(crate) lengths: [u64; CHANNELS.len()],

@@ -33,7 +33,7 @@ const ENVIRONMENT: &[&str] = &["temperature", "supply", "motion"];
 /// Kinds of faults.
 const FAULTS: &[&str] = &["impossible_rate", "shifted", "stuck_low", "stuck_high", "frozen", "stale", "low_supply"];
 
-/// What is wrong with such a text.
+/// Error in such a text.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScenarioTextError {

@@ -53,7 +53,7 @@ pub struct Simulation {
 pub struct TimedFault {
     /// Its beginning, s of virtual time.
     pub from_s: f64,
-    /// What is damaged.
+    /// The damage.
     pub fault: FrameFault,
     /// Bursts that it damages.
     pub bursts: u32,

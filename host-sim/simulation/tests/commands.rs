@@ -1,4 +1,4 @@
-//! What a port can do to the device: seeded sequences of commands, whole, wrong and damaged, at every rate and in any order. None of
+//! Attacks of a port on the device: seeded sequences of commands, whole, wrong and damaged, at every rate and in any order. None of
 //! them stops it, none writes the sensor's flash without being armed, and it takes the settings that it is given afterwards.
 
 use link::{BootCause, Decoder, Health, Hello, Message, Received};
@@ -58,8 +58,8 @@ const WORDS: [&str; 13] = [
     "forget",
     "dump",
     "measure",
-    "careful 1",
-    "careful 0",
+    "bus slow",
+    "bus usual",
     "help",
     "brownout",
     "armautonul",
@@ -163,7 +163,7 @@ impl Session {
 }
 
 /// The settings of a first start, whatever was set before.
-const SETTINGS: &[u8] = b"\rcareful 0\re 0\ri 0\rw 0\rforget\rg 300\rn 0\rf 204.8\rp 0\r";
+const SETTINGS: &[u8] = b"\rbus usual\re 0\ri 0\rw 0\rforget\rg 300\rn 0\rf 204.8\rp 0\r";
 
 #[test]
 fn no_sequence_of_commands_stops_or_misconfigures_the_device() {

@@ -567,7 +567,7 @@ fn autonull_says_what_it_does_not_apply() {
             // 0.0125 deg/s a count (data sheet Rev. B, Table 8).
             assert_eq!(x, "-160 counts not applied by the part");
         }
-        // What is applied: the samples of y and z are 0 now, and those of x too if its correction was positive.
+        // The correction is applied: the samples of y and z are 0 now, and those of x too if its correction was positive.
         let [_, x, y, z, ..] = *device.bus().part().counts();
         let applied = if rate < 0.0 { [x, y, z] } else { [0, y, z] };
         assert!(applied.iter().all(|count| count.abs() <= 1), "{applied:?}");

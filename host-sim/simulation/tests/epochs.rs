@@ -149,7 +149,7 @@ fn an_effect_that_an_epoch_can_show_is_learned_in_every_epoch() {
         let half_width = (cause.high - cause.low) / 2.0;
         assert!((0.5..2.0).contains(&(half_width / (1.96 * 0.0024))), "{cause:?}");
     }
-    // Of 40 intervals of 95 %, more than 7 miss the truth in one case of a thousand.
+    // More than 7 of 40 intervals of 95 % miss the truth in one case of a thousand.
     let missed = causes.iter().filter(|cause| !(cause.low..=cause.high).contains(&SENSITIVITY)).count();
     assert!(missed <= 7, "{missed} of 40 intervals miss the truth");
 }

@@ -29,7 +29,7 @@ fn run_until(device: &mut Device, end_s: f64) -> Vec<u8> {
     device.run_until((end_s * 1e6) as u64)
 }
 
-/// What a run has come to.
+/// Result of a run.
 struct Run {
     audit: SampleAudit,
     longest_gap_s: f64,
@@ -190,9 +190,9 @@ fn an_hour_with_each_fault() {
     grid(&cells(&[1e-7, 1e-6, 1e-5, 1e-4], &[1e-5, 1e-4, 1e-3, 1e-2]), 3, 3_600.0);
 }
 
-/// What lasts and falsifies no word: flags of DIAG_STAT that are set again with every sample, of a weak supply, an overload, a flash memory and
-/// a self-test that failed; a sensor without power or in reset for a second; a USB port whose host does not read. All but those two
-/// last for 110 s.
+/// States that last and falsify no word: flags of DIAG_STAT that are set again with every sample, of a weak supply, an
+/// overload, a flash memory and a self-test that failed; a sensor without power or in reset for a second; a USB port whose host does
+/// not read. All but those two last for 110 s.
 #[test]
 fn states_that_last_cost_no_sample_that_there_is() {
     fn hold(device: &mut Device, flag: DiagnosisFlag, is_on: bool) {

@@ -20,7 +20,7 @@ fn device() -> Device {
     device
 }
 
-/// What a device has sent.
+/// Messages of a device.
 #[derive(Default)]
 struct Heard {
     logs: Vec<String>,
@@ -60,11 +60,11 @@ fn report_after(device: &mut Device, keys: &str, seconds: f64) -> Heard {
 fn a_part_that_needs_longer_times_gets_them() {
     let mut device = device();
     device.run_until(2 * SECOND);
-    device.faults().frames = Some((FrameFault::Shifted, FaultEnd::CarefulBus));
+    device.faults().frames = Some((FrameFault::Shifted, FaultEnd::SlowBus));
     let heard = report_after(&mut device, "", 10.0);
     let steps: Vec<&String> = heard.logs.iter().filter(|line| line.contains("unusable bursts: ")).collect();
     assert_eq!(steps.len(), 5, "{:#?}", heard.logs);
-    assert!(steps[4].ends_with("careful timing of the bus"), "{}", steps[4]);
+    assert!(steps[4].ends_with("slow timing of the bus"), "{}", steps[4]);
     let health = heard.health.expect("a report");
     assert_eq!(
         (health.recoveries, health.rereads, health.bus_resets, health.sensor_resets),

@@ -13,7 +13,7 @@ const SECONDS: u64 = 200;
 const CHECK_EVERY_S: u64 = 10;
 const SECOND: u64 = 1_000_000;
 
-/// What a device with a filter of 2^`taps_log2` taps a stage sends in [`SECONDS`]: raw bursts and the last report of gyro x.
+/// Output of a device with a filter of 2^`taps_log2` taps a stage in [`SECONDS`]: raw bursts and the last report of gyro x.
 fn run(taps_log2: u8, tested: bool) -> (Vec<RawMessage>, ChannelMessage) {
     let part = VirtualAdis16405::new(NoiseModel::paper(), 3);
     let mut device = Device::new(part, Device::blank_memory());

@@ -62,7 +62,7 @@ struct Run {
     now_s: f64,
 }
 
-/// What a run has reported last.
+/// Last report of a run.
 struct Report {
     hello: Hello,
     health: Health,

@@ -74,7 +74,7 @@ fn a_file_that_is_cut_is_told_everywhere() {
     assert_eq!(reading["sha256"].as_str(), hash.split_whitespace().next());
     let html = std::fs::read_to_string(format!("{page}/index.html")).expect("a page");
     assert!(html.contains("Not read to its end: truncated") && html.contains("What was read"));
-    // Of many.
+    // A file of many bytes.
     let intact = write(&dir, "whole.ulg", &whole);
     let output = imunoise(&["batch", file, intact.to_str().expect("UTF-8"), "-o", &reports]);
     assert_eq!(output.status.code(), Some(3), "{}", String::from_utf8_lossy(&output.stderr));

@@ -85,7 +85,7 @@ impl Console for VirtualConsole {
 
     fn next(&mut self, until_s: f64) -> io::Result<Option<Received>> {
         while self.received.is_empty() && self.now_s() < until_s {
-            // What is asked of the sensor takes time on its bus.
+            // Requests to the sensor take time on its bus.
             self.now_us = self.now_us.max(self.device.bus().part().now() / 1000) + STEP_US;
             let sent = self.device.run_until(self.now_us);
             let kept = sent.into_iter().filter(|_| self.loss == 0.0 || !self.random.random_bool(self.loss));

@@ -46,7 +46,7 @@ fn options_of_the_documentation_are_those_of_the_program() {
         }
     }
     assert!(commands > 30, "{commands} commands");
-    // What says how a recording is read is described.
+    // The options of reading are described.
     let page = std::fs::read_to_string(root.join("docs/recordings.md")).expect("a page");
     for option in ["columns", "units", "topic", "rate", "sensor", "range", "from", "to", "yes", "each-sensor", "format"]
     {

@@ -90,7 +90,7 @@ fn wrong_usage_has_exit_code_2() {
     }
 }
 
-/// What a terminal obeys, and what hides or turns other letters, is shown escaped, also where a tip or a table follows.
+/// Characters that a terminal obeys, or that hide or turn other letters, are shown escaped, also where a tip or a table follows.
 #[test]
 fn names_with_control_characters_are_escaped() {
     let dir = tempdir().expect("a folder");

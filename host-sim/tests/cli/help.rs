@@ -48,7 +48,7 @@ fn options_are_grouped_and_examples_follow() {
     for (heading, option) in [("Input:", "--rate"), ("Sensor:", "--sensor"), ("Output:", "--page")] {
         assert!(section(&help, heading).iter().any(|name| name == option), "{heading} {option}: {help}");
     }
-    // What belongs to no group is about the help itself.
+    // An option without a group is about the help itself.
     assert_eq!(section(&help, "Options:"), ["-h,"], "{help}");
 }
 

@@ -1,4 +1,4 @@
-//! `inspect`, and the command that `analyze` proposes where a file does not say enough. What is found in a file is tested in `recordings`.
+//! `inspect`, and the command that `analyze` proposes where a file does not say enough. `recordings` tests the content of files.
 
 use crate::program::{imunoise, json_of, write};
 use rand::{Rng, SeedableRng};
@@ -20,7 +20,7 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
     (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0
 }
 
-/// What a command that fails writes to standard error; it prints nothing else. The error comes first.
+/// Standard error of a command that fails; it prints nothing else. The error comes first.
 fn refusal(output: &Output) -> String {
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.code() == Some(1) && output.stdout.is_empty() && text.starts_with("error: "), "{text}");

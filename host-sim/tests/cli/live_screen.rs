@@ -26,7 +26,7 @@ fn table() -> Vec<u8> {
     [head].into_iter().chain(rows).collect::<String>().into_bytes()
 }
 
-/// What `stty` says of a terminal.
+/// The settings of a terminal by `stty`.
 fn settings(terminal: &str) -> String {
     let output = Command::new("stty").args(["-F", terminal, "-a"]).output().expect("stty starts");
     String::from_utf8(output.stdout).expect("text")

@@ -1,5 +1,5 @@
 //! The command `imunoise`: its help, exit codes, streams and signals, the files that it writes, the live screen, and a device on a serial port;
-//! each verb once. What is read of a file is tested in `recordings`, what a report says in `reports`.
+//! each verb once. `recordings` tests the reading of files, `reports` the sentences of a report.
 
 mod analyze_and_replay;
 mod bench;

@@ -93,7 +93,7 @@ fn check(test: &str, run: &Run) {
     assert!(report.findings.iter().all(|finding| !time_base.contains(&finding.effect.name())), "{:?}", report.findings);
     let inertial = INERTIAL.map(|channel| of(&report, channel));
     for (channel, baseline) in inertial.iter().zip(run.baseline) {
-        // Of the same samples: the two differ by the overlap of the windows beyond n = 8, by the weights of the fit, and by the
+        // The samples are the same: the two differ by the overlap of the windows beyond n = 8, by the weights of the fit, and by the
         // degrees of freedom, which are those of the slope in Python and those of the model in the report.
         let ratio = deviance(&channel.before.unseen) / baseline;
         assert!((ratio - 1.0).abs() < 0.1, "{}: {ratio} of {baseline}", channel.name);
@@ -279,7 +279,7 @@ fn one_filter(test: &str, file: &str, rate: Option<f64>, taps: f64) {
         let filters: Vec<OutputFilter> = of.effects.iter().filter_map(filter).collect();
         let [filter] = filters[..] else { panic!("{channel}: {filters:?}") };
         assert_eq!(filter.taps.value, taps, "{}", channel);
-        // Where they are recorded, supply and temperature stay within a count: no channel can be shown to depend on them.
+        // If they are recorded, supply and temperature stay within a count: no channel can be shown to depend on them.
         let followed = of.effects.iter().find(|shown| ["supply", "temperature"].contains(&shown.effect.name()));
         assert_eq!(followed, None, "{}", channel);
     }

@@ -163,7 +163,7 @@ fn curves_with_gaps_are_those_of_the_whole_analysis() {
     });
     let reports = both(&dir, &write(&dir, "stamped.csv.gz", &gzip(stamped.as_bytes())), &[]);
     assert_same_curves(&reports, 0.0);
-    // Of the samples that the host reads late in each of the 7 times in which it is busy, the last one or two are about one period late,
+    // In each of the 7 times in which the host is busy and reads late, the last one or two are about one period late,
     // from which on they count.
     let late = reports.map(|report| number(&report["flagged"]["late_delivery"]));
     assert!((late[0] - late[1]).abs() <= 2.0 * 7.0, "{late:?}");

@@ -50,7 +50,7 @@ fn check(name: &str, screen: &str, findings: usize) {
     assert!(lines.len() <= MOST_LINES, "{name}: {} lines\n{screen}", lines.len());
     for line in &lines {
         assert!(line.chars().count() <= COLUMNS, "{name}: {line}");
-        // What is left out is left out between words.
+        // Text is left out between words.
         let is_cut = line.split('…').rev().skip(1).any(|before| before.ends_with(char::is_alphanumeric));
         assert!(!is_cut, "{name}: {line}");
     }
@@ -120,7 +120,7 @@ fn the_screens_of_other_sensors_are_whole() {
     }
 }
 
-/// Of seconds of a record it is not told that three coefficients describe the channels.
+/// No report on seconds of a record says that three coefficients describe the channels.
 #[test]
 fn the_screens_of_short_records_say_what_these_are_good_for() {
     let test = "the_screens_of_short_records_say_what_these_are_good_for";

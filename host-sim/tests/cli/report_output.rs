@@ -1,10 +1,10 @@
-//! Where a report goes: one screen, every table, nothing, JSON on standard output, pictures.
+//! Destinations of a report: one screen, every table, nothing, JSON on standard output, pictures.
 
 use crate::program::imunoise;
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// What the program prints for half a minute of the virtual sensor.
+/// Output of the program for half a minute of the virtual sensor.
 fn run(dir: &TempDir, arguments: &[&str]) -> String {
     let log = dir.path().join("bus.csv");
     let file = log.to_str().expect("UTF-8");

@@ -26,7 +26,7 @@ impl NoisyDevice {
         Self { device: Device::new(sensor, Device::blank_memory()), now_us: 0 }
     }
 
-    /// What it sends in its next 10 ms.
+    /// Bytes that it sends in its next 10 ms.
     fn next(&mut self) -> Vec<u8> {
         self.now_us += 10_000;
         let mut sent = self.device.run_until(self.now_us);

@@ -13,7 +13,7 @@ use system_tests::pseudo_terminals;
 use tempfile::tempdir;
 use virtual_sensor::{NoiseModel, VirtualAdis16405};
 
-/// What happens to the device after so much of its own time.
+/// Event of the device after so much of its own time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fault {
     /// The program on the host gets this signal, and the device is silent then.
@@ -60,7 +60,7 @@ fn record(log: &Path, fault: Fault) -> (Output, String) {
             interrupted = true;
         }
     }
-    // What was sent before the end.
+    // Bytes that were sent before the end.
     while let Ok(count) = near.read(&mut keys) {
         received.extend_from_slice(&keys[..count]);
     }

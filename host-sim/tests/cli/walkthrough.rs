@@ -7,14 +7,14 @@ use tempfile::tempdir;
 /// A line of the page that stands for any number of lines.
 const ANY_LINES: &str = "…";
 
-/// What a line begins with, before its first number.
+/// Beginning of a line, before its first number.
 fn label(line: &str) -> String {
     let words: Vec<&str> =
         line.split(|letter: char| letter.is_ascii_digit()).take(1).flat_map(str::split_whitespace).collect();
     words.join(" ")
 }
 
-/// What is printed, with the elisions of the page: as many lines before the first and after the last one, and between two of them the
+/// The printed lines, with the elisions of the page: as many lines before the first and after the last one, and between two of them the
 /// lines with the same labels.
 fn elided(printed: &[&str], page: &[&str]) -> Vec<String> {
     let parts: Vec<&[&str]> = page.split(|line| *line == ANY_LINES).collect();

@@ -1,11 +1,11 @@
-//! What time stamps show: the period of each sample, the losses and the rate.
+//! Result of an alignment: period of each sample, losses, rate.
 
 use crate::lateness_track::LostStretch;
 
-/// A sample rate with the interval that the time stamps leave it, by the clock that stamped them.
+/// Sample rate with its interval by the stamps' clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RateEstimate {
-    /// Least-squares slope of the sample periods over the time stamps, Hz.
+    /// Least-squares slope, Hz.
     pub hz: f64,
     /// Lower end, Hz.
     pub low_hz: f64,
@@ -13,26 +13,22 @@ pub struct RateEstimate {
     pub high_hz: f64,
 }
 
-/// Time stamps on sample periods.
 pub(crate) struct AlignedStamps {
-    /// Period of each sample, counted from the first; grows by at least one a sample.
+    /// From the first; grows by at least one.
     pub(crate) periods: Vec<u64>,
-    /// Samples that were read a period or more after the others.
+    /// A period or more behind the others.
     pub(crate) late: Vec<bool>,
-    /// The losses, in their order.
     pub(crate) losses: Vec<LostStretch>,
-    /// The rate; `None` if the samples span no time.
+    /// `None` without a time span.
     pub(crate) rate: Option<RateEstimate>,
-    /// Smallest step of the stamps that all of them are multiples of, s; `None` where it is far below the period.
+    /// Common step of the stamps, s; `None` far below the period.
     pub(crate) tick_s: Option<f64>,
-    /// Width of the lateness of ordinary samples, periods.
+    /// Lateness of ordinary samples, periods.
     pub(crate) width: f64,
-    /// Whether single losses are told from the rounding of the stamps.
+    /// True if single losses are told from rounding.
     pub(crate) resolved: bool,
-    /// The shortest loss that is told from late delivery, samples.
     pub(crate) least_loss: u64,
-    /// Whether the rate changes by more than a track follows; its interval is then the range that it takes.
+    /// Beyond what a track follows; the interval is then the range.
     pub(crate) is_rate_changing: bool,
-    /// Whether a loop wrote them that asks for samples when it has time.
     pub(crate) is_of_loop: bool,
 }

@@ -1,8 +1,5 @@
-//! The sample period of each row of a recording, by its time stamps or its index, and the rows that are one sample that was read twice.
-//!
-//! The first rows tell which rule holds for all: where stamps are finer than the sample period, rows are placed as they come; coarser stamps
-//! are placed when all of them are known. A recording that ends within the first rows is placed with all of them known.
-//! A recording can be read again: its rows then have the same places.
+//! Sample periods of rows by stamps or index, and repeated rows; fine stamps are placed at once, coarse ones at the
+//! end.
 
 use crate::aligned_stamps::AlignedStamps;
 use crate::irregular_stamps::of_few_digits;
@@ -14,33 +11,29 @@ use crate::time_base_error::{MIN_SAMPLES, TimeBaseError};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-/// Rows that tell the clock of the time stamps.
 pub(crate) const FIRST_ROWS: usize = 1 << 17;
-/// Rows with coarse stamps that are held at most: 600 MB.
+/// 600 MB.
 const MOST_COARSE_ROWS: usize = 1 << 25;
 
-/// Longest interval, in sample periods, at which a sample equal to the one before is the same sample read twice. Equal samples
-/// farther apart are chance: a filtered output of few counts repeats about once in a thousand samples.
+/// Longest interval, sample periods, of a repeated sample; farther equal ones are chance.
 const MAX_REPEATED_READ_INTERVAL: f64 = 0.75;
-/// Samples whose median duration tells which interval is shorter than a period.
+/// Window whose median duration gives the period.
 const REPEATED_READ_WINDOW: usize = 32;
-/// Least part of the rows that equal the one before, sooner than a period, that are more than by chance, for all of them to be left out.
+/// Least part of early equal rows beyond chance for all to be dropped.
 const LEAST_READ_AGAIN: f64 = 0.5;
-/// Distance before a loss, in widths of the lateness, at which a sample that was taken to be read twice may be what is missing.
+/// Search distance before a loss, in widths of the lateness.
 const SEARCHED_WIDTHS: f64 = 4.0;
 
-/// Largest relative difference between the stated and the measured rate: a wrong nominal rate and a clock on a breadboard,
-/// not another rate.
+/// Largest relative difference of stated and measured rate.
 const MAX_RATE_CONTRADICTION: f64 = 0.1;
-/// Share of samples that follow their neighbour below which the stated rate is doubted.
+/// Share of neighbours below which a stated rate is doubted.
 const MIN_NEIGHBOURS: f64 = 0.75;
 
-/// Most sample periods of a recording for each of its samples, and beside them. The gaps of a series of this length fit into
-/// memory.
+/// Most sample periods per sample.
 const MAX_PERIODS_PER_SAMPLE: u64 = 64;
 const MAX_PERIODS: u64 = 1 << 22;
 
-/// When a row arrived, as far as the file says it, and whether its numbers are those of the row before.
+/// Arrival of a row, and equality with the row before.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RowStamp {
     pub time_s: Option<f64>,
@@ -48,12 +41,10 @@ pub struct RowStamp {
     pub is_equal: bool,
 }
 
-/// Where a row lies in time.
+/// The place of a row in time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// In this sample period.
     At(Placed),
-    /// It is the row before, read once more.
     Repeated,
 }
 
@@ -61,43 +52,33 @@ pub enum Place {
 pub struct Clock {
     stated_hz: Option<f64>,
     state: State,
-    /// Why the time stamps are ignored, where a stated rate contradicts them.
     ignored: Option<String>,
 }
 
 enum State {
-    /// The first rows, until there are enough.
     FirstRows(Vec<RowStamp>),
-    /// Rows are placed as they come.
     Stream(Box<Stream>),
-    /// Rows are placed when the last one has come.
     Coarse(Coarse),
-    /// All places are known.
     Known(Known),
 }
 
-/// Rows that are placed as they come.
 struct Stream {
     clock: StreamClock,
     repeats: RepeatRule,
     before_s: Option<f64>,
-    /// Of each row that is not placed yet, whether it is a repeat.
     waiting: VecDeque<bool>,
     has_index: bool,
-    /// What the stamps of the first rows show.
     first_rows: Option<StampQuality>,
-    /// What all stamps show, where all of them are known.
     all_rows: Option<StampQuality>,
 }
 
-/// Time stamps, s, and whether each row equals the one before, soon after it.
+/// Times, s, and early repeats.
 struct Coarse {
     repeats: RepeatRule,
     times_s: Vec<f64>,
     repeated: Vec<usize>,
 }
 
-/// Places that are known.
 struct Known {
     places: Arc<KnownPlaces>,
     next_row: usize,
@@ -105,23 +86,21 @@ struct Known {
 }
 
 struct KnownPlaces {
-    /// Of each row that is no repeat.
     periods: Vec<u64>,
-    /// Numbers of the rows that are repeats, in ascending order.
+    /// Ascending row numbers of repeats.
     repeated: Vec<usize>,
     stamps: StampQuality,
 }
 
-/// Which rows that equal the one before are one sample that was read twice.
+/// Tells repeated samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct RepeatRule {
-    /// Those that come sooner than this after it, s; 0 where none is.
+    /// Largest interval, s; 0 for none.
     shortest_s: f64,
 }
 
 impl RepeatRule {
-    /// By the first rows. Equal rows that lie a period or more apart are equal by chance: where those that lie closer are equal as often, they
-    /// are samples too.
+    /// By the first rows; if distant rows are equal as often, close ones are samples too.
     fn new(rows: &[RowStamp], stated_hz: Option<f64>) -> Self {
         let none = Self { shortest_s: 0.0 };
         let Some(times) = times_of(rows) else { return none };
@@ -142,7 +121,6 @@ impl RepeatRule {
     }
 }
 
-/// Pairs of neighbouring rows, and how many of them are equal.
 #[derive(Debug, Clone, Copy, Default)]
 struct EqualPairs {
     all: f64,
@@ -150,7 +128,7 @@ struct EqualPairs {
 }
 
 impl Clock {
-    /// Of a recording of this rate, if it is stated, which overrides the rate that its time stamps show.
+    /// A stated rate overrides the stamps.
     ///
     /// # Errors
     /// The rate is not positive and finite.
@@ -161,7 +139,7 @@ impl Clock {
         Ok(Self { stated_hz, state: State::FirstRows(Vec::new()), ignored: None })
     }
 
-    /// The same for another reading of the rows that were placed.
+    /// For another reading.
     pub fn again(&self) -> Result<Self, TimeBaseError> {
         let state = match &self.state {
             State::Stream(stream) => State::Stream(Box::new(stream.again()?)),
@@ -173,8 +151,7 @@ impl Clock {
         Ok(Self { stated_hz: self.stated_hz, state, ignored: self.ignored.clone() })
     }
 
-    /// Takes the next rows, and returns the places of the oldest rows that are not placed yet, as far as they can be told; with `is_last` of
-    /// all of them.
+    /// Takes rows; returns the places of the oldest unplaced ones that are decided, all with `is_last`.
     ///
     /// # Errors
     /// The stamps show no sample period, or another one than the stated rate.
@@ -185,7 +162,7 @@ impl Clock {
                 if first.len() < FIRST_ROWS && !is_last {
                     return Ok(Vec::new());
                 }
-                // The rule is that of the same rows, however many come at once.
+                // As many first rows whatever the batch.
                 let mut first = std::mem::take(first);
                 let later = first.split_off(first.len().min(FIRST_ROWS));
                 let is_all = is_last && later.is_empty();
@@ -228,7 +205,6 @@ impl Clock {
         }
     }
 
-    /// Places rows by their number alone.
     fn row_clock(&self) -> Result<State, TimeBaseError> {
         let (repeats, clock) = (RepeatRule { shortest_s: 0.0 }, StreamClock::new(false, None)?);
         let (before_s, waiting, first_rows, all_rows) = (None, VecDeque::new(), None, None);
@@ -236,12 +212,12 @@ impl Clock {
         Ok(State::Stream(Box::new(stream)))
     }
 
-    /// Why the time stamps are ignored, in a sentence; `None` where they are not.
+    /// Reason to ignore the stamps.
     pub fn note(&self) -> Option<&str> {
         self.ignored.as_deref()
     }
 
-    /// What the stamps of the rows that were placed show; `None` where there are none.
+    /// `None` without stamps.
     pub fn stamps(&self) -> Option<StampQuality> {
         match &self.state {
             State::Stream(stream) => {
@@ -252,10 +228,11 @@ impl Clock {
         }
     }
 
-    /// Checks a recording of `samples` usable samples over `periods` periods, and gives its sample rate, Hz.
+    /// Sample rate, Hz, of `samples` usable samples over `periods`.
     ///
     /// # Errors
-    /// It has fewer than 4 samples, no two neighbours, gaps that are more than 64 times as long as the samples, or no rate.
+    /// It has fewer than 4 samples, no two neighbours, gaps that are more than 64 times as long as the samples, or no
+    /// rate.
     pub fn rate_hz(
         &self,
         samples: u64,
@@ -279,13 +256,11 @@ impl Clock {
 }
 
 impl KnownPlaces {
-    /// Of so many rows one after the other.
     fn of_rows(rows: usize) -> Self {
         Self { periods: (0..rows as u64).collect(), repeated: Vec::new(), stamps: StampQuality::default() }
     }
 }
 
-/// Whether it is the stamps that are at fault: a stated rate needs none.
 fn is_of_stamps(error: &TimeBaseError) -> bool {
     matches!(
         error,
@@ -293,7 +268,7 @@ fn is_of_stamps(error: &TimeBaseError) -> bool {
     )
 }
 
-/// The rule for all rows by the first ones, which are all where `is_all`.
+/// By the first rows; `is_all` if there are no others.
 fn begin(rows: &[RowStamp], stated_hz: Option<f64>, is_all: bool) -> Result<State, TimeBaseError> {
     let repeats = RepeatRule::new(rows, stated_hz);
     let has_index = rows.first().is_some_and(|row| row.index.is_some());
@@ -324,7 +299,7 @@ fn begin(rows: &[RowStamp], stated_hz: Option<f64>, is_all: bool) -> Result<Stat
     }
     let coarse = State::Coarse(Coarse { repeats, times_s: Vec::new(), repeated: Vec::new() });
     let places = match align(&times, repeated, stated_hz) {
-        // More rows may tell it.
+        // More rows may tell.
         Err(TimeBaseError::NoPeriod) if !is_all => return Ok(coarse),
         places => places?,
     };
@@ -354,7 +329,7 @@ impl Stream {
 
     fn place(&mut self, rows: &[RowStamp], is_last: bool) -> Vec<Place> {
         if self.waiting.is_empty() && rows.iter().all(|row| row.time_s.is_none()) {
-            // Without times no row is a repeat, and all are placed at once.
+            // Without times nothing repeats.
             let stamps = rows.iter().map(|row| Stamp { time_s: None, index: row.index });
             return self.clock.place(stamps, is_last).into_iter().map(Place::At).collect();
         }
@@ -396,7 +371,6 @@ impl Coarse {
 }
 
 impl Known {
-    /// The places of the next rows.
     fn next(&mut self, rows: usize) -> Vec<Place> {
         let KnownPlaces { periods, repeated, .. } = self.places.as_ref();
         let place = |row: usize| {
@@ -418,7 +392,7 @@ fn times_of(rows: &[RowStamp]) -> Option<Vec<f64>> {
     rows.iter().map(|row| row.time_s).collect()
 }
 
-/// The places of rows at `times` (s), of which those at `repeated` equal the row before, soon after it.
+/// `times` in s; rows `repeated` equal the row before.
 fn align(times: &[f64], mut repeated: Vec<usize>, stated_hz: Option<f64>) -> Result<KnownPlaces, TimeBaseError> {
     let arrived = |repeated: &[usize]| -> Vec<usize> {
         (0..times.len()).filter(|at| repeated.binary_search(at).is_err()).collect()
@@ -427,7 +401,7 @@ fn align(times: &[f64], mut repeated: Vec<usize>, stated_hz: Option<f64>) -> Res
     let mut positions = arrived(&repeated);
     let mut arrived_s = times_at(&positions);
     let mut alignment = AlignedStamps::new(&arrived_s, stated_hz).ok_or(TimeBaseError::NoPeriod)?;
-    // Coarse stamps do not tell a sample that was read twice from one that equals the one before by chance; the number of samples does.
+    // Coarse stamps: the number of samples tells repeats.
     if alignment.width >= COARSE && take_back(&mut repeated, &positions, &alignment) {
         positions = arrived(&repeated);
         arrived_s = times_at(&positions);
@@ -464,7 +438,7 @@ fn align(times: &[f64], mut repeated: Vec<usize>, stated_hz: Option<f64>) -> Res
         late: late.into_iter().filter(|late| *late).count() as u64,
         clock_steps: Vec::new(),
     };
-    // Periods beyond the range of u64 are all the same.
+    // Saturated periods.
     if !periods.is_sorted_by(|one, next| one < next) {
         let periods = periods.last().map_or(0, |last| last.saturating_add(1));
         return Err(TimeBaseError::TooSparse { samples: arrived_s.len() as u64, periods });
@@ -472,8 +446,7 @@ fn align(times: &[f64], mut repeated: Vec<usize>, stated_hz: Option<f64>) -> Res
     Ok(KnownPlaces { periods, repeated, stamps })
 }
 
-/// Takes rows back that equal the one before by chance: where the coarse stamps of the others, which are at `arrived`, show that as many
-/// samples are missing. Returns whether there are any.
+/// Takes chance repeats back, if the coarse stamps at `arrived` lack as many samples; true if any.
 fn take_back(repeated: &mut Vec<usize>, arrived: &[usize], alignment: &AlignedStamps) -> bool {
     let reach = (SEARCHED_WIDTHS * alignment.width).ceil() as usize;
     let mut taken = Vec::new();
@@ -493,7 +466,7 @@ fn take_back(repeated: &mut Vec<usize>, arrived: &[usize], alignment: &AlignedSt
     !taken.is_empty()
 }
 
-/// The mean interval of the window of samples that lasts as long as half of the others, s.
+/// Mean of the median window, s.
 fn usual_interval(times: &[f64]) -> Option<f64> {
     let window = if times.len() > 4 * REPEATED_READ_WINDOW { REPEATED_READ_WINDOW } else { 1 };
     let mut durations: Vec<f64> = times.windows(window + 1).map(|row| row[window] - row[0]).collect();
@@ -502,7 +475,6 @@ fn usual_interval(times: &[f64]) -> Option<f64> {
     (duration > 0.0 && duration.is_finite()).then_some(duration / window as f64)
 }
 
-/// Checks a stated rate against the stamps.
 fn contradiction(times: &[f64], alignment: &AlignedStamps, stated_hz: f64) -> Result<(), TimeBaseError> {
     let differs = |measured_hz: f64| (measured_hz / stated_hz - 1.0).abs() > MAX_RATE_CONTRADICTION;
     let few_neighbours = (alignment.losses.len() as f64) > (1.0 - MIN_NEIGHBOURS) * times.len() as f64;
@@ -517,7 +489,6 @@ fn contradiction(times: &[f64], alignment: &AlignedStamps, stated_hz: f64) -> Re
     }
 }
 
-/// Whether the gaps of `samples` samples that span so many periods are too long.
 fn is_too_sparse(samples: u64, span: u64) -> bool {
     span / MAX_PERIODS_PER_SAMPLE > samples && span > MAX_PERIODS
 }

@@ -1,37 +1,30 @@
-//! The rate of a clock that changes in the course of a record, and the stamps as a steady clock would have written them.
-//!
-//! The lower envelope of the lateness is followed over hundreds of samples: a period that is wrong by a hundredth moves it by periods,
-//! which would be losses or late deliveries. Where stamps are fine and regular, their intervals show the period at every time.
+//! A clock whose rate changes, by its local period in fine, regular stamps, and its stamps at a steady rate.
 
 use crate::lateness_track::quantile;
 
-/// Intervals whose mean is the local period.
 const WINDOW: usize = 128;
-/// Samples between two local periods.
+/// Samples between local periods.
 const STRIDE: usize = 4;
-/// Largest relative difference from the median of a window of an interval that is one period of it.
+/// Relative distance from the median of regular intervals.
 const NEAR: f64 = 0.04;
-/// Smallest part of the intervals that are one period long, for stamps that count as regular.
 const REGULAR: f64 = 0.75;
-/// The same in a window that may reach over a step of the rate.
 const MAJORITY: f64 = 0.45;
-/// Smallest relative change of the local period that is followed; half of a period in the queue over which the envelope is sought.
+/// Least relative change followed: half a period in the queue.
 const SMALLEST: f64 = 0.5 / 256.0;
-/// Standard errors of a local period in a change that is followed.
+/// Standard errors of a followed change.
 const SIGNIFICANT: f64 = 5.0;
-/// Longest local period, in the shortest, that is that of a clock and not of a queue that is drained.
+/// Ratio of local periods; beyond is a drained queue.
 const PLAUSIBLE: f64 = 1.5;
 
-/// Stamps of a clock whose rate changes.
 pub(crate) struct SteadiedStamps {
-    /// The stamps of a clock with the mean rate, s.
+    /// At the mean rate, s.
     pub(crate) times: Vec<f64>,
-    /// The shortest and the longest local period, s.
+    /// Extreme local periods, s.
     pub(crate) shortest_s: f64,
     pub(crate) longest_s: f64,
 }
 
-/// The mean of the intervals near the median of `window`, how many they are, and the sum of the squares of their distances from it.
+/// Mean, number and sum of squares of intervals near the median.
 fn local(window: &mut [f64]) -> (f64, f64, f64) {
     let median = quantile(window, 1, 2);
     let near = || window.iter().filter(|interval| (*interval - median).abs() <= NEAR * median);
@@ -40,15 +33,14 @@ fn local(window: &mut [f64]) -> (f64, f64, f64) {
     (mean, count, near().map(|interval| (interval - mean) * (interval - mean)).sum())
 }
 
-/// The stamps `times` as a steady clock would have written them; `None` where the clock is steady, or the stamps are too irregular to
-/// show its rate.
+/// At a steady rate; `None` if steady, or too irregular.
 pub(crate) fn steadied(times: &[f64]) -> Option<SteadiedStamps> {
     let intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     if intervals.len() < 2 * WINDOW {
         return None;
     }
     let mut scratch: Vec<f64> = Vec::with_capacity(WINDOW);
-    // One window after the other: most clocks are steady.
+    // Most clocks are steady.
     let mut regularity = Regularity::default();
     let mut periods: Vec<f64> = Vec::new();
     for window in intervals.chunks_exact(WINDOW) {
@@ -81,18 +73,16 @@ pub(crate) fn steadied(times: &[f64]) -> Option<SteadiedStamps> {
     Some(SteadiedStamps { times: steady, shortest_s: clock.shortest_s, longest_s: clock.longest_s })
 }
 
-/// How regular intervals are.
 #[derive(Debug, Clone, Copy, Default)]
 struct Regularity {
     windows: f64,
-    /// Intervals that are one period long.
     regular: f64,
-    /// Squares of their distances from it, in periods.
+    /// Squared distances, periods.
     squares: f64,
 }
 
 impl Regularity {
-    /// Adds the intervals of a window; their period, if most of them are one long.
+    /// Their period, if most are regular.
     fn add(&mut self, window: &mut [f64]) -> Option<f64> {
         let (period, count, squares) = local(window);
         self.windows += 1.0;
@@ -115,7 +105,6 @@ fn differs(period: f64, other: f64, least_change: f64) -> bool {
     (period / other - 1.0).abs() > least_change
 }
 
-/// The period of a clock from one window to the next.
 #[derive(Debug, Clone, Copy)]
 struct LocalPeriod {
     usual_s: f64,
@@ -129,11 +118,10 @@ impl LocalPeriod {
         Self { usual_s, period_s: None, shortest_s: f64::INFINITY, longest_s: 0.0 }
     }
 
-    /// The period in the middle of the intervals of `window`.
     fn follow(&mut self, window: &mut [f64], least_change: f64) -> f64 {
         let (now, count, _) = local(window);
         let is_new = self.period_s.is_none_or(|before| differs(now, before, least_change));
-        // A queue that is drained has intervals far shorter than those around it.
+        // A drained queue has far shorter intervals.
         let is_plausible = (self.usual_s / PLAUSIBLE..=self.usual_s * PLAUSIBLE).contains(&now);
         if is_new && count >= MAJORITY * WINDOW as f64 && is_plausible {
             self.period_s = Some(now);
@@ -145,24 +133,19 @@ impl LocalPeriod {
     }
 }
 
-/// The stamps of a clock as a steady clock would have written them, one block of rows after the other. Nothing changes before the rate does.
+/// Steady stamps, block by block; unchanged until the rate changes.
 pub(crate) struct SteadyStream {
     clock: LocalPeriod,
     regularity: Regularity,
-    /// Whether the rate has changed.
     is_changing: bool,
-    /// Stamps that are not returned yet, and before them those of the window around the first of them.
+    /// Unreturned stamps behind their window.
     times: Vec<f64>,
-    /// How many of them are before it.
     before: usize,
-    /// Intervals at the end that no window has counted.
     uncounted: usize,
-    /// What is added to a stamp.
     correction_s: f64,
 }
 
 impl SteadyStream {
-    /// Of a clock whose usual period is `usual_s`.
     pub(crate) fn new(usual_s: f64) -> Self {
         Self {
             clock: LocalPeriod { period_s: Some(usual_s), ..LocalPeriod::new(usual_s) },
@@ -175,8 +158,7 @@ impl SteadyStream {
         }
     }
 
-    /// Takes the next stamps, s, and returns the oldest of those that are not returned yet: as they are, and as a steady clock would have
-    /// written them. With `is_last` all of them.
+    /// Takes stamps, s; returns the oldest, as they are and steadied; all with `is_last`.
     pub(crate) fn steady(&mut self, next: impl Iterator<Item = f64>, is_last: bool) -> Vec<(f64, f64)> {
         let known = self.times.len();
         self.times.extend(next);
@@ -185,10 +167,10 @@ impl SteadyStream {
         let mut scratch = [0.0; WINDOW];
         let mut returned = Vec::new();
         let mut at = self.before;
-        // The interval before a stamp is corrected, so that the first stamp stays.
+        // The first stamp stays.
         while at < self.times.len() && (is_last || at + 2 * WINDOW < self.times.len()) {
             let part = (self.times.len() - at).min(STRIDE);
-            // A window is counted, and shows a change, when the stamps come near it.
+            // Windows are counted as the stamps approach.
             while self.uncounted >= WINDOW && intervals.len() - self.uncounted <= at + WINDOW {
                 let first = intervals.len() - self.uncounted;
                 scratch.copy_from_slice(&intervals[first..first + WINDOW]);
@@ -217,7 +199,7 @@ impl SteadyStream {
         returned
     }
 
-    /// The shortest and the longest local period, s, where the rate has changed.
+    /// Extreme local periods, s, after a change.
     pub(crate) fn periods_s(&self) -> Option<[f64; 2]> {
         self.is_changing.then_some([self.clock.shortest_s, self.clock.longest_s])
     }

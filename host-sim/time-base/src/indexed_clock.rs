@@ -1,48 +1,44 @@
-//! Time stamps beside the index of the samples: the rate, and where index and time contradict each other.
+//! Stamps beside an index: rate, and contradictions.
 
 use crate::aligned_stamps::RateEstimate;
 use crate::lateness_track::slope;
 use crate::lower_envelope::minimum_ahead;
 
-/// Samples over which the lower envelope of the lateness is sought, as deep a queue as is read late.
 const MAX_QUEUE: usize = 64;
-/// Windows, in samples, whose median duration gives a first period: the longest that the record has enough of.
+/// Window lengths for a first period.
 const WINDOWS: [usize; 4] = [4096, 256, 16, 1];
-/// Change of the envelope, in periods and in seconds, that is a step of the clock: more than a tick and a stall make.
+/// Periods and seconds of a clock's step, above ticks and stalls.
 pub(crate) const STEP_PERIODS: f64 = 16.0;
 pub(crate) const STEP_S: f64 = 0.25;
-/// Shift of the phase that is followed, per sample.
+/// Per sample.
 const PHASE_TRACKING: f64 = 1.0 / 64.0;
-/// Blocks whose mean residuals give the interval of the rate.
+/// Blocks for the rate's interval.
 const BLOCKS: usize = 16;
-/// Smallest relative half-width of the interval: the rounding of times in f64.
+/// Relative; rounding in f64.
 const MIN_RATE_ERROR: f64 = 1e-9;
 
-/// The host's clock went on by more, or by less, than the index.
+/// A jump of the host's clock against the index.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClockStep {
-    /// Position of the sample after the step.
     pub before: usize,
-    /// Time that the stamps show beyond the time that the index shows, s.
+    /// Stamps less index, s.
     pub seconds: f64,
 }
 
-/// What the stamps beside an index tell.
 pub(crate) struct IndexedClock {
-    /// The rate; `None` if the samples span no time.
+    /// `None` without a time span.
     pub(crate) rate: Option<RateEstimate>,
-    /// Steps of the clock, in their order.
     pub(crate) steps: Vec<ClockStep>,
 }
 
 impl IndexedClock {
-    /// Compares strictly growing `indices` with `times` in s, not decreasing.
+    /// `indices` strictly growing, `times` in s not decreasing.
     pub(crate) fn new(indices: &[u64], times: &[f64]) -> Self {
         let none = Self { rate: None, steps: Vec::new() };
         let Some(mut period_s) = first_period(indices, times) else { return none };
         let mut steps = steps(indices, times, period_s);
         let mut corrected = without(times, &steps);
-        // The period of the median window may be some parts in a thousand off, the line through all samples is not.
+        // The line is more precise.
         if let Some(refined_s) = slope(indices, &corrected, |_| true) {
             period_s = refined_s;
             steps = self::steps(indices, times, period_s);
@@ -64,7 +60,7 @@ impl IndexedClock {
     }
 }
 
-/// The median of the durations of windows, by their indices, s.
+/// s.
 fn first_period(indices: &[u64], times: &[f64]) -> Option<f64> {
     let window = WINDOWS.into_iter().find(|window| 4 * window <= times.len()).unwrap_or(1);
     let mut periods: Vec<f64> = (window..times.len())
@@ -89,7 +85,7 @@ fn steps(indices: &[u64], times: &[f64], period_s: f64) -> Vec<ClockStep> {
     let mut phase = envelope.first().copied().unwrap_or(0.0);
     let mut steps = Vec::new();
     for at in 0..lateness.len() {
-        // A clock that is set back, or an index that leaps, shows in the sample itself; the envelope sees it before.
+        // Steps back and leaps of the index show at once.
         let excess = if lateness[at] - phase < -least { lateness[at] - phase } else { envelope[at] - phase };
         if excess >= least || lateness[at] - phase < -least {
             steps.push(ClockStep { before: at, seconds: excess * period_s });
@@ -101,7 +97,6 @@ fn steps(indices: &[u64], times: &[f64], period_s: f64) -> Vec<ClockStep> {
     steps
 }
 
-/// The times with the steps taken out.
 fn without(times: &[f64], steps: &[ClockStep]) -> Vec<f64> {
     let mut steps = steps.iter().peekable();
     let mut offset = 0.0;

@@ -1,33 +1,26 @@
-//! Stamps that no steady clock with a fine tick writes: of loops that ask for samples when they have time, of numbers with few digits, whose
-//! tick grows with the time, and of clocks whose tick holds many samples.
-//!
-//! Each of them shows losses that are none to whoever takes one clock and one tick for granted.
+//! Stamps without a steady fine clock: polling loops, few digits, ticks of many samples; they look like losses.
 
 use crate::aligned_stamps::{AlignedStamps, RateEstimate};
 use crate::lateness_track::{LONG, LostStretch, quantile};
 
-/// Rows within which others make up for a late one.
+/// Rows that make up for a late one.
 const CATCHES_UP: usize = 16;
-/// Rows whose mean interval is the local period of a loop.
 const WINDOW: usize = 128;
 
-/// Ticks that hold so many samples are counted through.
+/// Samples per tick that are counted.
 const MANY: f64 = 32.0;
-/// Fewest whole ticks that tell a rate.
 const LEAST_TICKS: usize = 2;
-/// Samples by which two ticks may differ that hold equally many: their edges are rounded.
+/// Difference of equal ticks by rounding.
 const ROUNDING: f64 = 2.0;
 
-/// Digits of stamps that are few.
 const FEW_DIGITS: std::ops::RangeInclusive<i32> = 3..=7;
-/// Bits of a float in single precision.
 const SINGLE_BITS: i32 = 24;
-/// Rounding of a time, relative to it.
+/// Relative.
 const EXACT: f64 = 1e-12;
-/// Smallest tick that is of use, in mean intervals.
+/// In mean intervals.
 const LEAST_TICK: f64 = 0.05;
 
-/// Stamps that a loop wrote which asks for a sample when it has time, s: a sample is missing where an interval is long, and nowhere else.
+/// For a polling loop, s: only long intervals lack samples.
 pub(crate) fn of_loop(times: &[f64], tick_s: Option<f64>) -> Option<AlignedStamps> {
     let intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let usual_s = quantile(&mut intervals.clone(), 1, 2);
@@ -43,7 +36,7 @@ pub(crate) fn of_loop(times: &[f64], tick_s: Option<f64>) -> Option<AlignedStamp
         if let Some(&interval) = at.checked_sub(1).and_then(|before| intervals.get(before)) {
             let excess = (interval / usual_s).round() - 1.0;
             if interval >= LONG * usual_s && excess >= 1.0 && surplus(at - 1) >= LONG - 1.0 {
-                // A float beyond the range of u64 saturates.
+                // Saturates.
                 missing = missing.saturating_add(excess as u64);
                 missing_s += excess * usual_s;
                 losses.push(LostStretch { before: at, missing: excess as u64, certain: false });
@@ -77,22 +70,19 @@ pub(crate) fn of_loop(times: &[f64], tick_s: Option<f64>) -> Option<AlignedStamp
     })
 }
 
-/// Whether a tick of these stamps holds so many samples that they are counted through.
+/// True for ticks of many samples.
 pub(crate) fn is_of_many(times: &[f64], tick_s: f64) -> bool {
     let span_s = times.last().zip(times.first()).map_or(0.0, |(last, first)| last - first);
     tick_s * (times.len() as f64) > MANY * span_s && span_s > 0.0
 }
 
-/// The rows between two changes of the stamp.
 struct WholeTicks {
-    /// The row after them.
     end: usize,
     rows: f64,
     ticks: f64,
 }
 
-/// Stamps whose ticks hold many samples: the first sample of each tick is known to a sample period, and no other. Samples are missing from a
-/// tick where most others hold equally many more.
+/// Ticks of many samples: the first sample of each is known; samples are missing where other ticks hold more.
 pub(crate) fn by_ticks(times: &[f64], tick_s: f64, stated_hz: Option<f64>) -> Option<AlignedStamps> {
     let starts: Vec<usize> = (1..times.len()).filter(|at| times[*at] > times[*at - 1]).collect();
     let between = |pair: &[usize]| WholeTicks {
@@ -104,7 +94,7 @@ pub(crate) fn by_ticks(times: &[f64], tick_s: f64, stated_hz: Option<f64>) -> Op
     if wholes.len() < LEAST_TICKS {
         return None;
     }
-    // Samples of a tick: as most ticks have, else as all have together.
+    // As most ticks, else as all together.
     let mut counts: Vec<f64> = wholes.iter().map(|of| of.rows / of.ticks).collect();
     let usual = quantile(&mut counts, 1, 2);
     let is_alike = |of: &&WholeTicks| (of.rows - usual * of.ticks).abs() <= ROUNDING;
@@ -145,7 +135,7 @@ pub(crate) fn by_ticks(times: &[f64], tick_s: f64, stated_hz: Option<f64>) -> Op
     })
 }
 
-/// Stamps in so few digits that their tick grows with the time, all rounded as the last ones are; `None` for others.
+/// Few digits: rounded as the last ones; `None` for others.
 pub(crate) fn of_few_digits(times: &[f64]) -> Option<Vec<f64>> {
     let largest = times.iter().fold(0.0, |most: f64, time| most.max(time.abs()));
     let smallest = times.iter().map(|time| time.abs()).filter(|time| *time > 0.0).fold(f64::INFINITY, f64::min);

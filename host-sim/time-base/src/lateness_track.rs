@@ -1,81 +1,71 @@
-//! The lateness of the samples against periods of a given length: its lower envelope, the losses that lift it, and how short
-//! a description of the time stamps they are.
+//! Lateness against a fixed period: lower envelope, losses, description length.
 
 use crate::lower_envelope::{MinimumBehind, minimum_ahead};
 
-/// Samples over which the lower envelope is sought while the period is: a period that is wrong by a part in 200 hides a loss in a window of 200 samples.
+/// Samples of the envelope during the search: a period off by 1/200 hides a loss in 200.
 pub(crate) const SEARCH_QUEUE: usize = 64;
-/// Samples whose least envelope a rise of the envelope is measured from: a period that is wrong by a part in 32 causes no
-/// false loss.
+/// Samples from whose least envelope a rise counts.
 pub(crate) const MEMORY: usize = 16;
-/// The same where stamps are coarse, in widths of the lateness: so many ticks tell where the envelope is.
+/// For coarse stamps, in widths of the lateness.
 const TICKS_IN_MEMORY: f64 = 12.0;
-/// Width of the lateness, in periods, from which stamps count as coarse.
+/// Width of coarse stamps, periods.
 pub(crate) const COARSE: f64 = 0.6;
-/// Rise of the envelope, in periods, that is a loss. Coarse stamps move the envelope by up to half a period, where two
-/// ticks are nearly an odd number of periods.
+/// Rise of a loss, periods; coarse stamps move the envelope by up to half a period.
 pub(crate) const LOSS: f64 = 0.5;
 const COARSE_LOSS: f64 = 0.7;
-/// Interval, in periods, that a lost sample makes at least.
+/// Least interval of a loss, periods.
 pub(crate) const LONG: f64 = 1.5;
 
-/// Growth of the lateness in such an interval, in periods; rounding takes a tick, also in periods.
+/// Growth of the lateness, periods, less the tick.
 pub(crate) fn least_growth(tick: Option<f64>) -> f64 {
     LONG - 1.0 - tick.unwrap_or(0.0)
 }
 
-/// Distance of a rise from a whole number of periods below which nothing but a loss explains it.
+/// Distance from whole periods below which only a loss explains a rise.
 pub(crate) const CERTAIN: f64 = 0.3;
-/// Times that an estimate of the period is improved by the alignment that it gives.
 const MAX_REFINEMENTS: usize = 12;
-/// Relative change of the period with which it is good enough to align by: a tenth of a period in a queue of 256 would be 4e-4.
+/// Relative; 4e-4 would be a tenth of a period in a queue of 256.
 const CONVERGED: f64 = 2e-5;
-/// Fewest losses whose lengths and distances are compared with those of independent ones.
+/// Fewest losses compared with independent ones.
 const MIN_COMPARED: usize = 8;
-/// Largest variance that losses add to the duration of many samples, in that which this duration has and which 32 windows or more tell to
-/// a quarter.
 const INDEPENDENT: f64 = 2.0;
-/// Parts of the record, and most samples, of a window whose duration tells what the samples in it have in common.
+/// Parts of the record, and most samples, of a window.
 const WINDOWS: usize = 32;
 const LONGEST_WINDOW: usize = 512;
-/// Samples over which the scatter of the lateness is measured: a clock that drifts by 100 ppm moves by a fifth of a period.
+/// Drift of 100 ppm moves by a fifth of a period.
 const COST_BLOCK: usize = 2048;
-/// Median scatter of the lateness, in periods, below which more order is no evidence.
+/// Periods; more order is no evidence.
 const ORDER: f64 = 0.1;
-/// The median deviation from the median of a uniform distribution, in widths.
+/// In widths.
 const UNIFORM_MEDIAN_DEVIATION: f64 = 0.25;
-/// Blocks of the record whose mean residuals give the interval of the rate.
+/// Blocks for the rate's interval.
 const BLOCKS: usize = 16;
-/// Smallest relative half-width of the interval of a rate: the rounding of a time in f64 over a record of some samples.
+/// Relative; rounding in f64.
 const MIN_RATE_ERROR: f64 = 1e-9;
 
 /// Samples that were lost between two samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LostStretch {
-    /// Position in the recording of the sample after the loss. With coarse stamps the loss may be some ticks before.
+    /// Sample behind the loss; coarse stamps may be some ticks late.
     pub before: usize,
     /// Sample periods without a sample.
     pub missing: u64,
-    /// Whether nothing but a loss explains the stamps.
     pub certain: bool,
 }
 
-/// An alignment to periods of a given length.
 pub(crate) struct Track {
     pub(crate) period_s: f64,
     pub(crate) periods: Vec<u64>,
-    /// Lateness above the envelope's phase, periods.
+    /// Above the envelope, periods.
     above: Vec<f64>,
     pub(crate) losses: Vec<LostStretch>,
     pub(crate) width: f64,
-    /// Rises of the envelope without a long interval near them, which are no losses.
+    /// Rises without a long interval: no losses.
     pub(crate) gentle_rises: usize,
 }
 
 impl Track {
-    /// Aligns with a period, and again with the period that the alignment shows, until the period stays. Of these alignments
-    /// the one with the shortest description; with its cost. The envelope is sought over `queue` samples, and losses of fewer than `least`
-    /// samples are none.
+    /// Aligns until the period stays; returns the shortest description with its cost.
     pub(crate) fn refined(
         times: &[f64],
         period_s: f64,
@@ -97,13 +87,12 @@ impl Track {
         best
     }
 
-    /// Aligns `times` to periods of `period_s`, as [`refined`](Self::refined) does.
+    /// As [`refined`](Self::refined).
     pub(crate) fn new(times: &[f64], period_s: f64, tick_s: Option<f64>, (queue, least): (usize, u64)) -> Self {
         Self::of_lateness(lateness(times, period_s), period_s, tick_s, (queue, least))
     }
 
-    /// What would be losses if the samples of this alignment came in the opposite order. A loss lifts the lateness for good and nothing lowers
-    /// it for good, so that these are late deliveries; as many rises of the envelope are late deliveries too.
+    /// Losses in reversed order, which are late deliveries; as many rises are late deliveries too.
     pub(crate) fn falls(&self, times: &[f64], queue: usize) -> Vec<LostStretch> {
         let mut opposite = lateness(times, self.period_s);
         for ((at, late), period) in opposite.iter_mut().enumerate().zip(&self.periods) {
@@ -116,11 +105,11 @@ impl Track {
     fn of_lateness(lateness: Vec<f64>, period_s: f64, tick_s: Option<f64>, (queue, least): (usize, u64)) -> Self {
         let samples = lateness.len();
         let near = minimum_ahead(&lateness, SEARCH_QUEUE);
-        // A lost sample makes an interval long, in whatever order and however late the others are read.
+        // A loss makes a long interval in any order.
         let least_growth = least_growth(tick_s.map(|tick_s| tick_s / period_s));
         let is_long: Vec<bool> = lateness.windows(2).map(|pair| pair[1] - pair[0] >= least_growth).collect();
         let mut above: Vec<f64> = lateness.iter().zip(&near).map(|(late, least)| late - least).collect();
-        // Of a uniform lateness three quarters are below 3/4 of its width; late deliveries are fewer than the fourth.
+        // Uniform lateness: three quarters are below 3/4 of its width.
         let quartile = quantile(&mut above, 3, 4) * 4.0 / 3.0;
         drop(above);
         let width = tick_s.map_or(quartile, |tick| quartile.max((tick / period_s).min(quartile * 2.0)));
@@ -141,7 +130,7 @@ impl Track {
             drop(near);
             minimum_ahead(&lateness, queue.max(memory))
         };
-        // In the last ticks no later sample tells how far the envelope is: no loss is found there.
+        // The last ticks cannot show a loss.
         let undecided = if is_coarse { (2.0 * width).ceil() as usize + 1 } else { 0 };
         let last = samples.saturating_sub(undecided + 1);
         let periods = Vec::with_capacity(samples);
@@ -152,17 +141,17 @@ impl Track {
         for at in 0..samples {
             let lowest = envelope[at.min(last)];
             let excess = level.minimum().map_or(0.0, |level| lowest - missing as f64 - level);
-            // Towards the end the envelope is that of fewer ticks, and may rise by a period without a loss.
+            // Few ticks remain.
             let threshold = if is_coarse && at + memory > samples { threshold + 1.0 } else { threshold };
             if excess >= threshold && !is_abrupt(at) {
                 track.gentle_rises += usize::from(at >= gentle_until);
                 gentle_until = at + memory;
             } else if excess >= threshold {
-                // A float beyond the range of u64 saturates.
+                // Saturates.
                 let lost = (excess.round() as u64).max(1);
                 missing = missing.saturating_add(lost);
                 let certain = (excess - excess.round()).abs() < CERTAIN;
-                // Stamps within a tick or two do not tell one loss from two.
+                // Stamps within two ticks do not separate losses.
                 match track.losses.last_mut().filter(|last| at - last.before <= undecided) {
                     Some(last) => {
                         *last = LostStretch { missing: last.missing.saturating_add(lost), certain: true, ..*last };
@@ -178,9 +167,7 @@ impl Track {
         track
     }
 
-    /// Whether the losses are as independent of each other as the durations of many samples let them be, which gain `persistent` s² of
-    /// variance a sample. Samples that wait and then come together, and stamps that beat, look like losses at distances that make up for
-    /// each other.
+    /// True if losses are as independent as the durations, with `persistent` s² per sample, allow.
     pub(crate) fn are_losses_independent(&self, persistent: f64) -> bool {
         let samples = self.periods.len() as f64;
         let (sum, squares) = self.losses.iter().fold((0.0, 0.0), |(sum, squares): (f64, f64), loss| {
@@ -191,7 +178,6 @@ impl Track {
         self.losses.len() < MIN_COMPARED || variance <= INDEPENDENT * persistent
     }
 
-    /// The samples of `other` without a loss between them.
     pub(crate) fn complete(times: &[f64], other: &Self) -> Self {
         let periods: Vec<u64> = (0..times.len() as u64).collect();
         let slope_s = slope(&periods, times, |_| true).unwrap_or(other.period_s);
@@ -210,16 +196,12 @@ impl Track {
         self.above[at] >= 1.0 + if self.width < COARSE { 0.0 } else { self.width }
     }
 
-    /// Period by the samples that are not late, s.
+    /// By samples that are not late, s.
     pub(crate) fn slope_s(&self, times: &[f64]) -> Option<f64> {
         slope(&self.periods, times, |at| !self.is_late(at))
     }
 
-    /// Description length of the stamps by this alignment, natural units of information, less that of a stamp without a clock, to within
-    /// 1 s.
-    ///
-    /// It is that of the samples which are stamped first after they were taken, one a tick. Their scatter is measured around
-    /// the middle of each block of the record and not around the envelope, which follows a wrong period.
+    /// Description length, nats, over that without a clock, to 1 s; by the first sample of each tick.
     pub(crate) fn cost(&self, times: &[f64], tick_s: Option<f64>) -> f64 {
         let mut residuals = lateness(times, self.period_s);
         for ((at, residual), period) in residuals.iter_mut().enumerate().zip(&self.periods) {
@@ -240,8 +222,7 @@ impl Track {
         samples / tick * (scatter.max(rounding).max(ORDER) * self.period_s).ln() + cost_of(&self.losses, samples)
     }
 
-    /// Relative error of the slope: the range of the mean residuals of 16 blocks, over the length of the record. Four standard
-    /// errors where the residuals are independent; a clock that drifts widens it by its drift.
+    /// Range of 16 blocks' mean residuals over the length: four standard errors, or the drift.
     pub(crate) fn slope_error(&self, times: &[f64], slope_s: f64) -> f64 {
         let on_time: Vec<usize> = (0..times.len()).filter(|at| !self.is_late(*at)).collect();
         let length = (on_time.len() / BLOCKS).max(1);
@@ -254,14 +235,13 @@ impl Track {
             .map(mean)
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), mean| (mean.min(low), mean.max(high)));
         let span = self.periods.last().map_or(1.0, |&last| (last as f64).max(1.0));
-        // Ticks that are no fraction of the period fall evenly over it; those that nearly are move the line by up to one.
+        // Ticks near a fraction of the period move the line.
         let rounding = if self.width < COARSE { self.width } else { self.width / (on_time.len() as f64).sqrt() };
         (high - low).max(rounding) / span + MIN_RATE_ERROR
     }
 }
 
-/// Description length of losses among so many samples: before which samples they are, and their lengths, of a geometric distribution
-/// with their mean.
+/// Positions, and geometric lengths.
 fn cost_of(losses: &[LostStretch], samples: f64) -> f64 {
     let entropy = |part: f64| {
         let terms = [part, 1.0 - part].map(|part| if part > 0.0 { -part * part.ln() } else { 0.0 });
@@ -272,7 +252,7 @@ fn cost_of(losses: &[LostStretch], samples: f64) -> f64 {
     if missing > 0.0 { samples * entropy((count / samples).min(1.0)) + missing * entropy(count / missing) } else { 0.0 }
 }
 
-/// The variance in s² that a sample adds to the duration of many: that of the durations of long windows, over their length.
+/// Variance of long windows over their length, s².
 pub(crate) fn persistent_variance(times: &[f64]) -> f64 {
     let window = (times.len() / WINDOWS).clamp(1, LONGEST_WINDOW);
     let durations = || times.windows(window + 1).map(|row| row[window] - row[0]);
@@ -281,13 +261,13 @@ pub(crate) fn persistent_variance(times: &[f64]) -> f64 {
     durations().map(|duration| (duration - mean) * (duration - mean)).sum::<f64>() / count / window as f64
 }
 
-/// How many periods after its turn each sample was stamped, from the first sample.
+/// Periods from the first sample.
 fn lateness(times: &[f64], period_s: f64) -> Vec<f64> {
     let origin = times.first().copied().unwrap_or(0.0);
     times.iter().enumerate().map(|(at, time)| (time - origin) / period_s - at as f64).collect()
 }
 
-/// The value below which `parts` of `of` of the values lie; 0 without values.
+/// Value below which `parts`/`of` lie; 0 without values.
 pub fn quantile(values: &mut [f64], parts: usize, of: usize) -> f64 {
     if values.is_empty() {
         return 0.0;
@@ -296,11 +276,10 @@ pub fn quantile(values: &mut [f64], parts: usize, of: usize) -> f64 {
     *values.select_nth_unstable_by(at, f64::total_cmp).1
 }
 
-/// Slope in s of the least-squares line of time over period, for the samples that `admitted` selects. `None` if they span
-/// no time.
+/// Least-squares slope, s, of `admitted` samples; `None` without a span.
 pub(crate) fn slope(periods: &[u64], times: &[f64], admitted: impl Fn(usize) -> bool) -> Option<f64> {
     let (&first_period, &first_time) = (periods.first()?, times.first()?);
-    // Relative to the first sample: a late origin would cost digits.
+    // Relative to the first, for digits.
     let points = || {
         periods
             .iter()

@@ -1,10 +1,7 @@
-//! Time base of a recording: its sample rate, and the sample period in which each sample was taken.
+//! Time base of a recording: sample rate, and sample period of each sample.
 //!
-//! A sample that was read late is not a lost sample, and stamps that are coarser than the sample period are no losses:
-//! a loss is counted only where nothing else explains the stamps. What they cannot tell is said in [`StampQuality`].
-//!
-//! [`StampOrder`] takes stamps as a file has them, of counters that wrap and clocks that are set; [`Clock`] finds the sample period of
-//! each row by its stamp and its index.
+//! [`StampOrder`] handles counters that wrap and clocks that are set; [`Clock`] places rows; [`StampQuality`] states
+//! doubts.
 
 mod aligned_stamps;
 mod clock;

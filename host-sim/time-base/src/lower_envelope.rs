@@ -1,11 +1,11 @@
-//! The minimum of a series over a window ahead of each value or behind it.
+//! Minimum of a window ahead or behind.
 
 use std::collections::VecDeque;
 
-/// For each value the minimum of it and the `window − 1` values after it.
+/// For each value and the `window − 1` after it.
 pub(crate) fn minimum_ahead(values: &[f64], window: usize) -> Vec<f64> {
     let mut least = vec![0.0; values.len()];
-    // Positions ahead whose values decrease with their distance; the back is the minimum of the window.
+    // Increasing positions; the back is the minimum.
     let mut candidates: VecDeque<usize> = VecDeque::with_capacity(window.min(values.len()));
     for at in (0..values.len()).rev() {
         while candidates.front().is_some_and(|&ahead| values[ahead] >= values[at]) {
@@ -20,21 +20,19 @@ pub(crate) fn minimum_ahead(values: &[f64], window: usize) -> Vec<f64> {
     least
 }
 
-/// The minimum of the last values that were pushed.
 pub(crate) struct MinimumBehind {
     window: usize,
     pushed: usize,
-    /// Values that increase towards the newest, each with its number; the front is the minimum.
+    /// Increasing, with numbers; the front is the minimum.
     candidates: VecDeque<(usize, f64)>,
 }
 
 impl MinimumBehind {
-    /// Of the last `window` values, at least 1.
+    /// `window` is at least 1.
     pub(crate) fn new(window: usize) -> Self {
         Self { window, pushed: 0, candidates: VecDeque::new() }
     }
 
-    /// Adds a value.
     pub(crate) fn push(&mut self, value: f64) {
         while self.candidates.back().is_some_and(|&(_, newest)| newest >= value) {
             self.candidates.pop_back();

@@ -1,14 +1,8 @@
-//! Time stamps aligned to sample periods: the period, its interval, and which samples were lost or came late.
+//! Time stamps aligned to sample periods: period, interval, losses, late samples.
 //!
-//! A sample is read after it was taken, never before. Its lateness `c_i = t_i/T − i`, in sample periods `T`, therefore has a
-//! lower envelope: the number of samples that were lost before sample `i`. A stall of the host lifts `c` above the envelope
-//! until the queue is empty; a lost sample lifts the envelope itself by one for the rest of the record. Stamps that are
-//! coarser than the period spread `c` over several periods, but their envelope stays: the samples that are stamped just
-//! after they were taken.
-//!
-//! The period is not known beforehand. Several estimates of it are tried, each improved until it explains itself, and the
-//! one that needs the shortest description wins: the scatter of the lateness, no part of it below the tick of the stamps
-//! being worth anything, and the losses.
+//! Lateness `c_i = t_i/T − i` has a lower envelope, the losses before sample `i`: a stall lifts `c` for a while, a loss
+//! the envelope for good, and coarse stamps spread `c` above it. The period with the shortest description of scatter
+//! and losses wins.
 
 pub(crate) use crate::aligned_stamps::{AlignedStamps, RateEstimate};
 use crate::clock_rate::{SteadiedStamps, steadied};
@@ -16,56 +10,50 @@ use crate::irregular_stamps::{by_ticks, is_of_many, of_few_digits, of_loop};
 use crate::lateness_track::{COARSE, LostStretch, SEARCH_QUEUE, Track, persistent_variance, quantile};
 use crate::stamp_tick::tick;
 
-/// Samples over which the lower envelope of the lateness is sought: the deepest queue whose late delivery is distinguished
-/// from a loss. The last samples of a record have fewer after them, so there a late delivery may count as a loss.
+/// Samples of the envelope: the deepest queue told from a loss.
 pub(crate) const MAX_QUEUE: usize = 256;
 
-/// Lengths, in samples, of the windows whose durations give estimates of the period.
+/// Windows, samples, for estimates of the period.
 const WINDOWS: [usize; 6] = [1, 8, 32, 128, 512, 2048];
-/// Largest difference of their durations, in periods, that counts as jitter. Intervals of samples that have queued up are
-/// shorter, those across gaps and stalls longer.
+/// Largest jitter of their durations, periods.
 const NEAR: f64 = 0.6;
-/// Samples at the start of the record in which the period is sought, before it is improved with all of them.
+/// Searched samples at the start.
 const SEARCHED: usize = 100_000;
-/// Of these the samples, and the relative steps, in which it is sought where stamps are coarse and samples are lost.
+/// Samples and steps of the scan for coarse stamps with losses.
 const SCANNED: usize = 20_000;
 const SCAN_STEP: f64 = 1e-3;
 const SCAN_STEPS: u32 = 80;
 
-/// Largest relative difference of a period from the stated one.
+/// Relative to a stated rate.
 const MAX_CLOCK_ERROR: f64 = 0.1;
 
-/// Rises of the envelope, in its falls, that are losses and not late deliveries; and fewest of them where there is no fall.
+/// Ratio of rises to falls that are losses, and fewest rises.
 const TELLING: usize = 8;
-/// Ratio of the third to the first quartile of intervals that are of any length.
+/// Quartile ratio of unlike intervals.
 const UNLIKE: f64 = 1.5;
-/// Ticks in an interval that may be the tick itself.
+/// Ticks per interval that may be the tick.
 const FEW_TICKS: f64 = 2.5;
-/// Fewest rises of the envelope without a long interval that show a loop, and no clock.
+/// Rises without long intervals of a loop.
 const GENTLE: usize = 3;
-/// Probability that the longest rise by chance is taken for a loss.
 const FALSE_ALARM: f64 = 1e-3;
 
-/// Share of losses up to which an alignment of fine stamps is taken without looking for a better one.
+/// Largest share of losses without a further search.
 const CLEAR: f64 = 0.02;
 
-/// Distance of the tick from a whole number of periods below which the two beat: the stamps step over a period once in a beat.
+/// Distance of the tick from whole periods that beats.
 const BEAT: f64 = 0.1;
-/// Fewest steps that are taken for a beat. Two losses always lie at equal distances.
+/// Two losses always lie at equal distances.
 const MIN_BEATS: usize = 3;
-/// Scatter of the steps of a beat around a line, periods.
+/// Periods.
 const BEAT_SCATTER: f64 = 1.25;
 
-/// Fewest ticks between two losses, on average, with which single losses are told from the rounding of the stamps: with fewer
-/// up to two thirds of them were not found in generated records.
+/// Fewest ticks between losses to tell single ones: below, two thirds were missed.
 const MIN_TICKS_BETWEEN_LOSSES: f64 = 16.0;
-/// Losses that may have been overlooked there for each one that was found.
+/// Overlooked losses per found one.
 const OVERLOOKED: f64 = 4.0;
 
 impl AlignedStamps {
-    /// Aligns `times` (s, not decreasing). A stated rate in Hz is believed to within 10 %.
-    ///
-    /// `None` where no period in this range can be seen in them.
+    /// Aligns `times` (s, not decreasing), within 10 % of a stated rate; `None` without a visible period.
     pub(crate) fn new(times: &[f64], stated_hz: Option<f64>) -> Option<Self> {
         let tick_s = tick(times);
         if let Some(tick_s) = tick_s.filter(|tick_s| is_of_many(times, *tick_s)) {
@@ -88,7 +76,6 @@ impl AlignedStamps {
         Some(alignment)
     }
 
-    /// The same for the stamps of a clock whose rate is constant.
     fn of_steady(times: &[f64], stated_hz: Option<f64>) -> Option<Self> {
         let tick_s = tick(times);
         let stated_s = stated_hz.map(f64::recip);
@@ -105,7 +92,7 @@ impl AlignedStamps {
                 (_, track) = Track::refined(times, complete, tick_s, (MAX_QUEUE, least_loss));
             }
         }
-        // Whether the tick is near a whole number of periods, at least one.
+        // Near whole periods.
         let beats = match ticks_per_period {
             Some(periods) => periods > 0.5 && (periods - periods.round()).abs() < BEAT,
             None => track.width >= COARSE || track.losses.len() as f64 > CLEAR * times.len() as f64,
@@ -117,7 +104,7 @@ impl AlignedStamps {
                 loss.certain &= loss.missing > 1;
             }
         }
-        // Of single samples no more can have been lost than make the durations as different as they are.
+        // Bounded by the durations' scatter.
         let hidden = if least_loss > 1 { persistent / (track.period_s * track.period_s) } else { 0.0 };
         let mut alignment = Self::from_track(track, times, tick_s);
         alignment.rate.iter_mut().for_each(|rate| rate.high_hz *= 1.0 + hidden);
@@ -126,20 +113,19 @@ impl AlignedStamps {
         Some(alignment)
     }
 
-    /// What an alignment shows.
     fn from_track(track: Track, times: &[f64], tick_s: Option<f64>) -> Self {
         let samples = times.len() as f64;
-        // Losses that lie within a tick of each other look like one of several samples: an outage is longer than the tick.
+        // Losses within a tick look like one longer one.
         let single: f64 = track.losses.iter().map(|loss| (loss.missing as f64).min(track.width.ceil())).sum();
         let resolved = track.width < COARSE || samples >= MIN_TICKS_BETWEEN_LOSSES * track.width * single;
-        // Of losses that lie within a tick of each other the stamps show the sum at best; so many do if they are random.
+        // At best the stamps show their sum.
         let events = track.losses.len() as f64;
         let confused = if track.width < COARSE { 0.0 } else { events * events * track.width / samples };
         let surplus = uncertain(&track.losses, resolved) as f64 + confused;
         let rate = track.slope_s(times).and_then(|slope_s| {
             let error = track.slope_error(times, slope_s);
             let hz = slope_s.recip();
-            // If the uncertain losses are none, the samples were taken at a lower rate; if some were overlooked, at a higher.
+            // Without the uncertain losses, or with overlooked ones.
             let rows_only = 1.0 - surplus / (samples + surplus);
             let overlooked = if resolved { confused } else { confused + OVERLOOKED * surplus };
             let rate = RateEstimate {
@@ -156,13 +142,13 @@ impl AlignedStamps {
     }
 }
 
-/// Samples in losses that something else may explain: of a long loss that is uncertain one sample.
+/// At most one per uncertain long loss.
 pub(crate) fn uncertain(losses: &[LostStretch], resolved: bool) -> u64 {
     let samples = losses.iter().map(|loss| if resolved { u64::from(!loss.certain) } else { loss.missing });
     samples.fold(0, u64::saturating_add)
 }
 
-/// The period, s, whose alignment describes the start of the record most shortly.
+/// s, for the start of the record.
 fn search(times: &[f64], stated_s: Option<f64>, tick_s: Option<f64>) -> Option<f64> {
     let first = &times[..times.len().min(SEARCHED)];
     let is_plausible = |period_s: f64| {
@@ -173,7 +159,7 @@ fn search(times: &[f64], stated_s: Option<f64>, tick_s: Option<f64>) -> Option<f
     let mut tried: Vec<f64> = Vec::new();
     let mut best: Option<(f64, Track)> = None;
     let estimates = period_estimates(first, tick_s);
-    // The tick is the period of stamps that are whole numbers of it with samples lost between them, at intervals of any length.
+    // Whole ticks with losses between.
     let tick_as_period = tick_s.filter(|tick_s| are_unlike_or_ticks(first, *tick_s));
     for period_s in stated_s.into_iter().chain(estimates.iter().copied()).chain(tick_as_period) {
         if !is_plausible(period_s) || tried.iter().any(|other| (period_s / other - 1.0).abs() < 1e-4) {
@@ -187,7 +173,7 @@ fn search(times: &[f64], stated_s: Option<f64>, tick_s: Option<f64>) -> Option<f
         {
             best = Some(refined);
         }
-        // Fine stamps with few losses leave no doubt.
+        // Fine stamps, few losses.
         let is_clear =
             |(_, track): &(f64, Track)| track.width < COARSE && track.losses.len() as f64 <= CLEAR * first.len() as f64;
         if best.as_ref().is_some_and(is_clear) {
@@ -199,7 +185,7 @@ fn search(times: &[f64], stated_s: Option<f64>, tick_s: Option<f64>) -> Option<f
     if is_fine || found.losses.is_empty() {
         return Some(found.period_s);
     }
-    // With many losses most windows are longer than their samples: shorter periods are tried, one after the other.
+    // With many losses, shorter periods are tried.
     let scanned = &first[..first.len().min(SCANNED)];
     let longest_s = estimates.last().copied().filter(|period_s| is_plausible(*period_s)).unwrap_or(found.period_s);
     let starts = (0..SCAN_STEPS).map(|step| longest_s * (1.0 - SCAN_STEP * f64::from(step)));
@@ -216,17 +202,14 @@ fn search(times: &[f64], stated_s: Option<f64>, tick_s: Option<f64>) -> Option<f
     Some(better.map_or(found.period_s, |(_, track)| track.period_s))
 }
 
-/// Whether a quarter of the intervals is far longer than another quarter, or a quarter is as short as a tick or two.
+/// Quarters far apart, or as short as a tick or two.
 fn are_unlike_or_ticks(times: &[f64], tick_s: f64) -> bool {
     let mut intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let [short, long] = [1, 3].map(|parts| quantile(&mut intervals, parts, 4));
     long > UNLIKE * short || short < FEW_TICKS * tick_s
 }
 
-/// The shortest loss that stamps which come in bursts tell from late delivery, which lifts the envelope of an alignment without losses as
-/// often as it lowers it: eight rises or more are so long, and eight times as many as the falls; or it is longer than the longest of `n`
-/// rises by chance, whose lengths are distributed exponentially, is with a probability of a thousandth, if the longest of the falls is `ln
-/// n` mean lengths long.
+/// Shortest loss told from late delivery in bursts, by its rises against the falls.
 fn least_telling(times: &[f64], track: &Track) -> u64 {
     let complete = Track::complete(times, track);
     let rises = Track::new(times, complete.period_s, None, (MAX_QUEUE, 1)).losses;
@@ -242,14 +225,10 @@ fn least_telling(times: &[f64], track: &Track) -> u64 {
     (1..by_length.max(2)).find(is_telling).unwrap_or(by_length.max(2))
 }
 
-/// Estimates of the sample period, s, the best where stamps are fine and most intervals are one period first.
-///
-/// An estimate is the mean duration of the windows of some samples that last about as long as the window in the middle, or
-/// at the lower quartile where most windows have losses. The middle alone is biased where jitter is skewed, and a multiple
-/// of the tick.
+/// Estimates of the period, s, the best one for fine stamps first.
 fn period_estimates(times: &[f64], tick_s: Option<f64>) -> Vec<f64> {
     let mut estimates = Vec::new();
-    // A window longer than a quarter of the record has too few others to be compared with.
+    // Too few long windows to compare.
     for window in WINDOWS.into_iter().filter(|window| *window == 1 || 4 * window <= times.len()) {
         let mut durations: Vec<f64> = times.windows(window + 1).map(|row| row[window] - row[0]).collect();
         for (parts, of) in [(1, 2), (1, 4)] {
@@ -262,14 +241,10 @@ fn period_estimates(times: &[f64], tick_s: Option<f64>) -> Vec<f64> {
     estimates
 }
 
-/// Fewest losses whose distances tell how regular they are.
 const MIN_SCATTERED: usize = 8;
-/// Variance of the distances of losses, over the square of their mean, from which they are scattered. Rounding makes equal
-/// distances, of variance 0; those of random losses are exponentially distributed, of variance 1, which the least number of
-/// losses shows with a standard deviation of about 0.5.
+/// Least squared variation of distances of scattered losses: 0 by rounding, 1 ± 0.5 at random.
 const SCATTERED: f64 = 0.4;
 
-/// Whether losses lie at so different distances that rounding cannot have made most of them.
 fn are_scattered(losses: &[LostStretch]) -> bool {
     let distances = || losses.windows(2).map(|pair| (pair[1].before - pair[0].before) as f64);
     let count = distances().count() as f64;
@@ -278,8 +253,7 @@ fn are_scattered(losses: &[LostStretch]) -> bool {
     losses.len() >= MIN_SCATTERED && variance >= SCATTERED * mean * mean
 }
 
-/// Whether intervals of one tick differ by more than the rounding of a time in f64: the stamps are not multiples of the tick,
-/// and it is the sample period that they show.
+/// Finer than the tick: the stamps show the period.
 fn is_finer(times: &[f64], tick_s: f64) -> bool {
     let single =
         || times.windows(2).map(|pair| pair[1] - pair[0]).filter(|interval| (interval / tick_s).round() == 1.0);
@@ -289,13 +263,13 @@ fn is_finer(times: &[f64], tick_s: f64) -> bool {
     most - least > rounding
 }
 
-/// Whether single losses lie so regularly in a record of `samples` that a slightly longer period explains all of them.
+/// A slightly longer period would explain all.
 fn is_beat(losses: &[LostStretch], samples: usize) -> bool {
     let (Some(first), Some(last)) = (losses.first(), losses.last()) else { return false };
     if losses.len() < MIN_BEATS || losses.iter().any(|loss| loss.missing != 1) {
         return false;
     }
-    // Losses a sample: the slope that replaces the staircase.
+    // The slope that replaces the staircase.
     let slope = (losses.len() - 1) as f64 / (last.before - first.before) as f64;
     let corners = losses.iter().enumerate().flat_map(|(number, loss)| {
         let line = slope * loss.before as f64;

@@ -1,26 +1,21 @@
-//! Time stamps that go back: counters that pass their largest number, single wrong stamps, and clocks that were set or began anew.
-//!
-//! A stamp is judged by the rows around it: what goes on after a wrong one goes on from before it; a clock that was set goes on by itself.
+//! Stamps that go back: wrapping counters, single wrong stamps, clocks that are set, told by the rows around.
 
 use crate::lateness_track::quantile;
 use std::collections::VecDeque;
 
-/// Intervals whose median is the usual one.
 const USUAL: usize = 32;
-/// Longest interval across the end of a counter, and to the row before a wrong stamp, in usual ones.
+/// Longest step over a wrap or wrong stamp, usual intervals.
 const LONGEST_STEP: f64 = 64.0;
-/// Shortest distance of a wrong stamp from its neighbours, in usual intervals.
+/// Least distance of a wrong stamp, usual intervals.
 const WRONG: f64 = 16.0;
-/// The same of the first row.
 const FIRST_WRONG: f64 = 1e4;
-/// Rows that go on by themselves after a clock was set; and rows that are needed to doubt the first one.
+/// Rows that confirm a set clock, or doubt the first row.
 pub const ROWS_OF_SET_CLOCK: usize = 32;
 pub const ROWS_OF_FIRST: usize = 8;
 /// Rows before which a clock may be set forward.
 const ROWS_BEFORE_SET: u64 = 256;
 
-/// Numbers at which counters and clocks begin anew: of 15, 16, 24, 31 and 32 bits, and of a second, a minute, an hour, a day and a week, in s,
-/// ms, us and ns.
+/// 15, 16, 24, 31 and 32 bits; second, minute, hour, day and week in s, ms, us and ns.
 fn moduli() -> impl Iterator<Item = f64> {
     let counters = [15, 16, 24, 31, 32].into_iter().map(|bits| (1u64 << bits) as f64);
     let periods = [1.0, 60.0, 3600.0, 86_400.0, 604_800.0];
@@ -28,35 +23,29 @@ fn moduli() -> impl Iterator<Item = f64> {
     counters.chain(clocks.filter(|period| *period > 50.0))
 }
 
-/// What a stamp is, after those before it.
+/// Verdict on a stamp.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Order {
-    /// It follows, at this time.
     Next(f64),
-    /// It follows the row before the last one, at this time: the last stamp is wrong.
+    /// Follows the second last; the last is wrong.
     AfterWrong(f64),
-    /// It follows the last one, at this time, with which the clock was set forward by so much.
+    /// Follows, with the clock set forward by the second number.
     AfterSet(f64, f64),
-    /// It is before the last one.
     Back(f64),
 }
 
-/// Watches the order of stamps, in the unit of the file.
+/// In the file's unit.
 #[derive(Debug, Default)]
 pub struct StampOrder {
-    /// What is added to a stamp.
     offset: f64,
     before_last: Option<f64>,
     last: Option<f64>,
     intervals: VecDeque<f64>,
     accepted: u64,
-    /// How often a counter began anew, and the first number at which it did.
     wraps: u64,
     modulus: f64,
-    /// How often the clock was set back, or began anew, and the first row after that.
     sets: u64,
     first_set: u64,
-    /// The same of a clock that was set forward.
     sets_forward: u64,
     first_set_forward: u64,
     wrong: u64,
@@ -101,8 +90,7 @@ impl StampOrder {
         }
     }
 
-    /// By how much the clock was set with the last row, where only few rows are before it: a clock is set soon after it begins, and no recording
-    /// begins with so few samples before such a gap.
+    /// Amount of a forward setting with the last row, near the start only.
     fn set_forward(&mut self, time: f64) -> Option<f64> {
         if self.accepted > ROWS_BEFORE_SET {
             return None;
@@ -134,14 +122,14 @@ impl StampOrder {
         self.accepted += 1;
     }
 
-    /// Forgets the last row, which is not used.
+    /// The last row is not used.
     pub fn forget_last(&mut self) {
         self.last = self.before_last;
         self.intervals.pop_back();
         self.accepted = self.accepted.saturating_sub(1);
     }
 
-    /// Whether the first row is wrong, as the rows after it show, whose times are these.
+    /// True if `times` of later rows contradict the first.
     pub fn is_first_wrong(&mut self, times: &[f64]) -> bool {
         let [first, second, ..] = times else { return false };
         let mut intervals: Vec<f64> = times[1..].windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -151,7 +139,7 @@ impl StampOrder {
         is_wrong
     }
 
-    /// Whether no row but the first was used, which lies after all others.
+    /// True if only the first was used, behind all others.
     pub fn has_first_alone(&self) -> bool {
         self.accepted <= 1
     }
@@ -162,8 +150,7 @@ impl StampOrder {
         *self = Self { wrong: self.wrong, ..Self::default() };
     }
 
-    /// Goes on at once with a clock that was set back to `time`, or began anew, before the row with this number: how long that took is not
-    /// known, and no sample is taken to be missing there.
+    /// A clock set back to `time` before this row: no sample is missing there.
     pub fn set_clock(&mut self, time: f64, row: u64) {
         let (Some(last), Some(usual)) = (self.last, self.usual()) else { return };
         if self.sets == 0 {
@@ -173,17 +160,17 @@ impl StampOrder {
         self.offset += last + usual - time;
     }
 
-    /// The time of a stamp, as of [`judge`](Self::judge), after the clock was set.
+    /// By [`judge`](Self::judge), after a setting.
     pub fn shift(&self, time: f64, offset_before: f64) -> f64 {
         time - offset_before + self.offset
     }
 
-    /// What is added to a stamp.
+    /// Added to a stamp.
     pub fn offset(&self) -> f64 {
         self.offset
     }
 
-    /// What a reader of the analysis has to know, one sentence each.
+    /// Remarks for readers of the analysis, one sentence each.
     pub fn notes(&self) -> Vec<String> {
         let Self { wraps, modulus, sets, first_set, sets_forward, first_set_forward, wrong, .. } = self;
         let sentences = [

@@ -1,37 +1,34 @@
-//! What the time stamps of a recording show, and what they cannot show.
+//! Quality of a recording's time stamps.
 
 use crate::aligned_stamps::RateEstimate;
 use crate::indexed_clock::{ClockStep, IndexedClock};
 use crate::lateness_track::{COARSE, LostStretch};
 
-/// What the time stamps of a recording show, and what they cannot show.
+/// Evidence and doubts of the time stamps.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StampQuality {
-    /// The rate by the clock that stamped the samples, whatever rate was stated.
     pub rate: Option<RateEstimate>,
-    /// Tick of that clock, s: the step that all stamps are multiples of. `None` where it is less than a twentieth of a period.
+    /// Common step, s; `None` below a twentieth of a period.
     pub tick_s: Option<f64>,
-    /// Width of the lateness of ordinary samples, sample periods: the tick and the jitter. 0 where the samples have an index.
+    /// Lateness of ordinary samples (tick and jitter), periods; 0 with an index.
     pub width: f64,
-    /// Losses that the stamps show, refused samples included; none where the samples have an index.
+    /// Including refused samples; empty with an index.
     pub losses: Vec<LostStretch>,
-    /// Samples in losses that something else may explain.
+    /// Samples in losses with another possible explanation.
     pub uncertain: u64,
-    /// Whether losses of single samples are told from the rounding of the stamps.
+    /// True if single losses are told from rounding.
     pub resolved: bool,
-    /// The shortest loss that is told from late delivery, samples: more than 1 where samples come in bursts that differ by as much.
+    /// Samples; above 1 if samples come in bursts.
     pub least_loss: u64,
-    /// Whether the rate changes in the course of the record; the interval of [`rate`](Self::rate) is then the range that it takes.
+    /// True if the rate changes; [`rate`](Self::rate) then has its range.
     pub is_rate_changing: bool,
-    /// Whether a loop wrote them that asks for samples when it has time: its periods are as long as it takes.
+    /// True for a polling loop, whose periods vary.
     pub is_of_loop: bool,
-    /// Samples that were read at least a period later than the others.
     pub late: u64,
-    /// Where the index and the stamps contradict each other.
+    /// Contradictions between index and stamps.
     pub clock_steps: Vec<ClockStep>,
 }
 
-/// What the user should know of a rate that changes.
 fn changing_rate(rate: RateEstimate) -> String {
     format!(
         "the rate of the samples, or of the clock that stamped them, changes from {:.4} to {:.4} Hz; {:.4} Hz is the mean",
@@ -40,13 +37,13 @@ fn changing_rate(rate: RateEstimate) -> String {
 }
 
 impl StampQuality {
-    /// Of samples that have an index and time stamps, s.
+    /// Times in s.
     pub(crate) fn of_index(indices: &[u64], times: &[f64]) -> Self {
         let IndexedClock { rate, steps } = IndexedClock::new(indices, times);
         Self { rate, clock_steps: steps, resolved: true, least_loss: 1, ..Self::default() }
     }
 
-    /// Warnings that a report counts, by cause; those that do not occur are absent.
+    /// By cause, if any.
     pub fn warnings(&self) -> impl Iterator<Item = (&'static str, u64)> {
         let counts = [
             ("late_delivery", self.late),
@@ -56,7 +53,7 @@ impl StampQuality {
         counts.into_iter().filter(|(_, count)| *count > 0)
     }
 
-    /// What a reader of the analysis has to know, one sentence each; none for stamps that leave no doubt.
+    /// One sentence each; none without doubt.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         if let (Some(rate), true) = (self.rate, self.width >= COARSE) {
@@ -101,7 +98,7 @@ impl StampQuality {
         notes
     }
 
-    /// Samples in losses that something else may explain.
+    /// Samples in losses with another possible explanation.
     pub fn uncertain_losses(&self) -> u64 {
         self.uncertain
     }

@@ -1,26 +1,19 @@
-//! The tick of a clock: the step that all of its time stamps are multiples of.
+//! The tick: the common step of time stamps.
 
 use crate::lateness_track::quantile;
 
-/// Intervals that are examined; a tick is seen in far fewer.
 const EXAMINED: usize = 20_000;
-/// Largest deviation of an interval from a multiple of the tick, in mean intervals: the rounding of stamps in a text with
-/// few digits.
+/// In mean intervals: rounding of few digits.
 const TOLERANCE: f64 = 1e-3;
-/// Smallest tick that is of use, in mean intervals.
+/// In mean intervals.
 const MIN_TICK: f64 = 0.05;
-/// An interval of so many median ones is an outage, and says nothing of the tick or of the mean.
+/// In median intervals; an outage tells nothing.
 const OUTAGE: f64 = 1e3;
-/// Largest deviation of a stamp from a multiple of the tick since the last outage, in mean intervals: one at each end.
+/// In mean intervals, one at each end.
 const TOLERANCE_OF_STAMPS: f64 = 4.0 * TOLERANCE;
-/// Ticks between two stamps from which their distance tells the tick better than a shorter one.
 const TELLING: f64 = 100.0;
 
-/// The greatest common divisor of the intervals of `times`, s; `None` where there is none of a twentieth of the mean interval
-/// or more.
-///
-/// It is Euclid's, with intervals that are equal to within a thousandth of their mean taken for equal. All stamps between two outages
-/// have to be multiples of it, or it is none: the intervals of a clock that wanders equal their neighbours, and have no tick.
+/// Common divisor of the intervals of `times`, s, to a thousandth (Euclid); `None` below a twentieth of the mean.
 pub(crate) fn tick(times: &[f64]) -> Option<f64> {
     let examined = &times[..times.len().min(EXAMINED)];
     let intervals = || examined.windows(2).map(|pair| pair[1] - pair[0]);
@@ -41,7 +34,6 @@ pub(crate) fn tick(times: &[f64]) -> Option<f64> {
     for interval in intervals().filter(is_usual) {
         let (mut large, mut small) = (tick, interval);
         while small > tolerance {
-            // The remainder nearest to 0: a multiple may be a little less than whole.
             let rest = large - (large / small).round() * small;
             (large, small) = (small, rest.abs());
         }
@@ -53,8 +45,7 @@ pub(crate) fn tick(times: &[f64]) -> Option<f64> {
     (tick > 0.0).then(|| refined(tick, examined, outage, TOLERANCE_OF_STAMPS * mean)).flatten()
 }
 
-/// The tick near `tick` of which all `times` between two outages are multiples to within `tolerance`, improved at growing distances like
-/// a vernier; `None` where there is none.
+/// Near `tick`, improved at growing distances; `None` if `times` are not multiples within `tolerance`.
 fn refined(mut tick: f64, times: &[f64], outage: f64, tolerance: f64) -> Option<f64> {
     let (mut origin, mut last) = (*times.first()?, *times.first()?);
     for &time in times {

@@ -1,9 +1,4 @@
-//! The sample periods of rows that are read in blocks, in memory that does not grow with their number.
-//!
-//! With time stamps alone, the rule is that of [`lateness_track`](crate::lateness_track) for stamps that are finer than the sample
-//! period: a lost sample lifts the lower envelope of the lateness for good, a late delivery for as long as the queue is. The
-//! period is that of the first rows, and the envelope is sought over as many rows as there, so that a row is placed when those
-//! of the queue behind it are known. Before that a rate that changes is [followed](crate::clock_rate).
+//! Sample periods of rows read in blocks, in bounded memory, by the rule of [`lateness_track`](crate::lateness_track).
 
 use crate::aligned_stamps::RateEstimate;
 use crate::clock_rate::SteadyStream;
@@ -15,18 +10,16 @@ use crate::stamp_quality::StampQuality;
 use crate::time_base_error::TimeBaseError;
 use std::collections::VecDeque;
 
-/// What tells the sample periods.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Source {
-    /// The number of the row.
     Rows,
-    /// Its index; beside it there may be stamps with this period, s.
+    /// Perhaps beside stamps with this period, s.
     Index(Option<f64>),
-    /// Its time stamp, with the period of the first rows, s.
+    /// With the first rows' period, s.
     Stamps(f64),
 }
 
-/// When a row arrived, as far as the file says it.
+/// Arrival of a row, as far as recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Stamp {
     pub(crate) time_s: Option<f64>,
@@ -36,48 +29,38 @@ pub(crate) struct Stamp {
 /// The sample period of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Placed {
-    /// Counted from any origin.
     pub period: u64,
-    /// Periods without a row between all rows so far.
     pub missing: u64,
 }
 
-/// Places rows in the order in which they arrived.
 pub(crate) struct StreamClock {
     source: Source,
-    /// Rows that were placed.
     placed: u64,
     missing: u64,
-    /// Time of the first row, s.
+    /// s.
     origin_s: Option<f64>,
     last: Stamp,
-    /// Lateness of the rows that are not placed yet, and their times, s.
+    /// For unplaced rows: lateness, and times in s.
     ahead: Vec<f64>,
     times_s: Vec<f64>,
-    /// Growth of the lateness in an interval that a lost sample makes at least.
     least_growth: f64,
-    /// Lateness of the last rows that were placed.
     recent: VecDeque<f64>,
-    /// The stamps as a steady clock would have written them; `None` where they do not tell the sample periods.
+    /// `None` if the stamps do not place.
     steady: Option<SteadyStream>,
     level: MinimumBehind,
     line: Line,
-    /// The last period that was placed, counted from the first row, and its time, s.
+    /// Period from the first row, and time in s.
     end: (u64, f64),
     late: u64,
     uncertain: u64,
-    /// Smallest step of the index.
     least_step: u64,
-    /// Where the time leaps against the index, and by how much in all, s.
+    /// Leaps of time against the index, and their sum, s.
     clock_steps: Vec<ClockStep>,
     leapt_s: f64,
 }
 
 impl StreamClock {
-    /// Of rows that have an index and time stamps, if so; `head` is what the stamps of the first rows show.
-    ///
-    /// # Errors
-    /// The stamps are coarser than the sample period, or show none.
+    /// `head` has the stamps of the first rows; an error if they are coarser than the sample period, or show none.
     pub(crate) fn new(has_index: bool, head: Option<&StampQuality>) -> Result<Self, TimeBaseError> {
         let period_s = head.and_then(|head| head.rate).map(|rate| rate.hz.recip());
         let source = match (has_index, head) {
@@ -119,7 +102,7 @@ impl StreamClock {
         })
     }
 
-    /// Takes the next rows and returns the periods of those that can be placed now: of all with `is_last`.
+    /// All with `is_last`.
     pub(crate) fn place(&mut self, rows: impl Iterator<Item = Stamp>, is_last: bool) -> Vec<Placed> {
         match self.source {
             Source::Rows => {
@@ -183,7 +166,7 @@ impl StreamClock {
                 self.recent.pop_front();
             }
             if excess >= LOSS && self.has_long_interval() {
-                // A float beyond the range of u64 saturates.
+                // Saturates.
                 self.missing = self.missing.saturating_add((excess.round() as u64).max(1));
                 self.uncertain += u64::from((excess - excess.round()).abs() >= CERTAIN);
             }
@@ -203,30 +186,28 @@ impl StreamClock {
         placed
     }
 
-    /// Whether one of the last intervals is as long as a lost sample makes it.
     fn has_long_interval(&self) -> bool {
         self.recent.iter().zip(self.recent.iter().skip(1)).any(|(one, next)| next - one >= self.least_growth)
     }
 
-    /// The sample rate by the stamps of the rows that were placed, Hz.
+    /// By the stamps, Hz.
     fn rate_hz(&self) -> Option<f64> {
         let changing = self.changing_rate().map(|rate| rate.hz);
         changing.or(self.line.slope().map(f64::recip)).filter(|hz| hz.is_finite() && *hz > 0.0)
     }
 
-    /// The mean rate and its range, where it changes.
     fn changing_rate(&self) -> Option<RateEstimate> {
         let [shortest_s, longest_s] = self.steady.as_ref()?.periods_s()?;
         let (period, time_s) = self.end;
         Some(RateEstimate { hz: period as f64 / time_s, low_hz: longest_s.recip(), high_hz: shortest_s.recip() })
     }
 
-    /// What the stamps of the rows that were placed show; `first_rows` is what those of the first ones show.
+    /// `first_rows` has the stamps of the first ones.
     pub(crate) fn quality(&self, first_rows: &StampQuality) -> StampQuality {
         let changing = self.changing_rate();
         let by_line = || {
             let hz = self.rate_hz()?;
-            // The interval of the first rows holds for all.
+            // Valid for all.
             let of_first = first_rows.rate?;
             let (low_hz, high_hz) = (hz * of_first.low_hz / of_first.hz, hz * of_first.high_hz / of_first.hz);
             Some(RateEstimate { hz, low_hz, high_hz })
@@ -242,14 +223,14 @@ impl StreamClock {
         }
     }
 
-    /// Smallest step of the index; `None` where there is none, or one row.
+    /// `None` without an index, or one row.
     pub(crate) fn least_step(&self) -> Option<u64> {
         let has_step = matches!(self.source, Source::Index(_)) && self.placed > 1;
         has_step.then_some(self.least_step)
     }
 }
 
-/// The least-squares line through points that come one after the other, by their means and central moments.
+/// Least-squares line by running moments.
 #[derive(Debug, Clone, Copy, Default)]
 struct Line {
     count: f64,

@@ -1,23 +1,19 @@
-//! Why a recording has no time base.
+//! Reasons against a time base.
 
 use std::collections::BTreeMap;
 
-/// Fewest samples that give one octave of the Allan deviation: two adjacent windows of one sample in each half of the record.
+/// One octave: two windows of one sample per half.
 pub(crate) const MIN_SAMPLES: u64 = 4;
 
 /// Why a recording has no time base.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TimeBaseError {
-    /// No rate was given and none can be measured.
     #[error("no sample rate: give --rate HZ, or a recording with a time_s column")]
     NoRate,
-    /// The given rate is not positive and finite.
     #[error("a sample rate of {0} Hz: it must be positive and finite")]
     InvalidRate(f64),
-    /// Most time stamps are equal, or they span no time.
     #[error("the time stamps show no sample period: give --rate HZ")]
     NoPeriod,
-    /// The time stamps show another rate than the given one.
     #[error("--rate {stated_hz} contradicts the time stamps: by them it is {measured_hz:.4} Hz")]
     RateContradictsStamps {
         /// As given, Hz.
@@ -25,24 +21,20 @@ pub enum TimeBaseError {
         /// By the time stamps, Hz.
         measured_hz: f64,
     },
-    /// Stamps that need all of them to be understood, of too many rows.
+    /// Many rows whose stamps need all of them.
     #[error("the time stamps are too irregular for a recording of this length ({0}): give it in parts")]
     Irregular(String),
-    /// No sample follows another one by one sample period.
     #[error("no two neighbouring samples: a step of the column sample is at least {0}")]
     NoNeighbours(u64),
-    /// The gaps are so long that their periods do not fit into memory.
     #[error(
         "{samples} samples in {periods} sample periods: the gaps are longer than this analysis holds; give each stretch its \
          own file"
     )]
     TooSparse {
-        /// Usable samples.
         samples: u64,
         /// Sample periods from the first to the last.
         periods: u64,
     },
-    /// A range without a sample.
     #[error("no sample from {} to {} s (--from, --to): the recording has {recording_s:.3} s", short(*.from_s), short(*.to_s))]
     EmptyTimeRange {
         /// Its beginning, s from the first sample.
@@ -52,7 +44,6 @@ pub enum TimeBaseError {
         /// From the first sample to the last, s.
         recording_s: f64,
     },
-    /// Too few samples for one octave of the Allan deviation.
     #[error("record too short: {used} usable samples, one octave needs {MIN_SAMPLES}{}", list(.dropped))]
     TooShort {
         /// Samples without a fault for which they are left out.
@@ -62,13 +53,13 @@ pub enum TimeBaseError {
     },
 }
 
-/// The causes for which samples were left out, as the end of a sentence.
+/// As the end of a sentence.
 fn list(dropped: &BTreeMap<&'static str, u64>) -> String {
     let causes: Vec<String> = dropped.iter().map(|(cause, count)| format!("{cause} {count}")).collect();
     if causes.is_empty() { String::new() } else { format!("; left out: {}", causes.join(", ")) }
 }
 
-/// A time in a message: one of many digits with a power of ten.
+/// Many digits as a power of ten.
 fn short(time: f64) -> String {
     if time.abs() < 1e15 || time.is_infinite() { time.to_string() } else { format!("{time:e}") }
 }

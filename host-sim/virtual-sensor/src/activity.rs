@@ -72,7 +72,7 @@ impl Activity {
     }
 }
 
-/// What the controller reads during an [`Activity`] that needs a silent bus.
+/// Answers that the controller reads during an [`Activity`] that needs a silent bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BusyAnswers {
     /// Zeros.

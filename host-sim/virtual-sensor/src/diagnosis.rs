@@ -107,7 +107,7 @@ const HISTORY: usize = 256;
 /// The two alarms on the level or the rate of change of any output (data sheet Rev. B, Tables 24 to 26).
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Alarms {
-    /// Of each alarm the latest outputs of its source, the newest first.
+    /// For each alarm the latest outputs of its source, the newest first.
     history: [VecDeque<i16>; 2],
 }
 

@@ -178,7 +178,7 @@ impl InjectedEffect {
     }
 }
 
-/// What happens to a part besides its declared noise. Nothing by default.
+/// Effects on a part besides its declared noise. Nothing by default.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SensorScenario {
     /// Shown by the part's own outputs; without an effect no other channel depends on it.
@@ -297,7 +297,7 @@ impl EffectSource {
         })
     }
 
-    /// Whether the outputs repeat the previous sample this time. To be called once a sample.
+    /// True if the outputs repeat the previous sample this time. To be called once a sample.
     pub(crate) fn repeats_sample(&mut self) -> bool {
         let repeats = |active: &mut ActiveEffect| match active.effect {
             InjectedEffect::RepeatedSamples { fraction } => active.random.random_bool(probability(fraction)),

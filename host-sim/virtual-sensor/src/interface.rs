@@ -263,7 +263,7 @@ impl VirtualAdis16405 {
         }
     }
 
-    /// Executes a write to GLOB_CMD. Of several bits the first in this order counts: reset, precision auto-null, flash
+    /// Executes a write to GLOB_CMD. The first of several bits in this order counts: reset, precision auto-null, flash
     /// update, DAC latch, factory restore, auto-null.
     fn command(&mut self, byte: u8) {
         match byte {

@@ -9,7 +9,7 @@
 //! addresses the part too soon or clocks it too fast reads garbage and is not heard ([`Violation`]); what drivers of real parts
 //! do and the sheet neither shows nor forbids is accepted with a [`Note`]. [`Strictness`] changes both.
 //!
-//! What a real part may do and a forgiving model does not, each off unless it is asked for:
+//! Behaviour of real parts that a forgiving model lacks, each off unless it is asked for:
 //!
 //! | the part is | by |
 //! |---|---|

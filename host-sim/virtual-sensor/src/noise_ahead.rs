@@ -89,7 +89,7 @@ impl ChannelGroup {
         self.taken = 0;
         if samples == LONGEST {
             let channels = self.block.behind.clone();
-            // Where no thread can be started, the block is generated when it is needed.
+            // If no thread can be started, the block is generated when it is needed.
             self.ahead = thread::Builder::new().spawn(move || Block::generate(channels, LONGEST)).ok();
         }
     }

@@ -21,17 +21,17 @@ const MAX_SCK_LOW_POWER_HZ: u32 = 300_000;
 /// Lowest SCK, Hz.
 const MIN_SCK_HZ: u32 = 10_000;
 
-/// What the part does about a controller that does not keep the data sheet.
+/// Reaction of the part to a controller that does not keep the data sheet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Strictness {
     /// Every violation is recorded, and none has consequences: data are right at any clock and pause.
     Lenient,
     /// A transaction that comes too soon or is clocked too fast is garbled: the controller reads wrong words until chip select
-    /// rises, no frame is executed, and DIAG_STAT bit 3 is set. What drivers of the part do and the data sheet neither shows
+    /// rises, no frame is executed, and DIAG_STAT bit 3 is set. Behaviour of drivers that the data sheet neither shows
     /// nor forbids is accepted, with a [`Note`].
     #[default]
     DataSheet,
-    /// What else gets a note is a violation and has its consequences too; and chip select must be high for a time between two
+    /// Everything else that gets a note is a violation and has its consequences too; and chip select must be high for a time between two
     /// frames. The data sheet gives no least time. Drivers that raise chip select between frames keep it high for the
     /// stall; the ADIS16470 needs 1 µs.
     Pedantic {
@@ -45,11 +45,11 @@ pub enum Strictness {
 pub struct Note {
     /// Virtual time, ns.
     pub at_ns: u64,
-    /// What it was.
+    /// Its kind.
     pub kind: NoteKind,
 }
 
-/// What the part accepts with a note.
+/// Behaviour that the part accepts with a note.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoteKind {
     /// Chip select stayed low between two frames; Figure 11 shows it high.
@@ -278,7 +278,7 @@ pub(crate) struct SpiPort {
     selected: bool,
     /// When chip select fell last, ns.
     selected_at_ns: u64,
-    /// Whether chip select has fallen since the part fell asleep.
+    /// True if chip select has fallen since the part fell asleep.
     may_wake: bool,
     /// When chip select fell before the latest word, ns.
     word_select_at_ns: Option<u64>,
@@ -369,12 +369,12 @@ impl SpiPort {
         (self.selected && self.may_wake).then(|| now_ns - self.selected_at_ns)
     }
 
-    /// Whether what gets a note is a violation.
+    /// True if what gets a note is a violation.
     pub(crate) fn is_pedantic(&self) -> bool {
         matches!(self.strictness, Strictness::Pedantic { .. })
     }
 
-    /// Whether the next byte is the first of a word.
+    /// True if the next byte is the first of a word.
     pub(crate) fn at_word_begin(&self) -> bool {
         self.upper_byte.is_none()
     }

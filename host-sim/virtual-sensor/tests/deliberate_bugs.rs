@@ -173,13 +173,11 @@ impl Bug {
 fn every_bug_applies_and_is_in_the_docs() {
     let sources: String =
         TESTS.iter().map(|name| read(&repository().join(format!("host-sim/virtual-sensor/tests/{name}.rs")))).collect();
-    let mut table = "| bug | found by |\n|---|---|\n".to_owned();
     for bug in &BUGS {
         bug.seeded(&read(&repository().join("adis16405-driver/src").join(bug.file)));
         assert!(sources.contains(&format!("fn {}()", bug.found_by)), "no such test: {}", bug.found_by);
-        table += &format!("| {} | `{}` |\n", bug.meaning, bug.found_by);
     }
-    system_tests::generated("docs/driver.md", "deliberate-bugs", &table);
+    system_tests::generated("docs/driver.md", "deliberate-bugs", &format!("{} bugs", BUGS.len()));
 }
 
 /// A workspace of the driver and the virtual part alone, in the target folder.

@@ -73,7 +73,7 @@ fn the_driver_keeps_the_read_rate_at_every_clock() {
     }
 }
 
-/// Where the data sheet contradicts itself, at SMPL_PRD = 0x09, the driver names the slow clock (Table 7).
+/// At SMPL_PRD = 0x09, where the data sheet contradicts itself, the driver names the slow clock (Table 7).
 #[test]
 fn at_0x09_the_driver_takes_the_safe_side() {
     let config = config(GyroRange::Dps300, 2, 0x09);
@@ -86,7 +86,7 @@ fn at_0x09_the_driver_takes_the_safe_side() {
     assert_eq!((bus.part().violations(), bus.part().notes()), (&[][..], &[][..]));
 }
 
-/// What the driver sends needs no tolerance.
+/// The driver needs no tolerance.
 #[test]
 fn a_pedantic_part_has_nothing_to_note() {
     let mut part = VirtualAdis16405::new(NoiseModel::paper(), 1);

@@ -1,4 +1,4 @@
-//! What the part does when it is cold, latched, strict about its bus, or reset by its pin: words on the bus, without the
+//! The part when it is cold, latched, strict about its bus, or reset by its pin: words on the bus, without the
 //! driver. Times and bits are those of the data sheet.
 
 use virtual_sensor::{

@@ -1,4 +1,4 @@
-//! What drivers that others wrote send, word by word, and what the part answers. They work on real parts, so that what they
+//! Words of drivers that others wrote, and the answers of the part. The drivers work on real parts, so that what they
 //! decode is the truth of the part; and where they break a rule of the data sheet (Rev. B), they fail as on a real one.
 //!
 //! Each row of a table is a transaction: its source, its words, the pause after each of them with chip select low, and the pause
@@ -92,11 +92,11 @@ mod linux {
     const FAST_HZ: u32 = 2_000_000;
     /// `read_delay` and `write_delay` of `ADIS16400_DATA`, before chip select rises.
     const DELAY_NS: u64 = 50_000;
-    /// What the SPI core keeps chip select high for between the transfers of a message without a `cs_change_delay`.
+    /// Time for which the SPI core keeps chip select high between the transfers of a message without a `cs_change_delay`.
     const CS_CHANGE_NS: u64 = 10_000;
-    /// What the SPI core takes from one message to the next, at least.
+    /// Least time of the SPI core from one message to the next.
     const MESSAGE_NS: u64 = 30_000;
-    /// What the SPI core and its controller take around each transfer in low-power mode. The sums of the delays alone, 60 µs of
+    /// Time that the SPI core and its controller take around each transfer in low-power mode. The sums of the delays alone, 60 µs of
     /// stall and 113 µs from frame to frame, would break the 75 µs and 150 µs of Table 2.
     const SLOW_OVERHEAD_NS: u64 = 40_000;
 
@@ -241,7 +241,7 @@ mod linux {
         wait(&mut part, 50 * MS);
         let words: Vec<u16> = (0x02..=0x18).step_by(2).map(|address| read(&mut part, FAST_HZ, address)).collect();
         assert_eq!(decoded(&words), counts);
-        // What was sent while the part slept and woke up is lost.
+        // Words that were sent while the part slept and woke up are lost.
         let lost =
             |kind: &ViolationKind| matches!(kind, ViolationKind::Busy { activity: Activity::Sleep | Activity::WakeUp });
         assert!(violations(&part).iter().all(lost), "{:?}", violations(&part));

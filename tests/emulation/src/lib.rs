@@ -36,7 +36,7 @@ pub const SYSCFG_EXTICR: [u64; 2] = [0x4001_3808, 0x4001_380C];
 pub const EXTI_IMR: u64 = 0x4001_3C00;
 pub const EXTI_RTSR: u64 = 0x4001_3C08;
 pub const EXTI_FTSR: u64 = 0x4001_3C0C;
-/// What stops while a debugger has halted the processor; bit 12 is the watchdog (RM0090 section 38.16.4).
+/// Peripherals that stop while a debugger has halted the processor; bit 12 is the watchdog (RM0090 section 38.16.4).
 pub const DBGMCU_APB1_FZ: u64 = 0xE004_2008;
 
 /// Which memory is at address 0; 1 in its lowest two bits is system memory (RM0090 section 9.2.1).
@@ -110,7 +110,7 @@ pub enum Event {
     ClearInMemory(u64),
 }
 
-/// What a run consists of.
+/// Parts of a run.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Scenario {
     pub wiring: Wiring,
@@ -151,12 +151,12 @@ pub struct Work {
     pub samples: u64,
 }
 
-/// What the sensor on the bus has seen.
+/// Record of the sensor on the bus.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct BusRecord {
     /// Samples that the part has made.
     pub samples: u64,
-    /// What the part says against the timing of its bus, in words.
+    /// Violations of the timing of its bus, in words.
     pub violations: Vec<String>,
     /// The answer of the part to each burst, in order, with the number of its latest sample at that time.
     pub bursts: Vec<(u64, [u8; BURST_BYTES])>,
@@ -195,7 +195,7 @@ pub struct Outcome {
     pub led_changes: u32,
     /// Registers at the end, by address: speeds and pulls of ports A to C, and the others that this crate names.
     pub registers: BTreeMap<u64, u64>,
-    /// What a debug probe has read of the log.
+    /// Lines of the log that a debug probe has read.
     pub log: Vec<LogLine>,
 }
 

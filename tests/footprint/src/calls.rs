@@ -15,7 +15,7 @@ const CALL: &str = match option_env!("ALLAN_CALL") {
 };
 
 pub(crate) fn run() {
-    // What the calls work on, in the image without a call too.
+    // Values that the calls work on, in the image without a call too.
     let mut cascade = black_box(Cascade::<24, 8>::new());
     let mut curve = black_box(Curve::<24>::empty());
     let mut bytes = black_box([0_u8; 4_500]);

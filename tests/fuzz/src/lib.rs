@@ -1,4 +1,4 @@
-//! What reads bytes that someone else has written, each as a function of these bytes that has to return: it panics where a promise is
+//! Readers of bytes that someone else has written, each as a function of these bytes that has to return: it panics where a promise is
 //! broken. `tests/corpus.rs` calls them with the bytes that are kept in `corpus`; the example `fuzz` has libFuzzer look for others.
 
 mod c_interface;

@@ -1,4 +1,4 @@
-//! What is kept and read back: the state of estimators, and the settings in flash memory.
+//! Records that are kept and read back: the state of estimators, and the settings in flash memory.
 
 use allan_core::{Cascade, Coupling, FractionalOctaves, Hadamard};
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};

@@ -246,7 +246,7 @@ fn types_in_macro(tokens: TokenStream) -> Vec<Definition> {
     types.map(|three| Definition { name: three[2].clone(), public_type: true }).collect()
 }
 
-/// Whether one of the first attributes of an item restricts it to tests or documentation.
+/// True if one of the first attributes of an item restricts it to tests or documentation.
 fn left_out(tokens: &TokenStream) -> bool {
     let mut tokens = tokens.clone().into_iter();
     while let (Some(TokenTree::Punct(sign)), Some(TokenTree::Group(attribute))) = (tokens.next(), tokens.next())

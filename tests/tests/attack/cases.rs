@@ -42,7 +42,7 @@ pub(crate) const KINDS: [Kind; 13] = [
 /// Share of the intervals that hold the true value.
 const COVERAGE: f64 = 0.95;
 
-/// What a campaign has found.
+/// Findings of a campaign.
 pub(crate) struct Campaign {
     folder: TempDir,
     case: u64,
@@ -230,7 +230,7 @@ fn mutated_bytes(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     campaign.analyse(&recorded);
     let file = campaign.write(recorded.name, &recorded.bytes);
     let folder = campaign.folder().to_owned();
-    // What is no recording is refused by `inspect` too.
+    // `inspect` too refuses a file that is no recording.
     campaign.checked(&Program::new(&folder, &["inspect", &file]), &[0, 1], recorded.bytes.len() as u64);
 }
 

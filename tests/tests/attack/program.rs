@@ -15,7 +15,7 @@ const LOOK: Duration = Duration::from_millis(3);
 /// A run that uses no processor time and does not end.
 const MOST_WAIT: Duration = Duration::from_secs(120);
 
-/// What a run has left.
+/// Result of a run.
 pub(crate) struct Run {
     /// `None` where a signal ended it.
     pub(crate) code: Option<i32>,
@@ -83,7 +83,7 @@ impl Run {
         Self { code: status.code(), stdout, errors: String::from_utf8_lossy(&stderr).into_owned(), peak_mb }
     }
 
-    /// What is wrong with a run on so many bytes of input, whose exit codes may be `codes`.
+    /// Fault of a run on so many bytes of input, whose exit codes may be `codes`.
     pub(crate) fn fault(&self, codes: &[i32], bytes: u64) -> Option<String> {
         let Some(code) = self.code else { return Some("a signal ended it: no end within its bounds".to_owned()) };
         if !codes.contains(&code) {

@@ -132,7 +132,7 @@ fn a_reset_while_an_epoch_is_learned_from_costs_nothing() {
 
 /// Four effects at once, each undeclared to the firmware: a temperature effect, a Gauss-Markov process, a line and steps. Names,
 /// parameters and the errors before and after on the next epoch are those of the host on the same samples, bit for bit, and the table
-/// says them in words. What has no covariate is not changed.
+/// says them in words. A channel without a covariate is not changed.
 #[test]
 fn hidden_effects_are_learned_and_subtracted() {
     let Epochs { learned, validated, fit_s, longest_channel_s, response_s, random_walk, table } =

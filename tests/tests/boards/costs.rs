@@ -1,4 +1,4 @@
-//! What an image costs: one row a board, of which each test of a board prints all that are there.
+//! The cost of an image: one row a board; each test of a board prints all rows that are there.
 
 use super::images;
 use link::Health;
@@ -12,7 +12,7 @@ pub(crate) struct Memory {
     pub(crate) ram: u32,
 }
 
-/// What was measured of one board.
+/// Measured costs of one board.
 pub(crate) struct Costs<'a> {
     pub(crate) board: &'a str,
     pub(crate) memory: Memory,

@@ -85,7 +85,7 @@ pub(crate) fn in_stretches(
         let mut estimators = Estimators::new(&mut statistics, config);
         estimators.restore(index, &ChannelSums::from_estimator(&estimator));
         let at_us = |sample: u64| (sample as f64 * 1e6 / rate_hz) as u64;
-        estimators.mark_probed(bursts.first().map_or(0, |&(sample, _)| at_us(sample)));
+        estimators.accept_samples_after_settling(bursts.first().map_or(0, |&(sample, _)| at_us(sample)));
         for &(sample, ref bytes) in *bursts {
             if estimators.channel(index).is_some_and(|estimator| estimator.len() == report.samples) {
                 break;

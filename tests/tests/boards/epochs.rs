@@ -1,4 +1,4 @@
-//! What a device learns from epochs: the effects that are hidden from it, and the models that the host makes of the same samples.
+//! Models that a device learns from epochs: the effects that are hidden from it, and the host's models of the same samples.
 
 use adis16405_driver::{BURST_BYTES, Burst, SamplePeriod};
 use emulation::RATE_HZ;
@@ -7,7 +7,7 @@ use firmware::learner::{EpochFit, validate};
 use firmware::{CHANNELS, Estimators, FIRST_CONFIG, FinishedEpoch, Statistics, TimedBurst};
 use link::{LearnedMessage, Message, ValidationMessage};
 
-/// What the table of a device that has met [`emulation::four_effects`] says of them: for each channel one of these terms.
+/// The table of a device that has met [`emulation::four_effects`]: for each channel one of these terms.
 pub(crate) const FOUND: [(&str, &[&str]); 3] =
     [("gyro x", &["temp "]), ("gyro y", &["Gauss-Markov, "]), ("gyro z", &["sinusoid, ", "resonance, "])];
 
@@ -43,7 +43,7 @@ pub(crate) fn learned_on_host(
     let mut statistics = Statistics::new();
     let mut estimators = Estimators::new(&mut statistics, FIRST_CONFIG);
     let at_us = |sample: u64| (sample as f64 * 1e6 / RATE_HZ) as u64;
-    estimators.mark_probed(at_us(bursts[0].0));
+    estimators.accept_samples_after_settling(at_us(bursts[0].0));
     let mut bursts = bursts.iter();
     let mut epochs = Vec::new();
     for ((number, samples), rate_hz) in (0..).zip(samples.chunks(CHANNELS.len())).zip(rates) {

@@ -20,7 +20,7 @@ pub(crate) fn build_package((package, program): (&str, &str), target: &str, argu
 /// Vector table of the STM32F405, and the start of its core-coupled memory, which is the stack (RM0090 section 2.3).
 const FLASH_START: u32 = 0x0800_0000;
 const STACK_START: u32 = 0x1000_0000;
-/// Where every Cortex-M has its RAM.
+/// RAM of every Cortex-M.
 const RAM: std::ops::Range<u32> = 0x2000_0000..0x3000_0000;
 
 /// An ELF of 32 bits, little-endian.
@@ -40,7 +40,7 @@ impl Elf {
     }
 }
 
-/// What an image takes of flash and memory, in bytes.
+/// Flash and memory of an image, in bytes.
 #[derive(Debug)]
 pub(crate) struct Size {
     pub(crate) flash: u32,

@@ -15,7 +15,7 @@ fn sensor(seed: u64) -> VirtualAdis16405 {
     VirtualAdis16405::new(NoiseModel::paper(), seed)
 }
 
-/// What the UART of a sound board has sent, and the part.
+/// Bytes that the UART of a sound board has sent, and the part.
 pub(crate) fn run_sound(seed: u64, seconds: f64, keys: &[&str]) -> (Vec<(u64, u8)>, VirtualAdis16405) {
     let Outcome { received, part, .. } = run(SOUND, sensor(seed), seconds, keys, &[]);
     (received, part)
@@ -100,7 +100,7 @@ fn the_pico_samples_at_full_speed_and_recovers_from_faults() {
     assert_eq!(part.violations(), []);
 }
 
-/// The host finds the port by its name and the number of the board, reads a report and types commands. What USB carries is, byte for
+/// The host finds the port by its name and the number of the board, reads a report and types commands. The bytes of USB are, byte for
 /// byte, what the UART has sent since the port was opened.
 #[test]
 fn usb_carries_the_report_of_the_uart() {
@@ -141,7 +141,7 @@ fn an_unread_usb_port_loses_output_alone() {
     assert_eq!((uart.counters.bad_frames, uart.counters.missing, usb.counters.bad_frames), (0, 0, 0));
     assert!(uart.raw().len() as f64 > 4.8 * 819.2, "{} bursts in the stream of the UART", uart.raw().len());
     assert!(usb.raw().len() < uart.raw().len() / 10, "{} bursts in the stream of USB", usb.raw().len());
-    // What was dropped are messages of the stream, and lines, which have no number. The next message of the stream tells how many.
+    // Messages of the stream are dropped, and lines, which have no number. The next message of the stream tells how many.
     assert!(usb.counters.missing > 200 && u64::from(counter("usb_dropped")) >= usb.counters.missing);
     assert_eq!(
         (counter("lost_edges"), counter("queue_full"), counter("raw_dropped"), counter("recoveries")),
@@ -209,7 +209,7 @@ fn a_board_of_ones_own_resets_the_sensor_by_its_pin() {
     assert!(f64::from(counter("used")) > 2.2 * RATE_HZ, "{lines:?}");
 }
 
-/// What a person reads at the bench, of the emulated part.
+/// Answers that a person reads at the bench, of the emulated part.
 #[test]
 fn the_bench_console_reads_registers_and_times() {
     let keys = [
@@ -320,7 +320,7 @@ fn the_pico_learns_from_an_epoch() {
     assert_learns("Raspberry Pi Pico", true);
 }
 
-/// What USB costs, from the difference.
+/// Cost of USB, from the difference.
 #[test]
 #[ignore = "long: 150 emulated seconds with software floating point take some minutes; run with --long"]
 fn the_pico_learns_from_an_epoch_without_usb() {

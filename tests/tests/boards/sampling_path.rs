@@ -1,4 +1,4 @@
-//! What the sampling path of each image can run into: the machine code that the two sampling interrupts and that of the estimators reach.
+//! The sampling path of each image: the machine code that the two sampling interrupts and that of the estimators reach.
 
 use super::bench::{TARGET, feather_image, image};
 use super::images;
@@ -9,7 +9,7 @@ use std::process::Command;
 
 /// The target of the Pico.
 const PICO: &str = "thumbv6m-none-eabi";
-/// What calls a function by its address alone, and the closure that it calls: the encoder of messages, which hands over bytes.
+/// Callers of a function by its address alone, and the closure that it calls: the encoder of messages, which hands over bytes.
 const CALLS_BY_ADDRESS: [&str; 2] = ["firmware::transmit::TransmitQueue::send", "link::frame::CobsFlavor"];
 const CALLED_BY_ADDRESS: &str = "firmware::transmit::TransmitQueue::send::{{closure}}";
 /// The checks that are left, in crates of others: what is called, and a part of the place. A queue of `heapless` divides by the number of its
@@ -69,7 +69,7 @@ fn functions(image: &Path) -> BTreeMap<u32, Function> {
     functions
 }
 
-/// Whether a function panics, or is one that finds out whether to.
+/// True if a function panics, or is one that finds out whether to.
 fn is_panic(name: &str) -> bool {
     [
         "core::slice::index::SliceIndex",
@@ -138,7 +138,7 @@ fn the_main_loop_has_panics() {
 
 /// The functions that run while the flash of the Pico takes commands.
 const IN_RAM: [&str; 3] = ["read_unique_id", "erase_sector", "program_page"];
-/// Where the flash is read.
+/// Addresses of the flash.
 const FLASH: Range<u32> = 0x1000_0000..0x1100_0000;
 
 /// While the flash takes commands nothing can be read from it: the functions that command it lie in RAM, call nothing in flash by its

@@ -1,4 +1,4 @@
-//! What the boards differ in, and what their documents demand: crystal, pins, the 5 V of the sensor, brown-out, log.
+//! Differences of the boards, and demands of their documents: crystal, pins, the 5 V of the sensor, brown-out, log.
 
 use super::bench::{TARGET, feather_image, image, run};
 use super::costs::{Costs, Memory, assert_within_budget, counter};
@@ -106,7 +106,7 @@ pub(crate) fn assert_bus_times(sensor: &BusRecord, high_us: u64, gap_us: u64) {
 /// The times on the bus are settings, which a command makes longer.
 #[test]
 fn the_times_on_the_bus_are_longer_on_command() {
-    let keys = vec![(0.1, b"careful 1\ri 0\rf 819.2\r".to_vec()), (2.0, b"k".to_vec())];
+    let keys = vec![(0.1, b"bus slow\ri 0\rf 819.2\r".to_vec()), (2.0, b"k".to_vec())];
     let sensor = Some(Sensor::Published(24));
     let Outcome { sensor, received, .. } = run(image(), Scenario { sensor, keys, seconds: 2.3, ..Scenario::default() });
     assert_bus_times(&sensor.expect("a sensor"), 100, 9);

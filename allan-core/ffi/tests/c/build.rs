@@ -31,7 +31,7 @@ pub(crate) fn ours(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }
 
-/// Whether a tool starts.
+/// True if a tool starts.
 pub(crate) fn tool(name: &str) -> bool {
     Command::new(name).arg("--version").output().is_ok()
 }

@@ -7,18 +7,16 @@ use rp2040_hal::fugit::{HertzU32, RateExtU32};
 use rp2040_hal::pac::{self, DMA, RESETS, SPI0};
 use rp2040_hal::spi::{self, Spi, ValidSpiPinout};
 
-/// DMA channels.
 const RX: usize = 0;
 const TX: usize = 1;
 /// Entries of the receive buffer of SPI0.
 const BUFFER: u32 = 8;
-/// READ_ERROR and WRITE_ERROR of a channel's control register, cleared by writing ones.
+/// READ_ERROR and WRITE_ERROR, cleared by ones.
 const ERRORS: u32 = 1 << 30 | 1 << 29;
 
 /// SPI0 and the two DMA channels that serve it.
 pub struct Spi0<W: ValidSpiPinout<SPI0>> {
     spi: Spi<spi::Enabled, SPI0, W, 8>,
-    /// Clock of SPI0.
     clock: HertzU32,
     dma: DMA,
 }
@@ -35,7 +33,6 @@ impl<W: ValidSpiPinout<SPI0>> Spi0<W> {
     }
 }
 
-/// The registers of SPI0, for what the HAL has no function for.
 fn registers() -> &'static pac::spi0::RegisterBlock {
     // SAFETY: only this module, whose bus owns the HAL's driver of SPI0, uses them.
     unsafe { &*SPI0::ptr() }
@@ -46,7 +43,7 @@ impl<W: ValidSpiPinout<SPI0>> SpiPeripheral for Spi0<W> {
 
     fn set_clock_limit(&mut self, limit_hz: u32) -> u32 {
         self.spi.set_baudrate(self.clock, limit_hz.Hz());
-        // By the two dividers of the peripheral clock, rounded up (data sheet, section 4.4.3.4).
+        // Two dividers, rounded up (data sheet, section 4.4.3.4).
         let prescale = u32::from(registers().sspcpsr().read().cpsdvsr().bits());
         let rate = u32::from(registers().sspcr0().read().scr().bits());
         self.clock.to_Hz().div_ceil(prescale.max(1) * (rate + 1))
@@ -83,7 +80,7 @@ impl<W: ValidSpiPinout<SPI0>> SpiPeripheral for Spi0<W> {
             }
             registers.ch_ctrl_trig().write(|w| {
                 w.data_size().size_byte().incr_read().bit(channel == TX).incr_write().bit(channel == RX);
-                // Errors of the transfer before are cleared by writing ones (data sheet, section 2.5.7).
+                // Cleared by ones (data sheet, section 2.5.7).
                 w.read_error().clear_bit_by_one().write_error().clear_bit_by_one();
                 // SAFETY: a channel that is chained to itself triggers no other.
                 unsafe { w.chain_to().bits(channel as u8) };

@@ -1,23 +1,17 @@
-//! The flash memory of a board with an RP2040, by the functions of the boot ROM (RP2040 data sheet, section 2.8.3.1.3).
-//!
-//! While the flash takes commands nothing can be read from it: what runs meanwhile lies in RAM, with interrupts disabled. Then the
-//! second stage of the boot loader, copied to RAM, makes it readable again.
+//! The flash memory of an RP2040 board, by the boot ROM (RP2040 data sheet, section 2.8.3.1.3); while it takes
+//! commands, code runs from RAM without interrupts.
 
 use crate::microcontroller::settings_flash::{FlashError, FlashMemory};
 use core::sync::atomic::{Ordering, compiler_fence};
 use rp2040_hal::rom_data;
 
-/// Where the flash is read; the second stage of the boot loader is at its beginning.
 const FLASH: *const u32 = Rp2040Flash::ORIGIN as *const u32;
-/// Words of the second stage.
 const BOOT2_WORDS: usize = 64;
-/// Bytes of the unique number of a W25Q16, the instruction that reads it, and the dummy bytes after that (Winbond, W25Q16JV,
-/// instruction Read Unique ID).
+/// Unique number of a W25Q16: bytes, instruction, dummy bytes (Winbond, W25Q16JV, Read Unique ID).
 const UNIQUE_ID_BYTES: usize = 8;
 const READ_UNIQUE_ID: u32 = 0x4B;
 const DUMMY_BYTES: usize = 4;
 
-/// What runs while the flash takes commands.
 #[repr(C)]
 struct Command {
     connect_internal_flash: unsafe extern "C" fn(),
@@ -25,14 +19,13 @@ struct Command {
     flash_flush_cache: unsafe extern "C" fn(),
     flash_range_erase: unsafe extern "C" fn(u32, usize, u32, u8),
     flash_range_program: unsafe extern "C" fn(u32, *const u8, usize),
-    /// The second stage, in RAM.
     boot2: unsafe extern "C" fn(),
-    /// Address in the flash, from its beginning.
+    /// From the flash's beginning.
     offset: u32,
     data: *mut u8,
 }
 
-/// Runs `function`, which must lie in RAM, on `data`.
+/// `function` must lie in RAM.
 fn run(function: unsafe extern "C" fn(&Command), offset: u32, data: *mut u8) {
     // SAFETY: flash, which is readable here.
     let boot2: [u32; BOOT2_WORDS] = core::array::from_fn(|word| unsafe { FLASH.add(word).read_volatile() });
@@ -56,26 +49,25 @@ fn run(function: unsafe extern "C" fn(&Command), offset: u32, data: *mut u8) {
     core::hint::black_box(&boot2);
 }
 
-/// The unique number of the flash memory, and with it of the board. To be read while no DMA transfer runs.
+/// Unique number of flash and board; no DMA transfer may run.
 pub fn unique_id() -> [u8; UNIQUE_ID_BYTES] {
     let mut id = [0; UNIQUE_ID_BYTES];
     run(read_unique_id, 0, id.as_mut_ptr());
     id
 }
 
-/// Registers of the SSI, which drives the flash, in words (RP2040 data sheet, section 4.10.13).
+/// Registers of the SSI, words (RP2040 data sheet, section 4.10.13).
 const SSI: *mut u32 = 0x1800_0000 as *mut u32;
 const CTRLR0: usize = 0;
 const CTRLR1: usize = 1;
 const SSIENR: usize = 2;
 const SR: usize = 10;
 const DR0: usize = 24;
-/// TMOD of CTRLR0: EEPROM read, in which the SSI sends what is written to it and then receives CTRLR1 + 1 bytes.
+/// TMOD of CTRLR0: sends, then receives CTRLR1 + 1 bytes.
 const EEPROM_READ: u32 = 3 << 8;
-/// RFNE of SR: a byte has been received.
+/// RFNE of SR.
 const RECEIVED: u32 = 1 << 3;
 
-/// Reads the unique number to `data`.
 #[inline(never)]
 #[unsafe(link_section = ".data.read_unique_id")]
 unsafe extern "C" fn read_unique_id(command: &Command) {
@@ -90,7 +82,7 @@ unsafe extern "C" fn read_unique_id(command: &Command) {
         SSI.add(DR0).write_volatile(READ_UNIQUE_ID);
         let mut index = 0;
         while index < DUMMY_BYTES + UNIQUE_ID_BYTES {
-            // The SSI clocks the flash without pauses: a byte comes within some µs.
+            // A byte comes within some µs.
             while SSI.add(SR).read_volatile() & RECEIVED == 0 {}
             let byte = SSI.add(DR0).read_volatile() as u8;
             if index >= DUMMY_BYTES {
@@ -105,13 +97,11 @@ unsafe extern "C" fn read_unique_id(command: &Command) {
     }
 }
 
-/// Bytes of a sector, which is erased at once, and of a page, which is programmed at once.
 const SECTOR: usize = 4096;
 const PAGE: usize = 256;
-/// The instruction that erases a sector, for the boot ROM, which also takes a larger block and its instruction.
+/// For the boot ROM, beside a larger block and its instruction.
 const ERASE_SECTOR: u8 = 0x20;
 
-/// Erases the sector at the command's offset.
 #[inline(never)]
 #[unsafe(link_section = ".data.erase_sector")]
 unsafe extern "C" fn erase_sector(command: &Command) {
@@ -125,7 +115,6 @@ unsafe extern "C" fn erase_sector(command: &Command) {
     }
 }
 
-/// Programs the page at the command's offset.
 #[inline(never)]
 #[unsafe(link_section = ".data.program_page")]
 unsafe extern "C" fn program_page(command: &Command) {
@@ -139,8 +128,8 @@ unsafe extern "C" fn program_page(command: &Command) {
     }
 }
 
-/// The flash memory. Interrupts are disabled while a sector is erased, 45 ms typically and 400 ms at most, or a page is programmed, 0.4
-/// and 3 ms (Winbond, W25Q16JV, AC electrical characteristics).
+/// The flash memory; interrupts are disabled during erasure, 45 to 400 ms, and programming, 0.4 to 3 ms (Winbond,
+/// W25Q16JV, AC electrical characteristics).
 pub struct Rp2040Flash;
 
 impl FlashMemory for Rp2040Flash {
@@ -152,7 +141,7 @@ impl FlashMemory for Rp2040Flash {
         Ok(())
     }
 
-    /// Fewer bytes than a page can be programmed: those around them are written as ones, which changes nothing.
+    /// Bytes around are written as ones, which changes nothing.
     fn program(offset: u32, words: &[u8]) -> Result<(), FlashError> {
         let (mut at, mut rest) = (offset as usize, words);
         while !rest.is_empty() {

@@ -15,31 +15,25 @@ use rp2040_hal::fugit::ExtU32;
 use rp2040_hal::gpio::{FunctionSioInput, Interrupt, Pin, PinId, PullDown};
 use rp2040_hal::pac::{CLOCKS, PLL_SYS, PLL_USB, RESETS, TIMER, VREG_AND_CHIP_RESET, WATCHDOG, XOSC};
 
-/// Crystal of the Pico.
 const CRYSTAL_HZ: u32 = 12_000_000;
-/// Time after which the watchdog restarts if neither the main loop nor SysTick feeds it; its maximum is 8.388 s.
+/// For the main loop and SysTick; at most 8.388 s.
 const WATCHDOG_MS: u32 = 8_300;
-/// Time for which SysTick feeds the watchdog after the main loop, in s. The longest step of the main loop is the fit of one
-/// channel: with 20 points it takes 118 million instructions (tests/instructions, thumbv6m) and up to three of them follow
-/// one another, 2.5 s in the emulator with 12 points; slow flash may double that.
+/// Feeding by SysTick after the main loop, s; the longest step, a channel's fit, takes 2.5 s in the emulator.
 const EXTENSION_S: u32 = 30;
-/// Feedings by the main loop.
 static FEEDINGS: AtomicU32 = AtomicU32::new(0);
-/// Readings of the flag of the crystal, each of at least three cycles of at most 12 MHz: 100 ms. It is set 1 ms after the
-/// oscillator runs.
+/// Readings of the crystal's flag, 100 ms at 12 MHz; it is set after 1 ms.
 const CRYSTAL_READINGS: u32 = 400_000;
-/// Time for which the LED says that the crystal does not start before the next attempt, in half periods of the LED.
+/// Alarm before the next attempt, half periods of the LED.
 const ALARM_BLINKS: u32 = 80;
-/// Cycles of a half period of the LED: 62 ms at 6.5 MHz, the typical frequency of the ring oscillator (data sheet, 2.17).
+/// 62 ms at 6.5 MHz, the typical ring oscillator (data sheet, 2.17).
 const ALARM_CYCLES: u32 = 400_000;
-/// Core voltage below which the brown-out detector resets: 0.946 V of 1.1 V (data sheet, 2.10.6.1; 0.86 V after a reset).
+/// 0.946 V of 1.1 V (data sheet, 2.10.6.1; 0.86 V after a reset).
 const BROWN_OUT_LEVEL: u8 = 0b1011;
 
 /// Reads the cause of the start (RP2040 data sheet, sections 2.10.6.2 and 4.7.6).
 pub fn boot_cause(chip: &VREG_AND_CHIP_RESET, watchdog: &WATCHDOG) -> BootCause {
     let (reason, chip) = (watchdog.reason().read(), chip.chip_reset().read());
-    // The chip's flags are those of the last reset of the whole chip, which a reset by the watchdog is not. Power-on and
-    // brown-out share one flag.
+    // The chip's flags ignore a watchdog reset; power-on and brown-out share one.
     if reason.timer().bit_is_set() {
         BootCause::Watchdog
     } else if reason.force().bit_is_set() {
@@ -69,10 +63,7 @@ pub struct ClockParts {
 }
 
 impl Rp2040 {
-    /// Starts the watchdog, before anything that could wait without end, the clocks and the microsecond counter.
-    ///
-    /// Without the crystal there is no serial port: the ring oscillator runs at 1.8 to 12 MHz. The LED then blinks fast for
-    /// five seconds, and the next attempt follows.
+    /// Starts the watchdog first, then clocks and microsecond counter; without the crystal the LED blinks fast.
     ///
     /// # Errors
     /// The crystal's frequency makes no clock.
@@ -83,9 +74,9 @@ impl Rp2040 {
         led: &mut impl StatefulOutputPin,
     ) -> Result<ClocksManager, InitError> {
         let mut watchdog = rp2040_hal::Watchdog::new(watchdog);
-        // From the ring oscillator, until the crystal runs: the watchdog's time is then 5.7 s or more.
+        // By the ring oscillator until the crystal runs: 5.7 s or more.
         watchdog.enable_tick_generation((CRYSTAL_HZ / 1_000_000) as u8);
-        // While a debugger has halted the processor.
+        // During a halt by a debugger.
         watchdog.pause_on_debug(true);
         watchdog.start(WATCHDOG_MS.millis());
         chip.bod().modify(|_, w| {
@@ -107,7 +98,7 @@ impl Rp2040 {
     }
 }
 
-/// Switches the crystal oscillator on, as the HAL does again without a bound on the time.
+/// The HAL does so without a time limit.
 fn crystal_starts(crystal: &XOSC) -> bool {
     crystal.ctrl().write(|w| w.freq_range()._1_15mhz());
     crystal.ctrl().modify(|_, w| w.enable().enable());
@@ -128,7 +119,7 @@ impl Watchdog for Rp2040 {
     }
 }
 
-/// The counter falls by two a microsecond (erratum RP2040-E1).
+/// Falls by two a microsecond (erratum RP2040-E1).
 fn reload_watchdog() {
     // SAFETY: feeds the watchdog, and nothing else.
     unsafe { (*WATCHDOG::ptr()).load().write(|w| w.bits(2 * 1000 * WATCHDOG_MS)) };
@@ -143,7 +134,7 @@ impl Microcontroller for Rp2040 {
         }
     }
 
-    /// Restarts by the watchdog, since a reset of the core alone would not reset the peripherals.
+    /// A core reset would not reset the peripherals.
     fn restart() -> ! {
         // SAFETY: the write ends the program.
         unsafe { (*WATCHDOG::ptr()).ctrl().modify(|_, w| w.trigger().set_bit()) };
@@ -152,7 +143,7 @@ impl Microcontroller for Rp2040 {
         }
     }
 
-    /// Has the boot ROM show itself as a drive and to picotool, without an LED for its activity.
+    /// As a drive and for picotool, without an activity LED.
     fn start_boot_loader() -> ! {
         // SAFETY: the boot ROM, which does not feed the watchdog, takes over.
         unsafe { (*WATCHDOG::ptr()).ctrl().modify(|_, w| w.enable().clear_bit()) };

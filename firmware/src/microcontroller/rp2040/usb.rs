@@ -9,15 +9,13 @@ use rp2040_hal::pac::{RESETS, USBCTRL_DPRAM, USBCTRL_REGS};
 use rp2040_hal::usb::UsbBus;
 use usb_device::bus::UsbBusAllocator;
 
-/// Vendor and product that Raspberry Pi gives to devices with an RP2040 and a serial port (github.com/raspberrypi/usb-pid:
-/// Raspberry Pi Pico SDK CDC UART).
+/// Raspberry Pi Pico SDK CDC UART (github.com/raspberrypi/usb-pid).
 const PRODUCT_ID: (u16, u16) = (0x2E8A, 0x000A);
 
 /// The USB port, served in the interrupt USBCTRL_IRQ.
 pub type Rp2040UsbPort = UsbPort<'static, UsbBus>;
 
-/// Starts the USB port, with the serial number of the board: the unique number of its flash memory in hexadecimal, as the
-/// manufacturer's tools give it. To be called once, while no DMA transfer runs.
+/// Starts the USB port with the flash's unique number in hexadecimal. To be called once, while no DMA transfer runs.
 pub fn usb_port(
     (registers, memory): (USBCTRL_REGS, USBCTRL_DPRAM),
     clock: UsbClock,
@@ -28,8 +26,7 @@ pub fn usb_port(
     UsbParts::start(bus, PRODUCT_ID, unique_id(), reconnect)
 }
 
-/// Resets the controller, which takes the device off the bus, or starts it again as [`UsbBus::new`] does. The endpoints, which are set up
-/// in its memory, and the address follow when the host resets the bus.
+/// Takes the controller off the bus, or starts it as [`UsbBus::new`]; endpoints and address follow a bus reset.
 fn reconnect(connected: bool) {
     // SAFETY: no other program part uses the reset of the controller, and the interrupt that uses the controller waits meanwhile.
     let (resets, controller) = unsafe { (&*RESETS::ptr(), &*USBCTRL_REGS::ptr()) };

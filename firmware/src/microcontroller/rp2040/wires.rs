@@ -49,7 +49,7 @@ pub type ResetPin = Pin<Gpio21, FunctionNull>;
 /// The same, driven.
 pub type ResetLine = Pin<Gpio21, FunctionSioOutput>;
 
-/// Starts a board with these wires. `has_usb` starts the port on USB, and `reset_line` drives the pin at RST high.
+/// Starts a board; `has_usb` starts USB, `reset_line` drives RST high.
 pub fn start<B>(
     device: pac::Peripherals,
     queues: UartQueues,
@@ -63,7 +63,7 @@ where
     let mut resets = device.RESETS;
     let sio = Sio::new(device.SIO);
     let pins = gpio::Pins::new(device.IO_BANK0, device.PADS_BANK0, sio.gpio_bank0, &mut resets);
-    // Before SCK goes high, which the sensor would take for a clock edge: a pin is pulled down until it is driven.
+    // Before SCK rises, which the sensor would take for an edge.
     let select = pins.gpio17.into_push_pull_output_in_state(gpio::PinState::High);
     let reset_line = reset_line(pins.gpio21);
     let mut led = pins.gpio25.into_push_pull_output();
@@ -80,7 +80,7 @@ where
     let (peripheral, core_hz) = (clocks.peripheral_clock.freq(), clocks.system_clock.freq().to_Hz());
 
     let settings = uart::UartConfig::new(BAUD.Hz(), uart::DataBits::Eight, None, uart::StopBits::One);
-    // Nothing may be connected to the receiver: pulled up it is idle.
+    // Idle if not connected.
     let lines = (pins.gpio0.into_function(), pins.gpio1.reconfigure());
     let serial = uart::UartPeripheral::new(device.UART0, lines, &mut resets)
         .enable(settings, peripheral)

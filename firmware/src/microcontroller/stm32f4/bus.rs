@@ -10,11 +10,10 @@ use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Enable, Rcc};
 use stm32f4xx_hal::spi::{Mode, Phase, Polarity};
 
-/// DMA2 streams and channel of SPI1 (RM0090 table 43).
+/// Streams and channel of SPI1 (RM0090 table 43).
 const RX: usize = 0;
 const TX: usize = 3;
 const CHANNEL: u8 = 3;
-/// Bytes that the receive buffer of SPI1 and its shift register hold at most.
 const STALE_BYTES: u32 = 2;
 
 /// The sensor on SPI1.
@@ -26,11 +25,8 @@ pub struct Spi1 {
     dma: DMA2,
 }
 
-/// SPI1 in mode 3 on PA5 (SCK), PA6 (MISO) and PA7 (MOSI), with chip select on PA4. MISO is pulled down, so that an
-/// unplugged sensor gives no bits.
-///
-/// SPI1 samples MISO by the clock at the pad of SCK. A pad of low speed allows 25 MHz of peripheral clock; beyond it the last bit of a
-/// byte may be wrong. Medium speed allows 75 MHz (ST, errata sheet ES0182, section 2.12.4, at 30 pF).
+/// SPI1 in mode 3 on PA5 (SCK), PA6 (MISO, pulled down) and PA7 (MOSI), chip select on PA4. Low speed of SCK's pad
+/// allows 25 MHz of peripheral clock, medium 75 MHz (ST, errata sheet ES0182, section 2.12.4).
 pub(super) fn spi1_bus(
     (spi, dma): (SPI1, DMA2),
     (select, sck, miso, mosi): (PA4, PA5, PA6, PA7),
@@ -47,13 +43,12 @@ pub(super) fn spi1_bus(
     SensorSpi::new(Spi1 { bus_hz, dma }, select)
 }
 
-/// The registers of SPI1.
 fn registers() -> &'static pac::spi1::RegisterBlock {
     // SAFETY: only this module, whose bus was made of SPI1, uses them.
     unsafe { &*SPI1::ptr() }
 }
 
-/// The register by which the peripherals of the bus of SPI1 are reset.
+/// Resets the peripherals on SPI1's bus.
 fn reset_register() -> &'static pac::rcc::APB2RSTR {
     // SAFETY: after the start only this module uses it.
     unsafe { (*RCC::ptr()).apb2rstr() }
@@ -79,7 +74,7 @@ impl SpiPeripheral for Spi1 {
         clock_hz
     }
 
-    /// Through the reset of all of SPI1: BSY may stay set when it is disabled alone (ST, errata sheet ES0182, SPI).
+    /// BSY may stay set otherwise (ST, errata sheet ES0182, SPI).
     fn reset(&mut self) {
         let (spi, rcc) = (registers(), reset_register());
         let [control, control_2] = [spi.cr1().read().bits(), spi.cr2().read().bits()];
@@ -95,7 +90,7 @@ impl SpiPeripheral for Spi1 {
     fn drain(&mut self) {
         let _ended = wait_for(|| registers().sr().read().bsy().bit_is_clear());
         for _ in 0..STALE_BYTES {
-            // Reading DR, then SR, clears an overrun too (RM0090 section 28.3.10).
+            // Clears an overrun (RM0090 section 28.3.10).
             registers().dr().read();
             registers().sr().read();
         }
@@ -124,7 +119,7 @@ impl SpiPeripheral for Spi1 {
         registers().cr2().modify(|_, w| w.rxdmaen().set_bit().txdmaen().set_bit());
     }
 
-    /// A stream that was disabled sets its flag of completion too (RM0090 section 10.3.14), so the bytes that it has left decide.
+    /// Disabling sets the completion flag too (RM0090 section 10.3.14): the rest decides.
     fn stop(&mut self) -> bool {
         let flags = self.dma.lisr().read();
         let complete = flags.tcif0().bit_is_set() && flags.teif0().bit_is_clear() && flags.teif3().bit_is_clear();

@@ -1,25 +1,22 @@
-//! The flash memory of an STM32F405 (RM0090 chapter 3), of which the last sectors keep the settings.
-//!
-//! The program is in the same memory: while a sector is erased or a word programmed, the processor waits at the next instruction
-//! that it fetches (section 3.6), interrupts included.
+//! The flash memory of an STM32F405 (RM0090 chapter 3), whose last sectors keep the settings; the processor waits
+//! during erasure and programming (section 3.6).
 
 use super::watchdog;
 use crate::bus_frame::wait_for;
 use crate::microcontroller::settings_flash::{FlashError, FlashMemory};
 use stm32f4xx_hal::pac::{FLASH, flash::RegisterBlock};
 
-/// Bytes that are programmed at once, as the supply of 2.7 to 3.6 V allows (Table 7), and their code in PSIZE of FLASH_CR.
+/// Programmed at once at 2.7 to 3.6 V (Table 7), and its PSIZE.
 const WORD: usize = 4;
 const PSIZE_32: u8 = 0b10;
-/// Sectors 0 to 4 have as many bytes together as each of the sectors 5 to 11 (Table 5).
+/// Together as large as one of 5 to 11 (Table 5).
 const SECTORS_BEFORE: usize = 4;
-/// Keys that unlock FLASH_CR (section 3.6.1).
+/// For FLASH_CR (section 3.6.1).
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
-/// Waits of 0.4 ms at least until an operation is given up: a sector is erased within 2 s, a word programmed within 0.1 ms
-/// (STM32F405 data sheet, flash memory programming).
+/// Waits of 0.4 ms; a sector takes 2 s, a word 0.1 ms (STM32F405 data sheet, flash memory programming).
 const WAITS: u32 = 10_000;
 
-/// The flash memory. Its sectors 0 to 4, which are shorter, are not for settings.
+/// The flash memory; sectors 0 to 4 are too short for settings.
 pub struct Stm32Flash;
 
 impl FlashMemory for Stm32Flash {
@@ -52,7 +49,7 @@ impl FlashMemory for Stm32Flash {
     }
 }
 
-/// Runs `operation` with the controller unlocked and its errors of before cleared.
+/// With the controller unlocked and errors cleared.
 fn operate(operation: impl FnOnce(&RegisterBlock) -> Result<(), FlashError>) -> Result<(), FlashError> {
     // SAFETY: after the start only the main loop uses the registers of the flash memory.
     let flash = unsafe { &*FLASH::ptr() };
@@ -66,7 +63,7 @@ fn operate(operation: impl FnOnce(&RegisterBlock) -> Result<(), FlashError>) -> 
     flash.sr().modify(|r, w| unsafe { w.bits(r.bits()) });
     let done = if flash.cr().read().lock().bit_is_clear() { operation(flash) } else { Err(FlashError::Refused) };
     flash.cr().modify(|_, w| w.ser().clear_bit().pg().clear_bit().lock().set_bit());
-    // The data cache may hold what was there before (section 3.5.2); it is emptied while it is off.
+    // The cache is stale (section 3.5.2); it is emptied while off.
     flash.acr().modify(|_, w| w.dcen().clear_bit());
     flash.acr().modify(|_, w| w.dcrst().set_bit());
     flash.acr().modify(|_, w| w.dcrst().clear_bit());
@@ -74,7 +71,6 @@ fn operate(operation: impl FnOnce(&RegisterBlock) -> Result<(), FlashError>) -> 
     done
 }
 
-/// Waits for the end of an operation.
 fn finish(flash: &RegisterBlock) -> Result<(), FlashError> {
     let is_ready = (0..WAITS).any(|_| wait_for(|| flash.sr().read().bsy().bit_is_clear()));
     let status = flash.sr().read();

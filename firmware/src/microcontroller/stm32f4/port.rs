@@ -8,7 +8,7 @@ use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::serial::config::Config;
 use stm32f4xx_hal::serial::{Instance, Rx, RxListen, Serial, Tx, TxISR, TxListen};
 
-/// Baud rate of the serial port, 8N1.
+/// 8N1.
 const BAUD: u32 = 460_800;
 
 /// A USART, served in its interrupt.
@@ -19,7 +19,7 @@ pub struct UsartPort<U: Instance> {
 }
 
 impl<U: Instance> UsartPort<U> {
-    /// Starts the port and its receive interrupt. Nothing may be connected to the receiver: a pin with a pull-up is then idle.
+    /// Starts the port; a pulled-up receiver is idle if not connected.
     pub fn new(
         usart: U,
         pins: (impl Into<U::Tx<PushPull>>, impl Into<U::Rx<PushPull>>),
@@ -36,7 +36,7 @@ impl<U: Instance> UsartPort<U> {
 
 impl<U: Instance> ServedPort for UsartPort<U> {
     fn serve(&mut self, _now_us: u32) -> u32 {
-        // Read regardless of the flags: an overrun raises the interrupt too, and only a read clears it.
+        // An overrun also interrupts, and only a read clears it.
         let lost = match self.rx.read() {
             Ok(byte) => self.queues.receive.push(Some(byte)),
             Err(nb::Error::Other(_)) => self.queues.receive.push(None),

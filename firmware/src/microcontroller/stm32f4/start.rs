@@ -14,26 +14,24 @@ use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Enable, Rcc, Reset};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-/// Time without feeding after which the watchdog restarts, by an oscillator of 32 kHz: 5.4 s at its upper limit of 47 kHz (STM32F405 data
-/// sheet, LSI). A report of all channels takes less, and so does a sector of flash.
+/// Watchdog time by an oscillator of 32 kHz, 5.4 s at 47 kHz (STM32F405 data sheet, LSI); a report takes less.
 const WATCHDOG_MS: u32 = 8_000;
-/// Clock of the processor, from the crystal as from the internal oscillator.
+/// From crystal or internal oscillator.
 const CORE_HZ: u32 = 168_000_000;
-/// Clock of both peripheral buses. From it the prescalers of SPI1, 2 to 256, make 656 kHz for normal and 164 kHz for low-power
-/// mode; from 84 MHz the slowest one would be 328 kHz, more than low-power mode takes.
+/// Both peripheral buses; from 84 MHz the slowest clock of SPI1 is 328 kHz, too fast for low-power mode.
 const PERIPHERAL_HZ: u32 = 42_000_000;
-/// Readings of the flag of the crystal, each of at least three cycles of 16 MHz: 100 ms. Crystals start within some ms.
+/// Readings of the crystal's flag at 16 MHz: 100 ms.
 const CRYSTAL_READINGS: u32 = 550_000;
-/// BOR_LEV of level 3, 2.7 V (RM0090 section 3.9.10). The names in the register definitions have the order reversed.
+/// Level 3, 2.7 V (RM0090 section 3.9.10); the definitions' names are reversed.
 const BROWN_OUT_LEVEL_3: u8 = 0b00;
-/// Keys that unlock the option bytes (RM0090 section 3.7.2).
+/// For the option bytes (RM0090 section 3.7.2).
 const OPTION_KEYS: [u32; 2] = [0x0819_2A3B, 0x4C5D_6E7F];
 
 /// Reads the cause of the start and clears the reset flags (RM0090 section 6.3.21).
 pub fn boot_cause(rcc: &RCC) -> BootCause {
     let flags = rcc.csr().read();
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
-    // Power-on also sets the brown-out flag, and every reset sets the flag of the pin.
+    // Power-on also sets the brown-out flag, every reset the pin's.
     if flags.porrstf().bit_is_set() {
         BootCause::PowerOn
     } else if flags.wdgrstf().bit_is_set() {
@@ -58,19 +56,18 @@ impl Watchdog for Stm32f4 {
     }
 }
 
-/// What a start gives.
+/// The result of a start.
 pub struct Started {
     /// Why the microcontroller started.
     pub cause: BootCause,
-    /// What the clocks are derived from.
+    /// The source of the clocks.
     pub clock: ClockSource,
     /// The clocks.
     pub rcc: Rcc,
 }
 
 impl Stm32f4 {
-    /// Starts the watchdog, before anything that could wait without end, the clocks and the microsecond counter. A crystal
-    /// that does not start is replaced by the internal oscillator.
+    /// Starts the watchdog first, then clocks and microsecond counter; the internal oscillator replaces a dead crystal.
     pub fn start((rcc, flash, timer, watchdog): (RCC, FLASH, TIM2, IWDG), crystal_hz: u32) -> Started {
         let cause = boot_cause(&rcc);
         if cause == BootCause::Software && REQUEST.load(Relaxed) == BOOT_LOADER_REQUEST {
@@ -78,7 +75,7 @@ impl Stm32f4 {
         }
         IndependentWatchdog::new(watchdog).start(WATCHDOG_MS.millis());
         stop_watchdog_with_debugger();
-        // The option bytes keep the level; they are not written without being asked to.
+        // Option bytes are written only on request.
         let programmed = flash.optcr().read().bor_lev().bits() == BROWN_OUT_LEVEL_3;
         defmt::info!("brown-out level of 2.7 V {=str}", if programmed { "set" } else { "not set: command brownout" });
         let clock = start_crystal(&rcc);
@@ -86,7 +83,7 @@ impl Stm32f4 {
             ClockSource::Crystal => Config::hse(crystal_hz.Hz()),
             ClockSource::Internal => Config::hsi(),
         };
-        // With the 48 MHz that USB needs.
+        // 48 MHz for USB.
         let source = source.require_pll48clk();
         let config = source.sysclk(CORE_HZ.Hz()).pclk1(PERIPHERAL_HZ.Hz()).pclk2(PERIPHERAL_HZ.Hz());
         let mut rcc = rcc.freeze(config);
@@ -100,7 +97,6 @@ impl Stm32f4 {
     }
 }
 
-/// Switches the crystal oscillator on; off again if it does not start.
 fn start_crystal(rcc: &RCC) -> ClockSource {
     rcc.cr().modify(|_, w| w.hseon().on());
     if (0..CRYSTAL_READINGS).any(|_| rcc.cr().read().hserdy().is_ready()) {
@@ -111,24 +107,22 @@ fn start_crystal(rcc: &RCC) -> ClockSource {
     }
 }
 
-/// A processor that a debugger has halted is not restarted by the watchdog (RM0090 section 38.16.4, DBG_IWDG_STOP).
+/// DBG_IWDG_STOP (RM0090 section 38.16.4).
 fn stop_watchdog_with_debugger() {
     // SAFETY: a register that nothing else uses.
     unsafe { (*DBGMCU::ptr()).apb1_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit()) };
 }
 
-/// What the program before has asked for, in memory that a reset does not clear.
 #[unsafe(link_section = ".uninit.request")]
 static REQUEST: AtomicU32 = AtomicU32::new(0);
-/// That the boot loader be started; any number that memory is not likely to hold.
+/// Any number unlikely in memory.
 const BOOT_LOADER_REQUEST: u32 = 0xB007_10AD;
-/// The system memory with the boot loader, which begins with its vector table (RM0090 section 2.4; AN2606).
+/// Boot loader, beginning with its vector table (RM0090 section 2.4; AN2606).
 const SYSTEM_MEMORY: *const u32 = 0x1FFF_0000 as *const u32;
-/// MEM_MODE of SYSCFG_MEMRMP: system memory at address 0 (RM0090 section 9.2.1).
+/// Maps it to 0 (RM0090 section 9.2.1).
 const SYSTEM_MEMORY_AT_0: u8 = 0b01;
 
-/// Starts the boot loader of the ROM as a reset with BOOT0 high does: all peripherals are as after a reset, no interrupt is enabled, and
-/// system memory is at address 0.
+/// As a reset with BOOT0 high: reset peripherals, no interrupts, system memory at address 0.
 fn enter_boot_loader(rcc: &RCC) -> ! {
     REQUEST.store(0, Relaxed);
     rcc.apb2enr().modify(|_, w| w.syscfgen().set_bit());
@@ -157,14 +151,13 @@ impl Microcontroller for Stm32f4 {
         SCB::sys_reset()
     }
 
-    /// Has the next start begin with the boot loader of the ROM, for which everything has to be as after a reset.
+    /// At the next start, with everything as after a reset.
     fn start_boot_loader() -> ! {
         REQUEST.store(BOOT_LOADER_REQUEST, Relaxed);
         SCB::sys_reset()
     }
 
-    /// Has a supply below 2.7 V reset the microcontroller, which at 168 MHz needs that much: brown-out level 3 in the option
-    /// bytes (RM0090 sections 3.7.2 and 3.7.3), for which the processor waits some milliseconds.
+    /// Brown-out level 3, 2.7 V for 168 MHz, in the option bytes (RM0090 sections 3.7.2 and 3.7.3); takes milliseconds.
     fn program_brown_out() -> BrownOutLevel {
         // SAFETY: only this function uses the flash memory's registers after the start.
         let flash = unsafe { &*FLASH::ptr() };

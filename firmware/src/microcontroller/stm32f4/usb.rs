@@ -8,18 +8,17 @@ use stm32f4xx_hal::pac::{OTG_FS_DEVICE, OTG_FS_GLOBAL, OTG_FS_PWRCLK};
 use stm32f4xx_hal::rcc::Clocks;
 use usb_device::bus::UsbBusAllocator;
 
-/// Vendor and product of STMicroelectronics' virtual COM port.
+/// STMicroelectronics' virtual COM port.
 const PRODUCT_ID: (u16, u16) = (0x0483, 0x5740);
-/// The unique number of the microcontroller, in words (RM0090 section 39.1).
+/// Words (RM0090 section 39.1).
 const UNIQUE_ID: *const [u32; 3] = 0x1FFF_7A10 as *const [u32; 3];
-/// Words of the driver's copies of received packets: one of 64 bytes for each endpoint that receives, of which there are two.
+/// A packet of 64 bytes for each of two receiving endpoints.
 const PACKET_WORDS: usize = 2 * 64 / 4;
 
 /// The USB port, served in the interrupt OTG_FS.
 pub type Stm32UsbPort = UsbPort<'static, UsbBus<USB>>;
 
-/// Starts the USB port, with the unique number of the microcontroller as the serial number of the board. To be called once. Its
-/// clock is the 48 MHz of the main PLL.
+/// Starts the USB port, on 48 MHz of the main PLL, with the microcontroller's unique number. To be called once.
 pub fn usb_port(
     registers: (OTG_FS_GLOBAL, OTG_FS_DEVICE, OTG_FS_PWRCLK),
     wires: (impl Into<Dm>, impl Into<Dp>),
@@ -33,7 +32,7 @@ pub fn usb_port(
     UsbParts::start(bus, PRODUCT_ID, unique_id.into_iter().flat_map(u32::to_be_bytes), reconnect)
 }
 
-/// Takes the device off the bus, or connects it again (SDIS, RM0090 section 34.16.4). The host then resets the bus.
+/// SDIS (RM0090 section 34.16.4); the host then resets the bus.
 fn reconnect(connected: bool) {
     // SAFETY: the interrupt that uses the controller waits meanwhile.
     unsafe { (*OTG_FS_DEVICE::ptr()).dctl().modify(|_, w| w.sdis().bit(!connected)) };

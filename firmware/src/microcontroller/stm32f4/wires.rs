@@ -1,4 +1,4 @@
-//! The sensor's wires to an STM32F4: its bus and the data-ready input, of which and of a start the parts of a board are made.
+//! The sensor's wires to an STM32F4: bus and data-ready input.
 
 use super::bus::{Spi1Bus, spi1_bus};
 use super::start::{Started, Stm32f4};
@@ -17,7 +17,7 @@ pub struct SensorWires<const P: char, const N: u8> {
     pub pins: (PA4, PA5, PA6, PA7),
     /// The pin at DIO1.
     pub data_ready: Pin<P, N>,
-    /// What makes an edge of that pin an interrupt.
+    /// The peripherals that make edges of that pin interrupts.
     pub edges: (EXTI, SYSCFG),
 }
 
@@ -42,7 +42,7 @@ impl Started {
     }
 }
 
-/// Makes a pin the data-ready input. It is pulled down, so that an unplugged sensor gives no edges.
+/// Pulled down: no edges from an unplugged sensor.
 fn data_ready_input<const P: char, const N: u8>(
     pin: Pin<P, N>,
     (mut exti, syscfg): (EXTI, SYSCFG),

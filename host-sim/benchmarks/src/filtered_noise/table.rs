@@ -4,59 +4,50 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
-/// A coefficient that was estimated, with its 95 % bounds. One that the record does not show has the value and the lower bound 0.
+/// An estimate with 95 % bounds; 0 and lower bound 0 if not significant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FilteredCoefficient {
-    /// True value.
     pub truth: f64,
-    /// Estimate.
     pub value: f64,
-    /// Lower 95 % bound.
     pub low: f64,
-    /// Upper 95 % bound.
     pub high: f64,
 }
 
-/// What a report says of one channel.
+/// One channel of a report.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FilteredChannel {
-    /// Seed of the record.
     pub seed: u64,
-    /// Name of the channel.
     pub channel: &'static str,
-    /// Taps and decimation of the filter that the model has.
+    /// Taps and decimation in the model.
     pub filter: Option<[f64; 2]>,
-    /// N, B and K with their truth; absent where the model has none.
+    /// N, B and K with their truth, if the model has them.
     pub coefficients: [Option<FilteredCoefficient>; 3],
-    /// Every effect that is named, without the filter itself where there is one.
+    /// Named effects, without the filter itself.
     pub named: Vec<String>,
 }
 
-/// All channels of one filter and reading.
+/// Channels of one filter and reading.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FilterCell {
     /// Taps of each of the two averages.
     pub taps: usize,
-    /// 1 where every value is read, 2 where every second is.
+    /// Decimation: 1 if every value is read.
     pub every: usize,
-    /// In the order of the seeds.
     pub channels: Vec<FilteredChannel>,
 }
 
 /// The result of the benchmark.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FilteredNoiseTable {
-    /// By ascending taps and readings.
     pub cells: Vec<FilterCell>,
 }
 
 impl FilterCell {
-    /// Estimates of the coefficient at the index `at`.
     fn estimates(&self, at: usize) -> impl Iterator<Item = FilteredCoefficient> + '_ {
         self.channels.iter().filter_map(move |channel| channel.coefficients[at])
     }
 
-    /// Mean of the estimate over its truth, less 1, and its standard error, in percent, over the channels that show the coefficient.
+    /// Mean ratio to the truth less 1 and its standard error, percent, over the channels that have the coefficient.
     fn bias_percent(&self, at: usize) -> Option<(f64, f64)> {
         let shown = self.estimates(at).filter(|estimate| estimate.value > 0.0);
         let errors: Vec<f64> = shown.map(|estimate| 100.0 * (estimate.value / estimate.truth - 1.0)).collect();
@@ -66,13 +57,11 @@ impl FilterCell {
         (errors.len() > 1).then(|| (mean, (square / (count - 1.0) / count).sqrt()))
     }
 
-    /// Intervals that hold the truth, and all.
     fn covered(&self, at: usize) -> (usize, usize) {
         let covered = self.estimates(at).filter(|of| (of.low..=of.high).contains(&of.truth)).count();
         (covered, self.estimates(at).count())
     }
 
-    /// Channels in which something is named.
     fn named(&self) -> usize {
         self.channels.iter().filter(|channel| !channel.named.is_empty()).count()
     }
@@ -80,9 +69,6 @@ impl FilterCell {
 
 impl FilteredNoiseTable {
     /// Writes the table as text.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(
             out,

@@ -1,10 +1,10 @@
-//! What the estimator makes of a record, complete or with samples taken out of it.
+//! Estimates from a record, complete or with losses.
 
 use super::noise::{RATE_HZ, TestNoise};
 use allan_core::{Cascade, Curve, Model, fit::fit};
 use std::ops::Range;
 
-/// Octaves of the estimators, of which a record fills those up to half its length.
+/// A record fills those up to half its length.
 const OCTAVES: usize = 24;
 
 /// Curve and model of one record.
@@ -12,14 +12,13 @@ const OCTAVES: usize = 24;
 pub struct EstimatedRecord {
     /// Allan variances in counts².
     pub curve: Curve<OCTAVES>,
-    /// The terms of the noise, fitted to the curve; N, B and K in counts and seconds.
+    /// Fitted to the curve; N, B and K in counts and seconds.
     pub model: Model,
-    /// Samples that the estimator has seen.
     pub samples: u64,
 }
 
 impl EstimatedRecord {
-    /// Estimates a record that lacks the samples of these stretches.
+    /// Estimates a record without the samples of `gaps`.
     #[must_use]
     pub fn new(noise: TestNoise, record: &[i32], gaps: &[Range<usize>]) -> Self {
         let mut cascade = Cascade::<OCTAVES, 8>::new();

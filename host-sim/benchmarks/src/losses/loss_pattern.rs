@@ -1,4 +1,4 @@
-//! Which samples of a record are lost.
+//! The samples of a record that are lost.
 
 use super::noise::RATE_HZ;
 use rand::{Rng, SeedableRng};
@@ -9,9 +9,9 @@ use std::ops::Range;
 /// A pattern of lost samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LossPattern {
-    /// Each sample is lost with this probability.
+    /// With this probability per sample.
     Random(f64),
-    /// 5 to 200 samples in a row every 1 to 5 minutes, both uniformly distributed.
+    /// 5 to 200 samples every 1 to 5 minutes, uniformly.
     Bursts,
 }
 
@@ -20,7 +20,7 @@ impl LossPattern {
     pub const ALL: [Self; 5] =
         [Self::Random(0.0005), Self::Random(0.005), Self::Random(0.02), Self::Random(0.05), Self::Bursts];
 
-    /// The lost stretches of a record of so many samples, neither its first nor its last sample among them.
+    /// Lost stretches, without the first and the last sample.
     #[must_use]
     pub fn gaps(self, samples: usize, seed: u64) -> Vec<Range<usize>> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);

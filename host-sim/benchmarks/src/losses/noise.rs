@@ -1,5 +1,4 @@
-//! The noises of the benchmark, generated from their definitions: white noise and a walk sample by sample, flicker noise
-//! by its spectrum.
+//! The noises by definition: white noise and walk by sample, flicker noise by spectrum.
 
 use crate::spectral_noise::{flicker_density, gaussian_noise, normal};
 use allan_core::NoiseTerm;
@@ -10,30 +9,29 @@ use std::fmt;
 
 /// Samples per second of the simulated records.
 pub const RATE_HZ: f64 = 204.8;
-/// Moving averages of the filtered noises: two over eight values each, as in the part with SENS_AVG = 3.
+/// Two moving averages of eight values, as with SENS_AVG = 3.
 const TAPS: u16 = 8;
 
-/// Counts per 0.05 °/s: so many that rounding is far below every noise, behind the filter too.
+/// Counts per 0.05 °/s: rounding is negligible.
 const COUNTS: f64 = 64.0;
 
 /// A noise of the benchmark, in counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TestNoise {
     mixture: Mixture,
-    /// Whether the signal passes through the filter of the part.
+    /// True behind the part's filter.
     filtered: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mixture {
     White,
-    /// N, B and K of the paper's gyro 0.0368 °/√s, 0.0093 °/s, 0.0013 °/s^1.5.
+    /// 0.0368 °/√s, 0.0093 °/s, 0.0013 °/s^1.5.
     Paper,
-    /// White noise below, a random walk above 32 samples.
+    /// White noise below, a walk above 32 samples.
     Walk,
 }
 
-/// Coefficients in counts and seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Coefficients {
     n: f64,
@@ -63,7 +61,7 @@ impl TestNoise {
         }
     }
 
-    /// The terms of the noise, in the order of [`truth`](Self::truth).
+    /// In the order of [`truth`](Self::truth).
     #[must_use]
     pub fn terms(self) -> &'static [NoiseTerm] {
         const FILTERED: NoiseTerm = NoiseTerm::Filtered(MovingAverageFilter::bartlett(TAPS));
@@ -78,14 +76,13 @@ impl TestNoise {
         }
     }
 
-    /// Shortest averaging factor to which the terms are fitted: four times the length of the filter, which the flicker noise and
-    /// the walk pass too and the terms leave out.
+    /// Shortest averaging factor of the fit: four filter lengths, as flicker noise and walk ignore the filter.
     #[must_use]
     pub fn shortest_fitted(self) -> u64 {
         if self.filtered { 8 * u64::from(TAPS) } else { 1 }
     }
 
-    /// The true coefficients, each with its symbol, in counts and seconds.
+    /// With symbols, in counts and seconds.
     #[must_use]
     pub fn truth(self) -> Vec<(&'static str, f64)> {
         let Coefficients { n, b, k } = self.coefficients();
@@ -114,7 +111,6 @@ impl TestNoise {
         for _ in 0..stages {
             signal = signal.windows(TAPS.into()).map(|values| values.iter().sum::<f64>() / f64::from(TAPS)).collect();
         }
-        // A walk of hours stays far within 32 bits.
         signal.into_iter().map(|value| value.round() as i32).collect()
     }
 }

@@ -11,65 +11,55 @@ use std::io::{self, Write};
 /// The results for every noise and every loss.
 #[derive(Debug, Clone, Serialize)]
 pub struct LossTable {
-    /// Records of each noise.
     pub records: u64,
-    /// Samples of each record.
     pub samples: usize,
-    /// One for each noise and loss.
     pub comparisons: Vec<LossComparison>,
 }
 
-/// The records of one noise with one loss, beside the same records without.
+/// Records of one noise with one loss, and without.
 #[derive(Debug, Clone, Serialize)]
 pub struct LossComparison {
-    /// The noise.
     #[serde(serialize_with = "as_text")]
     pub noise: TestNoise,
-    /// The loss.
     #[serde(serialize_with = "as_text")]
     pub loss: LossPattern,
-    /// Share of the samples that was lost, of all records.
+    /// Lost share of all samples.
     pub lost: f64,
-    /// Records in which the longest averaging time is that of the complete record.
+    /// Records that keep the longest averaging time.
     pub same_longest: usize,
-    /// Averaging factor by averaging factor.
     pub octaves: Vec<OctaveRatio>,
-    /// N, B and K as far as the noise has them.
+    /// N, B and K, if the noise has them.
     pub coefficients: Vec<CoefficientComparison>,
 }
 
-/// One averaging factor of the records with losses, relative to the complete records.
+/// One averaging factor with losses, relative to the complete records.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct OctaveRatio {
-    /// Averaging factor, samples.
     pub n: u64,
-    /// Mean variance over the mean variance of the complete records, minus 1.
+    /// Ratio of mean variances, less 1.
     pub bias: f64,
-    /// Standard error of the bias, from the scatter of the differences record by record.
+    /// By the scatter of the differences.
     pub standard_error: f64,
-    /// The same before what the interpolation adds is subtracted.
+    /// Bias without the correction for interpolation.
     pub uncorrected: f64,
-    /// Mean degrees of freedom over those of the complete records.
+    /// Ratio of mean degrees of freedom.
     pub edf: f64,
 }
 
-/// One coefficient of the model that is fitted to the curves; behind the filter to averaging times of four times its length and
-/// more.
+/// One fitted coefficient; behind the filter from four filter lengths on.
 #[derive(Debug, Clone, Serialize)]
 pub struct CoefficientComparison {
-    /// N, B or K.
     pub symbol: &'static str,
-    /// Mean estimate of the complete records over the truth, minus 1.
+    /// Complete records: mean over truth, less 1.
     pub complete_bias: f64,
-    /// Standard deviation of the estimates of the complete records over the truth.
+    /// Complete records: standard deviation over truth.
     pub scatter: f64,
-    /// Mean difference that the losses make to the estimate, over the truth.
+    /// Mean difference by the losses, over truth.
     pub shift: f64,
-    /// Standard error of the shift.
     pub standard_error: f64,
-    /// Records of which the 95 % interval contains the truth.
+    /// Records whose 95 % interval contains the truth.
     pub covered: usize,
-    /// The same without losses.
+    /// Complete records of that kind.
     pub complete_covered: usize,
 }
 
@@ -78,7 +68,7 @@ fn as_text<S: Serializer>(value: &impl ToString, serializer: S) -> Result<S::Ok,
 }
 
 impl LossComparison {
-    /// Compares pairs of a complete record and the same record with losses.
+    /// Compares pairs of a complete record and the same with losses.
     #[must_use]
     pub fn new(noise: TestNoise, loss: LossPattern, pairs: &[(&EstimatedRecord, &EstimatedRecord)]) -> Self {
         let total = |of: fn(&(&EstimatedRecord, &EstimatedRecord)) -> u64| pairs.iter().map(of).sum::<u64>() as f64;
@@ -145,15 +135,11 @@ fn standard_error(values: &[f64]) -> f64 {
     values.iter().std_dev() / (values.len() as f64).sqrt()
 }
 
-/// Ranges of averaging factors of the table.
 const RANGES: [(&str, u64, u64); 4] =
     [("1 … 4", 1, 4), ("8 … 512", 8, 512), ("1,024 … 8,192", 1024, 8192), ("above", 8193, u64::MAX)];
 
 impl LossTable {
     /// Writes two tables as text: the variances, then the coefficients.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         let hours = self.samples as f64 / RATE_HZ / 3600.0;
         writeln!(out, "{} records of {hours:.2} h at {RATE_HZ} SPS for each noise\n", self.records)?;

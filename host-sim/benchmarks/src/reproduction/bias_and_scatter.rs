@@ -1,4 +1,4 @@
-//! Bias and scatter of the slope method and of the fit over many simulated hours, and the scatter of the Allan deviation.
+//! Bias and scatter of slope method and fit over simulated hours.
 
 use super::four_methods::FourMethods;
 use super::published_gyro::{
@@ -11,25 +11,22 @@ use serde::Serialize;
 /// Seeds of the simulated hours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reproduction {
-    /// Number of hours, at least 2.
     pub seeds: u64,
-    /// Seed of the first hour.
     pub first_seed: u64,
 }
 
-/// Bias and scatter of an estimate over the seeds, as fractions of the true value.
+/// Over the seeds, as fractions of the truth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RelativeError {
-    /// Mean of the estimates over the true value, less 1.
+    /// Mean over truth, less 1.
     pub bias: f64,
-    /// Standard deviation of the estimates over the true value.
+    /// Standard deviation over truth.
     pub scatter: f64,
 }
 
-/// Relative standard deviation of the Allan deviation at one octave: predicted, and over the seeds.
+/// Relative standard deviation of the Allan deviation at one octave.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OctaveScatter {
-    /// Averaging time, s.
     pub tau_s: f64,
     /// Predicted by equation (6) of the paper, `1/√(2(N/n − 1))`.
     pub formula: f64,
@@ -43,28 +40,24 @@ pub struct OctaveScatter {
     pub shares: [f64; 3],
 }
 
-/// Errors of the slope method and of the fit over all hours, and the four methods of the paper on the first hour.
+/// Errors over all hours, and the four methods on the first hour.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReproductionResult {
-    /// Number of hours.
     pub seeds: u64,
-    /// Relative error of the slope method on the true curve, without estimation noise.
+    /// Slope method on the true curve: inherent error.
     pub inherent: [f64; 3],
-    /// Slope method on the curve without overlap, as in the paper.
+    /// Slope method without overlap, as in the paper.
     pub plain: [RelativeError; 3],
-    /// Slope method on the curve with 8-fold overlap.
+    /// Slope method with 8-fold overlap.
     pub overlapped: [RelativeError; 3],
-    /// Fit to the curve with 8-fold overlap.
+    /// Fit with 8-fold overlap.
     pub fitted: [RelativeError; 3],
-    /// Fraction of the seeds in which the 95 % bounds of the fit contain the true value.
+    /// Fraction of seeds with the truth in the 95 % bounds of the fit.
     pub covered: [f64; 3],
-    /// Scatter of the Allan deviation, one entry per octave.
     pub scatter: Vec<OctaveScatter>,
-    /// The four methods on the record of the first seed.
     pub four_methods: FourMethods,
 }
 
-/// Estimates from one hour.
 struct Hour {
     plain: Vec<f64>,
     overlapped: Vec<f64>,
@@ -74,7 +67,7 @@ struct Hour {
 }
 
 impl Reproduction {
-    /// Simulates and analyses the hours. `progress` is called with the number of finished hours.
+    /// Simulates and analyses the hours; `progress` gets the number of finished ones.
     #[must_use]
     pub fn run(&self, mut progress: impl FnMut(u64)) -> ReproductionResult {
         let hours: Vec<Hour> = (0..self.seeds)
@@ -119,7 +112,7 @@ fn unfiltered(n: u64) -> f64 {
     NoiseTerm::BASELINE.iter().zip(TRUTH).map(|(kind, value)| value * value * kind.avar(n, 1.0 / RATE_HZ)).sum()
 }
 
-/// Relative standard deviation of the overlapped Allan deviation by the degrees of freedom of the true model.
+/// By the degrees of freedom of the true model.
 fn confidence(truth: &Model, octave: usize) -> f64 {
     let mut cascade = Cascade::<OCTAVES, 8>::new();
     cascade.push_slice(&vec![0; SAMPLES as usize]);
@@ -144,7 +137,6 @@ impl Hour {
     }
 }
 
-/// One value for each of N, B and K.
 fn each<T>(value: impl Fn(usize) -> T) -> [T; 3] {
     std::array::from_fn(value)
 }
@@ -161,7 +153,6 @@ fn error_over(hours: &[Hour], ratio: impl Fn(&Hour) -> f64) -> RelativeError {
     RelativeError { bias: mean - 1.0, scatter: (square / (count - 1.0)).sqrt() }
 }
 
-/// Standard deviation over the mean.
 fn relative(error: RelativeError) -> f64 {
     error.scatter / (1.0 + error.bias)
 }

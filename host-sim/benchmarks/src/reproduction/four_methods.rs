@@ -1,105 +1,86 @@
-//! The four methods that section 2.2 of the paper names, on one simulated record of its gyro z: Allan variance,
-//! autocorrelation, power spectral density with equation (5), and Kalman innovations.
+//! The four methods of section 2.2 of the paper on one simulated record.
 
 use super::published_gyro::{
-    LSB, OCTAVES, RATE_HZ, SECONDS, TAPS, allan_curve, deviations, fitted_terms, simulate_counts, slope_coefficients,
-    true_model,
+    LSB, OCTAVES, RATE_HZ, TAPS, allan_curve, deviations, fitted_terms, simulate_counts, slope_coefficients, true_model,
 };
-use allan_core::fit::{fit, fit_shapes};
-use allan_core::term::Markov;
+use allan_core::fit::fit;
 use allan_core::{Curve, Model, NoiseTerm};
 use noise_analysis::report::assessment::innovations::filter_innovations;
 use noise_analysis::samples::uniform_series::UniformSeries;
-use noise_analysis::spectra::{Welch, correlation_time};
+use noise_analysis::spectra::Welch;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::f64::consts::{E, PI};
 
-/// Samples of a segment of Welch's spectrum: 640 s, so that ten overlapping segments cover the record.
+/// 640 s: ten overlapping segments.
 const SEGMENT: usize = 1 << 17;
-/// Segment length over the largest averaging time at which (5) is compared. The integrand is largest at f = 0.37/τ, which
-/// is then the sixth point of the spectrum, beyond those that the removed mean and the window change.
+/// Segment length over the largest averaging time: the peak of the integrand, 0.37/τ, is at the sixth point.
 const SEGMENT_PER_TAU: f64 = 16.0;
-/// Lags, in samples, at which the autocovariance has no contribution of the filtered white noise any more.
+/// Lags, samples, beyond the filtered white noise.
 const SLOW_LAGS: std::ops::Range<usize> = 8..64;
-/// Parts of the record whose estimates give the bounds of the autocorrelation method.
+/// Parts that give the bounds of the autocorrelation method.
 const PARTS: usize = 16;
 
-/// N, B and K by one method, in deg/√s, deg/s and deg/s^1.5; `None` for what the method does not give.
+/// N, B and K by one method, in deg/√s, deg/s and deg/s^1.5, if it gives them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MethodCoefficients {
-    /// Name of the method.
     pub method: &'static str,
-    /// Estimates.
     pub values: [Option<f64>; 3],
-    /// Lower and upper 95 % bounds.
     pub bounds: [Option<(f64, f64)>; 3],
 }
 
-/// What the autocorrelation gives.
+/// Results of the autocorrelation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Autocorrelation {
     /// Variance of the samples, (deg/s)².
     pub variance: f64,
-    /// Its white part, (deg/s)²: the variance less the autocovariance at lags 8 to 63, extrapolated to lag 0.
+    /// White part, (deg/s)²: variance less the autocovariance at lags 8 to 63.
     pub white_variance: f64,
-    /// Lag in s at which the autocovariance of 1 s means is 1/e of that at 1 s, in the whole record.
+    /// Lag, s, at which the autocovariance of 1 s means is 1/e of that at 1 s.
     pub decay_s: Option<f64>,
-    /// The same in the quarters of the record, mean of the four lags.
     pub decay_in_quarters_s: Option<f64>,
-    /// Time constant of a Markov process by the estimator of the report, s; `None` where the fitted process is too slow
-    /// for the record (fewer than 160 time constants).
-    pub markov_time_s: Option<f64>,
 }
 
-/// The measured Allan deviation at one octave beside that by equation (5) from the measured spectrum.
+/// One octave of the measured Allan deviation and of equation (5).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SpectrumOctave {
-    /// Averaging time, s.
     pub tau_s: f64,
     /// Measured Allan deviation with 8-fold overlap, deg/s.
     pub measured: f64,
     /// Allan deviation by equation (5), deg/s.
     pub by_spectrum: f64,
-    /// Relative standard deviation of `measured` by its degrees of freedom under the true model.
+    /// Relative, by degrees of freedom of the true model.
     pub measured_error: f64,
-    /// Relative standard deviation of `by_spectrum` by the degrees of freedom of the spectrum.
+    /// Relative, by degrees of freedom of the spectrum.
     pub by_spectrum_error: f64,
-    /// Whether the segments of the spectrum are long enough for this averaging time.
+    /// True if the segments are long enough.
     pub resolved: bool,
 }
 
-/// Innovations of a Kalman filter on the second half of the record.
+/// Kalman innovations on the second half.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InnovationTest {
-    /// Model of the filter, fitted to the first half.
     pub model: &'static str,
-    /// Mean of the squared innovations over their expected variance; 1 for a true model.
+    /// Mean squared innovations over expectation.
     pub normalised: f64,
-    /// Bounds that contain `normalised` for 95 % of true models.
+    /// 95 % of true models.
     pub consistent: (f64, f64),
     /// Correlation of neighbouring innovations.
     pub correlation: f64,
-    /// p-value of the Ljung-Box test for whiteness over 20 lags.
+    /// Ljung-Box over 20 lags.
     pub whiteness_p: f64,
 }
 
 /// The results of the four methods.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FourMethods {
-    /// Seed of the record.
     pub seed: u64,
-    /// Coefficients, one entry per method.
     pub coefficients: Vec<MethodCoefficients>,
-    /// Variance and correlation times.
     pub autocorrelation: Autocorrelation,
-    /// Length of a segment of the spectrum, s.
     pub segment_s: f64,
-    /// Largest averaging time that the segments resolve, s.
+    /// Largest resolved averaging time, s.
     pub resolved_s: f64,
-    /// Equation (5), one entry per octave up to the length of a segment.
     pub spectrum: Vec<SpectrumOctave>,
-    /// Innovations of the fitted model, and of its N alone.
     pub innovations: Vec<InnovationTest>,
 }
 
@@ -127,7 +108,7 @@ impl FourMethods {
         Self {
             seed,
             coefficients,
-            autocorrelation: autocorrelation(&samples, &grid, &overlapped),
+            autocorrelation: autocorrelation(&samples),
             segment_s: SEGMENT as f64 / RATE_HZ,
             resolved_s: SEGMENT as f64 / RATE_HZ / SEGMENT_PER_TAU,
             spectrum: welch.map_or_else(Vec::new, |welch| spectrum_octaves(&welch, &overlapped)),
@@ -145,23 +126,21 @@ fn fitted_coefficients(model: &Model) -> MethodCoefficients {
     }
 }
 
-/// Mean of the products of `values` at a distance of `lag`, less the square of their mean.
+/// Mean product at a distance, less the squared mean.
 fn autocovariance(values: &[f64], lag: usize) -> f64 {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let products = values.iter().zip(&values[lag..]).map(|(a, b)| (a - mean) * (b - mean));
     products.sum::<f64>() / (values.len() - lag) as f64
 }
 
-/// Autocovariances from lag 0 on, less the mean of those in [`SLOW_LAGS`], which is their extrapolation to lag 0: within
-/// 64 samples the autocovariance of flicker noise and of the walk changes by less than 0.1 % of the white variance.
+/// From lag 0 on, less the mean in [`SLOW_LAGS`]: slow noise changes by less than 0.1 % within 64 samples.
 fn white_autocovariances(samples: &[f64]) -> Vec<f64> {
     let slow = SLOW_LAGS.map(|lag| autocovariance(samples, lag)).sum::<f64>() / SLOW_LAGS.len() as f64;
     (0..2 * usize::from(TAPS) - 1).map(|lag| autocovariance(samples, lag) - slow).collect()
 }
 
-/// N by the autocorrelation. White noise of variance `N²·RATE_HZ` behind the filter, whose weights have the sum 1, is
-/// correlated at lags below `2·TAPS − 1`; its autocovariances at all lags add up to the variance before the filter. The
-/// rounding adds `LSB²/12` at lag 0. Value and bounds are by Student's distribution of the estimates from [`PARTS`] parts.
+/// N by the autocorrelation. The autocovariances of filtered white noise below lag `2·TAPS − 1` add up to `N²·RATE_HZ`;
+/// rounding adds `LSB²/12` at lag 0. Bounds by Student's distribution over [`PARTS`].
 fn correlation_coefficients(samples: &[f64]) -> MethodCoefficients {
     let coefficient = |part: &[f64]| {
         let covariances = white_autocovariances(part);
@@ -181,7 +160,7 @@ fn correlation_coefficients(samples: &[f64]) -> MethodCoefficients {
     }
 }
 
-fn autocorrelation(samples: &[f64], grid: &UniformSeries, curve: &Curve<OCTAVES>) -> Autocorrelation {
+fn autocorrelation(samples: &[f64]) -> Autocorrelation {
     let second = RATE_HZ as usize;
     let means: Vec<f64> = samples.chunks_exact(second).map(|part| part.iter().sum::<f64>() / second as f64).collect();
     let decay = |means: &[f64]| {
@@ -189,19 +168,15 @@ fn autocorrelation(samples: &[f64], grid: &UniformSeries, curve: &Curve<OCTAVES>
         Some((lag * second) as f64 / RATE_HZ)
     };
     let quarters: Option<Vec<f64>> = means.chunks_exact(means.len() / 4).map(decay).collect();
-    let [white, _, _, rounding] = fitted_terms();
-    let markov = NoiseTerm::Markov(Markov { time_constant: SECONDS / 100.0 });
     Autocorrelation {
         variance: autocovariance(samples, 0),
         white_variance: white_autocovariances(samples)[0],
         decay_s: decay(&means),
         decay_in_quarters_s: quarters.map(|lags| lags.iter().sum::<f64>() / lags.len() as f64),
-        markov_time_s: correlation_time(grid, &fit_shapes(curve, &[white, markov, rounding])).map(|time| time.value),
     }
 }
 
-/// N, B and K by the fitted shape of the spectrum: the one-sided densities are 2N², B²/(πf) and K²/(2π²f²). B and K are
-/// `None` below 1 % of the density at one cycle per segment.
+/// N, B and K by the spectrum's fitted shape. B and K are `None` below 1 % at one cycle per segment.
 fn spectral_coefficients(welch: &Welch) -> MethodCoefficients {
     let (shape, bands) = welch.shape(|_| false);
     let n = shape.angle_random_walk();
@@ -215,12 +190,10 @@ fn spectral_coefficients(welch: &Welch) -> MethodCoefficients {
     MethodCoefficients { method: "spectrum", values: [Some(n), b, k], bounds: [bounds, None, None] }
 }
 
-/// Weight of the one-sided density at `frequency` in the Allan variance of samples at the averaging factor `n`.
+/// Weight of the one-sided density at `frequency` in the Allan variance at the averaging factor `n`.
 ///
-/// Equation (5), σ²(τ) = 4·∫ S(f)·sin⁴(πfτ)/(πfτ)² df over 0 … ∞, has the two-sided density: with S = N² it gives N²/τ. With
-/// the one-sided density, which is twice that, the factor is 2. A mean of `n` samples has the transfer function
-/// sin(πfτ)/(n·sin(πf/RATE_HZ)) where one of a continuous signal has sin(πfτ)/(πfτ), and the integral ends at half the
-/// sample rate: the density of the samples already contains what is aliased from above.
+/// Equation (5) has the two-sided density, so the factor is 2. A mean of `n` samples has sin(πfτ)/(n·sin(πf/RATE_HZ)),
+/// and the samples' density includes aliases.
 #[must_use]
 pub fn allan_weight(frequency: f64, n: u64) -> f64 {
     let phase = PI * frequency / RATE_HZ;
@@ -229,7 +202,7 @@ pub fn allan_weight(frequency: f64, n: u64) -> f64 {
 }
 
 fn spectrum_octaves(welch: &Welch, curve: &Curve<OCTAVES>) -> Vec<SpectrumOctave> {
-    // Neighbouring points under a Hann window correlate by (2/3)² and (1/6)², so a sum has this much more variance.
+    // Correlations of (2/3)² and (1/6)² under a Hann window.
     const NEIGHBOURS: f64 = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
     let (segment_s, truth) = (SEGMENT as f64 / RATE_HZ, true_model());
     let octave = |point: &allan_core::AllanPoint| {

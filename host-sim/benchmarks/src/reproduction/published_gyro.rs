@@ -1,4 +1,4 @@
-//! The gyro z of the paper: its coefficients, its simulated record, its true model, and the slope method of the paper.
+//! Gyro z of the paper: coefficients, simulated record, true model, slope method.
 
 use adis16405_driver::{Channel, GyroRange};
 use allan_core::term::MovingAverageFilter;
@@ -15,18 +15,16 @@ pub const SYMBOLS: [&str; 3] = ["N", "B", "K"];
 pub const RATE_HZ: f64 = 204.8;
 /// Length of the record, s.
 pub const SECONDS: f64 = 3600.0;
-/// Number of samples of the record.
 pub(super) const SAMPLES: u64 = (SECONDS * RATE_HZ) as u64;
-/// Octaves of an Allan curve of the record.
 pub(super) const OCTAVES: usize = 20;
 /// Size of a count, deg/s.
 pub(super) const LSB: f64 = Channel::GyroZ.lsb(GyroRange::Dps300);
 /// Taps of each of the two averages of the sensor's default filter.
 pub(super) const TAPS: u16 = 4;
-/// SPI word that writes 7 to the lower byte of SMPL_PRD: a sample period of 8 ticks of 1/1638.4 s.
+/// SPI word: 7 to SMPL_PRD, 8 ticks of 1/1638.4 s.
 const WRITE_SAMPLE_PERIOD: u16 = 0xB607;
 
-/// Simulates the record with the default filter and ±300 °/s; counts of [`LSB`].
+/// Default filter, ±300 °/s; counts of [`LSB`].
 pub(super) fn simulate_counts(seed: u64) -> Vec<i32> {
     let mut noise = NoiseModel::noiseless();
     let gyro = noise.channel_mut(OutputRegister::GyroZ);
@@ -42,14 +40,14 @@ pub(super) fn simulate_counts(seed: u64) -> Vec<i32> {
     (0..SAMPLES).map(|_| next()).collect()
 }
 
-/// The Allan curve of the record in deg/s.
+/// In deg/s.
 pub(super) fn allan_curve<const OVERLAP: usize>(counts: &[i32]) -> Curve<OCTAVES> {
     let mut cascade = Cascade::<OCTAVES, OVERLAP>::new();
     cascade.push_slice(counts);
     cascade.curve(1.0 / RATE_HZ).scaled(LSB)
 }
 
-/// The terms of the fit: N behind the filter, B, K, and the rounding to counts, which is white noise behind the filter.
+/// N behind the filter, B, K, and the rounding, white behind the filter.
 pub(super) fn fitted_terms() -> [NoiseTerm; 4] {
     [
         NoiseTerm::Filtered(MovingAverageFilter::bartlett(TAPS)),
@@ -59,7 +57,7 @@ pub(super) fn fitted_terms() -> [NoiseTerm; 4] {
     ]
 }
 
-/// The true model: [`TRUTH`], and the rounding to counts as an N of `LSB·√(1/(12·RATE_HZ))`.
+/// [`TRUTH`], and the rounding as N of `LSB·√(1/(12·RATE_HZ))`.
 pub(super) fn true_model() -> Model {
     let rounding = LSB * (1.0 / RATE_HZ / 12.0).sqrt();
     let terms = fitted_terms()
@@ -69,15 +67,14 @@ pub(super) fn true_model() -> Model {
     Model::new(1.0 / RATE_HZ, terms)
 }
 
-/// Averaging times in s between which the paper reads the slopes −½, 0 and +½.
+/// Averaging times, s, of the slopes −½, 0 and +½ in the paper.
 pub const INTERVALS: [RangeInclusive<f64>; 3] = [0.125..=2.0, 32.0..=128.0, 120.0..=230.0];
 
-/// N, B and K by equations (7) to (9) of the paper: the −½ line at 1 s, the flat part divided by 0.664 and the +½ line at
-/// 3 s, each fitted to the logarithms of the Allan deviations in its interval. `points` are averaging times in s with Allan
-/// deviations. `None` for an interval without a point.
+/// N, B and K by equations (7) to (9) of the paper: lines at 1 s, flat over 0.664, at 3 s, fitted to the logarithms.
+/// `points` are averaging times, s, and Allan deviations; `None` without a point.
 #[must_use]
 pub fn slope_coefficients(points: impl Iterator<Item = (f64, f64)> + Clone) -> [Option<f64>; 3] {
-    // Factors from the Allan deviation at τ to the coefficient.
+    // Allan deviation at τ to coefficient.
     let factors: [fn(f64) -> f64; 3] = [f64::sqrt, |_| (PI / (2.0 * LN_2)).sqrt(), |tau| (3.0 / tau).sqrt()];
     let mut factors = factors.into_iter();
     INTERVALS.map(|interval| {
@@ -89,7 +86,6 @@ pub fn slope_coefficients(points: impl Iterator<Item = (f64, f64)> + Clone) -> [
     })
 }
 
-/// Averaging time in s and Allan deviation of each point.
 pub(super) fn deviations(points: &[AllanPoint]) -> impl Iterator<Item = (f64, f64)> + Clone + '_ {
     points.iter().map(|point| (point.tau, point.avar.sqrt()))
 }

@@ -1,4 +1,4 @@
-//! The results as text for the terminal.
+//! The results as text.
 
 use super::bias_and_scatter::{OctaveScatter, ReproductionResult};
 use super::four_methods::FourMethods;
@@ -8,9 +8,6 @@ use std::io::{self, Write};
 
 impl ReproductionResult {
     /// Writes the tables of the coefficients, of the scatter of the octaves and of the four methods as text.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "{} simulated hours of gyro z at 204.8 SPS, default filter, ±300 °/s\n", self.seeds)?;
         writeln!(out, "bias ± scatter of the coefficients, % of the truth")?;
@@ -52,9 +49,6 @@ impl ReproductionResult {
 
 impl FourMethods {
     /// Writes three tables as text.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "four methods on one record (seed {})\n", self.seed)?;
         let cell = |value: Option<f64>, bounds: Option<(f64, f64)>| match bounds {
@@ -71,10 +65,10 @@ impl FourMethods {
         writeln!(out, "{}", TextTable::new(header, 1, std::iter::once(truth).chain(rows)))?;
         let found = &self.autocorrelation;
         let [variance, white] = [found.variance, found.white_variance].map(number);
-        let [whole, quarters, markov] = [found.decay_s, found.decay_in_quarters_s, found.markov_time_s].map(optional);
+        let [whole, quarters] = [found.decay_s, found.decay_in_quarters_s].map(optional);
         writeln!(out, "autocorrelation: variance {variance} (°/s)², white part {white} (°/s)²")?;
         writeln!(out, "decay to 1/e: {whole} s in the record, {quarters} s in its quarters: flicker noise and walk")?;
-        writeln!(out, "have no correlation time; time constant of a Markov process: {markov}\n")?;
+        writeln!(out, "have no correlation time\n")?;
         writeln!(out, "Allan deviation, °/s: measured, and by equation (5) from Welch's spectrum")?;
         writeln!(out, "segments of {} s resolve τ up to {} s", number(self.segment_s), number(self.resolved_s))?;
         let rows = self.spectrum.iter().map(|octave| {

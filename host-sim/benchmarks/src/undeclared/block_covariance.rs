@@ -1,5 +1,4 @@
-//! Covariance of the means of the blocks of a record, from the definitions of the noises, and the two tests of a waveform of
-//! the bias that it allows: its expected log likelihood ratio, and its p-value in one recording.
+//! Covariance of block means, and the tests of a waveform of the bias: expected log likelihood ratio, p-value.
 
 use super::channel_under_test::{Densities, fit_baseline};
 use super::environment::EnvironmentCourse;
@@ -8,20 +7,19 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f64::consts::{PI, TAU};
 
-/// Number of blocks of a record. A waveform that changes within one of them is not one of those that are tested here.
+/// Blocks per record; faster waveforms are not tested here.
 pub(super) const BLOCKS: usize = 128;
-/// Frequencies of flicker noise that are added up, in periods per record: its block means have next to none above.
+/// Highest summed frequency of flicker noise, periods per record.
 const HIGHEST: usize = 8 * BLOCKS;
-/// Lowest frequency in periods per record: the generator's own record is at least twice as long.
+/// Lowest frequency 1/2 period per record: the generator's record is longer.
 const SUBDIVISION: usize = 2;
 
-/// Noises of a bias, per unit of their coefficients.
+/// Per unit of the coefficients.
 pub(super) struct BlockNoises {
     block_s: f64,
     flicker: DMatrix<f64>,
 }
 
-/// Coefficients of the noises of one channel.
 pub(super) struct BlockNoise<'a> {
     /// Two-sided density of all white noise, unit²/Hz.
     pub(super) white: f64,
@@ -29,12 +27,11 @@ pub(super) struct BlockNoise<'a> {
     pub(super) flicker: f64,
     /// K, unit/√s.
     pub(super) walk: f64,
-    /// Correlation time in s and variance of each exponentially correlated process.
+    /// Time constant, s, and variance of each.
     pub(super) processes: &'a [(f64, f64)],
 }
 
 impl BlockNoises {
-    /// Of a record of `seconds` s.
     pub(super) fn new(seconds: f64) -> Self {
         let block_s = seconds / BLOCKS as f64;
         let spacing = 1.0 / (SUBDIVISION as f64 * seconds);
@@ -51,12 +48,11 @@ impl BlockNoises {
         Self { block_s, flicker: DMatrix::from_fn(BLOCKS, BLOCKS, |i, j| lags[i.abs_diff(j)]) }
     }
 
-    /// Covariance of the block means of noise with these coefficients.
     pub(super) fn covariance(&self, noise: &BlockNoise) -> DMatrix<f64> {
         let block_s = self.block_s;
         let entry = |i: usize, j: usize| {
             let white = if i == j { noise.white / block_s } else { 0.0 };
-            // Of the mean of a walk over a block with that over a later one: the variance at the middle of the first.
+            // Variance in the middle of the earlier block.
             let walk = match i == j {
                 true => i as f64 + 1.0 / 3.0,
                 false => i.min(j) as f64 + 0.5,
@@ -71,8 +67,7 @@ impl BlockNoises {
     }
 }
 
-/// Covariance of the means over two blocks, `lag` blocks apart and each of `length` correlation times, of a process of
-/// variance 1.
+/// Covariance of means over blocks `lag` apart, `length` correlation times each, in a process of variance 1.
 fn exponential(length: f64, lag: usize) -> f64 {
     let decay = (-length).exp();
     match lag {
@@ -81,23 +76,18 @@ fn exponential(length: f64, lag: usize) -> f64 {
     }
 }
 
-/// The expected log likelihood ratio of a waveform of the bias in noise of N, B and K, which the description with the waveform
-/// knows, against a constant with the best N, B and K.
+/// Expected log likelihood ratio of a waveform in N, B and K against a constant with the best N, B and K.
 ///
-/// Over the cosines of the blocks, which are nearly uncorrelated in each of the noises (Whittle): of a cosine whose
-/// coefficient has the variance `c` and the waveform's share `s`, and the variance `m` in the best description without it, the
-/// ratio is `½·((c + s²)/m − 1 + ln(m/c))`. With `m = c` the sum is `½·sᵀC⁻¹s`, the ratio in known noise; but a random walk takes
-/// up most of a slow drift.
+/// Per cosine of the blocks (Whittle), with the variance `c`, the waveform's share `s`, and `m` without it: `½·((c +
+/// s²)/m − 1 + ln(m/c))`.
 pub(super) struct WaveformTest {
     cosines: DMatrix<f64>,
-    /// In the noise as it is.
     densities: Vec<Densities>,
-    /// N², B² and K² of the channel.
     squares: [f64; 3],
 }
 
 impl WaveformTest {
-    /// In `noise`, of which N, B and K have these `squares`; what its white noise has beyond N, and its processes, are known.
+    /// `squares` are N², B² and K² of `noise`; its other white noise and processes are known.
     pub(super) fn new(noise: &BlockNoise, squares: [f64; 3], noises: &BlockNoises) -> Self {
         let cosines = cosines();
         let variances = |noise: &BlockNoise| cosine_variances(&cosines, &noises.covariance(noise));
@@ -112,7 +102,6 @@ impl WaveformTest {
         Self { cosines, densities, squares }
     }
 
-    /// Of the block means `values`.
     pub(super) fn ratio(&self, values: &[f64]) -> f64 {
         let shares = self.cosines.tr_mul(&DVector::from_column_slice(values));
         let with = |(of, share): (&Densities, &f64)| Densities { truth: of.truth + share * share, ..*of };
@@ -126,7 +115,7 @@ impl WaveformTest {
     }
 }
 
-/// The cosines of 1, 2, … half periods over the blocks, of length 1, in columns: each is orthogonal to a constant.
+/// Cosines of 1, 2, … half periods, normalised, in columns.
 fn cosines() -> DMatrix<f64> {
     let length = (2.0 / BLOCKS as f64).sqrt();
     DMatrix::from_fn(BLOCKS, BLOCKS - 1, |block, k| {
@@ -134,13 +123,12 @@ fn cosines() -> DMatrix<f64> {
     })
 }
 
-/// Variance of the coefficient of each cosine in noise of this covariance.
 fn cosine_variances(cosines: &DMatrix<f64>, covariance: &DMatrix<f64>) -> Vec<f64> {
     let weighted = covariance * cosines;
     (0..cosines.ncols()).map(|k| cosines.column(k).dot(&weighted.column(k))).collect()
 }
 
-/// `sᵀC⁻¹s` of what a waveform `s` has beside a constant.
+/// `sᵀC⁻¹s` of a waveform `s` beside a constant.
 fn energy(factor: &Cholesky<f64, Dyn>, values: &DVector<f64>) -> f64 {
     let ones = DVector::from_element(values.len(), 1.0);
     let weighted = factor.solve(&ones);
@@ -148,12 +136,11 @@ fn energy(factor: &Cholesky<f64, Dyn>, values: &DVector<f64>) -> f64 {
     values.dot(&factor.solve(values)) - along * along / weighted.dot(&ones)
 }
 
-/// p-value of the waveform `shape` in the block means `means`, by the likelihood ratio with the three noises estimated
-/// with and without it (χ² of one degree of freedom); `white` is the density of the white noise, which the samples tell.
+/// p-value of `shape` in block `means` by the likelihood ratio with free noises (χ²); `white` is known.
 pub(super) fn p_value(means: &[f64], shape: &[f64], noises: &BlockNoises, white: f64) -> f64 {
     let (means, shape) = (DVector::from_column_slice(means), DVector::from_column_slice(shape));
     let ones = DVector::from_element(means.len(), 1.0);
-    // Block-mean variances of flicker noise and walk over that of the white noise.
+    // Over the white variance.
     let ratios = || (-2..=12).map(|power| if power == -2 { 0.0 } else { 4f64.powi(power - 4) });
     let mut best = [f64::INFINITY; 2];
     for flicker in ratios() {
@@ -167,7 +154,7 @@ pub(super) fn p_value(means: &[f64], shape: &[f64], noises: &BlockNoises, white:
             };
             let Some(factor) = noises.covariance(&noise).cholesky() else { continue };
             let logarithm = 2.0 * factor.l_dirty().diagonal().iter().map(|entry| entry.ln()).sum::<f64>();
-            // Least squares on the constant alone, and on the constant and the waveform.
+            // Constant alone, and constant with waveform.
             let (a, b) = (factor.solve(&ones), factor.solve(&shape));
             let rest = means.dot(&factor.solve(&means)) - a.dot(&means).powi(2) / a.dot(&ones);
             let (along, length) =
@@ -181,14 +168,12 @@ pub(super) fn p_value(means: &[f64], shape: &[f64], noises: &BlockNoises, white:
     ChiSquared::new(1.0).map_or(1.0, |distribution| distribution.sf(fall))
 }
 
-/// Block means of a course over time.
 pub(super) fn block_means(course: &[f64]) -> Vec<f64> {
     let at = |block: usize| course.len() * block / BLOCKS;
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
     (0..BLOCKS).map(|block| mean(&course[at(block)..at(block + 1)])).collect()
 }
 
-/// Block means of the temperature and of the supply voltage.
 pub(super) fn environment_means(course: &EnvironmentCourse) -> [Vec<f64>; 2] {
     [block_means(&course.temperature_c), block_means(&course.supply_v)]
 }
@@ -207,11 +192,11 @@ mod tests {
         let covariance = &noises.flicker;
         let allan = covariance[(0, 0)] - covariance[(0, 1)];
         let expected = 2.0 * std::f64::consts::LN_2 / PI;
-        // The frequencies beyond 8 periods a block, which are left out, hold a few thousandths.
+        // Frequencies beyond 8 periods a block hold a few thousandths.
         assert!((allan / expected - 1.0).abs() < 0.01, "{allan}, {expected}");
     }
 
-    /// The Allan variances of a walk over one block, K²·τ/3, and of a Gauss-Markov process of a long correlation time.
+    /// K²·τ/3, and a Gauss-Markov process of long correlation time.
     #[test]
     fn walk_and_process_have_their_allan_variances() {
         let noises = BlockNoises::new(1280.0);
@@ -226,7 +211,7 @@ mod tests {
         assert!((allan(noise(0.0, &[(1e5, 2.0)])) / (2.0 * 2.0 / 3.0 * 1e-4) - 1.0).abs() < 1e-3);
     }
 
-    /// Under the hypothesis the p-values of 40 records are uniform: the mean is ½ with a standard deviation of 0.046.
+    /// The mean of 40 is ½ ± 0.046.
     #[test]
     fn the_test_of_a_waveform_keeps_its_level() {
         let noises = BlockNoises::new(BLOCKS as f64);

@@ -1,29 +1,23 @@
-//! Two-sided power spectral densities of the channel in which an effect is to be detected, and Whittle's likelihood ratio
-//! of an effect in it.
+//! Two-sided spectral densities of the channel under test, and Whittle's likelihood ratio of an effect.
 
 use super::generator::TrueRecording;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
 use virtual_sensor::{ChannelNoise, InjectedEffect, OutputRegister};
 
-/// Most iterations of the fit of N, B and K, most halvings of a step, and its largest length in logarithms of their squares.
+/// Iterations, halvings, and longest step in ln of the squares.
 const ITERATIONS: usize = 100;
 const HALVINGS: i32 = 12;
 const STEP: f64 = 3.0;
-/// Fall of the deviance of an iteration that is the last one: a thousandth of what a parameter is worth by chance.
 const CONVERGED: f64 = 1e-3;
-/// Least part of some density with which each noise starts.
 const START: f64 = 0.01;
-/// Part of the information of all noises that is added to that of each.
+/// Regularisation, as a part of all information.
 const LEAST_INFORMATION: f64 = 1e-9;
-/// Number of intervals of the logarithmic frequency grid.
 const GRID: usize = 1500;
-/// Logarithm of the taps of a stage of the longest filter.
 const LONGEST_FILTER_LOG2: u32 = 6;
-/// Lower limit of the filter's power gain in divisions: at the nulls the gain is 0. Between them it falls to 10⁻⁷.
+/// Least gain in divisions, for the nulls; otherwise it falls to 10⁻⁷.
 const LEAST_GAIN: f64 = 1e-9;
 
-/// Length and sample period of a recording.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RecordLength {
     pub(super) seconds: f64,
@@ -31,13 +25,12 @@ pub(super) struct RecordLength {
 }
 
 impl RecordLength {
-    /// Of a recording.
     pub(super) fn new(recording: &TrueRecording) -> Self {
         Self { seconds: recording.seconds, period_s: recording.sampling.period_s() }
     }
 }
 
-/// Two-sided density of N, B and K of `noise`, sampled, unit²/Hz; the white noise has passed a filter of power gain `white_gain`.
+/// Two-sided density of N, B and K, sampled, unit²/Hz; `white_gain` is the white noise's filter.
 pub(super) fn baseline_density(noise: &ChannelNoise, white_gain: f64, period_s: f64, frequency: f64) -> f64 {
     let [white, flicker, walk] = baseline_densities(period_s, frequency);
     noise.angle_random_walk.powi(2) * white_gain * white
@@ -47,7 +40,7 @@ pub(super) fn baseline_density(noise: &ChannelNoise, white_gain: f64, period_s: 
 
 /// Two-sided densities of N, B and K of 1.
 pub(super) fn baseline_densities(period_s: f64, frequency: f64) -> [f64; 3] {
-    // The one-sided density of B is B²/(πf), twice the two-sided one.
+    // Half of the one-sided B²/(πf).
     [1.0, 0.5 / (PI * frequency), (period_s / (2.0 * (PI * frequency * period_s).sin())).powi(2)]
 }
 
@@ -58,38 +51,35 @@ pub(super) fn markov_density(time_constant_s: f64, period_s: f64, frequency: f64
     period_s * (1.0 - decay * decay) / (1.0 - 2.0 * decay * angle.cos() + decay * decay)
 }
 
-/// Two-sided density of a sampled resonance of standard deviation 1 at `centre_hz`, whose full width at half maximum is
-/// `bandwidth_hz`, 1/Hz.
+/// Two-sided density of a sampled resonance of deviation 1; `bandwidth_hz` is the full width at half maximum, 1/Hz.
 pub(super) fn resonance_density(centre_hz: f64, bandwidth_hz: f64, period_s: f64, frequency: f64) -> f64 {
     let side = |offset: f64| markov_density(1.0 / (PI * bandwidth_hz), period_s, offset);
     0.5 * (side(frequency - centre_hz) + side(frequency + centre_hz))
 }
 
-/// Two-sided density of the rate that is differenced from an angle with a white error of standard deviation 1.
+/// Two-sided density of a rate differenced from an angle with white error of deviation 1.
 pub(super) fn quantization_density(period_s: f64, frequency: f64) -> f64 {
     4.0 * (PI * frequency * period_s).sin().powi(2) / period_s
 }
 
-/// Power gain of two moving averages over 2^`taps_log2` samples each.
+/// Two averages over 2^`taps_log2` samples.
 pub(super) fn filter_gain(taps_log2: u8, period_s: f64, frequency: f64) -> f64 {
     let taps = f64::from(1u32 << taps_log2);
     let half = PI * frequency * period_s;
     ((taps * half).sin() / (taps * half.sin())).powi(4)
 }
 
-/// Power gain of a filter of first order that halves the power at `corner_hz`.
+/// First order, half power at `corner_hz`.
 pub(super) fn low_pass_gain(corner_hz: f64, frequency: f64) -> f64 {
     1.0 / (1.0 + (frequency / corner_hz).powi(2))
 }
 
-/// Densities of an observed and a modelled output at one frequency, or the variances of one cosine.
+/// At one frequency, or variances of one cosine.
 #[derive(Clone, Copy)]
 pub(super) struct Densities {
-    /// Modelled per unit of N², B² and K², behind the filter.
+    /// Per unit of N², B² and K², behind the filter.
     pub(super) baseline: [f64; 3],
-    /// Modelled without a free parameter.
     pub(super) known: f64,
-    /// Of the output.
     pub(super) truth: f64,
 }
 
@@ -99,9 +89,7 @@ impl Densities {
     }
 }
 
-/// N², B² and K² that fit `densities` best (Whittle), each of which counts as often as `counts` has it, from `squares` on:
-/// Fisher's scoring of their logarithms, with shorter steps where the deviance would rise. A smaller noise starts where it is a
-/// hundredth of a density: it has next to no slope below.
+/// N², B² and K² of the best fit to `densities` (Whittle, weights `counts`) from `squares` on, by Fisher scoring.
 pub(super) fn fit_baseline(densities: &[Densities], counts: &[f64], squares: [f64; 3]) -> [f64; 3] {
     let deviance = |squares: &[f64; 3]| -> f64 {
         let of = |(densities, count): (&Densities, &f64)| {
@@ -124,7 +112,7 @@ pub(super) fn fit_baseline(densities: &[Densities], counts: &[f64], squares: [f6
             information += *count * shares * shares.transpose();
             score += *count * (densities.truth / modelled - 1.0) * shares;
         }
-        // A noise that the densities do not show has next to no information.
+        // Without information.
         information += Matrix3::identity() * (LEAST_INFORMATION * information.trace());
         let Some(step) = information.cholesky().map(|factor| factor.solve(&score)) else { break };
         let lengths = (0..HALVINGS).map(|halvings| 0.5f64.powi(halvings));
@@ -142,14 +130,12 @@ pub(super) fn fit_baseline(densities: &[Densities], counts: &[f64], squares: [f6
     best
 }
 
-/// N², B² and K² of `noise`.
 pub(super) fn squares(noise: &ChannelNoise) -> [f64; 3] {
     [noise.angle_random_walk, noise.bias_instability, noise.rate_random_walk].map(|coefficient| coefficient.powi(2))
 }
 
 impl RecordLength {
-    /// Frequencies in Hz, each with the number of Fourier frequencies that it represents. The grid is logarithmic from
-    /// 1/`seconds` to half the sample rate, with additional frequencies around a `peak` given by its centre and width.
+    /// Frequencies, Hz, and the Fourier frequencies that each represents, denser around a `peak` (centre, width).
     fn grid(self, peak: Option<(f64, f64)>) -> Vec<(f64, f64)> {
         let (lowest, highest) = (1.0 / self.seconds, 0.5 / self.period_s);
         let step = (highest / lowest).ln() / GRID as f64;
@@ -163,9 +149,7 @@ impl RecordLength {
         edges.windows(2).map(interval).filter(|(_, count)| *count > 0.0).collect()
     }
 
-    /// Expected log likelihood ratio (Whittle) of noise of density `truth` against the best fit of N, B and K behind
-    /// filters of the power gains `gains`, to which noise of density `known` is added. The fit starts from the coefficients of
-    /// `noise`.
+    /// Expected log likelihood ratio of `truth` against the best N, B and K behind `gains`, with `known` added.
     pub(super) fn ratio_against_baseline(
         self,
         noise: &ChannelNoise,
@@ -189,8 +173,7 @@ impl RecordLength {
         densities.iter().zip(&grid).map(deviance).sum()
     }
 
-    /// Expected log likelihood ratio of one process of density `shared` in all channels, whose own densities are
-    /// `separate`, against independent processes of the same density.
+    /// Expected log likelihood ratio of one process `shared` by all channels against independent ones.
     pub(super) fn ratio_of_common_mode(self, shared: impl Fn(f64) -> f64, separate: &[&dyn Fn(f64) -> f64]) -> f64 {
         let at = |(frequency, count): &(f64, f64)| {
             let ratios = separate.iter().map(|own| shared(*frequency) / own(*frequency));
@@ -200,13 +183,12 @@ impl RecordLength {
         self.grid(None).iter().map(at).sum()
     }
 
-    /// Expected log likelihood ratio of a waveform of density `waveform` that is known up to its size, in noise of density
-    /// `noise`: half the ratio of its energy to the noise (matched filter).
+    /// Expected log likelihood ratio of a waveform known up to its size (matched filter).
     pub(super) fn ratio_of_waveform(self, waveform: impl Fn(f64) -> f64, noise: impl Fn(f64) -> f64) -> f64 {
         self.grid(None).iter().map(|&(frequency, count)| count * waveform(frequency) / noise(frequency)).sum()
     }
 
-    /// Mean of a function of frequency up to half the sample rate.
+    /// Up to half the sample rate.
     pub(super) fn mean(self, function: impl Fn(f64) -> f64) -> f64 {
         let (sum, counts) = self
             .grid(None)
@@ -215,20 +197,16 @@ impl RecordLength {
         sum / counts
     }
 
-    /// Expected log likelihood ratio of a sinusoid of amplitude 1 in noise of the two-sided density `noise` at its
-    /// frequency: `T/(4S)`.
+    /// Expected log likelihood ratio of amplitude 1 in two-sided `noise`: `T/(4S)`.
     pub(super) fn ratio_of_sinusoid(self, noise: f64) -> f64 {
         self.seconds / (4.0 * noise)
     }
 }
 
-/// A channel with its noise and the effects that are already hidden. The test of the detection limit knows all
-/// parameters of these other effects.
+/// A channel with its noise and the other hidden effects, whose parameters the test knows.
 pub(super) struct ChannelUnderTest<'a> {
     channel: OutputRegister,
-    /// Size of a count, in the unit of the channel.
     resolution: f64,
-    /// Of the filter of its noise, Hz.
     corner_hz: f64,
     pub(super) noise: &'a ChannelNoise,
     pub(super) record: RecordLength,
@@ -243,7 +221,6 @@ impl<'a> ChannelUnderTest<'a> {
         Self { channel, resolution, corner_hz, noise, record, others }
     }
 
-    /// Size of a count, in the unit of the channel.
     pub(super) fn resolution(&self) -> f64 {
         self.resolution
     }
@@ -252,7 +229,6 @@ impl<'a> ChannelUnderTest<'a> {
         self.others.iter().filter(|effect| effect.channels().contains(&self.channel))
     }
 
-    /// Power gain of the sensor's filter.
     pub(super) fn gain(&self, frequency: f64) -> f64 {
         let filter = |effect: &InjectedEffect| match *effect {
             InjectedEffect::FilterBandwidth { taps_log2 } => filter_gain(taps_log2, self.record.period_s, frequency),
@@ -261,13 +237,13 @@ impl<'a> ChannelUnderTest<'a> {
         self.others.iter().map(filter).product()
     }
 
-    /// Power gains of what N, B and K have passed: all that filter, the white noise one before it, which no effect passes.
+    /// Filters of N, B and K; the white noise also has one before the sensor's.
     pub(super) fn noise_gains(&self, frequency: f64) -> [f64; 3] {
         let gain = self.gain(frequency);
         [gain * low_pass_gain(self.corner_hz, frequency), gain, gain]
     }
 
-    /// Correlation time in s and variance of each Markov, common-mode and telegraph process among the other effects.
+    /// Time constant, s, and variance of the other Markov, common-mode and telegraph processes.
     pub(super) fn processes(&self) -> impl Iterator<Item = (f64, f64)> {
         self.others().filter_map(|effect| match *effect {
             InjectedEffect::Markov { time_constant_s, deviation, .. }
@@ -281,7 +257,6 @@ impl<'a> ChannelUnderTest<'a> {
         })
     }
 
-    /// Density of the spikes among the other effects.
     fn spike_density(&self) -> f64 {
         let period_s = self.record.period_s;
         let spikes = |effect: &InjectedEffect| match *effect {
@@ -293,12 +268,10 @@ impl<'a> ChannelUnderTest<'a> {
         self.others().map(spikes).sum()
     }
 
-    /// Density of all white noise before the filter.
     pub(super) fn white_density(&self) -> f64 {
         self.noise.angle_random_walk.powi(2) + self.spike_density()
     }
 
-    /// Density of the other effects before the filter.
     fn added_density(&self, frequency: f64) -> f64 {
         let period_s = self.record.period_s;
         let slow: f64 =
@@ -312,7 +285,7 @@ impl<'a> ChannelUnderTest<'a> {
         slow + resonances.sum::<f64>() + self.spike_density()
     }
 
-    /// Density of what is added behind the filter: the rounding to counts, and the quantization effect.
+    /// Behind the filter: rounding and quantization.
     pub(super) fn rounding_density(&self, frequency: f64) -> f64 {
         let period_s = self.record.period_s;
         let angle = |effect: &InjectedEffect| match *effect {
@@ -324,23 +297,20 @@ impl<'a> ChannelUnderTest<'a> {
         self.resolution().powi(2) / 12.0 * period_s + self.others().map(angle).sum::<f64>()
     }
 
-    /// Density of the output without N, B and K.
     pub(super) fn known_density(&self, frequency: f64) -> f64 {
         self.gain(frequency) * self.added_density(frequency) + self.rounding_density(frequency)
     }
 
-    /// Density of the output.
     pub(super) fn density(&self, frequency: f64) -> f64 {
         let white_gain = low_pass_gain(self.corner_hz, frequency);
         let baseline = baseline_density(self.noise, white_gain, self.record.period_s, frequency);
         self.gain(frequency) * baseline + self.known_density(frequency)
     }
 
-    /// Whether the white noise, behind the filter, has an Allan deviation of less than half a count at all averaging times up to the
-    /// length of the longest filter, so that rounding is no white noise; or of less than half of a coarser quantum.
+    /// True if the filtered white noise stays below half a count or quantum: rounding is then not white.
     pub(super) fn is_below_a_count(&self) -> bool {
         let quantum = |effect: &InjectedEffect| match *effect {
-            // The angle is rounded to multiples of √12 times the coefficient.
+            // The angle has steps of √12 times the coefficient.
             InjectedEffect::Quantization { coefficient, .. } => 12f64.sqrt() * coefficient / self.record.period_s,
             _ => 0.0,
         };
@@ -349,7 +319,7 @@ impl<'a> ChannelUnderTest<'a> {
         largest < (0.5 * step).powi(2)
     }
 
-    /// Allan variance of the white noise behind the filter at `n` samples: the density times `2·sin⁴(πfnT)/(n·sin(πfT))²`.
+    /// Filtered white noise at `n` samples: density times `2·sin⁴(πfnT)/(n·sin(πfT))²`.
     fn white_avar(&self, n: u32) -> f64 {
         let (n, period_s) = (f64::from(n), self.record.period_s);
         self.record.mean(|frequency| {
@@ -359,13 +329,12 @@ impl<'a> ChannelUnderTest<'a> {
         })
     }
 
-    /// Density of the output divided by the gain of the filter: effects are added before the filter.
+    /// Effects are added before the filter.
     pub(super) fn density_before_filter(&self, frequency: f64) -> f64 {
         self.density(frequency) / self.gain(frequency).max(LEAST_GAIN)
     }
 
-    /// Probability that two neighbouring samples round to the same count: `q/(√(2π)·σ)` for differences of standard
-    /// deviation σ ≫ q, the size of a count.
+    /// Probability of equal neighbouring counts: `q/(√(2π)·σ)` for σ ≫ q.
     pub(super) fn equal_probability(&self) -> f64 {
         let period_s = self.record.period_s;
         let rounding = self.resolution().powi(2) / 12.0 * period_s;

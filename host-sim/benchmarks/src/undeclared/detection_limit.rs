@@ -1,16 +1,11 @@
-//! Detection limit: the smallest size at which a test that knows the truth detects an effect in half of the recordings.
+//! Detection limit: the size that a test that knows the truth detects in half of the recordings.
 //!
-//! That is the size at which the expected log likelihood ratio, of the truth against the best description without the
-//! effect, is `z²/2`. This is exact for Gaussian data whose mean is shifted by `z` standard deviations and approximate for
-//! the other effects. `z` is the point that a standard normal variable exceeds with a probability of 1 % divided by the
-//! number of independent places (frequencies, times, directions) where the effect could be. The description without the
-//! effect has free N, B and K; that of a telegraph signal also has a Markov process, and that of a common mode has
-//! independent processes. The other effect of a pair is known exactly.
+//! There the expected log likelihood ratio against the best description without the effect is `z²/2`; `z` is the normal
+//! point of 1 % over the number of places (frequencies, times, directions). N, B and K are free, and a Markov process
+//! (telegraph) or independent processes (common mode).
 //!
-//! The *strength* of an effect is its size over the limit, or, where that is less, its `z` over the one at the limit
-//! ([`strength`]). `z` does not grow with the size of a process that has few correlation times in the record, which is a random
-//! walk but for its lowest frequencies, nor with that of a slow drift beside a walk of free K; and it grows with the root of a
-//! number of events.
+//! The *strength* is size over limit or, if less, `z` over that at the limit ([`strength`]): `z` saturates for slow
+//! processes and drift, and grows with the root of a number of events.
 //!
 //! | effect | log likelihood ratio |
 //! |---|---|
@@ -36,22 +31,17 @@ use statrs::distribution::{ContinuousCDF, DiscreteCDF, Normal, Poisson};
 use std::f64::consts::{LN_2, PI};
 use virtual_sensor::{InjectedEffect, OutputRegister};
 
-/// Largest relative error of a host's clock: a crystal of the usual ±50 ppm. Every error within is as likely.
+/// Crystal of ±50 ppm, uniformly.
 pub(super) const HOST_CLOCK_TOLERANCE: f64 = 50e-6;
-/// Probability of a false alarm at the limit.
 const FALSE_ALARM: f64 = 0.01;
-/// Number of distinguishable time constants: octaves in half an hour.
 const TIME_CONSTANTS: f64 = 12.0;
-/// Number of independent times of a step.
 pub(super) const TIMES: f64 = 40.0;
-/// Number of axes along which an acceleration may act.
 const AXES: f64 = 3.0;
-/// Steps per correlation time of a simulated telegraph signal; the level is constant within a step.
+/// Per correlation time; the level is constant within a step.
 const TELEGRAPH_STEPS: f64 = 20.0;
-/// Number of steps of a simulated telegraph signal. The log likelihood ratio is proportional to it.
+/// The ratio is proportional to it.
 const TELEGRAPH_LENGTH: usize = 20_000;
 
-/// Strength of an effect beside the effects `others`.
 pub(super) fn strength(effect: &InjectedEffect, recording: &TrueRecording, others: &[InjectedEffect]) -> f64 {
     let of_size = size(effect) / smallest_size(effect, recording, others);
     let in_channel = |channel: OutputRegister| ChannelUnderTest::new(recording, channel, others);
@@ -79,7 +69,7 @@ pub(super) fn strength(effect: &InjectedEffect, recording: &TrueRecording, other
     }
 }
 
-/// Size at the detection limit of an effect with the parameters of `unit`, beside the effects `others`.
+/// Size at the limit of `unit`, beside `others`.
 pub(super) fn smallest_size(unit: &InjectedEffect, recording: &TrueRecording, others: &[InjectedEffect]) -> f64 {
     let record = RecordLength::new(recording);
     let (seconds, period_s) = (record.seconds, record.period_s);
@@ -112,7 +102,6 @@ pub(super) fn smallest_size(unit: &InjectedEffect, recording: &TrueRecording, ot
         }
         InjectedEffect::Quantization { channel, .. } => {
             let place = in_channel(channel);
-            // Quantization is added behind the filter.
             let density = |frequency: f64| quantization_density(period_s, frequency) / place.gain(frequency);
             smallest_deviation(&place, 1.0, None, density)
         }
@@ -122,7 +111,7 @@ pub(super) fn smallest_size(unit: &InjectedEffect, recording: &TrueRecording, ot
                 let rounding = place.rounding_density(frequency);
                 (place.density(frequency) - rounding) * filter_gain(taps_log2, period_s, frequency) + rounding
             };
-            // The size of a filter is fixed at 1; this limit makes its strength the ratio of `z` to the required one.
+            // The size of a filter is 1: its strength is the ratio of `z`.
             (required_ratio(1.0) / ratio_against_baseline(&place, None, truth)).sqrt()
         }
         InjectedEffect::RateRamp { channel, .. }
@@ -154,7 +143,7 @@ pub(super) fn smallest_size(unit: &InjectedEffect, recording: &TrueRecording, ot
             let equal = |&channel: &OutputRegister| in_channel(channel).equal_probability();
             smallest_count(samples * OutputRegister::INERTIAL.iter().map(equal).product::<f64>()) / samples
         }
-        // A larger difference than the tolerance cannot be the host's; half of the hosts err in its direction.
+        // Beyond the host's tolerance; half of the hosts err in its direction.
         InjectedEffect::SampleClock { .. } => HOST_CLOCK_TOLERANCE,
     }
 }
@@ -164,7 +153,7 @@ fn smallest_markov(place: &ChannelUnderTest<'_>, time_constant_s: f64) -> f64 {
     smallest_deviation(place, TIME_CONSTANTS, None, |frequency| markov_density(time_constant_s, period_s, frequency))
 }
 
-/// Smallest amplitude at which a telegraph signal is both detected and distinguished from a Markov process.
+/// Detected, and distinguished from a Markov process.
 fn smallest_telegraph(place: &ChannelUnderTest<'_>, time_constant_s: f64, seed: u64) -> f64 {
     let density = place.density_before_filter(0.5 / (PI * time_constant_s));
     let unit = (density / time_constant_s).sqrt();
@@ -174,21 +163,19 @@ fn smallest_telegraph(place: &ChannelUnderTest<'_>, time_constant_s: f64, seed: 
     (2.0 * smallest_markov(place, time_constant_s)).max(unit * distinguished)
 }
 
-/// Standard deviation at the limit of a process that has the density `unit_density` for a deviation of 1 and could be at
-/// `places` places. `peak` is the centre and the width of a peak of the density, Hz.
+/// Deviation at the limit of a process of density `unit_density` at `places` places; `peak` is centre and width, Hz.
 pub(super) fn smallest_deviation(
     place: &ChannelUnderTest<'_>,
     places: f64,
     peak: Option<(f64, f64)>,
     unit_density: impl Fn(f64) -> f64,
 ) -> f64 {
-    // The search is for the ratio to the white noise of a sample, to begin near the result.
+    // Relative to the white noise, to begin near the result.
     let white = place.noise.angle_random_walk / place.record.period_s.sqrt();
     let ratio = |relative: f64| ratio_of_process(place, peak, relative * white, &unit_density);
     white * solve_size(required_ratio(places), ratio)
 }
 
-/// Expected log likelihood ratio of such a process of standard deviation `deviation`.
 fn ratio_of_process(
     place: &ChannelUnderTest<'_>,
     peak: Option<(f64, f64)>,
@@ -206,13 +193,13 @@ fn ratio_against_baseline(place: &ChannelUnderTest<'_>, peak: Option<(f64, f64)>
     place.record.ratio_against_baseline(place.noise, (|frequency| place.noise_gains(frequency), known), peak, truth)
 }
 
-/// Log likelihood ratio `z²/2` at which an effect that could be at `places` places is detected in half of the recordings.
+/// `z²/2` for `places` places.
 pub(super) fn required_ratio(places: f64) -> f64 {
     let z = Normal::standard().inverse_cdf(1.0 - FALSE_ALARM / places.max(1.0));
     0.5 * z * z
 }
 
-/// The size at which `ratio(size)`, which increases with the size, equals `required`.
+/// Solves `ratio(size) = required`; `ratio` increases.
 pub(super) fn solve_size(required: f64, ratio: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (1e-9f64, 1e6f64);
     for _ in 0..60 {
@@ -222,8 +209,7 @@ pub(super) fn solve_size(required: f64, ratio: impl Fn(f64) -> f64) -> f64 {
     (low * high).sqrt()
 }
 
-/// Expected log likelihood ratio of a telegraph signal (hidden Markov chain of two levels, `amplitude` apart) against a
-/// Gauss-Markov process of the same covariance (Kalman filter), in white noise of two-sided density `density`.
+/// Expected log likelihood ratio of two levels `amplitude` apart against a Gauss-Markov process of equal covariance.
 pub(super) fn ratio_of_telegraph(
     amplitude: f64,
     time_constant_s: f64,
@@ -262,12 +248,10 @@ pub(super) fn ratio_of_telegraph(
     ratio * record.seconds / step_s / TELEGRAPH_LENGTH as f64
 }
 
-/// Expected log likelihood ratio of `samples` samples of which the fraction `probability` is shifted by `size`
-/// standard deviations of the noise, in either direction.
+/// Expected log likelihood ratio of `samples` samples, of which `probability` are shifted by ±`size` σ.
 pub(super) fn ratio_of_spikes(samples: f64, probability: f64, size: f64) -> f64 {
-    // Integration over the noise of a sample: ±8 σ in steps of 0.05 σ.
     let step = 0.05;
-    // The exponentials below overflow for larger sizes; the limit is far below.
+    // Larger sizes overflow, and are far above the limit.
     let size = size.min(37.0);
     let gain = |value: f64| {
         let raised = 0.5 * ((size * value - 0.5 * size * size).exp() + (-size * value - 0.5 * size * size).exp());
@@ -281,21 +265,18 @@ pub(super) fn ratio_of_spikes(samples: f64, probability: f64, size: f64) -> f64 
     samples * ((1.0 - probability) * mean(0.0) + probability * mean(size))
 }
 
-/// Mean number of events at the limit, in addition to a mean of `by_chance` other events: the number at which the median
-/// count is the smallest count that chance alone exceeds or reaches with a probability of at most 1 %.
+/// Mean number of events at the limit beside a mean of `by_chance`.
 pub(super) fn smallest_count(by_chance: f64) -> f64 {
-    // The probability of more than none, one, two … events.
+    // More than none, one, two …
     let exceeds = |count: u64| Poisson::new(by_chance).map_or(0.0, |distribution| distribution.sf(count));
     let mut fewest = 1_u64;
     while exceeds(fewest - 1) > FALSE_ALARM {
         fewest += 1;
     }
-    // The median of a Poisson variable is about its mean less 1/3. At least one event has a probability of ½ at a mean of
-    // ln 2.
+    // Median of a Poisson variable: mean − 1/3; ln 2 for one event.
     if fewest == 1 { LN_2 } else { fewest as f64 - 1.0 / 3.0 - by_chance }
 }
 
-/// Block means of a slow drift of size 1, with the number of places where it could be; `None` of other effects.
 fn waveform(effect: &InjectedEffect, recording: &TrueRecording) -> Option<(Vec<f64>, f64)> {
     let block_s = block_s(RecordLength::new(recording));
     let of_environment = || environment_means(&recording.environment(recording.samples()));
@@ -317,12 +298,10 @@ fn waveform(effect: &InjectedEffect, recording: &TrueRecording) -> Option<(Vec<f
     }
 }
 
-/// Length of a block, s.
 fn block_s(record: RecordLength) -> f64 {
     record.seconds / BLOCKS as f64
 }
 
-/// The test of a slow drift in this channel.
 pub(super) fn waveform_test(place: &ChannelUnderTest<'_>) -> WaveformTest {
     let rounding = place.resolution().powi(2) / 12.0 * place.record.period_s;
     let processes: Vec<(f64, f64)> = place.processes().collect();

@@ -1,7 +1,4 @@
-//! Recordings with hidden effects, drawn at random from a seed.
-//!
-//! Each recording has its own noise, a changing temperature and supply voltage, a host with its own clock error, and
-//! sometimes a motion. The analysis must not report these as effects, and must find those effects that depend on them.
+//! Recordings with hidden effects, drawn from a seed; noise, temperature, supply, clock and motion vary.
 
 use super::channel_under_test::{ChannelUnderTest, RecordLength};
 use super::detection_limit::{HOST_CLOCK_TOLERANCE, smallest_size, strength};
@@ -17,54 +14,43 @@ use serde::Serialize;
 use virtual_sensor::{Environment, InjectedEffect, NoiseModel, OutputRegister, SensorScenario};
 use virtual_sensor::{Motion, SupplyProfile, TemperatureProfile};
 
-/// Range of the strength (size over detection limit) of a single effect.
 const STRENGTH: (f64, f64) = (0.3, 30.0);
-/// Range of the strength of each effect of a pair or a triple, and of one outside the vocabulary, above the limit.
+/// For pairs, triples and effects outside the vocabulary.
 const STRENGTH_OF_PAIR: (f64, f64) = (2.0, 30.0);
-/// Fraction of the recordings with a motion although no effect depends on it.
+/// Fraction of recordings with an unneeded motion.
 const MOVED: f64 = 0.2;
 
-/// Largest quantum of the angle, over the standard deviation of the angle increment of a sample by its white noise. The error of a coarser
-/// quantum is not white.
+/// Over the angle increment's deviation by white noise; a coarser quantum has no white error.
 const LARGEST_QUANTUM: f64 = 1.0;
-/// Largest fraction of dropped or repeated samples.
 const LARGEST_FRACTION: f64 = 0.02;
-/// Largest sensitivities of a gyroscope to temperature, deg/s/degC, to the supply, deg/s/V, and to acceleration, deg/s/g: thirty
-/// times the data sheet's typical ones (0.01, 0.32 and 0.05). Larger ones are no property of the sensor.
+/// To temperature, supply and acceleration, in deg/s per degC, V and g: thirty times the data sheet's.
 const LARGEST_SENSITIVITIES: [f64; 3] = [0.3, 9.6, 1.5];
-/// Largest relative error of the sample clock.
 const LARGEST_CLOCK_ERROR: f64 = 0.01;
-/// Largest size of an effect, as a part of the output's full scale: what no test sees at any size is not hidden at all sizes.
+/// Over full scale.
 const LARGEST_PART: f64 = 0.1;
-/// Number of draws after which a set of effects is accepted although an effect is too weak.
+/// Draws until a set with a weak effect is accepted.
 const DRAWS: usize = 100;
 
 /// The groups of recordings in the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RecordingGroup {
-    /// No effect.
     Nothing,
-    /// One effect.
     Single(EffectKind),
-    /// Two effects.
     Pair,
-    /// Three effects.
     Triple,
-    /// One effect that the analysis was not made for.
     Outside(OutsideKind),
 }
 
 /// A recording to be simulated, with its true effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DrawnRecording {
-    /// All other fields follow from it, the length and the kinds.
+    /// Gives all other fields, with length and kinds.
     pub seed: u64,
-    /// Kinds of the hidden effects, in the order of those of `simulation`.
+    /// In the order of `simulation`.
     pub kinds: Vec<EffectKind>,
-    /// Size of each effect over its detection limit; of the one outside the vocabulary, where there is one.
+    /// Size over detection limit.
     pub strengths: Vec<f64>,
-    /// What the recording is made of.
     pub simulation: TrueRecording,
 }
 
@@ -115,14 +101,12 @@ impl DrawnRecording {
         let sampling = Sampling::adis16405();
         let outside = Vec::new();
         let mut simulation = TrueRecording { sampling, seconds, seed, noise, scenario, outside, host_clock_ratio };
-        // In a moving accelerometer the motion hides any other effect.
         let channels = if environment.motion.deviation_g > 0.0 {
             &OutputRegister::INERTIAL[..3]
         } else {
             &OutputRegister::INERTIAL
         };
         let channel = |random: &mut ChaCha8Rng| channels.choose(random).copied().unwrap_or(OutputRegister::GyroX);
-        // Half of the pairs and triples are in one channel.
         let shared = random.random_bool(0.5).then(|| channel(&mut random));
         let channel = |random: &mut ChaCha8Rng| shared.unwrap_or_else(|| channel(random));
         let (range, at_least) = if kinds.len() > 1 { (STRENGTH_OF_PAIR, STRENGTH_OF_PAIR.0) } else { (STRENGTH, 0.0) };
@@ -142,8 +126,7 @@ impl DrawnRecording {
     }
 }
 
-/// A knock in all channels: in `channel` with the factor 1, in the others with half to all of that in terms of their white noise, in
-/// either direction.
+/// A knock in all channels: factor 1 in `channel`, ±½ … 1 in the others, relative to white noise.
 pub(super) fn knock_shares(
     channel: OutputRegister,
     noise: &NoiseModel,
@@ -157,10 +140,8 @@ pub(super) fn knock_shares(
     OutputRegister::INERTIAL.map(&mut share).to_vec()
 }
 
-/// Effects of `kinds`, each in a channel from `channel`, with their strengths beside the other effects. The strength of an effect
-/// beside the effects before it is drawn from `range`, as far as the size of its kind has no upper limit. Sets with a strength
-/// below `at_least` are drawn again, and those of which an effect is in a channel whose noise is below a count, as no detection limit
-/// holds there, or is larger than [`LARGEST_PART`] of its full scale. The last draw is returned in any case, with whether it is as asked for.
+/// Effects of `kinds` with their strengths from `range`, drawn again if weaker than `at_least`, in noise below a count,
+/// or larger than [`LARGEST_PART`] of full scale; the flag says if the last draw is as asked for.
 pub(super) fn draw_effects(
     kinds: &[EffectKind],
     range: (f64, f64),
@@ -198,7 +179,7 @@ pub(super) fn draw_effects(
     drawn
 }
 
-/// By how much an effect changes the output by its size alone, in the unit of the channel; 0 of those with sizes in other units.
+/// Largest change of the output, in the channel's unit; 0 for sizes in other units.
 fn largest_change(effect: &InjectedEffect, seconds: f64) -> f64 {
     match effect {
         InjectedEffect::RateRamp { .. } => size(effect) * seconds,
@@ -213,16 +194,15 @@ fn largest_change(effect: &InjectedEffect, seconds: f64) -> f64 {
     }
 }
 
-/// Strength of the effect at the index `at` beside the others.
 fn strength_beside(effects: &[InjectedEffect], at: usize, recording: &TrueRecording) -> f64 {
     let others: Vec<InjectedEffect> =
         effects.iter().enumerate().filter(|(other, _)| *other != at).map(|(_, effect)| effect.clone()).collect();
     strength(&effects[at], recording, &others)
 }
 
-/// `unit` at `strength` times `limit`, or at the largest size of its kind.
+/// `strength` times `limit`, or the largest size.
 fn with_strength(unit: InjectedEffect, strength: f64, limit: f64, recording: &TrueRecording) -> InjectedEffect {
-    // The significance of a number of events grows with its square root.
+    // Significance grows with the root of a number of events.
     let squared = strength * strength * limit;
     let size = match unit {
         InjectedEffect::Quantization { channel, .. } => {
@@ -245,7 +225,7 @@ fn with_strength(unit: InjectedEffect, strength: f64, limit: f64, recording: &Tr
     scaled(unit, size)
 }
 
-/// The noise of the paper, with each coefficient of each inertial channel multiplied by a factor from 0.5 to 2.
+/// The paper's noise, times 0.5 … 2 per coefficient.
 fn noise(random: &mut ChaCha8Rng) -> NoiseModel {
     let mut noise = NoiseModel::paper();
     for channel in OutputRegister::INERTIAL {
@@ -257,7 +237,7 @@ fn noise(random: &mut ChaCha8Rng) -> NoiseModel {
     noise
 }
 
-/// A random environment. `moved` says whether an effect needs a motion.
+/// `moved` if an effect needs a motion.
 fn environment(random: &mut ChaCha8Rng, moved: bool) -> Environment {
     let temperature = TemperatureProfile {
         rise_c: log_uniform(random, 2.0, 12.0),

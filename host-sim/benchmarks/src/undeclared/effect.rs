@@ -12,7 +12,7 @@ use virtual_sensor::{InjectedEffect, OutputRegister};
 
 pub(super) const GYROS: [OutputRegister; 3] = [OutputRegister::GyroX, OutputRegister::GyroY, OutputRegister::GyroZ];
 
-/// Which variant of the virtual sensor's effect is hidden.
+/// The variant of the virtual sensor's effect that is hidden.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum, Serialize)]
 #[value(rename_all = "snake_case")]
 #[serde(rename_all = "snake_case")]
@@ -80,15 +80,14 @@ impl EffectKind {
     }
 }
 
-/// An effect of `kind` of size 1 with random parameters, in `channel`, or in another gyro where `channel` does not
-/// suit the kind.
+/// An effect of size 1 in `channel`, or another gyro if unsuitable.
 pub(super) fn draw_unit(
     kind: EffectKind,
     channel: OutputRegister,
     record: RecordLength,
     random: &mut ChaCha8Rng,
 ) -> InjectedEffect {
-    // An accelerometer's noise is about one count, so the error of a coarser quantum would not be white there.
+    // An accelerometer's noise is about a count: coarser quanta have no white error.
     let of_gyros = matches!(kind, EffectKind::Quantization | EffectKind::Acceleration);
     let channel = if of_gyros && !GYROS.contains(&channel) { GYROS[random.random_range(0..3)] } else { channel };
     let nyquist = 0.5 / record.period_s;
@@ -140,7 +139,7 @@ pub(super) fn draw_unit(
     }
 }
 
-/// Absolute value of the parameter that [`draw_unit`] sets to 1.
+/// Magnitude of the parameter that [`draw_unit`] sets to 1.
 pub(super) fn size(effect: &InjectedEffect) -> f64 {
     match *effect {
         InjectedEffect::Sinusoid { amplitude, .. } | InjectedEffect::Telegraph { amplitude, .. } => amplitude,
@@ -162,7 +161,7 @@ pub(super) fn size(effect: &InjectedEffect) -> f64 {
     }
 }
 
-/// The same effect with its size multiplied by `factor`. The size of a filter is fixed.
+/// A filter's size is fixed.
 pub(super) fn scaled(mut effect: InjectedEffect, factor: f64) -> InjectedEffect {
     match &mut effect {
         InjectedEffect::Sinusoid { amplitude: size, .. }
@@ -185,7 +184,7 @@ pub(super) fn scaled(mut effect: InjectedEffect, factor: f64) -> InjectedEffect 
     effect
 }
 
-/// Names of the parameters of `effect` as in a report, with their values. Times are counted from the start of the sensor.
+/// Names as in a report, with values; times from the sensor's start.
 pub(super) fn parameters(effect: &InjectedEffect) -> Vec<(&'static str, f64)> {
     match *effect {
         InjectedEffect::Sinusoid { frequency_hz, amplitude, .. } => {

@@ -1,5 +1,4 @@
-//! The environment of a recording over time: temperature, supply voltage and specific force, and the random processes that
-//! they and the effects are made of.
+//! Temperature, supply and force over time, and random processes.
 
 use crate::spectral_noise::normal;
 use rand::Rng;
@@ -8,16 +7,15 @@ use rand_distr::{Distribution, Exp1};
 use std::f64::consts::TAU;
 use virtual_sensor::Environment;
 
-/// Deviations from the constant values, one for each sample.
+/// Deviations from constant values, per sample.
 pub(super) struct EnvironmentCourse {
     pub(super) temperature_c: Vec<f64>,
     pub(super) supply_v: Vec<f64>,
-    /// Along x, y and z.
     pub(super) force_g: [Vec<f64>; 3],
 }
 
 impl EnvironmentCourse {
-    /// At the times `k·period_s` s, `k` from 0 on.
+    /// At `k·period_s` s.
     pub(super) fn new(environment: &Environment, samples: usize, period_s: f64, random: &mut ChaCha8Rng) -> Self {
         let Environment { temperature, supply, motion } = *environment;
         let times = || (0..samples).map(|at| at as f64 * period_s);
@@ -42,24 +40,20 @@ impl EnvironmentCourse {
     }
 }
 
-/// A random value between `low` and `high` whose logarithm is uniformly distributed.
 pub(super) fn log_uniform(random: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
     low * (random.random::<f64>() * (high / low).ln()).exp()
 }
 
-/// Sample rate in Hz and length in s of a record in which every frequency and time constant that is drawn can be seen.
+/// At this rate and length, every drawn frequency and time constant is visible.
 const USUAL_RATE_HZ: f64 = 100.0;
 const USUAL_S: f64 = 120.0;
 
-/// Factor on the frequencies that are drawn, and divisor of the time constants, in a record of `seconds` s with a sample every
-/// `period_s` s: below 1 where the sample rate is lower than [`USUAL_RATE_HZ`], above 1 where the record is shorter than [`USUAL_S`]
-/// and its rate allows it, else 1.
+/// Factor on drawn frequencies: below 1 for rates below [`USUAL_RATE_HZ`], above 1 for records below [`USUAL_S`].
 pub(super) fn frequency_factor(seconds: f64, period_s: f64) -> f64 {
     (USUAL_S / seconds).max(1.0).min(1.0 / (USUAL_RATE_HZ * period_s))
 }
 
-/// A signal that jumps between two levels after exponentially distributed times of the mean `2·time_constant_s`: its
-/// autocorrelation is `exp(−t/time_constant)`.
+/// Jumps between two levels with autocorrelation `exp(−t/time_constant)`.
 pub(super) fn two_levels(time_constant_s: f64, samples: usize, period_s: f64, random: &mut ChaCha8Rng) -> Vec<bool> {
     let stay = |random: &mut ChaCha8Rng| {
         let unit: f64 = Exp1.sample(random);
@@ -77,7 +71,7 @@ pub(super) fn two_levels(time_constant_s: f64, samples: usize, period_s: f64, ra
     (0..samples).map(level).collect()
 }
 
-/// A Gaussian process of variance 1 with the autocorrelation `exp(−t/time_constant)`.
+/// Variance 1, autocorrelation `exp(−t/time_constant)`.
 pub(super) fn gauss_markov(time_constant_s: f64, samples: usize, period_s: f64, random: &mut ChaCha8Rng) -> Vec<f64> {
     let kept = (-period_s / time_constant_s).exp();
     let drive = (1.0 - kept * kept).sqrt();
@@ -95,7 +89,6 @@ mod tests {
     use super::*;
     use rand::SeedableRng;
 
-    /// The runs of the ADIS16405, simulated half hours, a phone at 5 Hz, half a minute at 400 Hz, and one at 40 Hz.
     #[test]
     fn frequencies_follow_the_rate_and_the_length_of_the_record() {
         for (seconds, rate_hz, expected) in
@@ -106,7 +99,7 @@ mod tests {
         }
     }
 
-    /// 20,000 correlation times of 10 samples: the correlation at one of them is known to about 1/√20,000.
+    /// 20,000 correlation times: 1/√20,000.
     #[test]
     fn both_processes_have_the_exponential_autocorrelation() {
         let mut random = ChaCha8Rng::seed_from_u64(1);

@@ -1,6 +1,4 @@
-//! The generator of the recordings: noise by its spectrum, the effects by their definitions, the filter, the rounding and the
-//! host's time stamps. It shares no code with the analysis and none with the virtual sensor, of which it takes the
-//! description of a scenario alone.
+//! The generator of the recordings, which shares no code with the analysis or the virtual sensor.
 
 use super::environment::{EnvironmentCourse, gauss_markov, two_levels};
 use super::outside::OutsideEffect;
@@ -14,7 +12,7 @@ use simulation::SAMPLE_RATE_HZ;
 use std::f64::consts::{PI, TAU};
 use virtual_sensor::{ChannelNoise, InjectedEffect, NoiseModel, OutputRegister, SensorScenario};
 
-/// Largest count of the 14-bit registers of the inertial channels.
+/// 14 bits.
 const LARGEST_COUNT: i32 = 8191;
 /// Supply voltage, V, and specific force along z, g.
 const SUPPLY_V: f64 = 5.0;
@@ -22,28 +20,26 @@ const GRAVITY_G: f64 = 1.0;
 /// Mean delay of a host's time stamps, s.
 const LATENCY_S: f64 = 50e-6;
 
-/// Random streams of a seed; the noise of channel `n` has the stream `n`, the effect of index `n` `EFFECTS + n`.
+/// Channel `n` has the stream `n`, effect `n` `EFFECTS + n`.
 const ENVIRONMENT: u64 = 32;
 const REPEATED: u64 = 33;
 const HOST: u64 = 34;
 const EFFECTS: u64 = 64;
 
-/// At which rate the outputs are sampled, to which steps they are rounded, how large they can be, and how their noise is filtered.
+/// Rate, resolution, range and filters of the outputs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sampling {
     /// Nominal sample rate, Hz.
     pub rate_hz: f64,
-    /// Size of a count of each channel, in its unit, in the order of the burst.
+    /// Count of each channel, in its unit, in the order of the burst.
     pub resolutions: [f64; 12],
-    /// Largest value of each channel, in its unit, in the same order.
     pub full_scales: [f64; 12],
-    /// Frequency at which a filter of first order in the sensor halves the density of the white noise of each channel, Hz, for the
-    /// detection limit in noise that was measured; infinite without one, as in all noise of this generator.
+    /// Half-power corners of the noise's first-order filters, Hz, for measured noise; infinite without one.
     pub corners_hz: [f64; 12],
 }
 
 impl Sampling {
-    /// Of the virtual sensor.
+    /// For the virtual sensor.
     #[must_use]
     pub fn adis16405() -> Self {
         let resolutions = Channel::ALL.map(|channel| channel.lsb(GyroRange::Dps300));
@@ -51,28 +47,23 @@ impl Sampling {
         Self { rate_hz: SAMPLE_RATE_HZ, resolutions, full_scales, corners_hz: [f64::INFINITY; 12] }
     }
 
-    /// Sample period, s.
     pub(super) fn period_s(&self) -> f64 {
         1.0 / self.rate_hz
     }
 }
 
-/// Everything that a recording is made of.
+/// Everything that makes a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrueRecording {
-    /// Rate and resolutions.
     pub sampling: Sampling,
-    /// Length at the nominal sample rate, s.
+    /// At the nominal rate, s.
     pub seconds: f64,
-    /// Seed of all random numbers.
     pub seed: u64,
-    /// N, B and K of every channel.
     pub noise: NoiseModel,
-    /// Environment and hidden effects.
     pub scenario: SensorScenario,
     /// Hidden effects that the analysis was not made for.
     pub outside: Vec<OutsideEffect>,
-    /// Seconds that the host counts in a true second.
+    /// Host seconds per true second.
     pub host_clock_ratio: f64,
 }
 
@@ -83,12 +74,10 @@ impl TrueRecording {
         random
     }
 
-    /// Number of samples that the part takes.
     pub(super) fn samples(&self) -> usize {
         (self.seconds * self.sampling.rate_hz).round() as usize
     }
 
-    /// The environment at each of so many samples.
     pub(super) fn environment(&self, samples: usize) -> EnvironmentCourse {
         let mut random = self.random(ENVIRONMENT);
         EnvironmentCourse::new(&self.scenario.environment, samples, self.sampling.period_s(), &mut random)
@@ -126,7 +115,7 @@ impl TrueRecording {
             if is_missed {
                 continue;
             }
-            // A delayed sample waits in a queue: no time stamp is earlier than the one before.
+            // A queue: stamps do not decrease.
             let sampled_s = self.outside.iter().fold(at as f64 * period_s, |time_s, effect| effect.sampled_at(time_s));
             latest_s = latest_s.max((sampled_s + LATENCY_S * latency) * self.host_clock_ratio);
             let word = |channel: usize| counts[channel][shown].clamp(-LARGEST_COUNT, LARGEST_COUNT) as i16;
@@ -136,14 +125,13 @@ impl TrueRecording {
         recorder.finish()
     }
 
-    /// Register counts of every channel, in the order of the burst.
     fn counts(&self, samples: usize) -> Vec<Vec<i32>> {
         let period_s = self.sampling.period_s();
         let taps = self.scenario.effects.iter().find_map(|effect| match effect {
             InjectedEffect::FilterBandwidth { taps_log2 } => Some(1_usize << taps_log2),
             _ => None,
         });
-        // The filter has run before the first sample.
+        // The filter has run before the first sample, in a constant environment.
         let lead = taps.map_or(0, |taps| 2 * (taps - 1));
         let length = samples + lead;
         let environment = self.environment(samples);
@@ -165,7 +153,6 @@ impl TrueRecording {
                 Channel::AcclZ => Some(&environment.force_g[2]),
                 _ => None,
             };
-            // Before the first sample the environment is as at the first.
             let of = |course: &[f64], at: usize| course[at.saturating_sub(lead)];
             for (at, value) in values.iter_mut().enumerate() {
                 *value += level + own.map_or(0.0, |own| of(own, at));
@@ -206,7 +193,7 @@ impl TrueRecording {
     }
 }
 
-/// White noise, flicker noise by its spectrum, and the sum of white steps.
+/// Flicker noise by its spectrum.
 pub(super) fn baseline(noise: &ChannelNoise, rate_hz: f64, samples: usize, random: &mut ChaCha8Rng) -> Vec<f64> {
     let mut values: Vec<f64> = match noise.bias_instability {
         0.0 => vec![0.0; samples],
@@ -221,7 +208,7 @@ pub(super) fn baseline(noise: &ChannelNoise, rate_hz: f64, samples: usize, rando
     values
 }
 
-/// Adds what an effect changes before the filter; `lead` of the values, which are `period_s` s apart, are before the first sample.
+/// Adds an effect before the filter; `lead` values precede the first sample.
 pub(super) fn add_sensed(
     effect: &InjectedEffect,
     values: &mut [f64],
@@ -240,7 +227,7 @@ pub(super) fn add_sensed(
             add(&mut |at| amplitude * (TAU * frequency_hz * time_s(at) + phase_rad).sin());
         }
         InjectedEffect::Resonance { frequency_hz, bandwidth_hz, deviation, .. } => {
-            // The two quadratures of the band around its centre.
+            // Two quadratures around the centre.
             let time_constant_s = 1.0 / (PI * bandwidth_hz);
             let [cosine, sine] = [(); 2].map(|()| gauss_markov(time_constant_s, length, period_s, random));
             add(&mut |at| {
@@ -284,7 +271,7 @@ pub(super) fn add_sensed(
                 sum
             });
         }
-        // Behind the filter, in the converter's clock, or in the host.
+        // Behind the filter, in the clock, or in the host.
         InjectedEffect::Quantization { .. }
         | InjectedEffect::FilterBandwidth { .. }
         | InjectedEffect::DroppedSamples { .. }
@@ -293,12 +280,11 @@ pub(super) fn add_sensed(
     }
 }
 
-/// Means of so many neighbouring values; one for each window.
 fn moving_average(values: &[f64], taps: usize) -> Vec<f64> {
     values.windows(taps).map(|window| window.iter().sum::<f64>() / taps as f64).collect()
 }
 
-/// The rate that is differenced from an angle which is kept in steps of `quantum`.
+/// Differences of an angle in steps of `quantum`.
 pub(super) fn quantized_angle(rates: &[f64], quantum: f64, period_s: f64) -> Vec<f64> {
     let (mut angle, mut shown) = (0.0, 0.0);
     let rate = |rate: &f64| {

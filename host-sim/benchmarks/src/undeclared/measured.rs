@@ -1,5 +1,4 @@
-//! Effects hidden in measured noise: each is added to a stretch of a recording, and the report of the stretch with the effect is
-//! scored against that of the same stretch untouched.
+//! Effects hidden in measured noise: reports of a stretch with and without the effect are compared.
 //!
 //! ```text
 //! recording ─► stretch ─┬───────────────────────────► analysis ─► report of the noise ──────────────┐
@@ -7,9 +6,8 @@
 //!                       └──────────────────────────────┴► counts ─► analysis ─► report ─────────────┘
 //! ```
 //!
-//! What is in the noise itself is not known. So an effect is named if a finding of its kind is there that the untouched stretch does
-//! not have, and a wrong name is one that the untouched stretch does not have. An effect that needs a quantity beside the noise
-//! (temperature, supply, acceleration, a clock) or that would change the noise itself (another filter) is not hidden.
+//! Only findings count that the untouched stretch lacks. Effects that need other quantities, or change the noise
+//! itself, are not hidden.
 
 mod hidden_kind;
 mod hide;
@@ -31,7 +29,7 @@ use rand_chacha::ChaCha8Rng;
 use std::convert::Infallible;
 use stretch::Stretch;
 
-/// Random stream of the stretches; those of the effects are in `stretch` and `hide`.
+/// Random stream of the stretches; `stretch` and `hide` have others.
 const STRETCHES: u64 = u64::MAX;
 
 /// Length of a stretch; a shorter recording is one stretch.
@@ -43,25 +41,21 @@ pub enum StretchLength {
     Samples(u64),
 }
 
-/// Which effects to hide in which recordings.
+/// The effects to hide, and the recordings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredNoisePlan {
-    /// Recordings of sensors at rest, used in turn.
     pub recordings: Vec<NoiseRecording>,
-    /// Number of stretches, in each of which every kind is hidden alone.
+    /// Each with every kind alone.
     pub stretches: u64,
-    /// Length of every stretch.
     pub length: StretchLength,
-    /// Size of every effect over the detection limit for the N, B and K of its channel in the stretch.
+    /// Over the detection limit in the channel's N, B and K.
     pub strength: f64,
-    /// Seed of the first stretch.
     pub seed: u64,
-    /// Number of threads.
     pub jobs: usize,
 }
 
 impl MeasuredNoisePlan {
-    /// Hides and scores every effect. `progress` is called with the number of finished analyses and of all.
+    /// Hides and scores every effect; `progress` gets the numbers of finished and of all analyses.
     #[must_use]
     pub fn run(&self, progress: impl Fn(usize, usize) + Sync) -> MeasuredNoiseTable {
         if self.recordings.is_empty() {

@@ -1,6 +1,4 @@
-//! Effects outside the vocabulary of the report: the right answer is `unexplained`, or the name that describes the effect, where
-//! the report has one ([`OutsideKind::right_names`]). Every other name is wrong, but for that of a part of the effect, which is neither
-//! right nor wrong ([`OutsideEffect::has_part`]).
+//! Effects outside the vocabulary; right names are `unexplained` and [`OutsideKind::right_names`].
 
 use super::environment::{EnvironmentCourse, frequency_factor, gauss_markov, log_uniform};
 use crate::spectral_noise::normal;
@@ -12,49 +10,44 @@ use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 use virtual_sensor::OutputRegister;
 
-/// Standard deviation of the logarithm of the level of a band that wanders: by a factor of 2 either way.
+/// Deviation of ln level: a factor of 2.
 const LEVEL_DEVIATION: f64 = std::f64::consts::LN_2;
-/// Time constant of a knock's decay, s, where the sample rate shows it: half a second until it is below a hundredth.
+/// Below a hundredth after half a second.
 const KNOCK_DECAY_S: f64 = 0.1;
-/// Fewest periods of a supply's droop in a record.
 const FEWEST_DROOPS: f64 = 6.0;
 
-/// Kinds of effects that the analysis was not made for.
+/// Kinds that the analysis was not made for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OutsideKind {
-    /// A sinusoid whose frequency rises linearly over the record.
+    /// Frequency linear over the record.
     Chirp,
-    /// Disturbances at random times, each a jump that decays exponentially (shot noise).
+    /// Random jumps that decay exponentially (shot noise).
     Decays,
-    /// A rise and a sudden fall, again and again: a thermostat.
+    /// A rise and a sudden fall, again and again.
     Sawtooth,
-    /// A line whose amplitude swells and fades by half.
+    /// Amplitude swells and fades by half.
     ModulatedLine,
-    /// White noise whose standard deviation grows with the temperature.
+    /// White noise that grows with the temperature.
     LevelByTemperature,
-    /// The output stays at its last value for a while, in one channel ("stuck" in E. Balaban et al., "Modeling, detection, and
-    /// disambiguation of sensor faults for aerospace applications", IEEE Sensors J. 9, 2009).
+    /// Stuck for a while, in one channel (E. Balaban et al., IEEE Sensors J. 9, 2009).
     HeldValue,
-    /// Two converters take turns, one of them with an offset (N. Kurosawa et al., "Explicit analysis of channel mismatch effects in
-    /// time-interleaved ADC systems", IEEE Trans. Circuits Syst. I 48, 2001).
+    /// Offset of every second sample (N. Kurosawa et al., IEEE Trans. Circuits Syst. I 48, 2001).
     AlternatingConverters,
-    /// The sensor's sample clock changes its rate at one time.
+    /// The sample clock changes once.
     ClockStep,
-    /// The sensor heats itself from its start on, which its thermometer does not show: an exponential approach.
+    /// Exponential approach after the start, without the thermometer.
     SelfHeating,
-    /// After an overload the output is constant until the converter has recovered, again and again (overvoltage recovery in IEEE Std
-    /// 1241).
+    /// Constant after an overload, again and again (IEEE Std 1241).
     DeadTime,
-    /// The supply drops for a short time at regular intervals, as while a radio sends, and is not measured.
+    /// Regular short drops, not measured.
     SupplyDroop,
-    /// A line that is switched on for half of the time, as of a heater driven by pulse-width modulation.
     SwitchedLine,
-    /// Codes that the converter never gives, at every carry into a higher bit (IEEE Std 1241).
+    /// At carries (IEEE Std 1241).
     MissingCodes,
-    /// A band of noise, as of a vibration, whose level wanders.
+    /// A vibration whose level wanders.
     WanderingBand,
-    /// The platform is knocked once: half a second of a damped oscillation in all six channels.
+    /// Half a second of damped oscillation in all six channels.
     Knock,
 }
 
@@ -100,7 +93,7 @@ impl OutsideKind {
         }
     }
 
-    /// Names in a report that describe the effect.
+    /// Names that describe the effect.
     #[must_use]
     pub const fn right_names(self) -> &'static [&'static str] {
         match self {
@@ -110,7 +103,7 @@ impl OutsideKind {
             Self::ModulatedLine | Self::SwitchedLine => &["modulated_line"],
             Self::LevelByTemperature => &["level_change"],
             Self::HeldValue | Self::DeadTime => &["stuck"],
-            // An offset of every second sample is a line at half the sample rate, and nothing else.
+            // A line at half the sample rate.
             Self::AlternatingConverters => &["sinusoid", "periodic"],
             Self::ClockStep => &["sample_clock"],
             Self::MissingCodes => &["missing_codes"],
@@ -125,34 +118,29 @@ impl OutsideKind {
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutsideEffect {
     pub(super) kind: OutsideKind,
-    /// The outputs that it is in, each with a factor on its size; none of an effect of the sample clock.
+    /// Outputs with factors on the size; none for the sample clock.
     pub(super) shares: Vec<(OutputRegister, f64)>,
-    /// In the unit of the channel: the amplitude, the height of a jump, the distance of two levels, or the standard deviation at its
-    /// highest. Of a held value and of a dead time the length in s, of a clock step the relative change of the rate.
+    /// In the channel's unit, s of a held value and of dead time, or relative change of a clock step.
     pub(super) size: f64,
-    /// Of the sweep its first and its last frequency, of the others the frequency at which they repeat and that of the
-    /// modulation, Hz; of what comes at random times one over the mean time between them and one over their time constant; of a
-    /// band its centre and its width. One over the modulus of missing codes.
+    /// Hz: first and last frequency of a sweep; else repetition and modulation; 1/interval and 1/time constant of
+    /// random events; centre and width of a band. 1/modulus of missing codes.
     pub(super) frequencies_hz: [f64; 2],
-    /// When it begins, s from the first sample, and the time constant of it or of its decay or the length of a part of it, s.
+    /// Onset, s from the first sample, and time constant or length, s.
     pub(super) times_s: [f64; 2],
-    /// Of the random numbers that the effect itself has.
+    /// For its own random numbers.
     pub(super) seed: u64,
 }
 
 impl OutsideEffect {
-    /// Its kind.
     pub(super) fn kind(&self) -> OutsideKind {
         self.kind
     }
 
-    /// The outputs that it is in; none of an effect that concerns the samples of all channels.
     pub(super) fn channels(&self) -> impl Iterator<Item = OutputRegister> + '_ {
         self.shares.iter().map(|(channel, _)| *channel)
     }
 
-    /// Whether `found` is a part of it that is there without the rest: the carrier of a line that changes. Each sideband of one that swells
-    /// and fades by half has a sixteenth of its power, and at the detection limit of the carrier they are in the noise.
+    /// True for a part that is found without the rest, as the carrier of a changing line.
     pub(super) fn has_part(&self, found: &Effect) -> bool {
         let [carrier_hz, change_hz] = self.frequencies_hz;
         let changes = matches!(self.kind, OutsideKind::ModulatedLine | OutsideKind::SwitchedLine);
@@ -160,12 +148,11 @@ impl OutsideEffect {
             if changes && (line.frequency_hz.value - carrier_hz).abs() < 0.5 * change_hz)
     }
 
-    /// Whether it shows in `channel`.
     pub(super) fn shows_in(&self, channel: OutputRegister) -> bool {
         self.shares.is_empty() || self.channels().any(|of| of == channel)
     }
 
-    /// With random parameters, of size 1, in a record of `seconds` s with a sample every `period_s` s.
+    /// Random parameters, size 1, `seconds` long.
     pub(super) fn draw_unit(
         kind: OutsideKind,
         channel: OutputRegister,
@@ -179,7 +166,7 @@ impl OutsideEffect {
                 let first = factor * log_uniform(random, 1.0, 10.0);
                 [first, first * log_uniform(random, 2.0, 5.0)]
             }
-            // Ten to forty in a record, each of a fiftieth to a fifth of the time between them.
+            // Ten to forty, a fiftieth to a fifth of the interval.
             OutsideKind::Decays => {
                 let rate = log_uniform(random, 10.0, 40.0) / seconds;
                 [rate, rate * log_uniform(random, 5.0, 50.0)]
@@ -197,7 +184,7 @@ impl OutsideEffect {
                 [0.0; 2]
             }
             OutsideKind::DeadTime => [log_uniform(random, 10.0, 40.0) / seconds, 0.0],
-            // A twentieth to a fifth of the time.
+            // A twentieth to a fifth.
             OutsideKind::SupplyDroop => {
                 let lowest = (0.05 * factor).max(FEWEST_DROOPS / seconds);
                 let frequency = log_uniform(random, lowest, 10.0 * lowest);
@@ -219,7 +206,7 @@ impl OutsideEffect {
         Self { kind, shares, size: 1.0, frequencies_hz, times_s, seed: random.random() }
     }
 
-    /// What it adds to each sample of a channel in which it is with the factor 1; nothing of an effect on the counts or on the clock.
+    /// Added to a channel with factor 1; empty for counts and clock.
     pub(super) fn signal(&self, environment: &EnvironmentCourse, samples: usize, period_s: f64) -> Vec<f64> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         let (size, [first, second], [begin_s, part_s]) = (self.size, self.frequencies_hz, self.times_s);
@@ -264,7 +251,7 @@ impl OutsideEffect {
                 let level = gauss_markov(part_s, samples, period_s, &mut random);
                 let value = |at: usize| {
                     let phase = TAU * first * at as f64 * period_s;
-                    // The mean square of the level is 1.
+                    // Mean square of the level: 1.
                     let level = (LEVEL_DEVIATION * level[at] - LEVEL_DEVIATION.powi(2)).exp();
                     size * level * (cosine[at] * phase.cos() + sine[at] * phase.sin())
                 };
@@ -280,7 +267,6 @@ impl OutsideEffect {
         }
     }
 
-    /// What it makes of the counts of a channel that it is in.
     pub(super) fn change_counts(&self, counts: &mut [i32], period_s: f64) {
         let at = |time_s: f64| (time_s / period_s).round() as usize;
         match self.kind {
@@ -311,13 +297,13 @@ impl OutsideEffect {
         }
     }
 
-    /// Whether the converter of missing codes never gives `code`.
+    /// True if the converter never gives `code`.
     pub(super) fn is_missing(&self, code: i32) -> bool {
         let modulus = (1.0 / self.frequencies_hz[0]).round() as i32;
         code.rem_euclid(modulus) == modulus - 1
     }
 
-    /// True time at which a sample is taken that is nominally taken at `time_s`: later by the clock that got slower.
+    /// True time of a sample nominally at `time_s`.
     pub(super) fn sampled_at(&self, time_s: f64) -> f64 {
         match self.kind {
             OutsideKind::ClockStep => time_s + self.size * (time_s - self.times_s[0]).max(0.0),
@@ -326,7 +312,6 @@ impl OutsideEffect {
     }
 }
 
-/// Events at random times, exponentially distributed.
 struct RandomTimes<'a> {
     rate_hz: f64,
     next_s: f64,
@@ -339,7 +324,6 @@ impl<'a> RandomTimes<'a> {
         Self { rate_hz, next_s: first / rate_hz, random }
     }
 
-    /// Number of events since the last call, up to `time_s`.
     fn until(&mut self, time_s: f64) -> u32 {
         let mut events = 0;
         while self.next_s <= time_s {
@@ -351,7 +335,6 @@ impl<'a> RandomTimes<'a> {
     }
 }
 
-/// A course over time from 0 at its lowest to 1 at its highest.
 pub(super) fn relative(course: &[f64]) -> impl Iterator<Item = f64> + '_ {
     let lowest = course.iter().copied().fold(f64::INFINITY, f64::min);
     let highest = course.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -378,7 +361,6 @@ mod tests {
         }
     }
 
-    /// Counts of a sawtooth, no two neighbours of which are equal.
     fn counts() -> Vec<i32> {
         (0..SAMPLES).map(|at| (at % 101) as i32 - 50).collect()
     }
@@ -397,13 +379,13 @@ mod tests {
         let dead = OutsideEffect { size: 0.1, ..effect(OutsideKind::DeadTime) };
         let mut changed = counts();
         dead.change_counts(&mut changed, PERIOD_S);
-        // 10 to 40 events are expected, of 20 samples each; the fewest and the most at 3.5 σ.
+        // 10 to 40 events of 20 samples; 3.5 σ.
         let events = standing(&changed) as f64 / 19.0;
         let expected = dead.frequencies_hz[0] * SAMPLES as f64 * PERIOD_S;
         assert!((events - expected).abs() < 3.5 * expected.sqrt(), "{events}, {expected}");
     }
 
-    /// 12,000 samples at 5 Hz, of 2.5 Hz at most.
+    /// 2.5 Hz at most.
     #[test]
     fn no_frequency_is_above_half_of_a_low_sample_rate() {
         for (kind, seed) in OutsideKind::ALL.into_iter().flat_map(|kind| (0..20).map(move |seed| (kind, seed))) {
@@ -415,7 +397,7 @@ mod tests {
                 kind,
                 OutsideKind::HeldValue | OutsideKind::DeadTime | OutsideKind::ClockStep | OutsideKind::MissingCodes
             );
-            // Without a change of temperature its level is 0.
+            // No change without a change of temperature.
             let changes = signal.iter().filter(|value| value.abs() > 0.1).count();
             assert!(is_of_codes || kind == OutsideKind::LevelByTemperature || changes > 5, "{kind:?}: {changes}");
         }
@@ -441,8 +423,7 @@ mod tests {
         assert_eq!([50.0, 100.0, 300.0].map(|time_s| clock.sampled_at(time_s)), [50.0, 100.0, 302.0]);
     }
 
-    /// The mean square of each signal: ½·½ of a line that is on half of the time, a part `p` of unit droops; a band of
-    /// variance 1 whose level has a mean square of 1, with few correlation times of 5 to 25 s in 500 s.
+    /// ½·½ of a switched line, `p` of droops, about 1 of a wandering band.
     #[test]
     fn signals_have_the_power_of_their_definition() {
         let power = |kind: OutsideKind| {

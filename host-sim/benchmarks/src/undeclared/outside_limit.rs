@@ -1,5 +1,4 @@
-//! Detection limit of effects outside the vocabulary: the smallest size at which a test that is told their signal detects them in
-//! half of the recordings.
+//! Detection limit outside the vocabulary, for a test that knows the signal.
 
 use super::block_covariance::BLOCKS;
 use super::channel_under_test::{ChannelUnderTest, resonance_density};
@@ -9,11 +8,7 @@ use super::detection_limit::{
 use super::environment::EnvironmentCourse;
 use super::outside::{OutsideEffect, OutsideKind, relative};
 
-/// The effect with its size at `strength` times the detection limit, beside the noise of its channel `place`, and the strength that
-/// it has: that of missing codes has no size to choose.
-///
-/// The significance of a number of samples, of a difference of two clocks and of a level grows with the root of it, as that of dropped
-/// samples does.
+/// Size at `strength` times the limit, and the strength obtained; missing codes have no size.
 pub(super) fn with_strength(
     unit: OutsideEffect,
     strength: f64,
@@ -33,7 +28,6 @@ pub(super) fn with_strength(
     }
 }
 
-/// Size at the detection limit of `effect`.
 fn smallest_outside_size(effect: &OutsideEffect, environment: &EnvironmentCourse, place: &ChannelUnderTest<'_>) -> f64 {
     let period_s = place.record.period_s;
     let samples = (place.record.seconds / period_s).round();
@@ -43,16 +37,13 @@ fn smallest_outside_size(effect: &OutsideEffect, environment: &EnvironmentCourse
         let unit = unit.signal(environment, samples as usize, period_s);
         (required_ratio(places) / ratio_of_signal(&unit, period_s, density)).sqrt()
     };
-    // Each of a row of equal samples is as improbable as that two neighbours are equal.
+    // Each of a row as improbable as two equal neighbours.
     let equal = |places: f64| required_ratio(places) / -place.equal_probability().ln();
     match effect.kind() {
-        // Independent frequencies.
         OutsideKind::Chirp | OutsideKind::Sawtooth | OutsideKind::ModulatedLine | OutsideKind::SwitchedLine => {
             of_signal(0.5 * samples)
         }
-        // Frequencies with parts of a period.
         OutsideKind::SupplyDroop => of_signal(0.5 * samples * TIMES),
-        // Times with lengths.
         OutsideKind::Decays => of_signal(40.0 * 12.0),
         OutsideKind::AlternatingConverters => of_signal(1.0),
         OutsideKind::Knock => of_signal(samples),
@@ -65,16 +56,14 @@ fn smallest_outside_size(effect: &OutsideEffect, environment: &EnvironmentCourse
                 })
         }
         OutsideKind::HeldValue => equal(samples) * period_s,
-        // Every one of them is at a time of its own.
         OutsideKind::DeadTime => equal(samples) * period_s,
         OutsideKind::ClockStep => HOST_CLOCK_TOLERANCE,
         OutsideKind::SelfHeating => {
             let block_s = place.record.seconds / BLOCKS as f64;
-            // Mean of the approach over each block.
+            // Mean of the approach per block.
             let (length, test) = (block_s / effect.times_s[1], waveform_test(place));
             let mean = |block: usize| 1.0 - (-length * block as f64).exp() * -(-length).exp_m1() / length;
             let values: Vec<f64> = (0..BLOCKS).map(mean).collect();
-            // Octaves of time constants.
             let places = 12.0;
             solve_size(required_ratio(places), |size| {
                 test.ratio(&values.iter().map(|value| size * value).collect::<Vec<f64>>())
@@ -89,8 +78,7 @@ fn smallest_outside_size(effect: &OutsideEffect, environment: &EnvironmentCourse
     }
 }
 
-/// Expected log likelihood ratio of a known signal in noise of the two-sided `density`: the energy of its spectrum over that
-/// of the noise (matched filter). The mean is not known.
+/// Matched filter: energy of the spectrum over two-sided noise, without the mean.
 fn ratio_of_signal(signal: &[f64], period_s: f64, density: impl Fn(f64) -> f64) -> f64 {
     let transform = fourier::forward(signal.len());
     let (mut input, mut output) = (signal.to_vec(), transform.make_output_vec());
@@ -98,7 +86,7 @@ fn ratio_of_signal(signal: &[f64], period_s: f64, density: impl Fn(f64) -> f64) 
         return 0.0;
     }
     let seconds = signal.len() as f64 * period_s;
-    // Each ordinate stands for two frequencies, that at half the sample rate for one.
+    // An ordinate counts twice, except at half the sample rate.
     let is_single = |k: usize| 2 * k == signal.len();
     let energy = |(k, bin): (usize, &fourier::Complex<f64>)| {
         let part = if is_single(k) { 0.5 } else { 1.0 };
@@ -107,8 +95,7 @@ fn ratio_of_signal(signal: &[f64], period_s: f64, density: impl Fn(f64) -> f64) 
     output.iter().enumerate().skip(1).map(energy).sum()
 }
 
-/// Expected log likelihood ratio of white noise whose variance is 1 plus `added`, sample by sample, against the best constant
-/// variance.
+/// Against the best constant variance, per sample.
 fn ratio_of_levels(added: impl Iterator<Item = f64>) -> f64 {
     let (sum, logs, count) =
         added.fold((0.0, 0.0, 0.0), |(sum, logs, count), added: f64| (sum + added, logs + added.ln_1p(), count + 1.0));
@@ -120,7 +107,7 @@ mod tests {
     use super::{ratio_of_levels, ratio_of_signal};
     use std::f64::consts::TAU;
 
-    /// `A²T/(4S)` for a sinusoid of `T` s (D. Rife and R. Boorstyn 1974, with the two-sided density S).
+    /// `A²T/(4S)` (D. Rife and R. Boorstyn 1974).
     #[test]
     fn the_ratio_of_a_sinusoid_has_its_closed_form() {
         let signal: Vec<f64> = (0..1000).map(|at| 0.3 * (TAU * 0.07 * f64::from(at)).sin()).collect();
@@ -128,7 +115,7 @@ mod tests {
         assert!((ratio_of_signal(&signal, 0.01, |_| 0.2) / expected - 1.0).abs() < 1e-6);
     }
 
-    /// `½·Σs²/σ²` of any known signal in white noise of variance σ², S over the sample period.
+    /// `½·Σs²/σ²` in white noise.
     #[test]
     fn the_ratio_of_an_alternating_offset_is_half_its_energy() {
         let signal: Vec<f64> = (0..1000).map(|at| if at % 2 == 0 { 0.3 } else { -0.3 }).collect();
@@ -136,7 +123,7 @@ mod tests {
         assert!((ratio_of_signal(&signal, 0.01, |_| 0.2) / expected - 1.0).abs() < 1e-6);
     }
 
-    /// Half of the samples of variance 1, half of 3: ½·n·(ln 2 − ½ ln 3).
+    /// Half of variance 1, half of 3: ½·n·(ln 2 − ½ ln 3).
     #[test]
     fn the_ratio_of_two_levels_has_its_closed_form() {
         let added = (0..1000).map(|at| if at < 500 { 0.0 } else { 2.0 });

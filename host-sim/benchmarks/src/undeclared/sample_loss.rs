@@ -1,14 +1,13 @@
-//! Samples that are lost at random on the way from the sensor to the analysis.
+//! Randomly lost samples.
 
 use measurement::Measurement;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// The random stream of the losses; the others of a seed belong to the drawn recording and to the sensor.
+/// Random stream of the losses.
 const STREAM: u64 = u64::MAX - 2;
 
-/// Removes each sample but the first and the last with the probability `share`, in every channel. They count as `gap`, as
-/// samples that never arrived.
+/// Removes samples but the first and last with the probability `share`, in every channel, as `gap`.
 pub(super) fn lose_samples(measurement: &mut Measurement, share: f64, seed: u64) {
     if share <= 0.0 || measurement.is_empty() {
         return;
@@ -59,7 +58,7 @@ mod tests {
         let mut lossy = whole.clone();
         lose_samples(&mut lossy, 0.02, 7);
         let lost = whole.len() - lossy.len();
-        // 409.6 of 20,480 on average, with a standard deviation of 20.
+        // 409.6 ± 20 of 20,480.
         assert!((330..490).contains(&lost), "{lost}");
         assert_eq!(lossy.dropped["gap"], whole.dropped["gap"] + lost as u64);
         assert_eq!(lossy.periods(), whole.periods());
@@ -69,7 +68,6 @@ mod tests {
             let of_whole = whole.slots.binary_search(&lossy.slots[at]).unwrap();
             assert_eq!(after.counts[at], before.counts[of_whole]);
         }
-        // A refused sample is the same one, or lost.
         let slot_of = |of: &Measurement, position: &usize| of.slots[*position];
         let refused = |of: &Measurement| -> Vec<u64> {
             of.channels[0].refused["spikes"].iter().map(|position| slot_of(of, position)).collect()

@@ -1,4 +1,4 @@
-//! The score of one recording: it is simulated, analysed without its truth, and the report is compared with the truth.
+//! The score of one recording: simulated, analysed, compared with the truth.
 
 use super::channel_under_test::ChannelUnderTest;
 use super::draw::DrawnRecording;
@@ -13,7 +13,7 @@ use recordings::time_base::{TimeBaseError, measurement};
 use serde::Serialize;
 use virtual_sensor::InjectedEffect;
 
-/// Channels that the analysis is given: those that are scored, and those that effects depend on.
+/// Scored channels, and those that effects depend on.
 const RECORDED: [Channel; 8] = [
     Channel::Supply,
     Channel::GyroX,
@@ -25,103 +25,82 @@ const RECORDED: [Channel; 8] = [
     Channel::Temp,
 ];
 
-/// Kind of an effect in a report that no other kind describes.
 pub(super) const UNEXPLAINED: &str = "unexplained";
 
 /// Why a recording could not be scored.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScoreError {
-    /// It has no timeline.
     #[error("seed {seed}: {reason}")]
     Timeline {
         /// Seed of the recording.
         seed: u64,
-        /// The cause.
         reason: TimeBaseError,
     },
 }
 
-/// An estimated parameter of an effect that was named. Values are in the unit of the report.
+/// For a named effect, in the report's unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ParameterScore {
-    /// Kind of the effect.
     pub kind: EffectKind,
-    /// Name as in the report.
     pub name: &'static str,
-    /// True value.
     pub truth: f64,
-    /// Estimate.
     pub value: f64,
-    /// Lower 95 % bound.
     pub low: f64,
-    /// Upper 95 % bound.
     pub high: f64,
-    /// Absolute error over the absolute value of the parameter; for a sensitivity to three axes, over its length.
+    /// For a sensitivity to three axes, over its length.
     pub relative_error: f64,
 }
 
 /// A hidden effect and whether it was named.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectScore {
-    /// Kind of the effect.
     pub kind: EffectKind,
-    /// Size over the detection limit.
+    /// Size over detection limit.
     pub strength: f64,
-    /// Whether the report lists it in its channels.
     pub named: bool,
-    /// Whether a test that is given channel and waveform, but not the noise, detects it; absent in pairs, and for effects
-    /// that are not a known waveform of the bias.
+    /// Detected by a test with channel and waveform but unknown noise; absent in pairs and for other effects.
     pub shape_known: Option<bool>,
-    /// First other effect that the report lists in its channels, if it was not named.
+    /// First other effect in its channels, if not named.
     pub instead: Option<String>,
 }
 
-/// Deviance per point on the half of the recording that the fit has not seen, in the first channel with an effect.
+/// Deviance per point on the unseen half, in the first channel with an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct UnseenErrors {
-    /// Of the baseline model.
     pub before: f64,
-    /// Of the model with the added terms.
     pub after: f64,
-    /// Of the true model.
     pub truth: f64,
-    /// Of the true terms, fitted to the other half: the difference to `truth` is due to the fit.
+    /// True terms fitted to the other half: the error of the fit.
     pub refitted: f64,
 }
 
 /// The score of one recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RecordingScore {
-    /// Seed of the recording.
     pub seed: u64,
-    /// One for each hidden effect.
     pub answers: Vec<EffectScore>,
-    /// Reported effects that were not hidden, as `channel: kind`.
+    /// As `channel: kind`.
     pub false_alarms: Vec<String>,
-    /// Parameters of the effects that were named.
     pub estimates: Vec<ParameterScore>,
-    /// Absent where nothing is hidden, or where an error is not finite.
+    /// Absent if nothing is hidden, or an error is not finite.
     pub unseen: Option<UnseenErrors>,
-    /// Of the effect outside the vocabulary that is hidden, if any.
+    /// Effect outside the vocabulary.
     pub outside: Option<OutsideScore>,
 }
 
 /// A hidden effect that the analysis was not made for.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OutsideScore {
-    /// Kind of the effect.
     pub kind: OutsideKind,
-    /// Size over the detection limit.
+    /// Size over detection limit.
     pub strength: f64,
-    /// Whether the report says that something is unexplained in its channel.
+    /// `unexplained` in its channel.
     pub unexplained: bool,
-    /// Whether the report has a name for it that describes it, in its channel.
     pub named: bool,
 }
 
-/// Generates a recording, of which the share `loss` of the samples is lost at random, analyses it and compares the report
-/// with the truth.
+/// Generates a recording, loses the share `loss`, analyses it and compares with the truth.
 ///
 /// # Errors
 /// The recording has no timeline.
@@ -144,7 +123,7 @@ pub fn score_recording(drawn: &DrawnRecording, loss: f64) -> Result<RecordingSco
         let truth = true_model_errors(drawn, channel);
         let of = report.channels.iter().find(|report| report.name == channel.name());
         score.unseen = of.zip(truth).and_then(|(report, truth)| {
-            // Without the spikes that the first half's rule excludes: the true model has none either.
+            // Without spikes by the first half's rule, as the true model.
             let error =
                 |model: &ModelReport| model.unseen_excluding.as_ref().unwrap_or(&model.unseen).deviance_per_point;
             Some(UnseenErrors {
@@ -158,10 +137,10 @@ pub fn score_recording(drawn: &DrawnRecording, loss: f64) -> Result<RecordingSco
     Ok(score)
 }
 
-/// Compares a report with the truth; `loss` is the share of the samples that was lost beside the hidden effects.
+/// `loss` is the share lost beside the effects.
 pub(super) fn compare(drawn: &DrawnRecording, report: &Report, loss: f64) -> RecordingScore {
     let moved = drawn.simulation.scenario.environment.motion.deviation_g > 0.0;
-    // Accelerometers are not scored during a motion: its effect on them can resemble any kind.
+    // A motion can resemble any kind in an accelerometer.
     let is_scored = |channel: &Channel| Channel::INERTIAL[..if moved { 3 } else { 6 }].contains(channel);
     let scored: Vec<(Channel, &ChannelReport)> = Channel::INERTIAL
         .into_iter()
@@ -179,7 +158,7 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, loss: f64) -> Rec
         .zip(effects)
         .zip(&drawn.strengths)
         .map(|((&kind, effect), &strength)| {
-            // Counts that seldom change do not show a filter.
+            // Counts that seldom change show no filter.
             let is_shown = |channel: Channel| kind != EffectKind::FilterBandwidth || !is_below_a_count(channel);
             let shown = scored.iter().filter(|(channel, _)| shows_in(effect, *channel) && is_shown(*channel));
             score_effect(kind, strength, &shown.map(|(_, report)| *report).collect::<Vec<_>>())
@@ -189,7 +168,7 @@ pub(super) fn compare(drawn: &DrawnRecording, report: &Report, loss: f64) -> Rec
     let is_true = |channel: Channel, found: &Effect| {
         let kind = found.name();
         let is_lost = loss > 0.0 && kind == EffectKind::DroppedSamples.name();
-        // Where something is hidden, a part of it that is said to be unexplained is no wrong name.
+        // `unexplained` for a part is no wrong name.
         let output = simulation::output_register(channel);
         let is_outside = outside.is_some_and(|effect| {
             let describes =
@@ -227,13 +206,11 @@ fn score_outside(effect: &OutsideEffect, strength: f64, scored: &[(Channel, &Cha
     OutsideScore { kind: effect.kind(), strength, unexplained: names.contains(&UNEXPLAINED), named }
 }
 
-/// Whether `effect` is in `channel`. Effects without channels concern the samples of all channels.
 fn shows_in(effect: &InjectedEffect, channel: Channel) -> bool {
     effect.channels().is_empty() || effect.channels().contains(&simulation::output_register(channel))
 }
 
-/// An effect counts as named if the report lists it in at least half of the channels that it affects; dropped and repeated samples
-/// and the sample clock count as named if they are listed in one channel.
+/// Named if listed in half of its channels; sample faults and clock in one.
 pub(super) fn score_effect(kind: EffectKind, strength: f64, affected: &[&ChannelReport]) -> EffectScore {
     let listing =
         affected.iter().filter(|report| report.effects.iter().any(|found| found.effect.name() == kind.name())).count();
@@ -249,7 +226,7 @@ pub(super) fn score_effect(kind: EffectKind, strength: f64, affected: &[&Channel
     }
 }
 
-/// The estimated parameters of `effect` in the first of its channels that lists it.
+/// In the first channel that lists it.
 pub(super) fn score_parameters(
     kind: EffectKind,
     effect: &InjectedEffect,
@@ -266,7 +243,6 @@ pub(super) fn score_parameters(
     let score = |&(name, truth): &(&'static str, f64)| {
         let estimate = estimates.get(name)?;
         let truth = match kind {
-            // What is dropped cannot be lost once more.
             EffectKind::DroppedSamples => truth + (1.0 - truth) * loss,
             _ => truth,
         };

@@ -1,4 +1,4 @@
-//! The scores of all recordings: their summary and the tables of the terminal.
+//! Scores of all recordings, with summary.
 
 use super::draw::RecordingGroup;
 use super::effect::EffectKind;
@@ -8,25 +8,21 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
-/// Smallest strength at which an effect is required to be named.
+/// Smallest required strength.
 pub const STRONG: f64 = 2.0;
-/// Upper limits of the classes of strength.
 const CLASSES: [f64; 5] = [0.5, 1.0, 2.0, 5.0, f64::INFINITY];
 const CLASS_NAMES: [&str; 5] = ["< 0.5", "0.5…1", "1…2", "2…5", "≥ 5"];
 
-/// The scores of all recordings, in the order of the plan.
+/// In the order of the plan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ScoreTable {
-    /// Group and score of each recording.
     pub outcomes: Vec<(RecordingGroup, RecordingScore)>,
 }
 
 /// A number of cases out of all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Proportion {
-    /// Cases that fulfil the criterion.
     pub yes: usize,
-    /// All cases.
     pub all: usize,
 }
 
@@ -65,72 +61,70 @@ impl ScoreTable {
         self.outcomes(RecordingGroup::Single(kind)).flat_map(|outcome| &outcome.answers)
     }
 
-    /// Single effects of a strength of at least [`STRONG`] that were named.
+    /// Single effects of at least [`STRONG`].
     #[must_use]
     pub fn named(&self) -> Proportion {
         let strong = self.singles().flat_map(|outcome| &outcome.answers).filter(|answer| answer.strength >= STRONG);
         Proportion::count(strong.map(|answer| answer.named))
     }
 
-    /// Recordings without an effect in which an effect is reported.
+    /// Without an effect.
     #[must_use]
     pub fn false_alarms(&self) -> Proportion {
         Proportion::count(self.outcomes(RecordingGroup::Nothing).map(|outcome| !outcome.false_alarms.is_empty()))
     }
 
-    /// Recordings with one effect in which another one is reported.
+    /// With one effect.
     #[must_use]
     pub fn something_else(&self) -> Proportion {
         Proportion::count(self.singles().map(|outcome| !outcome.false_alarms.is_empty()))
     }
 
-    /// Recordings of several effects of which all were named: [`RecordingGroup::Pair`] or [`RecordingGroup::Triple`].
+    /// All of several: [`RecordingGroup::Pair`] or [`RecordingGroup::Triple`].
     #[must_use]
     pub fn all_named(&self, group: RecordingGroup) -> Proportion {
         Proportion::count(self.outcomes(group).map(|outcome| outcome.answers.iter().all(|answer| answer.named)))
     }
 
-    /// Recordings of all groups in which an effect is reported that was not hidden.
+    /// All groups.
     #[must_use]
     pub fn wrong_names(&self) -> Proportion {
         Proportion::count(self.outcomes.iter().map(|(_, outcome)| !outcome.false_alarms.is_empty()))
     }
 
-    /// Effects outside the vocabulary, of a strength of at least [`STRONG`], that are reported as unexplained or by a name that
-    /// describes them.
+    /// Outside the vocabulary, at least [`STRONG`]: unexplained, or described.
     #[must_use]
     pub fn outside_told(&self) -> Proportion {
         let strong = self.outcomes.iter().filter_map(|(_, outcome)| outcome.outside.as_ref());
         Proportion::count(strong.filter(|score| score.strength >= STRONG).map(OutsideScore::is_told))
     }
 
-    /// Scores of the effects of one kind outside the vocabulary, each with what was reported instead.
+    /// With other reports instead.
     fn outside(&self, kind: OutsideKind) -> impl Iterator<Item = (&OutsideScore, &[String])> {
         let of = self.outcomes(RecordingGroup::Outside(kind));
         of.filter_map(|outcome| Some((outcome.outside.as_ref()?, outcome.false_alarms.as_slice())))
     }
 
-    /// Parameters of strong single effects within the required accuracy: 2 % for frequencies and the sample rate, 10 % for
-    /// the others.
+    /// Parameters of strong single effects: 2 % for frequencies and rate, 10 % for others.
     #[must_use]
     pub fn near(&self) -> Proportion {
         Proportion::count(self.estimates(None).map(ParameterScore::is_near))
     }
 
-    /// 95 % intervals of the parameters of all named single effects that contain the true value.
+    /// 95 % intervals of named single effects with the truth.
     #[must_use]
     pub fn coverage(&self) -> Proportion {
         Proportion::count(self.singles().flat_map(|outcome| &outcome.estimates).map(ParameterScore::is_covered))
     }
 
-    /// Recordings with a strong single effect whose errors on unseen data fulfil `which`.
+    /// Strong single effects with errors that fulfil `which`.
     #[must_use]
     pub fn unseen(&self, which: fn(&UnseenErrors) -> bool) -> Proportion {
         let strong = self.singles().filter(|outcome| is_strong(outcome));
         Proportion::count(strong.filter_map(|outcome| outcome.unseen).map(|unseen| which(&unseen)))
     }
 
-    /// Parameters of strong single effects, of one kind or of all.
+    /// Strong single effects, of one kind or all.
     fn estimates(&self, kind: Option<EffectKind>) -> impl Iterator<Item = &ParameterScore> {
         let strong = self.singles().filter(|outcome| is_strong(outcome));
         strong
@@ -150,7 +144,7 @@ impl ParameterScore {
 }
 
 impl OutsideScore {
-    /// Whether the report says in its channel that something is unexplained, or describes it.
+    /// Unexplained, or described, in its channel.
     #[must_use]
     pub fn is_told(&self) -> bool {
         self.unexplained || self.named
@@ -158,22 +152,22 @@ impl OutsideScore {
 }
 
 impl UnseenErrors {
-    /// Largest ratio to another error that counts as equally good.
+    /// Largest ratio of equally good errors.
     const TOLERANCE: f64 = 1.5;
 
-    /// Whether the model with the added terms is as good as the true model.
+    /// Added terms as good as the true model.
     #[must_use]
     pub fn is_near_truth(&self) -> bool {
         self.after <= Self::TOLERANCE * self.truth
     }
 
-    /// Whether the model with the added terms is as good as the fitted true terms.
+    /// Added terms as good as the fitted true terms.
     #[must_use]
     pub fn is_near_true_terms(&self) -> bool {
         self.after <= Self::TOLERANCE * self.refitted
     }
 
-    /// Whether the fitted true terms are as good as the true model.
+    /// Fitted true terms as good as the true model.
     #[must_use]
     pub fn are_true_terms_near_truth(&self) -> bool {
         self.refitted <= Self::TOLERANCE * self.truth
@@ -182,9 +176,6 @@ impl UnseenErrors {
 
 impl ScoreTable {
     /// Writes all tables and the summary as text.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         self.write_rates(out)?;
         self.write_confusion(out)?;
@@ -383,7 +374,7 @@ fn percent(value: Option<f64>) -> String {
     value.map_or("–".to_owned(), |value| format!("{value:.2} %"))
 }
 
-/// The smallest of `values` that at least the fraction `level` of them does not exceed.
+/// Smallest value that the fraction `level` does not exceed.
 pub(super) fn quantile(values: &[f64], level: f64) -> Option<f64> {
     let mut sorted: Vec<f64> = values.to_vec();
     sorted.sort_by(f64::total_cmp);

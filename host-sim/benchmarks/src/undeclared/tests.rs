@@ -37,14 +37,12 @@ fn gyro() -> ChannelNoise {
     *NoiseModel::paper().channel(OutputRegister::GyroX)
 }
 
-/// Half an hour of noise in a constant environment.
 fn quiet(noise: NoiseModel) -> TrueRecording {
     let scenario = SensorScenario::default();
     let (sampling, outside) = (Sampling::adis16405(), Vec::new());
     TrueRecording { sampling, seconds: RECORD.seconds, seed: 1, noise, scenario, outside, host_clock_ratio: 1.0 }
 }
 
-/// The densities of this module and of the terms of the fit are independent implementations.
 #[test]
 fn densities_are_those_of_the_terms() {
     let one = |n: f64, b: f64, k: f64| ChannelNoise {
@@ -71,7 +69,7 @@ fn densities_are_those_of_the_terms() {
             assert!((ours / theirs - 1.0).abs() < 1e-6, "{term:?} at {frequency} Hz: {ours:e}, {theirs:e}");
         }
     }
-    // The two treat the aliasing of flicker noise differently; far below the sample rate both are B²/(2πf).
+    // Aliases of flicker noise differ; far below the sample rate both are B²/(2πf).
     let flicker = baseline_density(&one(0.0, 1.0, 0.0), 1.0, PERIOD_S, 0.01);
     assert!((flicker / Term::BiasInstability.process().density(0.01, PERIOD_S) - 1.0).abs() < 0.01);
 }
@@ -83,12 +81,12 @@ fn noise_that_n_b_and_k_describe_has_no_likelihood_ratio() {
     let stronger = |frequency: f64| 2.0 * baseline(frequency);
     let (unfiltered, nothing) = (|_: f64| [1.0; 3], |_: f64| 0.0);
     assert!(RECORD.ratio_against_baseline(&noise, (unfiltered, nothing), None, stronger) < 1e-3);
-    // The same holds behind a known filter with known noise added.
+    // Behind a known filter, with known noise.
     let filter = |frequency: f64| filter_gain(3, PERIOD_S, frequency);
     let known = |frequency: f64| 0.01 * markov_density(1.0, PERIOD_S, frequency);
     let truth = |frequency: f64| 2.0 * baseline(frequency) * filter(frequency) + known(frequency);
     assert!(RECORD.ratio_against_baseline(&noise, (|frequency| [filter(frequency); 3], known), None, truth) < 1e-3);
-    // A Markov process much shorter than a sample is white noise; one of 1 s is not.
+    // A Markov process is white below a sample.
     let markov = |time_s: f64| {
         let truth = |frequency: f64| baseline(frequency) + 0.01 * markov_density(time_s, PERIOD_S, frequency);
         RECORD.ratio_against_baseline(&noise, (unfiltered, nothing), None, truth)
@@ -97,33 +95,27 @@ fn noise_that_n_b_and_k_describe_has_no_likelihood_ratio() {
     assert!(markov(1.0) > 10.0, "{}", markov(1.0));
 }
 
-/// In white noise the log likelihood ratios have closed forms.
 #[test]
 fn likelihood_ratios_in_white_noise_equal_their_closed_forms() {
-    // The 1 % point of the normal distribution.
     assert!((required_ratio(1.0) - 0.5 * 2.326_348f64.powi(2)).abs() < 1e-4);
     assert!((solve_size(8.0, |size| 0.5 * size * size) - 4.0).abs() < 1e-6);
 
     let white = ChannelNoise { angle_random_walk: 0.5, ..ChannelNoise::default() };
-    // A sinusoid of amplitude A in M samples: half of A²·M/2/σ².
+    // Half of A²·M/2/σ².
     let density = baseline_density(&white, 1.0, PERIOD_S, 10.0);
     assert!((RECORD.ratio_of_sinusoid(density) / (0.5 * 0.5 * 1800.0 / 0.25) - 1.0).abs() < 1e-9);
-    // A white waveform of standard deviation 0.1 in white noise.
+    // Deviation 0.1.
     let matched = RECORD.ratio_of_waveform(|_| 0.01 * PERIOD_S, |_| density);
     assert!((matched / (0.5 * 0.01 * 1800.0 / PERIOD_S / (0.25 / PERIOD_S)) - 1.0).abs() < 0.01, "{matched}");
 }
 
-/// What neither a random walk nor flicker noise resembles has the ratio in known noise: a bias that changes its sign from block to
-/// block, by `s` in `M` samples of white noise of standard deviation σ, `½·s²·M/σ²`. White noise of a free N takes up its part in
-/// one of 127 cosines: `N² + s²·M/127` in place of `N²` changes the ratio of 2 by `2²/127`, a few hundredths. A ramp of the ratio
-/// 30 in known noise is mostly a walk.
+/// `½·s²·M/σ²` of a bias that alternates by block, less some hundredths by a free N; a ramp of 30 is mostly a walk.
 #[test]
 fn a_free_walk_takes_up_a_slow_drift_and_nothing_else() {
     let mut model = NoiseModel::paper();
     *model.channel_mut(OutputRegister::GyroX) = ChannelNoise { angle_random_walk: 0.5, ..ChannelNoise::default() };
     let recording = quiet(model);
     let test = waveform_test(&ChannelUnderTest::new(&recording, OutputRegister::GyroX, &[]));
-    // Rounding adds this fraction of the noise.
     let rounding = 0.05f64.powi(2) / 12.0 * PERIOD_S / 0.25;
     let of = |ratio: f64, unit: fn(usize) -> f64| {
         let values: Vec<f64> = (0..128).map(unit).collect();
@@ -138,25 +130,24 @@ fn a_free_walk_takes_up_a_slow_drift_and_nothing_else() {
     assert!(ramp > 0.0 && ramp < 0.7, "{ramp}");
 }
 
-/// The strength of a process of a few correlation times and that of events do not grow with the size alone.
+/// A process of few correlation times, and events.
 #[test]
 fn the_strength_is_that_of_the_size_or_of_its_significance() {
     let (recording, channel) = (quiet(NoiseModel::paper()), OutputRegister::GyroX);
     let of = |effect: &InjectedEffect| strength(effect, &recording, &[]);
     let markov = |time_constant_s: f64, deviation: f64| InjectedEffect::Markov { channel, time_constant_s, deviation };
     let limit = |time_s: f64| smallest_size(&markov(time_s, 1.0), &recording, &[]);
-    // Of 1,800 correlation times: the size decides.
+    // 1,800 correlation times: size.
     assert!((of(&markov(1.0, 2.0 * limit(1.0))) - 2.0).abs() < 1e-6);
-    // Of fewer than four: the lowest three frequencies alone tell it from a walk.
+    // Fewer than four: three frequencies tell it from a walk.
     assert!(of(&markov(500.0, 1e3)) < 2.0, "{}", of(&markov(500.0, 1e3)));
-    // The number of events at the limit is ln 2, and their scatter the root of the number.
+    // ln 2 events at the limit.
     let dropped = |number: f64| InjectedEffect::DroppedSamples { fraction: number * PERIOD_S / RECORD.seconds };
     assert!((of(&dropped(9.0 * std::f64::consts::LN_2)) - 3.0).abs() < 1e-9);
     let spikes = InjectedEffect::Spikes { channel, rate_per_hour: 8.0 * std::f64::consts::LN_2, size: 1e3 };
     assert!((of(&spikes) - 2.0).abs() < 1e-9, "{}", of(&spikes));
 }
 
-/// Closed forms of the change of a limit by another effect.
 #[test]
 fn a_detection_limit_includes_the_other_effect() {
     let mut noise = NoiseModel::paper();
@@ -168,23 +159,22 @@ fn a_detection_limit_includes_the_other_effect() {
         smallest_size(shape, &recording, &[other]) / smallest_size(shape, &recording, &[])
     };
 
-    // At the centre of a resonance the densities add up.
+    // Densities add at the centre.
     let line = InjectedEffect::Sinusoid { channel, frequency_hz: 20.0, amplitude: 1.0, phase_rad: 0.0 };
     let resonance = InjectedEffect::Resonance { channel, frequency_hz: 20.0, bandwidth_hz: 1.0, deviation: 2.0 };
     near(larger(&line, resonance), ((0.25 + 0.5 * 4.0 * 2.0 / (PI * 1.0)) / 0.25f64).sqrt());
-    // A filter reduces noise and sinusoid equally; only the rounding, some 1 % of the noise, is behind it.
+    // The filter reduces both; 1 % of rounding is behind it.
     let rounding = |gain: f64| (0.25 + 0.05f64.powi(2) / 12.0 * PERIOD_S / gain) / 0.25;
     let gain = filter_gain(2, PERIOD_S, 20.0);
     near(larger(&line, InjectedEffect::FilterBandwidth { taps_log2: 2 }), (rounding(gain) / rounding(1.0)).sqrt());
-    // For a ramp, a process much shorter than a block is white noise of the density 2·σ²·T.
+    // White of 2·σ²·T.
     let ramp = InjectedEffect::RateRamp { channel, slope: 1.0 };
     let markov = InjectedEffect::Markov { channel, time_constant_s: 0.5, deviation: 1.0 };
     near(larger(&ramp, markov), ((0.25 + 2.0 * 0.5) / 0.25f64).sqrt());
-    // Spikes are additional white noise. A known waveform changes no limit.
+    // Spikes are white; a known waveform changes nothing.
     let spikes = InjectedEffect::Spikes { channel, rate_per_hour: 3600.0, size: 10.0 };
     near(larger(&ramp, spikes.clone()), ((0.25 + 100.0 * PERIOD_S * PERIOD_S) / 0.25f64).sqrt());
     near(larger(&spikes, ramp), 1.0);
-    // An effect in another channel changes no limit.
     near(
         larger(&line, InjectedEffect::Markov { channel: OutputRegister::GyroY, time_constant_s: 1.0, deviation: 9.0 }),
         1.0,
@@ -212,7 +202,7 @@ fn both_effects_of_a_pair_are_above_twice_the_limit() {
 
 #[test]
 fn the_ratio_of_rare_large_spikes_is_proportional_to_their_number() {
-    // Each spike contributes s²/2 plus the logarithm of the probability of its sample and sign.
+    // s²/2 plus ln of the probability of sample and sign.
     let (samples, probability, size) = (1e6, 1e-5f64, 12.0f64);
     let each = 0.5 * size * size + (0.5 * probability).ln();
     let expected = samples * probability * each - samples * probability;
@@ -224,9 +214,9 @@ fn the_ratio_of_rare_large_spikes_is_proportional_to_their_number() {
 
 #[test]
 fn a_telegraph_signal_below_the_noise_is_not_distinguished_from_a_markov_process() {
-    // The mean of the white noise over the correlation time of 1 s has a standard deviation of 1.
+    // Deviation 1 over the correlation time.
     let ratio = |amplitude: f64| ratio_of_telegraph(amplitude, 1.0, 1.0, RECORD, 1);
-    // The ratio decreases with the eighth power of the amplitude; the simulated signal of 1000 s makes it scatter.
+    // Falls with the eighth power; the simulation scatters.
     assert!(ratio(0.3).abs() < 1.0, "{}", ratio(0.3));
     assert!(ratio(3.0) > 10.0, "{}", ratio(3.0));
     assert!(ratio(30.0) > ratio(10.0) && ratio(10.0) > ratio(3.0));
@@ -264,7 +254,6 @@ fn a_recording_depends_on_its_seed_only_and_no_seed_is_used_twice() {
     assert!((0..100).all(|seed| differ(DrawnRecording::several(seed))));
 }
 
-/// A reported effect and its channel.
 type Found = (Channel, Effect);
 
 const CURVE: CurveEvidence = CurveEvidence { excess: 0.1, tau_s: 1.0, sigmas: 9.0, gain_sigmas: 9.0 };
@@ -363,12 +352,10 @@ fn an_effect_is_named_in_its_channel_and_a_false_alarm_in_another() {
     assert_eq!(otherwise.answers[0].instead.as_deref(), Some("markov"));
     assert_eq!(otherwise.false_alarms, ["gyro_y: markov"]);
 
-    // Accelerometers are not scored during a motion.
     case.simulation.scenario.environment.motion.deviation_g = 0.1;
     assert_eq!(compare(&case, &report(&[(Channel::AcclX, markov())]), 0.0).false_alarms, [""; 0]);
 }
 
-/// Outside the vocabulary, `unexplained` and a name that describes the effect are right, in the channels that it is in.
 #[test]
 fn an_effect_outside_the_vocabulary_is_told_by_its_own_name_or_as_unexplained() {
     let quiet = |kind: OutsideKind| {
@@ -399,7 +386,7 @@ fn an_effect_outside_the_vocabulary_is_told_by_its_own_name_or_as_unexplained() 
     assert_eq!(told(&band, own, resonance()), (false, true, true));
     assert_eq!(told(&band, own, markov()), (false, false, false));
     assert_eq!(told(&band, other, resonance()), (false, false, false));
-    // The clock is that of all channels; a knock is in all of them.
+    // All channels.
     let clock = ClockDeviation { rate_hz: within_a_tenth(200.0), nominal_hz: 204.8, sigmas: 9.0, change: None };
     assert_eq!(told(&quiet(OutsideKind::ClockStep), Channel::AcclZ, clock.into()), (false, true, true));
     let dropped = DroppedSamples { fraction: within_a_tenth(1e-3), missing: 10.0, samples: 1e4, gaps: 10 };
@@ -415,7 +402,7 @@ fn an_effect_outside_the_vocabulary_is_told_by_its_own_name_or_as_unexplained() 
     assert_eq!(told(&quiet(OutsideKind::Knock), Channel::AcclZ, knock.into()), (false, true, true));
 }
 
-/// 2 is the smallest strength that is drawn. Each kind is in the counts, the stamps or both.
+/// 2 is the smallest strength; in counts, stamps or both.
 #[test]
 fn every_effect_outside_the_vocabulary_changes_the_recording() {
     for kind in OutsideKind::ALL {
@@ -426,7 +413,7 @@ fn every_effect_outside_the_vocabulary_changes_the_recording() {
     }
 }
 
-/// The noise of the paper is about a count in an accelerometer, of which 2 taps a stage leave 0.6 and 64 a tenth.
+/// A count in an accelerometer: 2 taps leave 0.6, 64 a tenth.
 #[test]
 fn an_effect_of_all_channels_is_named_if_half_of_those_that_show_it_list_it() {
     let mut case = DrawnRecording::draw(&[EffectKind::FilterBandwidth], 60.0, 1);
@@ -441,9 +428,7 @@ fn an_effect_of_all_channels_is_named_if_half_of_those_that_show_it_list_it() {
     assert_eq!([1, 2].map(|count| listed(6, count)), [false, true]);
 }
 
-/// The deviance per point of the true model has the mean 1 and, with some ten correlated octaves, a standard deviation of
-/// 0.5, or 0.2 for the mean of eight. Fitting to as much data as is tested adds the contribution of one point for each
-/// parameter: with five parameters and ten octaves less than another 1 on average.
+/// Mean 1, standard deviation 0.2 over eight. A fit adds one point per parameter: less than 1 for five.
 #[test]
 fn the_true_model_has_a_deviance_of_one_and_the_fitted_true_terms_below_two() {
     let channel = |case: &DrawnRecording| simulation::channel(case.simulation.scenario.effects[0].channels()[0]);

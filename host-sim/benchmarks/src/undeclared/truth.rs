@@ -1,5 +1,4 @@
-//! Reference results from the truth: the error of the true model on unseen data, and whether a test that is given the
-//! channel and the waveform of an effect detects it.
+//! Reference results from the truth: error of the true model, and the test with a known waveform.
 
 use super::block_covariance::{BLOCKS, BlockNoises, block_means, environment_means, p_value};
 use super::channel_under_test::ChannelUnderTest;
@@ -16,11 +15,10 @@ use recordings::recording::{RecordedSample, Recording};
 use simulation::{SAMPLE_RATE_HZ, output_register};
 use virtual_sensor::{ChannelNoise, InjectedEffect, OutputRegister, SensorScenario};
 
-/// Probability of a false alarm of the test that is given the waveform: that of the analysis for one channel, which its
-/// documentation promises.
+/// For the analysis, per channel.
 const FALSE_ALARM: f64 = 2e-4;
 
-/// Whether an estimator could remove the effect from the data. Other effects are terms of the true model.
+/// False for terms of the true model.
 fn is_removable(effect: &InjectedEffect) -> bool {
     !matches!(
         effect,
@@ -34,22 +32,20 @@ fn is_removable(effect: &InjectedEffect) -> bool {
     )
 }
 
-/// Deviance per point on the second half of a recording without its removable effects. A common mode is removable, by
-/// the other channels.
+/// Deviance per point on the second half without removable effects; a common mode is removable.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct TrueModelErrors {
-    /// Of the true model.
     pub(super) model: f64,
-    /// Of the true terms with coefficients and shapes that are fitted to the first half.
+    /// Coefficients and shapes fitted to the first half.
     pub(super) fitted: f64,
 }
 
-/// The errors in `channel`; `None` where the recording is too short.
+/// `None` for short recordings.
 pub(super) fn true_model_errors(drawn: &DrawnRecording, channel: Channel) -> Option<TrueModelErrors> {
     let effects: Vec<InjectedEffect> =
         drawn.simulation.scenario.effects.iter().filter(|effect| !is_removable(effect)).cloned().collect();
     let model = model(drawn.simulation.noise.channel(output_register(channel)), channel, &effects);
-    // Each effect has the random stream of its index, so a removed effect is replaced by one of size 0.
+    // Streams go by index: size 0 replaces an effect.
     let hidden = SensorScenario {
         effects: drawn.simulation.scenario.effects.iter().map(zero_if_removable).collect(),
         ..drawn.simulation.scenario.clone()
@@ -69,7 +65,6 @@ fn zero_if_removable(effect: &InjectedEffect) -> InjectedEffect {
     if is_removable(effect) { InjectedEffect::RateRamp { channel, slope: 0.0 } } else { effect.clone() }
 }
 
-/// The true model of `channel` with `effects`.
 fn model(noise: &ChannelNoise, channel: Channel, effects: &[InjectedEffect]) -> Model {
     let period_s = 1.0 / SAMPLE_RATE_HZ;
     let rounding = channel.lsb(GyroRange::Dps300) * (period_s / 12.0).sqrt();
@@ -118,11 +113,7 @@ fn curve(samples: &[RecordedSample], channel: Channel, range: GyroRange) -> alla
     cascade.curve(1.0 / SAMPLE_RATE_HZ).scaled(channel.lsb(range))
 }
 
-/// Whether a test that is given channel and waveform of `effect`, but estimates the noise, detects it at the significance
-/// level of the analysis; `None` for effects that are not a known waveform of the bias.
-///
-/// The slowest noise has few periods in a recording, from which the test estimates its size. This is an upper limit for methods
-/// that have to find channel and waveform too.
+/// Known channel and waveform, estimated noise, at the analysis' significance; `None` for other effects.
 pub(super) fn detects_known_waveform(
     effect: &InjectedEffect,
     truth: &TrueRecording,

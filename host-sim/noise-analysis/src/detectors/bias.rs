@@ -1,9 +1,7 @@
-//! What changes the bias of a channel over the record: a ramp, a step, a transient after the start, regressors such as the
-//! temperature, vibration, or several.
+//! Changes of a channel's bias over the record.
 //!
-//! In the differences of the Allan variance a change over the whole record has a few degrees of freedom and is lost in slow
-//! noise. Here each candidate is tested on block means against every mixture of white, flicker and random-walk noise, and
-//! against the other candidates: the one that explains the data best is accepted, then the next one given the first.
+//! Each candidate is tested on block means against every mixture of white, flicker and random-walk noise. The best one
+//! is accepted, then the best of the rest beside it, and so on.
 
 use super::bias_response::BiasResponse;
 use super::bias_step::{self, BiasStep, StepPosition};
@@ -21,71 +19,58 @@ use crate::effects::{LinearDrift, LinearDriftEvidence};
 use crate::samples::series::Series;
 use nalgebra::DVector;
 
-/// Least fraction of a channel's samples that a regressor must have too.
+/// Least fraction of a channel's samples at whose time a regressor has one too.
 const LEAST_COMMON: f64 = 0.9;
-/// Largest number of candidates that are accepted.
+/// Most candidates that are accepted.
 const MOST: usize = 4;
 
-/// Sensitivity of the bias to a regressor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct BiasSensitivity {
     /// In the channel's unit over the regressor's.
     pub sensitivity: f64,
     /// Standard deviation of the sensitivity.
     pub error: f64,
-    /// Of the error.
+    /// Degrees of freedom of `error`.
     pub degrees_of_freedom: f64,
 }
 
-/// What changes the bias of one channel.
 #[derive(Debug, Default, Clone, PartialEq)]
 pub(crate) struct BiasChanges {
-    /// A step.
     pub step: Option<Detection>,
-    /// A ramp over the whole record.
     pub ramp: Option<Detection>,
-    /// Indices of the regressors that the bias depends on, with the sensitivity to each.
+    /// Index of each regressor that the bias depends on, and the sensitivity to it.
     pub sensitivities: Vec<(usize, BiasSensitivity)>,
-    /// A transient after the start, and responses to temperature behind a lag or with a curvature, and to vibration.
+    /// Transient after the start; responses to lagged or squared temperature and to vibration.
     pub responses: Vec<BiasResponse>,
 }
 
-/// What was measured beside the channel that its bias may depend on.
+/// Measured quantities that the bias may depend on.
 struct Covariates<'a> {
-    /// Block means of each regressor, with its index.
     regressors: Vec<(usize, DVector<f64>)>,
-    /// The regressor that is the temperature.
     temperature: Option<(usize, TemperatureCourse)>,
     vibrations: Vec<Vibration<'a>>,
 }
 
-/// A candidate that may explain changes of the bias.
 enum Candidate {
     Ramp,
     Regressor(usize),
     Step(StepPosition),
     Transient(Transient),
-    /// The temperature behind a lag.
     Lagged(TimeConstant),
-    /// The square of the temperature.
     Squared,
-    /// One of the vibrations.
     Vibration(usize),
 }
 
-/// A candidate that was accepted.
 struct Accepted {
     candidate: Candidate,
-    /// Its block means.
     regressor: DVector<f64>,
     /// Probability of as good an explanation by chance.
     p_value: f64,
 }
 
-/// Looks for what changes the bias of `series`. `regressors` are other channels that may influence it. Samples that one of
-/// them lacks are not used; a regressor that lacks more than a tenth of the samples of `series` is left out. `accelerations`
-/// may shake the channel. Of slow changes rounding makes steps smaller than `least_step`, in the channel's unit, which is asked for where
-/// there is a step.
+/// Finds the changes of the bias of `series`. Samples that a regressor lacks are not used; a regressor that lacks more
+/// than a tenth of them is left out. `accelerations` may shake the channel. `least_step`, in the channel's unit, bounds
+/// the size of a step from below: rounding makes smaller steps of slow changes.
 #[must_use]
 pub(crate) fn find(
     series: &Series,
@@ -108,12 +93,11 @@ pub(crate) fn find(
     find_on_common_samples(series, &regressors, accelerations, grids, least_step)
 }
 
-/// Whether `regressor` has at least the fraction [`LEAST_COMMON`] of the samples of `series`.
 fn covers(regressor: &Series, series: &Series) -> bool {
     regressor.slots == series.slots || series.count_common(regressor) as f64 >= LEAST_COMMON * series.slots.len() as f64
 }
 
-/// [`find`] where all have samples in the same sample periods.
+/// [`find`] for series with samples in the same sample periods.
 fn find_on_common_samples(
     series: &Series,
     regressors: &[(usize, &Series)],
@@ -121,7 +105,7 @@ fn find_on_common_samples(
     grids: &NoiseGrids,
     least_step: &dyn Fn() -> f64,
 ) -> BiasChanges {
-    // Beside a large bias the squares of its changes would be lost.
+    // Squares of small changes beside a large bias would lose digits.
     let (first, bias) = series.slots.first().copied().zip(series.values.first().copied()).unwrap_or_default();
     let series = &series.clone().lowered_from(first, bias);
     let Some(blocks) = BlockMeans::from_series(series) else { return BiasChanges::default() };
@@ -184,8 +168,7 @@ fn find_on_common_samples(
     changes
 }
 
-/// Drops, the weakest first, what was accepted before others that explain it: beside them chance makes as good an explanation with [`REFUTED`] or
-/// more.
+/// Drops, the weakest first, each accepted candidate whose p-value beside the others is [`REFUTED`] or more.
 fn drop_explained_by_others(blocks: &BlockMeans, grid: &NoiseGrid, accepted: &mut Vec<Accepted>) {
     while accepted.len() > 1 {
         let p_value = |at: usize| {
@@ -200,8 +183,7 @@ fn drop_explained_by_others(blocks: &BlockMeans, grid: &NoiseGrid, accepted: &mu
     }
 }
 
-/// The response to the temperature at its mean that belongs to an accepted curvature, be it significant or not: of a square about another
-/// temperature it is a part. `None` where it is accepted, and without a curvature.
+/// The linear response at the mean temperature beside an accepted curvature, significant or not.
 fn linear_part(
     blocks: &BlockMeans,
     grid: &NoiseGrid,
@@ -220,13 +202,12 @@ fn linear_part(
     Some(Accepted { candidate: Candidate::Regressor(*index), regressor: regressor.clone(), p_value })
 }
 
-/// Whether the block means of a regressor span at least one count. Within a count, they show how its values were rounded.
+/// True if the block means of a regressor span at least one count; smaller changes are rounding.
 fn varies(means: &DVector<f64>, regressor: &Series) -> bool {
     means.max() - means.min() >= regressor.resolution
 }
 
-/// Of the candidates with a p-value below [`SIGNIFICANCE`], a step, a transient and a curvature with one below [`bias_step::SIGNIFICANCE`], the one
-/// that explains the data best beside those accepted before.
+/// The likeliest candidate beside those accepted, if its p-value is significant for its kind.
 fn best_candidate(
     series: &Series,
     blocks: &BlockMeans,
@@ -239,11 +220,11 @@ fn best_candidate(
     let known: Vec<DVector<f64>> = accepted.iter().map(|accepted| accepted.regressor.clone()).collect();
     let regression = GlsRegression::new(blocks, grid, &known);
     let ramp = blocks.ramp();
-    // With the −2 ln likelihood by which they are compared.
+    // −2 ln likelihood, by which they are compared.
     let mut rivals: Vec<(f64, Accepted)> = Vec::new();
     let single =
         || std::iter::once((None, &ramp)).chain(regressors.iter().map(|(index, regressor)| (Some(*index), regressor)));
-    // Where the bias follows a slow temperature behind a lag, it resembles the temperature itself: not as much as it has to for its name.
+    // A lag of a slow temperature resembles the temperature, but less than its name requires.
     let mut resembles_temperature = false;
     let estimates =
         regression.estimates_below(REFUTED, &single().map(|(_, regressor)| regressor.clone()).collect::<Vec<_>>());
@@ -272,7 +253,7 @@ fn best_candidate(
             && let smoothed = course.smoothed_regressor(lag.value, blocks)
             && let Some(without_lag) = regression.estimate(&smoothed)
         {
-            // Smoothed as it is behind the lag, the temperature has a smaller rounding error: that is no lag.
+            // Smoothed by the lag, the temperature has less rounding error: an advantage that is no lag.
             let is_late = lag.estimate.deviance + thermal_response::ADVANTAGE < without_lag.deviance;
             let (RegressionEstimate { p_value, deviance, .. }, candidate, regressor) = if is_late {
                 let regressor = course.lagged_regressor(lag.value, blocks);
@@ -290,7 +271,7 @@ fn best_candidate(
     if let Some(transient) = transient {
         let RegressionEstimate { p_value, deviance, .. } = transient.estimate();
         let regressor = transient.regressor(blocks);
-        // It has one more parameter, as a lag has.
+        // One more parameter, as a lag has.
         let accepted = Accepted { candidate: Candidate::Transient(transient), regressor, p_value };
         rivals.push((deviance + thermal_response::ADVANTAGE, accepted));
     }
@@ -317,8 +298,7 @@ fn best_candidate(
     rivals.into_iter().min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, best)| best)
 }
 
-/// A ramp with the slope of `estimate`, which is per block, as it is reported. The noise model has a term for it, so the
-/// samples are not corrected.
+/// The ramp with the slope of `estimate`, per block. The samples keep it: the noise model has a term for it.
 fn ramp_detection(series: &Series, blocks: &BlockMeans, estimate: &RegressionEstimate, p_value: f64) -> Detection {
     let block_s = blocks.width as f64 * series.period_s;
     let (slope, half) = (estimate.size / block_s, NORMAL_975 * estimate.error / block_s);

@@ -1,5 +1,4 @@
-//! A bias that follows the course of something that was measured: the course in fractions of a block, and the response that the
-//! samples are corrected for.
+//! A bias that follows a measured course, and its correction of the samples.
 
 use super::block_means::BlockMeans;
 use super::gls_regression::RegressionEstimate;
@@ -8,28 +7,22 @@ use crate::distributions::NORMAL_975;
 use crate::effects::{Effect, ResponseVariance};
 use nalgebra::DVector;
 
-/// Fractions of a block in which a course is known.
 pub(super) const FRACTIONS: u64 = 32;
 
-/// A quantity over the record, one value for each stretch of some sample periods.
+/// A quantity over the record: one value per `width` sample periods.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Course {
-    /// Sample periods of a stretch.
     pub width: u64,
-    /// At least one.
     pub values: Vec<f64>,
 }
 
-/// A response that the samples can be corrected for.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct BiasResponse {
-    /// As reported.
     pub effect: Effect,
     bias: Course,
 }
 
 impl Course {
-    /// Averages over the blocks.
     pub(super) fn in_blocks(&self, blocks: &BlockMeans) -> DVector<f64> {
         let size = (blocks.width as f64 / self.width as f64).max(1.0);
         let mean = |&number: &usize| {
@@ -48,13 +41,13 @@ impl Course {
         self.values.iter().sum::<f64>() / self.values.len() as f64
     }
 
-    /// The Allan variance of the bias that follows the course with `sensitivity`.
+    /// Allan variance of the bias that follows the course with `sensitivity`.
     pub(super) fn variance(&self, sensitivity: f64) -> ResponseVariance {
         let values: Vec<f64> = self.values.iter().map(|value| sensitivity * value).collect();
         ResponseVariance::from_means(&values, self.width)
     }
 
-    /// The bias that follows the course with `sensitivity`; 0 at the mean of the course.
+    /// Bias that follows the course with `sensitivity`; 0 at the course's mean.
     pub(super) fn response(&self, sensitivity: f64, effect: Effect) -> BiasResponse {
         let mean = self.mean();
         let values = self.values.iter().map(|value| sensitivity * (value - mean)).collect();
@@ -63,7 +56,7 @@ impl Course {
 }
 
 impl BiasResponse {
-    /// The bias in the sample period `slot`, in the channel's unit; 0 at the mean of what it follows.
+    /// Bias in the sample period `slot`, in the channel's unit; 0 at the course's mean.
     #[must_use]
     pub(crate) fn bias(&self, slot: u64) -> f64 {
         let Course { width, values } = &self.bias;
@@ -75,7 +68,6 @@ impl BiasResponse {
     }
 }
 
-/// A regression coefficient with its 95 % interval, of a channel in `unit`.
 pub(super) fn interval(of: &RegressionEstimate, unit: &'static str) -> ChannelEstimate {
     let half = NORMAL_975 * of.error;
     BoundedEstimate::new(of.size, of.size - half, of.size + half).in_unit(unit)

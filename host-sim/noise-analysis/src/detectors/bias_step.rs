@@ -1,7 +1,4 @@
-//! A step in the bias: it changes at once and stays.
-//!
-//! Random walk, flicker noise, ramps and temperature change the bias too, so a step has to explain the data better than any
-//! of them by a margin.
+//! A step in the bias, which has to be likelier by a margin than random walk, flicker noise, ramps and temperature.
 
 use super::block_means::BlockMeans;
 use super::gls_regression::{GlsRegression, RegressionEstimate, StepSizes};
@@ -13,46 +10,34 @@ use crate::effects::findings::{Correction, Detection};
 use crate::samples::series::Series;
 use nalgebra::DVector;
 
-/// Highest p-value of a step. The bias of a real part at rest moves less regularly than any mixture of the noises: p-values
-/// down to 3e-5 occur in the measured recordings, in which no step is visible.
+/// Highest p-value of a step. Measured recordings without a visible step reach 3e-5.
 pub(super) const SIGNIFICANCE: f64 = 1e-5;
 /// Advantage in −2 ln likelihood that a step must have over any other cause.
 pub(super) const ADVANTAGE: f64 = 12.0;
-/// Largest square of the size of a second step over that of the first; above it, the bias jumps repeatedly and is no single step.
+/// Largest square of a second step's size over the first one's; above it the bias jumps repeatedly.
 const SECOND: f64 = 0.2;
-/// In white noise of deviation σ, 95 % of the errors in the position of a step of size s are within this times (σ/s)²
-/// samples (Y.-C. Yao, "Approximating the distribution of the maximum likelihood estimate of the change-point in a sequence
-/// of independent random variables", Ann. Statist. 15, 1987).
 const POSITION_95: f64 = 11.0;
-/// Positions whose −2 ln likelihood exceeds the least one by less than this are inside the 95 % interval.
 const POSSIBLE: f64 = 7.0;
-/// Blocks at either end in which no step is sought: filters settle there, and too few blocks follow to confirm a step.
+/// Blocks at either end without a search: filters settle there, and too few blocks follow.
 const ENDS: usize = 3;
-/// Blocks on either side of a step that are averaged for the bias before and after it.
+/// Blocks on either side that are averaged for the bias before and after a step.
 const SIDE: usize = 4;
 
-/// The step that explains the data best.
 pub(super) struct BiasStep {
     pub position: StepPosition,
-    /// Block means of a step of size 1 at this position.
     pub regressor: DVector<f64>,
-    /// −2 ln likelihood with the best size.
     pub deviance: f64,
     /// Probability of such a step anywhere in the record by chance.
     pub p_value: f64,
 }
 
-/// Position of a step in the record.
 pub(super) struct StepPosition {
-    /// First sample after the step.
     sample: usize,
-    /// 95 % bounds, in sample periods from the first sample.
     low: f64,
     high: f64,
 }
 
-/// The likeliest step given the `known` regressors, to which `regression` was fitted, if its p-value is below [`SIGNIFICANCE`];
-/// `None` if the bias jumps more than once, by as much.
+/// The likeliest step beside the `known` regressors; `None` if insignificant, or if another step is as large.
 pub(super) fn find(
     series: &Series,
     blocks: &BlockMeans,
@@ -72,7 +57,7 @@ pub(super) fn find(
     let regressor = blocks.step_at(series.slots[sample]);
     let with_step: Vec<DVector<f64>> = known.iter().cloned().chain([regressor.clone()]).collect();
     let with_step = GlsRegression::new(blocks, grid, &with_step);
-    // Not their gains: beside a step that no model has, the noise is larger.
+    // Sizes, not gains: beside a step that no model has, the noise is larger.
     let again = StepScan::new(&with_step, &with_step.steps()).filter(|second| {
         with_step.deviance() - second.deviance > 2.0 * ADVANTAGE && second.size.powi(2) > SECOND * scan.size.powi(2)
     });
@@ -86,7 +71,6 @@ pub(super) fn find(
     Some(BiasStep { position: StepPosition { sample, low, high }, regressor, deviance: scan.deviance, p_value })
 }
 
-/// A step with the size of `estimate`, as it is reported.
 pub(super) fn detection(
     series: &Series,
     position: &StepPosition,
@@ -107,15 +91,12 @@ pub(super) fn detection(
     }
 }
 
-/// A step tried at the beginning of every block.
 struct StepScan {
     /// −2 ln likelihood with the step at each block.
     deviances: Vec<f64>,
-    /// The least of them.
     deviance: f64,
-    /// Its block.
     at: usize,
-    /// Size of the step there, and its p-value for a known position.
+    /// Its size, and its p-value for a known position.
     size: f64,
     p_value: f64,
     /// Effective number of independent tests.
@@ -123,7 +104,6 @@ struct StepScan {
 }
 
 impl StepScan {
-    /// Of the `steps` of `regression`.
     fn new(regression: &GlsRegression<'_>, steps: &[Option<StepSizes>]) -> Option<Self> {
         let sought = ENDS..steps.len().saturating_sub(ENDS) + 1;
         let tried = |(at, step): (usize, &Option<StepSizes>)| {
@@ -139,18 +119,16 @@ impl StepScan {
         Some(Self { deviances, deviance, at, size: best.size, p_value: best.p_value, independent })
     }
 
-    /// p-value for an unknown position: adds Rice's expected number of crossings of a level by a smooth process.
+    /// p-value for an unknown position: adds Rice's expected number of level crossings of a smooth process.
     fn p_value_anywhere(&self) -> f64 {
         let level = quantile(0.5 * self.p_value);
         (self.p_value + self.independent * (-0.5 * level * level).exp()).min(1.0)
     }
 
-    /// Whether only one block is possible.
     fn is_unique(&self) -> bool {
         self.deviances.iter().filter(|deviance| **deviance < self.deviance + POSSIBLE).count() <= 1
     }
 
-    /// First and last sample period in which the step may be.
     fn possible(&self, blocks: &BlockMeans) -> (f64, f64) {
         let possible = |at: &usize| self.deviances[*at] < self.deviance + POSSIBLE;
         let earliest = (1..=self.at).rev().take_while(possible).last().unwrap_or(self.at);
@@ -160,18 +138,14 @@ impl StepScan {
     }
 }
 
-/// The first sample after a step at the beginning of block `at`, give or take a block, and half of its 95 % interval in
-/// samples.
-///
-/// It is the sample from which on the new bias explains the data best where white noise dominates the differences of
-/// neighbouring samples.
+/// The first sample after a step near the beginning of block `at`, and half of its 95 % interval in samples.
 fn locate(series: &Series, blocks: &BlockMeans, at: usize) -> Option<(usize, f64)> {
     let slot = |number: usize| number as u64 * blocks.width;
     let position = |slot: u64| series.slots.partition_point(|&other| other < slot);
     let (from, to) = (blocks.numbers[at - 1], blocks.numbers[at]);
     let means = blocks.means.as_slice();
     let average = |means: &[f64]| means.iter().sum::<f64>() / means.len() as f64;
-    // The block next to the step is left out on either side: it may contain a part of the step.
+    // The blocks beside the step may contain a part of it.
     let before = average(&means[(at - 1).saturating_sub(SIDE)..(at - 1).max(1)]);
     let after = average(&means[(at + 1).min(means.len() - 1)..(at + 1 + SIDE).min(means.len())]);
     let (middle, size) = (0.5 * (before + after), after - before);

@@ -5,31 +5,23 @@ use nalgebra::DVector;
 
 /// Number of blocks in a record.
 pub const BLOCKS: usize = 128;
-/// A block with less than this fraction of its samples is left out.
 const LEAST_FILL: f64 = 0.25;
-/// Fewest slots in a block.
 const FEWEST_SLOTS: u64 = 16;
-/// Fewest blocks for a regression.
 const FEWEST_BLOCKS: usize = BLOCKS / 4;
 
-/// Least change of a mean, in steps of the resolution: a smaller one is an error of floating-point numbers.
+/// Least change of a mean, in steps of the resolution: smaller ones are rounding errors of floats.
 const LEAST_CHANGE: f64 = 1e-6;
 
 /// Means of the blocks of a record.
 pub struct BlockMeans {
-    /// Sample periods in a block.
     pub width: u64,
-    /// Numbers of the blocks that are not left out, from 0 on.
     pub numbers: Vec<usize>,
-    /// Mean of each of these blocks, in the unit of the series.
     pub means: DVector<f64>,
-    /// Fraction of the samples of each that are present.
     pub fills: Vec<f64>,
 }
 
 impl BlockMeans {
-    /// Averages the series over [`BLOCKS`] blocks; `None` if it has fewer than 16 sample periods a block, too many gaps, or
-    /// if its means never change.
+    /// `None` with fewer than 16 sample periods a block, with too many gaps, or if the means never change.
     pub fn from_series(series: &Series) -> Option<Self> {
         let width = (series.slots.last()? + 1) / BLOCKS as u64;
         if width < FEWEST_SLOTS {
@@ -37,7 +29,6 @@ impl BlockMeans {
         }
         let (mut sums, mut counts) = (vec![0.0; BLOCKS], vec![0u64; BLOCKS]);
         for (&slot, value) in series.slots.iter().zip(series.values.iter()) {
-            // The few samples after the last whole block are left out.
             if let Some(sum) = sums.get_mut((slot / width) as usize) {
                 *sum += value;
                 counts[(slot / width) as usize] += 1;

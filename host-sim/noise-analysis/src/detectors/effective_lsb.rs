@@ -1,15 +1,12 @@
-//! The effective LSB of a channel: the number of counts of which all differences of its values are multiples. More than one
-//! means that the values were rounded before they were recorded.
-//!
-//! Where the noise is larger than the step, such rounding adds white noise of variance step²/12, which no curve and no
-//! spectrum distinguishes from other white noise; the values themselves show it.
+//! Effective LSB: the number of counts that divides all differences of a channel's values. More than one means rounding
+//! before the recording, white noise of variance step²/12.
 
 use crate::bounds::BoundedEstimate;
 use crate::effects::EffectiveLsb;
 use crate::effects::findings::Detection;
 use crate::samples::series::Series;
 
-/// Fewest changes of the value; all must be multiples of the step. Without such rounding about half of the changes would be odd numbers of counts.
+/// Fewest changes of the value; without such rounding about half of them are odd.
 const FEWEST_CHANGES: usize = 50;
 
 /// The largest number of counts that divides every difference of two values; 1 if the values change fewer than 50 times.
@@ -22,7 +19,6 @@ pub(crate) fn counts_per_step(series: &Series) -> u32 {
     if changes < FEWEST_CHANGES { 1 } else { u32::try_from(divisor).unwrap_or(1).max(1) }
 }
 
-/// Reports a step of more than one count.
 #[must_use]
 pub(crate) fn find(series: &Series) -> Option<Detection> {
     let counts = counts_per_step(series);

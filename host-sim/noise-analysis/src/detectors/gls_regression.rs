@@ -1,31 +1,26 @@
 //! Generalised least squares of block means on regressors, in noise whose mixture is unknown.
 //!
-//! For one mixture this is least squares with an unknown scale, so that a size divided by its error has Student's
-//! distribution. Over mixtures it is the average of these, each weighted by the restricted likelihood of the residuals (REML;
-//! D. Harville, "Maximum likelihood approaches to variance component estimation and to related problems", JASA 72, 1977).
-//! Where mixtures are as frequent as the noise grid assumes, the p-values are exact (E. Pitman, "The estimation of the
-//! location and scale parameters of a continuous population of any given form", Biometrika 30, 1939), also where the
-//! slowest noise leaves few degrees of freedom.
+//! For one mixture, size over error has Student's distribution. The mixtures are weighted by the restricted likelihood
+//! of the residuals (REML; D. Harville, JASA 72, 1977). p-values are exact if mixtures are as frequent as the noise
+//! grid assumes (E. Pitman, Biometrika 30, 1939).
 
 use super::block_means::BlockMeans;
 use super::noise_grid::{NoiseCovariance, NoiseFamily, NoiseGrid};
 use crate::distributions::upper_tail;
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView};
 
-/// A regressor that keeps less than this fraction of its information when the others are fitted too is a combination of them.
+/// A regressor that keeps less than this fraction of its information beside the others is a combination of them.
 const COLLINEAR: f64 = 1e-6;
 
-/// Halvings that find the least part of the sum of squares that is significant, to a thousandth of it.
 const HALVINGS: usize = 16;
 
 /// Coefficient of a regressor that is fitted together with others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RegressionEstimate {
-    /// Coefficient of the regressor, in the unit of the means over that of the regressor.
+    /// In the unit of the means over that of the regressor.
     pub size: f64,
-    /// Standard deviation of the size.
     pub error: f64,
-    /// Probability of a size at least as far from 0 if the true one is 0.
+    /// Two-sided, against a size of 0.
     pub p_value: f64,
     /// −2 ln likelihood with the best size, averaged over all mixtures.
     pub deviance: f64,
@@ -38,32 +33,25 @@ pub struct GlsRegression<'a> {
     families: Vec<FamilyFits<'a>>,
 }
 
-/// The regression under the mixtures of one family.
 struct FamilyFits<'a> {
     family: &'a NoiseFamily,
     fits: Vec<GlsFit<'a>>,
 }
 
-/// The regression under one mixture.
 struct GlsFit<'a> {
     noise: &'a NoiseCovariance,
-    /// Coordinates of means and known regressors, weighted.
     weighted_means: DVector<f64>,
     weighted_known: DMatrix<f64>,
-    /// Inverse of the information on the known regressors, and their weighted products with the means.
+    /// Inverse of the information on the known regressors.
     inverse: DMatrix<f64>,
     products: DVector<f64>,
-    /// The inverse times the products: the sizes of the known regressors.
     known_sizes: DVector<f64>,
-    /// Weighted sum of squares of the residuals.
     residual: f64,
     log_determinant: f64,
 }
 
-/// The sizes of a step under every mixture.
 pub(super) struct StepSizes(Vec<SizeAndInformation>);
 
-/// A size and its information under one mixture.
 #[derive(Clone, Copy)]
 struct SizeAndInformation {
     size: f64,
@@ -92,17 +80,16 @@ impl<'a> GlsRegression<'a> {
         self.estimates(std::slice::from_ref(regressor)).pop()?
     }
 
-    /// The same for each of `regressors`, every one by itself.
     pub(super) fn estimates(&self, regressors: &[DVector<f64>]) -> Vec<Option<RegressionEstimate>> {
         self.sizes(regressors).into_iter().map(|sizes| self.average(&sizes?)).collect()
     }
 
-    /// Sizes of each of `regressors`, every one by itself, under every mixture; `None` for a combination of the known ones.
+    /// Sizes of each of `regressors` alone, under every mixture; `None` for a combination of the known ones.
     fn sizes(&self, regressors: &[DVector<f64>]) -> Vec<Option<Vec<SizeAndInformation>>> {
         if regressors.is_empty() {
             return Vec::new();
         }
-        // One product of matrices for each family is faster than one of a matrix and a vector for each regressor.
+        // One matrix product is faster than many products with vectors.
         let columns = DMatrix::from_columns(regressors);
         let coordinates: Vec<DMatrix<f64>> =
             self.families.iter().map(|of| of.family.coordinates_of_columns(&columns)).collect();
@@ -114,8 +101,7 @@ impl<'a> GlsRegression<'a> {
         (0..regressors.len()).map(of_regressor).collect()
     }
 
-    /// Sizes of a step at the beginning of each block, every one by itself, under every mixture; `None` where the step is a combination
-    /// of the known regressors.
+    /// Sizes of a step at each block alone, under every mixture; `None` for a combination of the known regressors.
     pub(super) fn steps(&self) -> Vec<Option<StepSizes>> {
         let by_mixture: Vec<Vec<Option<SizeAndInformation>>> =
             self.families.iter().flat_map(FamilyFits::estimate_steps).collect();
@@ -123,18 +109,17 @@ impl<'a> GlsRegression<'a> {
         (0..self.blocks.means.len()).map(step).collect()
     }
 
-    /// Whether any of these may have a p-value below `limit`.
+    /// True if any of these may have a p-value below `limit`.
     pub(super) fn any_step_may_be_below(&self, limit: f64) -> bool {
         let least_part = self.least_part(limit);
         self.families.iter().any(|family| family.any_step_explains(least_part))
     }
 
-    /// As [`estimate`](Self::estimate), if the p-value is below `limit`.
+    /// [`estimate`](Self::estimate) if the p-value is below `limit`.
     pub(super) fn estimate_below(&self, limit: f64, regressor: &DVector<f64>) -> Option<RegressionEstimate> {
         self.estimates_below(limit, std::slice::from_ref(regressor)).pop()?
     }
 
-    /// The same for each of `regressors`, every one by itself.
     pub(super) fn estimates_below(&self, limit: f64, regressors: &[DVector<f64>]) -> Vec<Option<RegressionEstimate>> {
         let least_part = self.least_part(limit);
         let estimate = |sizes: Option<Vec<SizeAndInformation>>| {
@@ -144,13 +129,12 @@ impl<'a> GlsRegression<'a> {
         self.sizes(regressors).into_iter().map(estimate).collect()
     }
 
-    /// Whether a regressor explains more than this part of the weighted sum of squares under any mixture.
+    /// True if a regressor explains more than this part of the weighted sum of squares under any mixture.
     fn reaches(&self, part: f64, sizes: &[SizeAndInformation]) -> bool {
         self.fits().zip(sizes).any(|(fit, at)| fit.is_explained(part, *at))
     }
 
-    /// The part of the weighted sum of squares that a regressor has to explain under one mixture at least for a p-value below
-    /// `limit`, which is an average of those under each mixture.
+    /// Least part of the weighted sum of squares to explain, under one mixture, for a p-value below `limit`.
     fn least_part(&self, limit: f64) -> f64 {
         let freedom = self.degrees_of_freedom();
         let p_value = |part: f64| 2.0 * upper_tail(normal_equivalent((freedom * part / (1.0 - part)).sqrt(), freedom));
@@ -162,13 +146,11 @@ impl<'a> GlsRegression<'a> {
         least
     }
 
-    /// −2 ln likelihood with such a step; `None` where too few blocks are left.
     pub(super) fn deviance_with(&self, StepSizes(sizes): &StepSizes) -> Option<f64> {
         let residuals = self.residuals(sizes)?;
         Some(mean_likelihood(&self.profiled(&residuals)).0)
     }
 
-    /// Such a step with its error and its p-value.
     pub(super) fn estimate_step(&self, StepSizes(sizes): &StepSizes) -> Option<RegressionEstimate> {
         self.average(sizes)
     }
@@ -182,7 +164,6 @@ impl<'a> GlsRegression<'a> {
         self.families.iter().flat_map(independent).zip(weights).map(|(tests, weight)| weight * tests).sum()
     }
 
-    /// −2 ln likelihood of the known regressors alone, averaged over all mixtures.
     pub(super) fn deviance(&self) -> f64 {
         mean_likelihood(&self.deviances()).0
     }
@@ -192,12 +173,11 @@ impl<'a> GlsRegression<'a> {
         self.fits().map(|fit| freedom * fit.residual.ln() + fit.log_determinant).collect()
     }
 
-    /// Degrees of freedom left by the constant, the known regressors and one more.
     fn degrees_of_freedom(&self) -> f64 {
         self.blocks.means.len() as f64 - 2.0 - self.known as f64
     }
 
-    /// Weighted sums of the squares of the residuals beside one more regressor; `None` where too few blocks are left.
+    /// Weighted sums of squares of the residuals beside one more regressor; `None` if too few blocks are left.
     fn residuals(&self, sizes: &[SizeAndInformation]) -> Option<Vec<f64>> {
         let residual = |(fit, at): (&GlsFit<'_>, &SizeAndInformation)| {
             (fit.residual - at.size * at.size * at.information).max(1e-12 * fit.residual)
@@ -206,7 +186,6 @@ impl<'a> GlsRegression<'a> {
         is_enough.then(|| self.fits().zip(sizes).map(residual).collect())
     }
 
-    /// −2 ln likelihood under each mixture for these residuals.
     fn profiled(&self, residuals: &[f64]) -> Vec<f64> {
         let freedom = self.degrees_of_freedom();
         let deviance = |(fit, residual): (&GlsFit<'_>, &f64)| (freedom + 1.0) * residual.ln() + fit.log_determinant;
@@ -241,7 +220,6 @@ impl<'a> GlsRegression<'a> {
 }
 
 impl FamilyFits<'_> {
-    /// Under each mixture, the size of a step at the beginning of each block.
     fn estimate_steps(&self) -> Vec<Vec<Option<SizeAndInformation>>> {
         let products = self.products_with_blocks();
         let estimate = |(fit, products): (&GlsFit<'_>, &DMatrixView<'_, f64>)| {
@@ -253,7 +231,6 @@ impl FamilyFits<'_> {
         self.fits.iter().zip(&self.of_fits(&products)).map(estimate).collect()
     }
 
-    /// Whether a step explains more than this part of the weighted sum of squares under any mixture.
     fn any_step_explains(&self, part: f64) -> bool {
         let products = self.products_with_blocks();
         let explains = |(fit, products): (&GlsFit<'_>, &DMatrixView<'_, f64>)| {
@@ -263,9 +240,8 @@ impl FamilyFits<'_> {
         self.fits.iter().zip(&self.of_fits(&products)).any(explains)
     }
 
-    /// The products of each block with the weighted means and with the weighted known regressors of each mixture, a row each.
+    /// Rows per mixture: the products of each block with the weighted means and known regressors.
     fn products_with_blocks(&self) -> DMatrix<f64> {
-        // One product of matrices is faster than one of a matrix and a vector for each mixture.
         let columns = self
             .fits
             .iter()
@@ -277,7 +253,6 @@ impl FamilyFits<'_> {
         self.family.products_with_blocks(&DMatrix::from_columns(&columns))
     }
 
-    /// The rows of each mixture.
     fn of_fits<'p>(&self, products: &'p DMatrix<f64>) -> Vec<DMatrixView<'p, f64>> {
         let vectors = |fit: &GlsFit<'_>| 1 + fit.weighted_known.ncols();
         self.fits.iter().zip(0..).map(|(fit, at)| products.rows(at * vectors(fit), vectors(fit))).collect()
@@ -285,7 +260,6 @@ impl FamilyFits<'_> {
 }
 
 impl<'a> GlsFit<'a> {
-    /// For means and known regressors with these coordinates.
     fn new(noise: &'a NoiseCovariance, means: &DVector<f64>, known: &DMatrix<f64>) -> Option<Self> {
         let weighted_means = noise.weighted(means);
         let weighted_known = noise.weighted_columns(known);
@@ -303,14 +277,12 @@ impl<'a> GlsFit<'a> {
         Some(Self { noise, weighted_means, weighted_known, inverse, products, known_sizes, residual, log_determinant })
     }
 
-    /// Size of a regressor with these coordinates.
     fn estimate(&self, regressor: DVectorView<'_, f64>) -> Option<SizeAndInformation> {
         let with_known = |known: usize| self.weighted_known.column(known).dot(&regressor);
         self.beside_known(self.noise.square(regressor), regressor.dot(&self.weighted_means), &with_known)
     }
 
-    /// Of the information on each step, and the products of each block with the weighted means and with the weighted known regressors, a
-    /// row each: the steps before each block but the first, where one would be the constant; the last one first.
+    /// Sizes of the steps before each block but the first, the last one first.
     fn estimate_steps(
         &self,
         information: &[f64],
@@ -323,7 +295,6 @@ impl<'a> GlsFit<'a> {
         })
     }
 
-    /// Size of a regressor with this information, and these weighted products with the means and with each known regressor.
     fn beside_known(
         &self,
         information: f64,
@@ -339,7 +310,6 @@ impl<'a> GlsFit<'a> {
         (left > COLLINEAR * information).then(|| SizeAndInformation { size: along / left, information: left })
     }
 
-    /// Whether a regressor of this size explains more than this part of the weighted sum of squares.
     fn is_explained(&self, part: f64, SizeAndInformation { size, information }: SizeAndInformation) -> bool {
         size * size * information > part * self.residual
     }
@@ -353,8 +323,7 @@ fn mean_likelihood(deviances: &[f64]) -> (f64, Vec<f64>) {
     (least - 2.0 * (total / weights.len() as f64).ln(), weights.iter().map(|weight| weight / total).collect())
 }
 
-/// The normal deviate with the tail probability of Student's `t`, by Wallace's approximation (D. Wallace, Ann. Math.
-/// Statist. 30, 1959).
+/// Normal deviate with the tail probability of Student's `t` (D. Wallace, Ann. Math. Statist. 30, 1959).
 fn normal_equivalent(t: f64, freedom: f64) -> f64 {
     let size = (freedom * (t * t / freedom).ln_1p()).sqrt() * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0);
     size.copysign(t)
@@ -388,7 +357,6 @@ mod tests {
         }
     }
 
-    /// For any fraction of random walk in the noise.
     #[test]
     fn p_values_are_as_frequent_as_they_say() {
         let (grids, runs) = (NoiseGrids::default(), 1_000);
@@ -404,14 +372,11 @@ mod tests {
             }
             covered += u32::from(estimate.size.abs() < 1.96 * estimate.error);
         }
-        // Expected 100 ± 9.5 and 10 ± 3.2; the limits are wider because the walks are not distributed as in the grid, and there
-        // is no flicker noise.
+        // Expected 100 ± 9.5 and 10 ± 3.2; wider, because the walks are not distributed as in the grid.
         assert!((70..150).contains(&below[0]) && below[1] < 25, "{below:?}");
         assert!(covered > 900, "{covered}");
     }
 
-    /// Just above the p-value of a regressor a limit does not leave it out, and just below it does; for every mixture that the walk
-    /// makes likely, and for steps.
     #[test]
     fn a_regressor_is_left_out_by_its_p_value_alone() {
         let grids = NoiseGrids::default();
@@ -419,7 +384,6 @@ mod tests {
         for run in 0..40 {
             let walk = 10f64.powf(random.random_range(-4.5..0.0));
             let mut series = series(&mut random, walk);
-            // From nothing to ten times the error in white noise.
             let size = 0.25 * f64::from(run % 4) / 3.0;
             series.values_mut().iter_mut().skip(2_048).for_each(|value| *value += size);
             let blocks = BlockMeans::from_series(&series).unwrap();
@@ -436,7 +400,6 @@ mod tests {
         }
     }
 
-    /// Compared with least squares on the samples in white noise; an unknown mixture can only increase the error.
     #[test]
     fn sizes_beside_a_known_regressor_are_those_of_least_squares() {
         let mut random = ChaCha8Rng::seed_from_u64(2);

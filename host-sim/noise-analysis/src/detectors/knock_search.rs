@@ -1,4 +1,4 @@
-//! The search for knocks in channels that were recorded together, stage by stage.
+//! The search for knocks in channels that were recorded together.
 //!
 //! ```text
 //! channels ─► long knocks ─► without them ─┬► single samples that stand out
@@ -13,36 +13,30 @@ use crate::parallel::in_parallel;
 use crate::samples::series::Series;
 use std::ops::Range;
 
-/// A channel in which knocks are sought.
 pub(crate) struct SearchedChannel<'a> {
-    /// By which its rules are fitted: the first of `parts`.
+    /// The first of `parts`, by which the channel's rules are fitted.
     pub fitted: &'a Series,
-    /// In which knocks are sought, in the order of time; of every channel as many. None of them decides what another one shows.
+    /// The parts in which knocks are sought, in the order of time; none affects another one.
     pub parts: Vec<&'a Series>,
-    /// Whether single samples are looked at.
     pub can_show_spikes: bool,
 }
 
-/// Where one channel is loud.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct LoudStretches {
     pub knocks: Vec<Knock>,
-    /// Sample periods in which the level of its noise, which moves by itself, is high: what stands out in them is no spike.
+    /// Sample periods in which the wandering level of the noise is high: outliers there are no spikes.
     pub by_itself: Vec<Range<u64>>,
 }
 
-/// What stands out of the noise of one channel by single samples.
 struct StandingOut<'a> {
     rule: &'a SpikeRule,
     disturbances: Vec<Disturbance>,
     by_itself: Vec<Range<u64>>,
     singles: FoundSpikes,
-    /// Samples that were looked at.
     samples: u64,
 }
 
-/// Where each channel is loud, for each part. Noise with a first Allan variance of at least `dithered_avar_counts2` dithers the rounding.
-/// Samples in the sample periods `repeated` are loud as their neighbours are, but make spikes of these.
+/// The loud stretches of each channel, for each part; a first Allan variance of `dithered_avar_counts2` dithers.
 pub(crate) fn find(
     channels: &[SearchedChannel],
     repeated: &[u64],
@@ -65,7 +59,6 @@ pub(crate) fn find(
         .collect()
 }
 
-/// Where each channel is loud in one part, beside its `long` knocks.
 fn find_in_part(
     series: &[Series],
     (rules, spike_rules): (&[KnockRule], &[Option<SpikeRule>]),
@@ -106,14 +99,14 @@ fn add(knocks: &mut [Vec<Knock>], found: Vec<Vec<Knock>>) {
     knocks.iter_mut().zip(found).for_each(|(own, found)| found.into_iter().for_each(|knock| join(own, knock)));
 }
 
-/// Sample periods of the samples of a series within knocks, in ascending order.
+/// Sample periods of the samples within knocks, in ascending order.
 pub(crate) fn slots_within(series: &Series, knocks: &[Knock]) -> Vec<u64> {
     let is_within = |slot: &u64| knocks.iter().any(|knock| knock.slots.contains(slot));
     if knocks.is_empty() { Vec::new() } else { series.slots.iter().copied().filter(is_within).collect() }
 }
 
 impl<'a> StandingOut<'a> {
-    /// By a rule in a part of a channel. What `levels` explain by a level that moves by itself is no disturbance.
+    /// Applies a rule to a part of a channel; a wandering level that explains louder noise is no disturbance.
     fn find(rule: &'a SpikeRule, levels: &KnockRule, part: &Series) -> Self {
         let samples = part.values.len() as u64;
         let (singles, disturbed) = rule.separate(rule.find(part), samples);
@@ -123,12 +116,11 @@ impl<'a> StandingOut<'a> {
         Self { rule, disturbances, by_itself, singles, samples }
     }
 
-    /// Its single samples in a knock, if chance puts as many there.
     fn by_chance_in(&self, knock: &Knock) -> Vec<u64> {
         self.singles.by_chance_within(&knock.slots, self.samples)
     }
 
-    /// What its single samples show of the `known` knocks.
+    /// Evidence of the `known` knocks in its single samples.
     fn parts_of(&self, known: &[Range<u64>]) -> Vec<Disturbance> {
         self.rule.parts_of(&self.singles, known, self.samples)
     }

@@ -1,4 +1,4 @@
-//! The detector of knocks on simulated channels: how often it sees one in noise, and which ones it finds.
+//! The detector of knocks on simulated channels: false alarms and detections.
 
 use super::knock_search::{self, SearchedChannel};
 use super::knocks::{BlockSize, Knock, KnockRule, find_by};
@@ -11,14 +11,11 @@ use rand_distr::StandardNormal;
 use std::f64::consts::TAU;
 
 const PERIOD_S: f64 = 0.01;
-/// Ten minutes at 100 Hz.
 const SAMPLES: usize = 60_000;
-/// Samples of a record without a knock.
+/// Sample periods of a record without a knock.
 const QUIET: u64 = 40_000;
-/// Of the ADIS16405's profile.
 const DITHERED: f64 = 0.2;
 
-/// A channel with a resolution of a quarter of its white noise, from the values of `next`.
 fn series(seed: u64, mut next: impl FnMut(&mut ChaCha8Rng, usize) -> f64) -> Series {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     Series {
@@ -35,12 +32,11 @@ fn normal(random: &mut ChaCha8Rng) -> f64 {
     random.sample(StandardNormal)
 }
 
-/// White noise of deviation 1, times `level`.
 fn white(seed: u64, level: impl Fn(usize) -> f64) -> Series {
     series(seed, |random, at| level(at) * normal(random))
 }
 
-/// White noise behind two cascaded averages over `taps` samples, of deviation 1.
+/// White noise of deviation 1 behind two cascaded averages over `taps` samples.
 fn filtered(taps: usize) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
     let mut memory = vec![0.0; 2 * taps - 1];
     // A triangle of 1 … taps … 1; its sum of squares is taps·(2·taps² + 1)/3.
@@ -53,7 +49,6 @@ fn filtered(taps: usize) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
     }
 }
 
-/// A random walk whose steps have the deviation `step`, in white noise.
 fn walking(step: f64) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
     let mut level = 0.0;
     move |random, _| {
@@ -74,7 +69,7 @@ fn flickering() -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
     }
 }
 
-/// A resonance at a twentieth of the sample rate, in white noise: an amplitude that rises and falls within `width`⁻¹ samples.
+/// A resonance at a twentieth of the sample rate in white noise, whose amplitude changes within 1/`width` samples.
 fn resonating(width: f64, deviation: f64) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
     let (mut a, mut b) = (0.0, 0.0);
     let kept = (-width).exp();
@@ -89,7 +84,7 @@ fn resonating(width: f64, deviation: f64) -> impl FnMut(&mut ChaCha8Rng, usize) 
     }
 }
 
-/// A resonance as a vibration is: the logarithm of its amplitude is a Markov process of deviation ln 2 and of this correlation time, in samples.
+/// A resonance in white noise; ln amplitude is a Markov process of deviation ln 2, correlation time in samples.
 fn wandering(deviation: f64, time: f64) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
     let (mut a, mut b, mut level) = (0.0, 0.0, 0.0);
     let (kept, level_kept) = ((-0.1_f64).exp(), (-1.0 / time).exp());
@@ -105,7 +100,7 @@ fn wandering(deviation: f64, time: f64) -> impl FnMut(&mut ChaCha8Rng, usize) ->
     }
 }
 
-/// Jumps to and fro between two levels `amplitude` apart with the correlation time `time_s`, in white noise.
+/// Telegraph noise with levels `amplitude` apart and correlation time `time_s` in white noise.
 fn telegraph(amplitude: f64, time_s: f64) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
     let mut up = false;
     move |random, _| {
@@ -114,30 +109,25 @@ fn telegraph(amplitude: f64, time_s: f64) -> impl FnMut(&mut ChaCha8Rng, usize) 
     }
 }
 
-/// Records of each kind of noise.
 const RECORDS: u64 = 40;
 
-/// Of 40 records without a knock as many as chance allows have one: with a probability of 2·10⁻⁴ each, more than one of
-/// them only once in 30,000 times.
+/// Chance gives a record a knock with a probability of 2·10⁻⁴; more than one of 40 has one once in 30,000 times.
 fn assert_quiet(name: &str, record: impl Fn(u64) -> Series + Sync) {
     let found = records_with_a_knock(record);
     assert!(found <= 1, "{name}: {found} of {RECORDS} records, {} expected", RECORDS as f64 * SIGNIFICANCE);
 }
 
-/// The knocks in channels.
 fn find(channels: &[Series]) -> Vec<Vec<Knock>> {
     let searched = |series| SearchedChannel { fitted: series, parts: vec![series], can_show_spikes: true };
     let found = knock_search::find(&channels.iter().map(searched).collect::<Vec<SearchedChannel>>(), &[], DITHERED);
     found.into_iter().flatten().map(|of| of.knocks).collect()
 }
 
-/// How many of [`RECORDS`].
 fn records_with_a_knock(record: impl Fn(u64) -> Series + Sync) -> usize {
     let is_found = |seed: &u64| !find(&[record(*seed).before(QUIET)])[0].is_empty();
     in_parallel(&(0..RECORDS).collect::<Vec<u64>>(), is_found).into_iter().filter(|found| *found).count()
 }
 
-/// Noise that is five times as large for 10 s in 22 minutes of two channels at 200 Hz: each channel has one knock of it.
 #[test]
 fn a_long_knock_is_one() {
     const SAMPLES: usize = 1 << 18;
@@ -189,7 +179,7 @@ fn lines_and_resonances_have_no_knock() {
 
 #[test]
 fn vibrations_whose_level_wanders_have_no_knock() {
-    // What is weaker than the noise, or has few blocks, does not show how its level moves: of 240 records at most 1 in 100.
+    // Noise that hides its movements, or has few blocks: at most 1 in 100 of 240 records.
     let vibrations = [0.3, 1.0, 3.0].into_iter().flat_map(|deviation| [500.0, 2000.0].map(|time| (deviation, time)));
     let found: Vec<usize> = vibrations
         .map(|(deviation, time)| records_with_a_knock(|seed| series(seed, wandering(deviation, time))))
@@ -199,8 +189,7 @@ fn vibrations_whose_level_wanders_have_no_knock() {
 
 #[test]
 fn a_noise_level_that_follows_the_temperature_has_no_knock() {
-    // A factor of 1.5 with a time constant of two minutes, and a cycle of ten minutes of ±5 %: white noise that follows the
-    // square root of the absolute temperature does that over ±30 °C.
+    // A factor of 1.5 over two minutes, and a cycle of ±5 % in ten minutes, as √T of ±30 °C.
     let minute = 60.0 / PERIOD_S;
     assert_quiet("warming", |seed| white(seed, |at| 1.0 + 0.5 * (1.0 - (-(at as f64) / (2.0 * minute)).exp())));
     assert_quiet("cycle", |seed| white(seed, |at| 1.0 + 0.05 * (TAU * at as f64 / (10.0 * minute)).sin()));
@@ -214,8 +203,7 @@ fn jumps_of_the_bias_are_no_knock() {
     }
 }
 
-/// Spikes of 20 deviations, of which some blocks of 20 differences have two or three; behind an average over two samples each is in two of them.
-/// With the spikes in the blocks, 27 of 1,200 records had a knock: 5 of the 240 here. By chance more than one has one in a thousand cases.
+/// More than one record has a knock by chance in one of a thousand cases.
 #[test]
 fn single_samples_are_no_knock() {
     let found = [0.0005, 0.002, 0.005].map(|rate| {
@@ -242,7 +230,7 @@ fn random_losses_are_no_knock() {
             series(seed, filtered(8)).filtered(|slot| !lost[slot as usize])
         });
     }
-    // All losses in one half minute, where every second sample is missing.
+    // Losses in one half minute: every second sample.
     assert_quiet("a burst of losses", |seed| {
         white(seed, |_| 1.0).filtered(|slot| !(20_000..23_000).contains(&slot) || slot % 2 == 0)
     });
@@ -250,13 +238,13 @@ fn random_losses_are_no_knock() {
 
 #[test]
 fn noise_below_a_count_has_no_knock() {
-    // The bias drifts from the middle of a count to its edge and back, so that the noise shows and hides.
+    // The bias drifts from the middle of a count to its edge and back.
     assert_quiet("undithered", |seed| {
         series(seed, |random, at| 0.03 * normal(random) + 0.125 * (TAU * at as f64 / 20_000.0).sin())
     });
 }
 
-/// Length in s and level of knocks that are found for certain.
+/// Length in s and level of knocks that are found with certainty.
 const KNOCKS: [(f64, f64); 5] = [(1.0, 5.0), (3.0, 3.0), (10.0, 2.0), (30.0, 1.5), (40.0, 1.3)];
 
 #[test]
@@ -269,7 +257,6 @@ fn knocks_are_found_and_measured_where_samples_are_lost() {
     assert_knocks_are_found(0.02);
 }
 
-/// Every knock in a record that loses this share of its samples at random.
 fn assert_knocks_are_found(lost: f64) {
     let mut random = ChaCha8Rng::seed_from_u64(7);
     let kept: Vec<bool> = (0..SAMPLES).map(|_| !random.random_bool(lost)).collect();
@@ -289,7 +276,6 @@ fn assert_knocks_are_found(lost: f64) {
             covered += usize::from((parameter.low..=parameter.high).contains(&truth));
             all += 1;
         }
-        // Nearly all of it is left out, and little else.
         let excluded = |slot: f64| knock.slots.contains(&(slot as u64));
         let samples = (0..SAMPLES).filter(|&at| inside(at));
         let share = samples.clone().filter(|&at| excluded(at as f64)).count() as f64 / samples.count() as f64;
@@ -297,12 +283,11 @@ fn assert_knocks_are_found(lost: f64) {
         assert!(share > 0.9, "{length_s} s at {level}: {share}");
         assert!(outside < 0.5 + 0.3 * length_s, "{length_s} s at {level}: {outside} s too many");
     }
-    // Of 15 intervals of 95 %, more than three miss once in 200 times.
+    // In 15 intervals of 95 %, more than three miss once in 200 times.
     assert!(covered >= all - 3, "{covered} of {all}");
 }
 
-/// A mount that rings at an 18th of the sample rate and loses its amplitude, 30 deviations of the noise behind the part's filter, in ten
-/// samples. It is found wherever it is against the blocks.
+/// A mount rings at an 18th of the sample rate, with 30 deviations of the filtered noise, and decays in ten samples.
 #[test]
 fn a_knock_of_a_few_samples_is_found_behind_a_filter() {
     let begin = |seed: u64| 20_000 + 7 * seed as usize;
@@ -339,7 +324,7 @@ fn a_decaying_shock_is_left_out_to_its_end() {
 #[test]
 fn a_shock_is_found_in_every_channel_that_shows_it_and_in_no_other() {
     let inside = |at: usize| (25_000..25_500).contains(&at);
-    // By itself, 1.35 times the noise over five seconds would not be a knock anywhere in the record.
+    // Without the other channel, 1.35 times the noise over five seconds is no knock.
     let channels =
         [6.0, 1.35, 1.0].map(|level| white((100.0 * level) as u64, |at| if inside(at) { level } else { 1.0 }));
     assert!(find(&channels[1..]).iter().all(Vec::is_empty));

@@ -1,9 +1,8 @@
-//! Knocks: stretches of some samples to minutes whose noise level the neighbouring stretches exclude, on both sides.
+//! Knocks: stretches of some samples to minutes whose noise level the stretches on both sides exclude.
 //!
-//! Blocks of several lengths are tested at several averaging times, in each channel by itself, short ones where no longer one is too loud.
-//! The probability of a knock by chance anywhere in the record of a channel is [`SIGNIFICANCE`], divided equally among all blocks of either
-//! kind. The likeliest stretch around a block that is too loud is the knock; the record without it is tested again. Where one channel has
-//! a knock, the others are tested in that stretch alone.
+//! Blocks of several lengths are tested at several averaging times. [`SIGNIFICANCE`] is divided equally among all of
+//! them. The likeliest stretch around a loud block is the knock; the rest is tested again. The time of a knock is
+//! tested in the other channels alone.
 
 use super::noise_levels::{
     DIFFERENCES, FEW_DIFFERENCES, HALF_EFFICIENCY, LevelScatter, NEIGHBOURS, Neighbourhood, SquaredDifferences,
@@ -20,43 +19,35 @@ use crate::samples::rounding::dithered_avar;
 use crate::samples::series::Series;
 use std::ops::Range;
 
-/// Highest probability by which chance shows a knock in a channel at a time when another channel has one.
+/// Highest p-value of a knock at the time of another channel's knock.
 const SIGNIFICANCE_AT_A_KNOWN_TIME: f64 = 1e-3;
-/// Highest probability by which chance raises the smaller half of the squares of a block that is too loud.
+/// Highest p-value of the smaller half of the squares of a loud block.
 const SIGNIFICANCE_THROUGHOUT: f64 = 1e-3;
-/// A channel that would lose more than this part of its samples has no knocks: its noise level changes all the time, and the
-/// levels between are no better known than those of the supposed knocks.
+/// Largest part of the samples in knocks; beyond it the level wanders all the time, and the channel has none.
 const LARGEST_SHARE: f64 = 0.1;
-/// How often a record is tested again without the knocks that were found.
+/// Most rounds, each without the knocks that were found.
 const PASSES: usize = 8;
-/// Fewest differences in a stretch whose time another channel has given.
 const FEWEST_DIFFERENCES: usize = 16;
-/// Stretches of the same length on either side with which it is compared.
 const SIDE: i64 = 6;
-/// The end of a knock is where the ln likelihood has fallen by half of the 95 % quantile of χ² with one degree of freedom.
+/// Half of the 95 % quantile of χ² with one degree of freedom: loss of ln likelihood at the end of a knock.
 const LIKELIHOOD_LOSS: f64 = 1.92;
-/// Square of a difference, over the level of the knock, above which it counts as this: a single sample does not extend a
-/// knock. Of normal differences 0.3 % are larger.
+/// Cap on the square of a difference over the knock's level, against single samples; 0.3 % of normal ones are larger.
 const LARGEST_SQUARE: f64 = 9.0;
 
-/// A knock in one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Knock {
-    /// Sample periods that are left out: those that may belong to it.
+    /// Sample periods that may belong to it and are left out.
     pub slots: Range<u64>,
-    /// Its first sample period and the one after its last.
     from: BoundedSlot,
     to: BoundedSlot,
     /// Standard deviation of the differences over that of the neighbours, with 95 % bounds.
     level: f64,
     level_bounds: (f64, f64),
-    /// Averaging factor of the differences.
     n: usize,
-    /// Probability by chance anywhere in the record, or at a time that another channel has given.
+    /// p-value for anywhere in the record, or for a time known from another channel.
     p_value: f64,
 }
 
-/// A sample period with its 95 % bounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct BoundedSlot {
     value: u64,
@@ -64,45 +55,39 @@ struct BoundedSlot {
     high: u64,
 }
 
-/// How the noise level of one channel scatters where there is no knock.
+/// The scatter of one channel's noise level without knocks.
 #[derive(Debug, Clone)]
 pub(crate) struct KnockRule {
     scales: Vec<Scale>,
-    /// Least level of the neighbours: where the noise does not reach from one count to the next, the level depends on the
-    /// distance of the bias from a count's edge.
+    /// Least level of the neighbours, against noise below one count.
     floor: f64,
 }
 
-/// One averaging time.
 #[derive(Debug, Clone)]
 struct Scale {
     n: usize,
-    /// Of blocks of [`FEW_DIFFERENCES`] and of [`DIFFERENCES`].
+    /// Blocks of [`FEW_DIFFERENCES`] and of [`DIFFERENCES`].
     blocks: [Blocks; 2],
-    /// The same where levels of one length move by themselves, and those of the others are taken to move too.
     moving: Option<[Blocks; 2]>,
 }
 
-/// Blocks of so many differences and of doublings of their length.
 #[derive(Debug, Clone)]
 struct Blocks {
     size: usize,
-    /// For each doubling.
     freedoms: Vec<BlockFreedom>,
-    /// Whether levels of one of the lengths move by themselves, also without the loudest stretch, which may be a knock.
+    /// True if levels of one length wander, also without the loudest stretch, which may be a knock.
     moves: bool,
 }
 
-/// Which levels are taken to move by themselves.
+/// Lengths at which levels are taken to wander.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Moving {
-    /// Those of a length that shows it, or of a longer one.
+    /// The length that shows it, and longer ones.
     OwnLength,
-    /// All of an averaging time at which one length shows it: the noise of shorter ones may hide it.
+    /// All lengths of an averaging time of which one shows it: the noise of shorter ones may hide it.
     AnyLength,
 }
 
-/// Degrees of freedom of the level of a block, and of that of its neighbours, and how it moves by itself.
 #[derive(Debug, Clone, Copy)]
 struct BlockFreedom {
     block: f64,
@@ -110,31 +95,24 @@ struct BlockFreedom {
     wandering: Option<Wandering>,
 }
 
-/// A block that is too loud.
 #[derive(Clone)]
 struct LoudBlock {
     scale: usize,
-    /// Differences of the block.
     differences: Range<usize>,
-    /// Level of its neighbours.
     quiet: f64,
     ratio: f64,
     freedom: BlockFreedom,
-    /// 1 where it is above [`SIGNIFICANCE`].
     p_value: f64,
 }
 
-/// Which blocks are tested.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum BlockSize {
-    /// [`FEW_DIFFERENCES`] and doublings of their number. Of a longer knock they would find the loudest part, and two or three spikes make one
-    /// of them loud: they are tested where there is neither.
+    /// Tested only where there is neither a longer knock nor a spike.
     Few,
-    /// [`DIFFERENCES`] and doublings of their number.
     Many,
 }
 
-/// Knocks in channels that were recorded together, by channel, in the order of time, by one rule a channel.
+/// Knocks by channel, in the order of time, with one rule a channel.
 pub(crate) fn find_by(rules: &[KnockRule], channels: &[Series], size: BlockSize) -> Vec<Vec<Knock>> {
     let pairs: Vec<(&KnockRule, &Series)> = rules.iter().zip(channels).collect();
     let mut found: Vec<Vec<Knock>> = in_parallel(&pairs, |(rule, series)| rule.find(series, size, Moving::OwnLength));
@@ -151,7 +129,7 @@ pub(crate) fn find_by(rules: &[KnockRule], channels: &[Series], size: BlockSize)
     found
 }
 
-/// Leaves out what one channel alone shows, where its level may move by itself in a way that other lengths of blocks show.
+/// Drops a knock of one channel alone that a wandering level, seen at other lengths of blocks, may explain.
 fn leave_out_movements(channels: &[(&KnockRule, &Series)], size: BlockSize, found: &mut [Vec<Knock>]) {
     let sought: Vec<_> = channels.iter().zip(found.iter()).collect();
     let standing = in_parallel(&sought, |((rule, series), own)| {
@@ -169,7 +147,6 @@ fn leave_out_movements(channels: &[(&KnockRule, &Series)], size: BlockSize, foun
 }
 
 impl KnockRule {
-    /// Fits the rule to a channel.
     pub(crate) fn fit(series: &Series, dithered_avar_counts2: f64) -> Self {
         let count = series.resolution * series.resolution;
         let mut is_dithered = false;
@@ -205,12 +182,11 @@ impl KnockRule {
         Self { scales, floor }
     }
 
-    /// Whether there is a difference between [`Moving::OwnLength`] and [`Moving::AnyLength`].
+    /// True if [`Moving::OwnLength`] and [`Moving::AnyLength`] differ.
     fn moves_at_other_lengths(&self) -> bool {
         self.scales.iter().any(|scale| scale.moving.is_some())
     }
 
-    /// Knocks of a channel, in no order.
     fn find(&self, series: &Series, size: BlockSize, moving: Moving) -> Vec<Knock> {
         let mut rest = series.clone();
         let mut knocks: Vec<Knock> = Vec::new();
@@ -231,14 +207,14 @@ impl KnockRule {
         knocks
     }
 
-    /// The knocks around the loudest blocks of a series, by chance in half of [`SIGNIFICANCE`]; none overlaps another.
+    /// Knocks around the loudest blocks, by chance in half of [`SIGNIFICANCE`]; none overlaps another.
     fn loudest(&self, series: &Series, size: BlockSize, moving: Moving) -> Vec<Knock> {
         let scales: Vec<SquaredDifferences> =
             self.scales.iter().map(|scale| SquaredDifferences::new(series, scale.n)).collect();
         let (mut blocks, mut tests) = (Vec::<LoudBlock>::new(), 0_usize);
         for (scale, differences) in scales.iter().enumerate() {
             let [few, many] = self.scales[scale].blocks_by(moving);
-            // A short knock may be in halves of two blocks.
+            // A short knock may lie in halves of two blocks.
             let (of_size, from) = match size {
                 BlockSize::Few => (few, [0, FEW_DIFFERENCES / 2].as_slice()),
                 BlockSize::Many => (many, [0].as_slice()),
@@ -251,7 +227,7 @@ impl KnockRule {
         }
         let limit = 0.5 * SIGNIFICANCE / tests.max(1) as f64;
         let slots_of = |block: &LoudBlock| scales[block.scale].slots(block.differences.clone());
-        // Of a level that moves by itself, where that shows most.
+        // Probability by the wandering level, at the scale that shows it most.
         let by_itself = |block: &LoudBlock| {
             let own = slots_of(block);
             let is_around = |other: &Range<u64>| {
@@ -265,7 +241,7 @@ impl KnockRule {
             block.p_value < limit && self.is_loud_throughout(block, &scales[block.scale]) && by_itself(block) < limit
         };
         let mut blocks: Vec<&LoudBlock> = blocks.iter().filter(is_knock).collect();
-        // Probabilities below the smallest float are equal; the higher level is then the better located one.
+        // Probabilities that underflow are equal; the higher level is then the better located one.
         blocks.sort_by(|a, b| a.p_value.total_cmp(&b.p_value).then(b.ratio.total_cmp(&a.ratio)));
         let mut knocks: Vec<Knock> = Vec::new();
         for block in blocks {
@@ -274,7 +250,7 @@ impl KnockRule {
             let is_near = |other: &Knock| {
                 slots.start < other.slots.end + reach && other.slots.start < slots.end.saturating_add(reach)
             };
-            // What is near a louder block is tested again without it.
+            // Blocks near a louder one are tested in the next round.
             if !knocks.iter().any(is_near) {
                 knocks.push(knock_around(block, &scales[block.scale], 2.0 * block.p_value * tests as f64));
             }
@@ -282,8 +258,7 @@ impl KnockRule {
         knocks
     }
 
-    /// The blocks of one averaging time and size, from the difference `from` on, with the probability of each by chance, and how many were
-    /// tested.
+    /// Loud blocks of one averaging time and size from `from` on with p-values, and the number tested.
     fn loud_blocks(
         &self,
         (scale, Blocks { size, freedoms, .. }): (usize, &Blocks),
@@ -307,7 +282,7 @@ impl KnockRule {
                 let quiet = quiet.max(self.floor);
                 let ratio = level / quiet;
                 if ratio > 1.0 && ratio.is_finite() {
-                    // The probability of most is of no use, and takes longest.
+                    // Skips the costly tail where the result is not needed.
                     let p_value =
                         if ratio < least { 1.0 } else { exceedance(ratio, freedom.block, freedom.neighbours) };
                     let differences = from + at * size..from + (at + 1) * size;
@@ -318,8 +293,7 @@ impl KnockRule {
         (loud, tested)
     }
 
-    /// Whether the smaller half of the squares of a block is larger than that of its neighbours too. Where the bias jumps
-    /// several times in a block, some of its squares are large and the others are as elsewhere.
+    /// True if the smaller half of the squares is too large as well, unlike at jumps of the bias.
     fn is_loud_throughout(&self, block: &LoudBlock, differences: &SquaredDifferences) -> bool {
         let size = block.differences.len();
         let (at, from) = (block.differences.start / size, block.differences.start % size);
@@ -334,8 +308,7 @@ impl KnockRule {
         exceedance(level / quiet.max(self.floor), freedom, others) < SIGNIFICANCE_THROUGHOUT
     }
 
-    /// Whether a level that moves by itself explains how loud a series is in these sample periods: where it is loudest against the blocks around
-    /// them, of all averaging times, one of its blocks has as much with a probability of at least [`SIGNIFICANCE`].
+    /// True if a wandering level explains the loudness in these sample periods.
     pub(crate) fn moves_by_itself(&self, series: &Series, slots: &Range<u64>) -> bool {
         let of_scale = |scale: &Scale| {
             let Blocks { size, freedoms, .. } = &scale.blocks[0];
@@ -354,7 +327,6 @@ impl KnockRule {
         loudest.is_some_and(|(_, by_itself)| by_itself >= SIGNIFICANCE)
     }
 
-    /// A knock at the time of one in another channel.
     fn at_known_time(&self, series: &Series, known: &Knock) -> Option<Knock> {
         let tests = self.scales.len() as f64;
         let of_scale = |scale: &Scale| {
@@ -403,8 +375,7 @@ impl Scale {
 }
 
 impl Blocks {
-    /// `levels`, of which it may be known that they move by themselves, are those of `size` differences, which have `noise` degrees of
-    /// freedom in noise that does not change, and by shorter blocks at most those of `shorter`.
+    /// Degrees of freedom of `levels`: `noise` in steady noise, at most `shorter`, less if they wander.
     fn fit(
         differences: &SquaredDifferences,
         (levels, mut moves): (&[Option<f64>], bool),
@@ -416,7 +387,7 @@ impl Blocks {
         for doublings in doublings(differences, size, period_s) {
             let mut longer = longer_levels(levels, doublings);
             let of_noise = noise * f64::from(1_u32 << doublings);
-            // Levels that move at a short length, by themselves or together, do so at a longer one, which may have too few blocks to show it.
+            // Levels that wander at a short length do so at a longer one, which may have too few blocks to show it.
             let shorter = freedoms.last().map_or(shorter, |freedom| freedom.times(2.0));
             let scatter = LevelScatter::new(&longer);
             let by_scatter = scatter.as_ref().map_or(f64::INFINITY, LevelScatter::freedom);
@@ -433,7 +404,7 @@ impl Blocks {
     }
 }
 
-/// Takes out the levels of the loudest stretch that is as long as all knocks of a channel may be.
+/// Removes the levels of the loudest stretch, as long as all knocks of a channel may be together.
 fn remove_loudest(levels: &mut [Option<f64>]) {
     let length = ((LARGEST_SHARE * levels.len() as f64).ceil() as usize).max(1);
     let sum = |from: &usize| levels[*from..from + length].iter().flatten().sum::<f64>();
@@ -444,34 +415,31 @@ fn remove_loudest(levels: &mut [Option<f64>]) {
 }
 
 impl BlockFreedom {
-    /// Of a block of so many times the length, at most.
+    /// Upper bound for blocks `longer` times the length.
     fn times(self, longer: f64) -> Self {
         Self { block: longer * self.block, neighbours: longer * self.neighbours, ..self }
     }
 }
 
-/// Adds a knock to `knocks`, or extends those that it follows or precedes at less than the length of the shorter to one.
+/// Adds a knock, or merges it with those at less distance than the length of the shorter.
 pub(super) fn join(knocks: &mut Vec<Knock>, mut knock: Knock) {
     while let Some(near) = knocks.iter().position(|other| other.is_near(&knock)) {
-        // The one that was found first is the louder one, and keeps its level.
+        // The first one found is louder and keeps its level.
         knock = knocks.remove(near).extended_by(&knock);
     }
     knocks.push(knock);
 }
 
-/// The likeliest stretch of a raised level around a block.
-///
-/// The level is tried at the square root of the block's ratio, so that the stretch includes the rise and the decay.
+/// The likeliest stretch of a raised level around a block, tried at the root of the block's ratio.
 fn knock_around(block: &LoudBlock, differences: &SquaredDifferences, p_value: f64) -> Knock {
     let quiet = block.quiet / TRIMMED_MEAN;
     let tried = block.ratio.sqrt();
     let length = block.differences.len();
-    // ln likelihood ratio of each difference; correlated differences count as fewer.
+    // ln likelihood ratio of each difference; correlated ones count as fewer.
     let weight = 0.5 * block.freedom.block / length as f64;
     let window =
         block.differences.start.saturating_sub(4 * length)..(block.differences.end + 4 * length).min(differences.len());
     let gain = |square: f64| {
-        // A difference with a missing sample has no square, and says nothing.
         if !square.is_finite() {
             return 0.0;
         }
@@ -479,12 +447,10 @@ fn knock_around(block: &LoudBlock, differences: &SquaredDifferences, p_value: f6
         weight * (ratio * (1.0 - 1.0 / tried) - tried.ln())
     };
     let gains: Vec<f64> = differences.squares(window.clone()).map(gain).collect();
-    // Running sums of the gains: a stretch gains the difference of two of them.
     let mut sums = vec![0.0];
     for gain in &gains {
         sums.push(sums[sums.len() - 1] + gain);
     }
-    // The likeliest stretch begins at or before the middle of the block and ends after it.
     let middle = (block.differences.start + block.differences.end) / 2 - window.start;
     let by = |a: &usize, b: &usize| sums[*a].total_cmp(&sums[*b]);
     let start = (0..=middle).min_by(by).unwrap_or(middle);
@@ -496,7 +462,6 @@ fn knock_around(block: &LoudBlock, differences: &SquaredDifferences, p_value: f6
     };
     let (start_low, start_high) = bounds(&mut starts(), start);
     let (end_low, end_high) = bounds(&mut ends(), end);
-    // The level of what belongs to it for certain.
     let certain = if end_low > start_high + FEWEST_DIFFERENCES { start_high..end_low } else { start..end };
     let inside = differences.squares(window.start + certain.start..window.start + certain.end);
     let (sum, count) =
@@ -504,7 +469,7 @@ fn knock_around(block: &LoudBlock, differences: &SquaredDifferences, p_value: f6
     let ratio = sum / f64::max(count, 1.0) / quiet;
     let freedom = block.freedom.block * count / length as f64;
     let half = NORMAL_975 * (2.0 / freedom + 2.0 / block.freedom.neighbours).sqrt();
-    // A difference is that of its average and the next one, so that the first one that is loud begins one average early.
+    // A difference spans its average and the next one, so the first loud one begins one average early.
     let n = differences.n as u64;
     let at = |number: usize| differences.slots(window.start + number..window.start + number).start;
     let from = BoundedSlot { value: at(start) + n, low: at(start_low), high: at(start_high) + 2 * n };
@@ -521,10 +486,9 @@ fn knock_around(block: &LoudBlock, differences: &SquaredDifferences, p_value: f6
 }
 
 impl From<Disturbance> for Knock {
-    /// Its level is that of the samples that stand out, against single samples.
     fn from(of: Disturbance) -> Self {
         let bounded = |value: u64, low: u64, high: u64| BoundedSlot { value, low, high };
-        // Of a mean square of so many degrees of freedom.
+        // Half interval of a mean square with `count` degrees of freedom.
         let half = NORMAL_975 * (0.5 / of.count as f64).sqrt();
         Self {
             from: bounded(of.certain.start, of.slots.start, of.certain.start),
@@ -539,8 +503,7 @@ impl From<Disturbance> for Knock {
 }
 
 impl Knock {
-    /// Adds the disturbances that single samples show to the knocks of a channel of so many samples, up to the part of it that knocks may
-    /// have, and puts all in the order of time.
+    /// Adds disturbances to a channel's knocks, up to [`LARGEST_SHARE`], in the order of time.
     pub(crate) fn add_disturbances(knocks: &mut Vec<Self>, disturbances: Vec<Disturbance>, samples: usize) {
         let mut with = knocks.clone();
         disturbances.into_iter().for_each(|disturbance| join(&mut with, disturbance.into()));
@@ -551,7 +514,7 @@ impl Knock {
         knocks.sort_by_key(|knock| knock.slots.start);
     }
 
-    /// Whether it follows or precedes another one at less than the length of the shorter.
+    /// True if the gap is less than the length of the shorter.
     fn is_near(&self, other: &Self) -> bool {
         let length = |knock: &Self| knock.slots.end - knock.slots.start;
         let reach = length(self).min(length(other));
@@ -559,7 +522,6 @@ impl Knock {
             && other.slots.start <= self.slots.end.saturating_add(reach)
     }
 
-    /// This one, from the earlier start to the later end of both.
     fn extended_by(mut self, other: &Self) -> Self {
         if other.slots.start < self.slots.start {
             (self.slots.start, self.from) = (other.slots.start, other.from);
@@ -570,19 +532,17 @@ impl Knock {
         self
     }
 
-    /// Whether both have a sample period in common.
     pub(crate) fn overlaps(&self, other: &Self) -> bool {
         self.slots.start < other.slots.end && other.slots.start < self.slots.end
     }
 
-    /// The knock of a series as it is reported; `channels` are the names of those that show it, the channel's own included.
+    /// The reported knock; `channels` names all channels that show it, this one included.
     pub(crate) fn detection(&self, series: &Series, channels: &[&'static str]) -> Detection {
         let excluded = series.slots.iter().copied().filter(|slot| self.slots.contains(slot)).collect();
         let effect = self.interval(series.period_s, channels).into();
         Detection { effect, correction: Some(Correction::Exclude(excluded)) }
     }
 
-    /// The same of samples of this period, s.
     pub(crate) fn interval(&self, period_s: f64, channels: &[&'static str]) -> NoisyInterval {
         let time = |slot: u64| slot as f64 * period_s;
         let bounded = |of: BoundedSlot| BoundedEstimate::new(time(of.value), time(of.low), time(of.high));

@@ -1,11 +1,8 @@
-//! The covariance that white, flicker and random-walk noise give the means of equal blocks.
+//! The covariance of the means of equal blocks in white, flicker and random-walk noise, on a grid of mixtures with
+//! equal prior probability.
 //!
-//! The mixture of the three noises is unknown, so the covariances form a grid over the ratios of flicker noise and random
-//! walk to white noise. All points of the grid have the same prior probability: a record that holds few periods of the
-//! slowest noise leaves many of them possible.
-//!
-//! All mixtures with one ratio of flicker to white noise are diagonal in one basis, in which the sum of these two has the variance
-//! 1: that of the generalised eigenvectors of the walk's covariance. So a grid of 153 mixtures needs nine matrices.
+//! All mixtures with one ratio of flicker to white noise are diagonal in the basis of the walk's generalised
+//! eigenvectors, so 153 mixtures need nine matrices.
 
 use super::block_means::{BLOCKS, BlockMeans};
 use crate::parallel::in_parallel;
@@ -13,50 +10,39 @@ use nalgebra::{DMatrix, DVector, DVectorView};
 use std::f64::consts::{LN_2, PI};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// Variances of flicker noise (B²) and of a walk's increment over a block, relative to the white variance of a block's
-/// mean: 0, and this number of values from the least on, two to a decade.
+/// Least value and number of values of B² and of a walk's variance per block, over a mean's white variance, beside 0.
 const FLICKER: (f64, usize) = (1e-2, 8);
 const WALK: (f64, usize) = (1e-5, 16);
-/// Fills of blocks are rounded to a multiple of this.
 const FILL_STEP: f64 = 1.0 / 64.0;
 
-/// The covariances of all mixtures, for one set of blocks.
+/// The covariances of all mixtures for one set of blocks.
 pub type NoiseGrid = Arc<Vec<NoiseFamily>>;
 
 /// The mixtures with one ratio of flicker to white noise.
 pub struct NoiseFamily {
-    /// Column `b` has the coordinates of a 1 in block `b`.
+    /// Column `b`: coordinates of a 1 in block `b`.
     basis: DMatrix<f64>,
-    /// Coordinates of a bias of 1.
     constant: DVector<f64>,
     pub mixtures: Vec<NoiseCovariance>,
 }
 
-/// Covariance of block means for one mixture of noises, in units of the white variance, with the mean of the record as an
-/// unknown constant.
+/// Covariance of block means for one mixture, in units of the white variance, with an unknown constant.
 pub struct NoiseCovariance {
-    /// Inverse variance of each coordinate.
     precisions: DVector<f64>,
-    /// `precisions` times the coordinates of the constant, over the root of the information on the constant.
+    /// `precisions` times the coordinates of the constant, over the root of its information.
     along_constant: DVector<f64>,
-    /// Logarithm of the determinant of the covariance times the information on the constant, as REML has it.
+    /// ln determinant of the covariance times the information on the constant (REML).
     pub log_determinant: f64,
-    /// What it says of a step before each block: the same for every channel with these blocks.
     steps: OnceLock<StepInformation>,
 }
 
-/// What a covariance says of a step.
 struct StepInformation {
-    /// On the size of a step before each block, were it the only regressor.
     of_size: Vec<f64>,
-    /// Effective number of independent tests when a step is tried before every block.
     independent: f64,
 }
 
 impl NoiseFamily {
-    /// For blocks of these numbers and fills. Noise has the white variance 1 in the mean of a whole block, flicker noise
-    /// with B² = `flicker`, and a random walk that grows by the variance of each of `walks` over a block. `None` if the covariance is
-    /// not positive definite.
+    /// White variance 1 in a whole block, B² = `flicker`, a walk of variance `walks` per block; `None` if not definite.
     fn new(numbers: &[usize], fills: &[f64], flicker: f64, walks: impl Iterator<Item = f64>) -> Option<Self> {
         let coloured = flicker_covariance();
         let count = numbers.len();
@@ -64,8 +50,7 @@ impl NoiseFamily {
             let white = if row == column { 1.0 / fills[row] } else { 0.0 };
             white + flicker * coloured[numbers[row].abs_diff(numbers[column])]
         });
-        // Covariance of the means of a walk over two blocks: its variance in the middle of the earlier block; of a block with itself,
-        // at a third of it.
+        // Variance of the walk in the middle of the earlier block; a third of a block for the same block.
         let walk = DMatrix::from_fn(count, count, |row, column| {
             numbers[row.min(column)] as f64 + if row == column { 1.0 / 3.0 } else { 0.5 }
         });
@@ -92,28 +77,24 @@ impl NoiseFamily {
         Some(Self { basis, constant, mixtures })
     }
 
-    /// Coordinates of one value a block.
     pub(super) fn coordinates(&self, values: &DVector<f64>) -> DVector<f64> {
         &self.basis * values
     }
 
-    /// Coordinates of the values in each column.
     pub(super) fn coordinates_of_columns(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         &self.basis * columns
     }
 
-    /// For coordinates in columns, the products of each with a 1 in each block, in rows.
+    /// Products of the columns' coordinates with a 1 in each block, in rows.
     pub(super) fn products_with_blocks(&self, weighted: &DMatrix<f64>) -> DMatrix<f64> {
         weighted.transpose() * &self.basis
     }
 
-    /// Information of one of the mixtures on the size of a step before each block, were it the only regressor.
     pub(super) fn step_information<'a>(&self, mixture: &'a NoiseCovariance) -> &'a [f64] {
         &self.steps(mixture).of_size
     }
 
-    /// Effective number of independent tests when a step is tried before every block: the sum of acos of the correlation
-    /// of neighbouring steps, over π.
+    /// Effective number of independent tests of a step: Σ acos ρ/π with the correlation ρ of neighbouring steps.
     pub(super) fn independent_steps(&self, mixture: &NoiseCovariance) -> f64 {
         self.steps(mixture).independent
     }
@@ -124,15 +105,13 @@ impl NoiseFamily {
 }
 
 impl NoiseCovariance {
-    /// The inverse covariance, projected so that it does not see a constant, times the values with these coordinates: the product of
-    /// what is returned with the coordinates of other values is their weighted product.
+    /// Coordinates times the inverse covariance, without the constant.
     pub(super) fn weighted(&self, coordinates: &DVector<f64>) -> DVector<f64> {
         let mut weighted = self.precisions.component_mul(coordinates);
         weighted.axpy(-self.along_constant.dot(coordinates), &self.along_constant, 1.0);
         weighted
     }
 
-    /// The same for the values in each column.
     pub(super) fn weighted_columns(&self, coordinates: &DMatrix<f64>) -> DMatrix<f64> {
         let mut weighted = coordinates.clone();
         for mut column in weighted.column_iter_mut() {
@@ -143,7 +122,7 @@ impl NoiseCovariance {
         weighted
     }
 
-    /// Weighted sum of the squares of values with these coordinates, of which the constant does not see anything.
+    /// Weighted sum of squares of the values with these coordinates, without the constant.
     pub(super) fn square(&self, coordinates: DVectorView<'_, f64>) -> f64 {
         let weighted = self.precisions.component_mul(&coordinates);
         weighted.dot(&coordinates) - self.along_constant.dot(&coordinates).powi(2)
@@ -153,7 +132,7 @@ impl NoiseCovariance {
 impl StepInformation {
     fn new(family: &NoiseFamily, mixture: &NoiseCovariance) -> Self {
         let size = family.basis.ncols();
-        // The step before the first block is the constant, on which there is no information.
+        // The step before the first block is the constant.
         let mut step = family.constant.clone();
         let later = family.basis.column_iter().take(size - 1).map(|block| {
             step -= block;
@@ -172,7 +151,7 @@ impl StepInformation {
     }
 }
 
-/// The grids of a recording's channels: one for each set of blocks, computed once.
+/// The grids of a recording's channels: one per set of blocks, computed once.
 #[derive(Default)]
 pub struct NoiseGrids {
     known: Mutex<Vec<(Layout, NoiseGrid)>>,
@@ -190,7 +169,7 @@ impl NoiseGrids {
         if layout.0.len() == BLOCKS && layout.1.iter().all(|&fill| f64::from(fill) * FILL_STEP == 1.0) {
             return WITHOUT_GAPS.get_or_init(|| noise_grid(&layout)).clone();
         }
-        // After a panic elsewhere the list is still valid: entries are added whole.
+        // Valid after a panic elsewhere: entries are added whole.
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, grid)) = known.iter().find(|(other, _)| *other == layout) {
             return grid.clone();
@@ -211,10 +190,7 @@ fn noise_grid((numbers, fills): &Layout) -> NoiseGrid {
     Arc::new(families.into_iter().flatten().collect())
 }
 
-/// Covariance of the means of two blocks in flicker noise with B = 1, by the distance of the blocks.
-///
-/// Flicker noise is approximated by Gauss-Markov processes with correlation times an octave apart, each of the variance
-/// B²·ln 2/π, from an eighth of a block to four records. Faster ones only add to the white noise.
+/// Covariance of the means of two blocks in flicker noise with B = 1, a sum of Gauss-Markov processes, by distance.
 fn flicker_covariance() -> Vec<f64> {
     let mut covariance = vec![0.0; BLOCKS];
     let mut time = 0.125;
@@ -227,8 +203,7 @@ fn flicker_covariance() -> Vec<f64> {
     covariance
 }
 
-/// Covariance of the means of two blocks in a Gauss-Markov process of variance 1 whose correlation time is `time` blocks,
-/// by the distance of the blocks.
+/// Covariance of block means in a Gauss-Markov process of variance 1, time constant in blocks, by their distance.
 pub fn markov_covariance(time: f64) -> impl Iterator<Item = f64> {
     let decay = move |blocks: f64| (-blocks / time).exp();
     (0..).map(move |distance: usize| {
@@ -246,10 +221,8 @@ mod tests {
     use super::{BLOCKS, NoiseFamily, flicker_covariance};
     use nalgebra::{DMatrix, DVector};
 
-    /// Weighted products, determinant and information on steps of a mixture, by the inverse of its covariance.
     #[test]
     fn mixtures_weigh_as_the_inverse_of_their_covariance() {
-        // Two blocks are missing, and one has half of its samples.
         let numbers: Vec<usize> = (0..BLOCKS).filter(|number| ![5, 70].contains(number)).collect();
         let count = numbers.len();
         let fills: Vec<f64> = (0..count).map(|at| if at == 30 { 0.5 } else { 1.0 }).collect();

@@ -1,9 +1,7 @@
 //! Noise level of a channel over time: mean squares of second differences over blocks, at several averaging times.
 //!
-//! A level is compared with those of the neighbouring blocks, on either side. The ratio of two mean squares of noise that
-//! does not change has Fisher's F distribution. Its degrees of freedom are those of the differences' own correlation, and
-//! no more than the scatter of the levels from block to block allows, so that filtered noise, lines and a level that moves
-//! by itself have the false-alarm rate that is asked for.
+//! Levels of neighbouring blocks are compared by Fisher's F distribution, with no more degrees of freedom than the
+//! scatter of the levels allows.
 
 use crate::distributions::{quantile, student_tail};
 use crate::effects::findings::REFUTED;
@@ -13,52 +11,42 @@ use crate::samples::series::Series;
 use statrs::function::beta::checked_beta_reg;
 use std::ops::Range;
 
-/// Errors above this many standard deviations are left out of the estimate of the standard deviation; of normal errors it is
-/// 7·10⁻⁶.
+/// Errors above this many standard deviations are left out of the estimated deviation; 7·10⁻⁶ of normal ones.
 pub(super) const CLIP: f64 = 4.5;
-/// Differences of a block, the shortest of several lengths.
 pub(super) const DIFFERENCES: usize = 64;
-/// Differences of a shorter one: as many as a knock has that rings for a few periods. Without the largest tenth all but two are left.
+/// Differences of a still shorter block, for knocks that ring a few periods.
 pub(super) const FEW_DIFFERENCES: usize = 20;
-/// Longest averaging time of the differences, s: what moves more slowly is motion or drift and no level of noise.
+/// Longest averaging time of the differences, s; slower changes are motion or drift.
 const LONGEST_AVERAGE_S: f64 = 0.5;
-/// Longest block, s. Disturbances last seconds to minutes.
+/// Longest block, s; disturbances last seconds to minutes.
 const LONGEST_BLOCK_S: f64 = 128.0;
-/// The largest squares of a block, this part of them, are left out of its level: a jump of the bias or a few spikes make
-/// large differences, and are no noise.
+/// Part of a block's largest squares that its level leaves out, against jumps and spikes.
 const TRIMMED: f64 = 0.1;
-/// Mean of the squares of standard normal numbers without the largest tenth: P(χ²₃ < q)/0.9 with P(χ²₁ < q) = 0.9.
+/// Mean square of standard normal numbers without the largest tenth: P(χ²₃ < q)/0.9 with P(χ²₁ < q) = 0.9.
 pub(super) const TRIMMED_MEAN: f64 = 0.6231;
-/// The same without the larger half has degrees of freedom that are smaller by this factor: its relative variance is
-/// 0.0330/0.5²/0.1427² = 6.49, that without the largest tenth 2.56.
+/// Degrees of freedom without the larger half over those without the largest tenth: 0.0330/0.5²/0.1427² = 6.49.
 pub(super) const HALF_EFFICIENCY: f64 = 2.56 / 6.49;
-/// Variance of that mean over that of the mean of all squares, each relative to its expectation (the winsorised variance,
-/// 0.806/0.9², over 0.6231²·2).
+/// Relative variance of the mean of all squares over that of the trimmed mean (0.806/0.9²/0.6231² over 2).
 const EFFICIENCY: f64 = 1.0 / 1.282;
-/// Blocks on either side that a block is compared with, beyond the one next to it, and how many of them there must be.
+/// Most blocks compared on either side beyond the next one, and the least number.
 pub(super) const NEIGHBOURS: usize = 12;
 const FEWEST_NEIGHBOURS: usize = 6;
 /// Variance of the median of normal numbers over that of their mean: π/2.
 const MEDIAN_LOSS: f64 = std::f64::consts::FRAC_PI_2;
-/// An average is used if at least this part of its samples is there.
 const LEAST_FILL: f64 = 0.9;
-/// Blocks from which on their scatter bounds the degrees of freedom.
+/// Fewest blocks whose scatter bounds the degrees of freedom.
 const FEWEST_FOR_SCATTER: usize = 24;
-/// Stretches, and differences in each, from which the correlations of a long record are estimated: with 65,536 products each is
-/// known to 0.004, and the degrees of freedom to a thousandth.
+/// Stretches of a long record, and differences in each: 65,536 products determine a correlation to 0.004.
 const STRETCHES: usize = 64;
 const STRETCH: usize = 1024;
-/// Degrees of freedom beyond which a level is taken to be exact.
+/// Degrees of freedom of a level that is taken as exact.
 const MOST_FREEDOM: f64 = 1e6;
-/// Relative standard deviation of a scatter by the distance of the 90 % quantile from the median of n normal numbers, times √n: that distance
-/// has the variance 0.1·0.9/0.1755² + 0.5²/0.3989² − 2·0.1·0.5/(0.1755·0.3989) = 3.07, over [`NORMAL_90`]².
+/// Relative standard deviation times √n of a scatter by the 90 % quantile's distance from the median.
 const SCATTER_ERROR: f64 = 1.37;
-/// Steps by halves within an octave in which a ratio is sought.
 const RATIO_STEPS: usize = 20;
-/// The 90 % quantile of the standard normal distribution.
 const NORMAL_90: f64 = 1.2816;
 
-/// Averaging factors at which levels are estimated, samples: powers of two.
+/// Averaging factors, samples: powers of two.
 pub(super) fn averaging_factors(period_s: f64) -> impl Iterator<Item = usize> {
     (0..).map(|octave| 1_usize << octave).take_while(move |&n| n == 1 || n as f64 * period_s <= LONGEST_AVERAGE_S)
 }
@@ -66,14 +54,12 @@ pub(super) fn averaging_factors(period_s: f64) -> impl Iterator<Item = usize> {
 /// Squares of the differences of neighbouring averages over `n` samples; one for each average but the last.
 pub(super) struct SquaredDifferences {
     pub(super) n: usize,
-    /// First sample period of the first average.
     start: u64,
     /// `NaN` where an average has too few samples.
     differences: Vec<f64>,
 }
 
 impl SquaredDifferences {
-    /// `n` is a power of two.
     pub(super) fn new(series: &Series, n: usize) -> Self {
         let start = series.span.start;
         let shift = n.trailing_zeros();
@@ -95,44 +81,38 @@ impl SquaredDifferences {
             if a == full && b == full {
                 return sums[at + 1] / full - sums[at] / full;
             }
-            // White noise has the same variance in every difference, however many samples are missing.
+            // Normalised: white noise has the same variance in every difference, whatever is missing.
             (sums[at + 1] / b - sums[at] / a) / (0.5 * n as f64 * (1.0 / a + 1.0 / b)).sqrt()
         };
         Self { n, start, differences: (0..count.saturating_sub(1)).map(difference).collect() }
     }
 
-    /// Number of differences.
     pub(super) fn len(&self) -> usize {
         self.differences.len()
     }
 
-    /// The squares of some differences.
     pub(super) fn squares(&self, differences: Range<usize>) -> impl Iterator<Item = f64> + '_ {
         self.differences[differences].iter().map(|value| value * value)
     }
 
-    /// Number of the first difference that begins at or after a sample period.
     pub(super) fn number(&self, slot: u64) -> usize {
         (slot.saturating_sub(self.start)).div_ceil(self.n as u64) as usize
     }
 
-    /// Sample periods of the averages of some differences.
     pub(super) fn slots(&self, differences: Range<usize>) -> Range<u64> {
         let at = |number: usize| self.start + number as u64 * self.n as u64;
         at(differences.start)..at(differences.end + 1)
     }
 
-    /// Mean of the squares of some differences without the largest tenth; `None` where half of them are missing.
+    /// Mean of the squares without the largest tenth; `None` if half of them are missing.
     pub(super) fn trimmed_level(&self, differences: Range<usize>) -> Option<f64> {
         self.level_without(TRIMMED, differences, &mut Vec::new())
     }
 
-    /// The same without the larger half.
     pub(super) fn half_level(&self, differences: Range<usize>) -> Option<f64> {
         self.level_without(0.5, differences, &mut Vec::new())
     }
 
-    /// `present` is a buffer.
     fn level_without(&self, left_out: f64, differences: Range<usize>, present: &mut Vec<f64>) -> Option<f64> {
         let all = differences.len();
         let within = self.differences.get(differences)?.iter().map(|value| value * value);
@@ -148,21 +128,19 @@ impl SquaredDifferences {
         Some(present[..kept].iter().sum::<f64>() / kept as f64)
     }
 
-    /// Levels of the blocks of `size` differences, from the difference `from` on.
     pub(super) fn levels(&self, size: usize, from: usize) -> Vec<Option<f64>> {
         let mut present = Vec::with_capacity(size);
         let starts = (from..(self.differences.len() + 1).saturating_sub(size)).step_by(size);
         starts.map(|start| self.level_without(TRIMMED, start..start + size, &mut present)).collect()
     }
 
-    /// Degrees of freedom of the blocks of [`FEW_DIFFERENCES`] and of [`DIFFERENCES`], by the correlation of the differences:
-    /// `m/(1 + 2 Σ (1 − k/m) ρ_k²)` with their autocorrelation ρ, for `m` of them.
+    /// Degrees of freedom of blocks of [`FEW_DIFFERENCES`] and of [`DIFFERENCES`]: `m/(1 + 2 Σ (1 − k/m) ρ_k²)`.
     pub(super) fn freedoms(&self) -> [f64; 2] {
         let covariances = Covariances::new(&self.differences);
         let variance = covariances.at(0).0;
         let square = |lag: usize| {
             let (covariance, count) = covariances.at(lag);
-            // The square of an estimated correlation is too large by about one over the number of products.
+            // The square of an estimated correlation is too large by about 1/count.
             ((covariance / variance).powi(2) - f64::max(count, 1.0).recip()).max(0.0)
         };
         let squares: Vec<f64> = (1..DIFFERENCES).map(|lag| if variance > 0.0 { square(lag) } else { 0.0 }).collect();
@@ -174,17 +152,15 @@ impl SquaredDifferences {
     }
 }
 
-/// Mean products of differences some places apart.
+/// Mean products of differences at a lag.
 struct Covariances {
-    /// 0 where a difference is missing.
     values: Vec<f64>,
-    /// 1 of each difference that is there, 0 of a missing one; empty where none is missing.
+    /// 1 or 0 per difference; empty if none is missing.
     present: Vec<f64>,
 }
 
 impl Covariances {
-    /// Of all `differences`, or of a long record of stretches that are spread evenly over it, with as many missing ones between
-    /// them as lags are asked for.
+    /// From all `differences`, or from [`STRETCHES`] of a long record, separated by missing values.
     fn new(differences: &[f64]) -> Self {
         if differences.len() > 2 * STRETCHES * STRETCH {
             let from = |stretch: usize| stretch * (differences.len() - STRETCH) / (STRETCHES - 1);
@@ -208,7 +184,6 @@ impl Covariances {
         Self { values, present }
     }
 
-    /// Mean product at a distance of `lag`, and the number of products.
     fn at(&self, lag: usize) -> (f64, f64) {
         let later = |of: &'_ [f64]| lag.min(of.len());
         let count = if self.present.is_empty() {
@@ -220,8 +195,7 @@ impl Covariances {
     }
 }
 
-/// Sum of the products of the elements of two slices, up to the end of the shorter one, in eight sums that a processor adds
-/// to at once.
+/// Sum of products up to the end of the shorter slice, in eight sums for SIMD.
 fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
     const LANES: usize = 8;
     let length = a.len().min(b.len());
@@ -235,7 +209,6 @@ fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
 }
 
-/// Means of `2^doublings` neighbouring levels each; `None` where half of them are missing.
 pub(super) fn longer_levels(levels: &[Option<f64>], doublings: u32) -> Vec<Option<f64>> {
     let size = 1_usize << doublings;
     let mean = |chunk: &[Option<f64>]| {
@@ -245,7 +218,7 @@ pub(super) fn longer_levels(levels: &[Option<f64>], doublings: u32) -> Vec<Optio
     levels.chunks_exact(size).map(mean).collect()
 }
 
-/// Sizes of the blocks, as doublings of `size` differences, at which a record is examined: as long as a block has neighbours.
+/// Doublings of `size` differences at which a record is examined, as long as a block has neighbours.
 pub(super) fn doublings(differences: &SquaredDifferences, size: usize, period_s: f64) -> impl Iterator<Item = u32> {
     let shortest_s = (size * differences.n) as f64 * period_s;
     let blocks = differences.len() / size;
@@ -261,7 +234,7 @@ pub(super) fn doublings(differences: &SquaredDifferences, size: usize, period_s:
     (0..24).take_while(is_examined)
 }
 
-/// For each block the medians of the blocks before it and after it, [`NEIGHBOURS`] at most, without the next one on either side.
+/// Medians of up to [`NEIGHBOURS`] blocks before and after each block, without the next one on either side.
 pub(super) struct Neighbourhood {
     sides: Vec<[Option<f64>; 2]>,
 }
@@ -275,7 +248,6 @@ impl Neighbourhood {
             FEWEST_NEIGHBOURS.. => Some(median(&mut known[known_of].to_vec())),
             _ => None,
         };
-        // How many levels are known before each block.
         let mut before = vec![0];
         for level in levels {
             before.push(before[before.len() - 1] + usize::from(level.is_some()));
@@ -287,16 +259,14 @@ impl Neighbourhood {
         Self { sides: (0..levels.len()).map(sides).collect() }
     }
 
-    /// The level that the neighbours of a block of `freedom` degrees of freedom show: the larger one of the sides. At an end of the record,
-    /// where one side has too few blocks, it is that of the other side.
+    /// Level of the neighbours of a block: that of the louder side, or at an end of the record the known one.
     pub(super) fn level(&self, at: usize, freedom: f64) -> Option<f64> {
         let level = self.sides[at].into_iter().flatten().max_by(f64::total_cmp)?;
         // Median of χ²/ν by Wilson and Hilferty.
         Some(level / (1.0 - 2.0 / (9.0 * freedom)).max(0.3).powi(3))
     }
 
-    /// Degrees of freedom of that level, for blocks of `freedom` each: those of the median of as many independent blocks, and no more than
-    /// the medians of both sides of the blocks differ from each other.
+    /// Degrees of freedom of that level: of a median of blocks, and no more than the medians of both sides allow.
     pub(super) fn freedom(&self, freedom: f64) -> f64 {
         let independent = freedom * NEIGHBOURS as f64 / MEDIAN_LOSS;
         let change = |sides: &[Option<f64>; 2]| match *sides {
@@ -305,12 +275,11 @@ impl Neighbourhood {
         };
         let Some(changes) = sorted(self.sides.iter().filter_map(change).collect()) else { return independent };
         let deviation = (quantile_of(&changes, 0.9) - quantile_of(&changes, 0.1)) / (2.0 * NORMAL_90);
-        // The logarithm of a mean square of ν degrees of freedom has the variance 2/ν, and there are two sides.
+        // ln of a mean square of ν degrees of freedom has the variance 2/ν; two sides.
         independent.min(4.0 / (deviation * deviation))
     }
 }
 
-/// The [`median`]s of each `width` neighbouring values.
 fn running_medians(values: &[f64], width: usize) -> Vec<f64> {
     let mut window: Vec<f64> = Vec::with_capacity(width);
     let mut medians = Vec::with_capacity(values.len());
@@ -327,14 +296,13 @@ fn running_medians(values: &[f64], width: usize) -> Vec<f64> {
     medians
 }
 
-/// How the levels of the blocks of one length scatter around those nearby.
+/// Scatter of the levels of one block length around those nearby.
 pub(super) struct LevelScatter {
-    /// Of each level over the median of those around it, in ascending order.
+    /// Each level over the median around it, in ascending order.
     ratios: Vec<f64>,
 }
 
 impl LevelScatter {
-    /// `None` for few blocks.
     pub(super) fn new(levels: &[Option<f64>]) -> Option<Self> {
         let known: Vec<f64> = levels.iter().copied().flatten().collect();
         let medians = running_medians(&known, (2 * NEIGHBOURS + 1).min(known.len()));
@@ -345,19 +313,16 @@ impl LevelScatter {
         Some(Self { ratios })
     }
 
-    /// Standard deviation of the logarithm of a ratio, by the distance of the 90 % quantile from the median, which a tenth of disturbed blocks does
-    /// not move.
+    /// Standard deviation of ln ratio by the 90 % quantile, which a tenth of disturbed blocks does not move.
     fn deviation(&self) -> f64 {
         (quantile_of(&self.ratios, 0.9) / quantile_of(&self.ratios, 0.5)).ln() / NORMAL_90
     }
 
-    /// Degrees of freedom of a mean square that scatters as much.
     pub(super) fn freedom(&self) -> f64 {
         2.0 / self.deviation().powi(2)
     }
 
-    /// How the level moves by itself, where its noise has `freedom` degrees of freedom in a block; `None` where it scatters as that noise does,
-    /// unless it is `known` to move from shorter blocks.
+    /// Wandering beyond noise of `freedom` degrees of freedom; `None` without it, unless `known` from shorter blocks.
     pub(super) fn wandering(&self, freedom: f64, known: bool) -> Option<Wandering> {
         let most = 1.0 + quantile(REFUTED) * SCATTER_ERROR / (self.ratios.len() as f64).sqrt();
         if !known && self.deviation() < most * (2.0 / freedom).sqrt() {
@@ -366,53 +331,48 @@ impl LevelScatter {
         let lowest = quantile_of(&self.ratios, 0.1);
         let excess = |part: f64| (quantile_of(&self.ratios, part) - lowest).ln();
         let deviation = (excess(0.9) - excess(0.5)) / NORMAL_90;
-        // Counts that seldom change have half of the levels at their lowest.
         let freedom = 0.5 * self.ratios.len() as f64 / SCATTER_ERROR.powi(2);
         let median = excess(0.5);
         (deviation > 0.0 && deviation.is_finite()).then_some(Wandering { lowest, median, deviation, freedom })
     }
 }
 
-/// In ascending order; `None` of fewer than [`FEWEST_FOR_SCATTER`].
+/// In ascending order; `None` if fewer than [`FEWEST_FOR_SCATTER`].
 fn sorted(mut values: Vec<f64>) -> Option<Vec<f64>> {
     values.sort_by(f64::total_cmp);
     (values.len() >= FEWEST_FOR_SCATTER).then_some(values)
 }
 
-/// Of values in ascending order.
 fn quantile_of(values: &[f64], part: f64) -> f64 {
     values[((values.len() - 1) as f64 * part).round() as usize]
 }
 
-/// A level that moves by itself, as that of a vibration. Most of it may be other noise, which does not move, so that it is high for a short
-/// time more often than its median scatter tells: the logarithm of what it has above its lowest tenth is taken as normal.
+/// A wandering level, as that of a vibration; log-normal above its lowest tenth, which is steady noise.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wandering {
-    /// Level over those around it, in the lowest tenth of the blocks.
+    /// Level over those around it in the lowest tenth of the blocks.
     lowest: f64,
-    /// Median and deviation of the logarithm of what there is above.
+    /// Median and deviation of the logarithm of the excess.
     median: f64,
     deviation: f64,
-    /// Degrees of freedom of the deviation.
     freedom: f64,
 }
 
 impl Wandering {
-    /// Probability of a level of at least `ratio` times those around it, by Student's distribution.
+    /// Probability of at least `ratio` times the level around, by Student's distribution.
     pub(super) fn exceedance(&self, ratio: f64) -> f64 {
         let excess = (ratio - self.lowest).max(0.0).ln();
         student_tail((excess - self.median) / self.deviation, self.freedom)
     }
 }
 
-/// Probability that a mean square of `freedom` degrees of freedom exceeds another one of `of_other`, of the same
-/// expectation, by the factor `ratio`: the upper tail of Fisher's F distribution.
+/// Upper tail of Fisher's F distribution, for a `ratio` of mean squares with these degrees of freedom.
 pub(super) fn exceedance(ratio: f64, freedom: f64, of_other: f64) -> f64 {
     let (freedom, of_other) = (freedom.min(MOST_FREEDOM), of_other.min(MOST_FREEDOM));
     checked_beta_reg(0.5 * of_other, 0.5 * freedom, of_other / (of_other + freedom * ratio)).unwrap_or(1.0)
 }
 
-/// The ratio whose [`exceedance`] is `p_value`, to less than one part in a million.
+/// The ratio whose [`exceedance`] is `p_value`, to 10⁻⁶.
 pub(super) fn ratio_by_chance(p_value: f64, freedom: f64, of_other: f64) -> f64 {
     let exceeds = |ratio: f64| exceedance(ratio, freedom, of_other) > p_value;
     let (mut low, mut high) = (1.0, 2.0);
@@ -422,7 +382,7 @@ pub(super) fn ratio_by_chance(p_value: f64, freedom: f64, of_other: f64) -> f64 
     end_of((low, high), RATIO_STEPS, exceeds)
 }
 
-/// Standard deviation of the non-zero entries of `errors`, without those above [`CLIP`] standard deviations.
+/// Standard deviation of the non-zero `errors`, without those above [`CLIP`] deviations.
 pub(super) fn clipped_deviation(errors: &[f64]) -> f64 {
     let mut limit = f64::INFINITY;
     let mut deviation = 0.0;

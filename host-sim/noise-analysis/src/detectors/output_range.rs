@@ -1,5 +1,4 @@
-//! What the output of a channel can express: whether its samples are cut off at the end of a range, whether its noise
-//! reaches from one count to the next, and whether there are codes that its converter never gives.
+//! Limits of a channel's output: samples cut off at an end, noise below a count, missing codes.
 
 use crate::bounds::BoundedEstimate;
 use crate::detectors::effective_lsb::greatest_common_divisor;
@@ -11,36 +10,30 @@ use crate::samples::rounding::{DITHERED_OCTAVES, dithered_avar};
 use crate::samples::series::Series;
 use measurement::ChannelProfile;
 
-/// Samples at an end of the values from which on the channel is cut off there. Three times as many as at any other value, by
-/// chance alone, have a probability of 4·10⁻⁵: that of 20 or more events where 7 are expected.
+/// Fewest samples at an end; chance makes 20 where 7 are expected with a probability of 4·10⁻⁵.
 const FEWEST_AT_AN_END: u64 = 20;
-/// How many times more often than any other value an end occurs. The arcsine distribution of a sinusoid, which has the
-/// sharpest ends of all smooth signals, has 1/(√2 − 1) = 2.4 times as many samples in its last count as in the one before.
+/// Least ratio of an end to any other value; a sinusoid has 1/(√2 − 1) = 2.4.
 const PILED: u64 = 3;
-/// Fewest other values: of a few values, such as those of a signal that repeats, none is an end of a range.
+/// Fewest other values; with few values, none is an end of a range.
 const FEWEST_VALUES: usize = 10;
-/// Most bins in which values are counted: all those of a converter of 14 bits by themselves.
+/// Most bins: the codes of a converter of 14 bits.
 const MOST_BINS: i64 = 1 << 14;
-/// Fewest missing codes: one between two others may be that between two levels of the signal, such as those of a random telegraph.
+/// Fewest missing codes; a single one may separate two levels of a telegraph signal.
 const FEWEST_MISSING: usize = 2;
-/// Fewest samples whose noise is compared with a count.
 const FEWEST_SAMPLES: usize = 100;
 
-/// How often each value of a channel occurs, in memory that does not grow with their number: values far apart are counted in bins
-/// of several counts.
+/// Histogram of a channel's values in bounded memory: bins widen with their range.
 #[derive(Default)]
 pub(crate) struct ValueCounts {
     bins: Vec<u64>,
     /// Number of the first bin; bin `b` has the counts from `b·2^width_log2` on.
     first: i64,
     width_log2: u32,
-    /// Smallest and largest value, counts.
     extremes: Option<(i32, i32)>,
     samples: u64,
 }
 
 impl ValueCounts {
-    /// Takes the next value, counts.
     pub(crate) fn push(&mut self, value: i32) {
         let (least, largest) = self.extremes.get_or_insert((value, value));
         (*least, *largest) = (value.min(*least), value.max(*largest));
@@ -66,7 +59,6 @@ impl ValueCounts {
         }
     }
 
-    /// Makes the bins twice as wide.
     fn widen(&mut self) {
         let first = self.first >> 1;
         let mut wider = vec![0; self.bins.len() / 2 + 1];
@@ -76,8 +68,7 @@ impl ValueCounts {
         (self.bins, self.first, self.width_log2) = (wider, first, self.width_log2 + 1);
     }
 
-    /// Samples that are cut off: at the ends of the `range` of the channel (in its unit, where it is known), or at another level.
-    /// `resolution` is the smallest distance of two values, in the channel's unit.
+    /// Samples cut off at the ends of the channel's range or at another level; `resolution` in the channel's unit.
     pub(crate) fn saturation(&self, channel: &ChannelProfile, resolution: f64) -> Option<Detection> {
         let (least, largest) = self.extremes?;
         let occurring: Vec<u64> = self.bins.iter().copied().filter(|count| *count > 0).collect();
@@ -108,13 +99,10 @@ impl ValueCounts {
         Some(Detection { effect: saturation.into(), correction: None })
     }
 
-    /// Codes that never occur, each between two that occur often. `resolution` is the distance of two codes, in the unit of the channel,
-    /// whose noise reaches over several of them.
+    /// Codes that never occur, each between two that occur often; `resolution` is their distance in `unit`.
     ///
-    /// A density with one peak is at least as high at a code as at the lower of its neighbours, so that a code that is not missing has no
-    /// sample by chance with a probability below `e^−n`, where n is the number of samples of the rarer neighbour. A converter lacks
-    /// codes at carries: all at the same distance from each other, two counts or more. Where the noise was scaled for a part of the record,
-    /// codes are missing in its tails alone.
+    /// A unimodal density leaves a code empty with a probability below `e^−n` for n samples of the rarer neighbour.
+    /// Codes missing at carries have one spacing of two counts or more. Scaled noise lacks codes only in its tails.
     pub(crate) fn missing_codes(&self, resolution: f64, unit: &'static str) -> Option<Detection> {
         if self.width_log2 > 0 {
             return None;
@@ -129,7 +117,6 @@ impl ValueCounts {
         let (&[(first, _), .., _], true) = (missing.as_slice(), missing.len() >= FEWEST_MISSING) else { return None };
         let spacing = missing.iter().map(|(at, _)| at - first).fold(0, greatest_common_divisor);
         let last = missing.last().map_or(first, |(at, _)| *at);
-        // Bin 0 is the first neighbour of number 0.
         let is_given = |at: u64| self.bins[at as usize + 1] > 0;
         if spacing < 2 || (first..=last).step_by(spacing as usize).any(is_given) {
             return None;
@@ -143,8 +130,7 @@ impl ValueCounts {
     }
 }
 
-/// Noise that does not reach from one count to the next: its Allan variance at the shortest octaves is below that of
-/// [dithered](dithered_avar) samples, whose variance is `dithered_avar_counts2` counts².
+/// Noise below a count: a first Allan variance below that of [dithered](dithered_avar) samples.
 #[must_use]
 pub(crate) fn find_noise_below_count(series: &Series, dithered_avar_counts2: f64) -> Option<Detection> {
     if series.values.len() < FEWEST_SAMPLES {
@@ -153,12 +139,11 @@ pub(crate) fn find_noise_below_count(series: &Series, dithered_avar_counts2: f64
     let curve = GappedCascade::of_series(series, 0..series.values.len()).curve(series.period_s);
     let octaves = curve.points().iter().take(DITHERED_OCTAVES);
     let deviations = octaves.map(|point| (point.avar.sqrt(), dithered_avar(dithered_avar_counts2, point.n).sqrt()));
-    // The nearest to its limit.
     let (counts, dithered_counts) = deviations.max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)))?;
     if counts > dithered_counts {
         return None;
     }
-    // Before the rounding it may be anything up to the limit.
+    // Before the rounding, any value up to the limit.
     let [deviation, limit] = [counts, dithered_counts].map(|counts| counts * series.resolution);
     let noise = NoiseBelowCount {
         deviation: BoundedEstimate::new(deviation, 0.0, limit).in_unit(series.unit),
@@ -178,7 +163,6 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
-    /// Normal values of deviation `deviation` counts that are cut off above `limit`.
     fn counted(deviation: f64, limit: i32) -> ValueCounts {
         let mut random = ChaCha8Rng::seed_from_u64(3);
         let mut counts = ValueCounts::default();
@@ -191,7 +175,7 @@ mod tests {
     #[test]
     fn values_that_are_cut_off_are_told_from_rare_ones() {
         let channel = profile(0.05).channel("gyro_x").expect("a gyro");
-        // Cut off at half a standard deviation; the second noise spreads over ten times as many counts as there are bins.
+        // Cut off at half a standard deviation; the second noise spreads over ten times as many counts as bins.
         for deviation in [10.0, MOST_BINS as f64] {
             let limit = (0.5 * deviation) as i32;
             let found = counted(deviation, limit).saturation(&channel, channel.lsb).expect("cut off");
@@ -205,7 +189,6 @@ mod tests {
         }
     }
 
-    /// Every eighth code, or none, becomes the next one, in normal noise of 10 counts and in a walk over as many.
     #[test]
     fn codes_that_never_occur_between_others_are_missing() {
         let mut random = ChaCha8Rng::seed_from_u64(4);
@@ -220,7 +203,6 @@ mod tests {
             counts.missing_codes(0.05, "deg/s").map(|found| found.effect)
         };
         let Some(Effect::MissingCodes(found)) = of(0.0, 8) else { panic!("none is found") };
-        // 21 samples or more are expected of each code within 3.5 standard deviations: −35 … 35 has 9 of −33, −25 … 31.
         assert!((8..=10).contains(&found.codes), "{found:?}");
         assert!((found.spacing.value - 0.4).abs() < 1e-12);
         for step in [0.0, 0.1] {
@@ -228,7 +210,6 @@ mod tests {
         }
     }
 
-    /// Twice as loud for a half of the record, by twice the counts.
     #[test]
     fn codes_that_scaled_noise_lacks_in_its_tails_are_not_missing() {
         let mut random = ChaCha8Rng::seed_from_u64(6);
@@ -240,7 +221,7 @@ mod tests {
         assert_eq!(counts.missing_codes(0.05, "deg/s"), None);
     }
 
-    /// A telegraph between two levels, each of which the noise spreads over three codes: the one between them is empty.
+    /// Each level spreads over three codes; the one between them is empty.
     #[test]
     fn a_gap_between_two_levels_is_no_missing_code() {
         let mut random = ChaCha8Rng::seed_from_u64(5);

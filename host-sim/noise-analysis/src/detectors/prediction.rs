@@ -1,33 +1,26 @@
 //! The best linear prediction of a sample from those before it, which shows a spike in front of a filter.
 //!
-//! A filter spreads a spike over as many samples as the noise in front of it. From both sides such a spike is interpolated by its own
-//! samples: what is left has 0.27 of its distance from the noise behind a mean of two values, and 0.5 behind one of eight. The error of a
-//! prediction is what is new in a sample, of the noise and of a spike alike, and keeps 0.96 and 0.84 of it. What an error of 1 adds to the
-//! samples from its own on is the filter's response to a spike.
+//! A filter spreads a spike as it does the noise, so interpolation keeps only 0.27 (mean of two values) to 0.5 (of
+//! eight) of the spike. The prediction error is the innovation and keeps 0.96 and 0.84 of it.
 
 use super::noise_levels::clipped_deviation;
 use crate::samples::interpolation::{Autocovariance, LEAST_WHITE, REACH};
 use crate::samples::series::Series;
 use nalgebra::{SMatrix, SVector};
 
-/// Samples from which one is predicted.
 const ORDER: usize = 2 * REACH;
-/// A response ends where less than this part of its largest value follows.
+/// A response ends where less than this part of its maximum follows.
 const LEFT: f64 = 0.25;
 
-/// The prediction of a channel whose noise is that behind a filter.
 pub(super) struct Prediction {
-    /// The weight of the samples before, the latest first.
     weights: [f64; ORDER],
-    /// What an error of 1 adds to the samples from its own on.
+    /// Response of the samples, from its own on, to an error of 1.
     response: Vec<f64>,
-    /// Standard deviation of the error, in the channel's unit.
     pub deviation: f64,
 }
 
 impl Prediction {
-    /// By the autocovariance of a series of this `mean`. `None` where an error does not end within the samples from which one is predicted, as in drift
-    /// or on a line, or is one of a single sample, as in white noise.
+    /// `None` if the response is longer than the prediction (drift, a line) or a single sample (white noise).
     pub(super) fn fit(series: &Series, covariance: &Autocovariance, mean: f64) -> Option<Self> {
         let white = |a: usize, b: usize| if a == b { LEAST_WHITE * covariance[0] } else { 0.0 };
         let entry = |a: usize, b: usize| covariance[a.abs_diff(b)] + white(a, b);
@@ -50,19 +43,17 @@ impl Prediction {
         Some(prediction)
     }
 
-    /// How many samples a spike changes.
     pub(super) fn length(&self) -> usize {
         self.response.len()
     }
 
-    /// The positions of those that a spike changes from one on, up to the next gap.
+    /// Positions that a spike changes from one on, up to the next gap.
     pub(super) fn changed(&self, series: &Series, position: usize) -> impl Iterator<Item = usize> {
         let end = (position + self.length()).min(series.values.len());
         (position..end).take_while(move |&at| series.is_gapless(position, at))
     }
 
-    /// The largest sum of the samples that a spike of an error of 1 changes, with weights for the distances to both sides of one: what is left of
-    /// it by an interpolation.
+    /// The largest remainder of a spike of error 1 after an interpolation with `weights`.
     pub(super) fn interpolated(&self, weights: &[f64; REACH]) -> f64 {
         let sample = |at: i64| usize::try_from(at).ok().and_then(|at| self.response.get(at)).copied().unwrap_or(0.0);
         let left = |at: i64| {
@@ -73,7 +64,7 @@ impl Prediction {
         (-reach..self.length() as i64 + reach).map(left).fold(0.0, f64::max)
     }
 
-    /// The error of the sample at `position` of values of this `mean`; 0 where one of those before it is missing.
+    /// Prediction error at `position`; 0 if a sample before it is missing.
     pub(super) fn error(&self, series: &Series, values: &[f64], mean: f64, position: usize) -> f64 {
         if position < ORDER || !series.is_gapless(position - ORDER, position) {
             return 0.0;
@@ -82,9 +73,7 @@ impl Prediction {
         values[position] - mean - before.map(|(weight, value)| weight * (value - mean)).sum::<f64>()
     }
 
-    /// Whether an error at `position` is that of a spike in front of the filter: of one error alone. A spike behind the filter is in the samples
-    /// from which the following ones are predicted too, and a jump of the bias, behind it or in front, in these as well. Neither of them, from
-    /// any sample on from which that at `position` is predicted, may take away more of the squares of the errors.
+    /// True if one innovation explains the error at `position`: a spike in front of the filter.
     pub(super) fn is_in_front(&self, series: &Series, values: &[f64], mean: f64, position: usize) -> bool {
         let behind: Vec<f64> = std::iter::once(1.0).chain(self.weights.map(|weight| -weight)).collect();
         let sums = behind.iter().scan(0.0, |sum, of| {
@@ -104,7 +93,6 @@ impl Prediction {
         is_less(&behind) && jumps.iter().all(is_less)
     }
 
-    /// Takes a spike off the values from `position` on.
     pub(super) fn subtract(&self, series: &Series, values: &mut [f64], position: usize, error: f64) {
         for (at, response) in self.changed(series, position).zip(&self.response) {
             values[at] -= error * response;

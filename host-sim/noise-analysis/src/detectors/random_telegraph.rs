@@ -1,8 +1,7 @@
 //! Random telegraph noise: jumps to and fro between two levels at random times.
 //!
-//! Its Allan variance and its spectrum are those of a Markov process, and over a few correlation times those of a random
-//! walk. The detector compares the likelihood of a hidden Markov chain of two states with that of a Gaussian process of any
-//! variance and correlation time, on means of equal parts of the record.
+//! The likelihood of a hidden Markov chain of two states is compared with that of a Gaussian process of the same
+//! spectrum, on means of equal parts.
 
 use super::telegraph_models::{TwoStateChain, gauss_markov_log_likelihood, white_log_likelihood};
 use crate::bounds::BoundedEstimate;
@@ -12,32 +11,27 @@ use crate::effects::{Spikes, TelegraphEvidence, TelegraphNoise};
 use crate::robust::deviation_from_zero;
 use crate::samples::uniform_series::UniformSeries;
 
-/// Numbers of parts into which the record is divided: few parts for long correlation times, many for short ones.
+/// Numbers of parts: few for long correlation times, many for short ones.
 const PARTS: [usize; 3] = [256, 1024, 4096];
-/// Parts per correlation time where the Allan curve has shown one; more than this resolve a time well enough.
+/// Most useful parts per correlation time, if the Allan curve shows one.
 const RESOLVED: f64 = 20.0;
-/// Least gain of the two levels in ln likelihood. A larger one has a probability below e⁻¹² where there are none.
+/// Least gain of the two levels in ln likelihood; probability below e⁻¹² without them.
 const LEAST_GAIN: f64 = 12.0;
-/// Parts of a record in which two levels are compared with a Gaussian process, at most: 3,000 correlation times.
+/// Most parts in which two levels are compared with a Gaussian process: 3,000 correlation times.
 const COMPARED_PARTS: usize = 1 << 16;
-/// How many times as likely a Gaussian process is as a telegraph signal, where it is named: a probability of 95 % where the two are as
-/// frequent.
+/// Likelihood ratio of a Gaussian process against a telegraph signal: 95 % if they are as frequent.
 pub(crate) const TOLD_APART: f64 = 19.0;
 /// Fewest jumps; one or two are steps of the bias.
 const FEWEST_JUMPS: f64 = 6.0;
-/// Least correlation time, in parts.
 const LEAST_TIME: f64 = 4.0;
-/// Least fraction of the record at each level.
 const LEAST_OCCUPANCY: f64 = 0.05;
-/// Largest variance around the levels: this multiple of the white variance, plus this fraction of the square of their
-/// distance for slow noise. A clipped sinusoid has about ten times as much.
+/// Largest variance around the levels, in white variances; a clipped sinusoid has ten times as much.
 const WHITE_FACTOR: f64 = 1.5;
 const SLOW_FRACTION: f64 = 0.01;
-/// Parts of a time constant over which a change is taken: a decay loses a fifth in it.
+/// Parts of a time constant per change: a decay loses a fifth.
 const PER_CHANGE: f64 = 4.0;
 
-/// Looks for telegraph noise in a channel with the given unit. `correlation_times` are those that its Allan curve has shown,
-/// in s.
+/// `correlation_times`, in s, are those in the Allan curve.
 #[must_use]
 pub(crate) fn find(series: &UniformSeries, unit: &'static str, correlation_times: &[f64]) -> Option<TelegraphNoise> {
     let samples = series.values().len();
@@ -63,8 +57,7 @@ pub(crate) fn find(series: &UniformSeries, unit: &'static str, correlation_times
     found
 }
 
-/// Whether a Gaussian process is [`TOLD_APART`] times as likely as two levels, both with about this standard deviation and this correlation
-/// time, in s.
+/// True if a Gaussian process is [`TOLD_APART`] times as likely; correlation time in s.
 #[must_use]
 pub(crate) fn is_gaussian(series: &UniformSeries, deviation: f64, time_constant: f64) -> bool {
     let size = ((time_constant / RESOLVED / series.sample_period()) as usize).max(1);
@@ -75,12 +68,7 @@ pub(crate) fn is_gaussian(series: &UniformSeries, deviation: f64, time_constant:
     gauss_markov_log_likelihood(&means) - levels.log_likelihood > TOLD_APART.ln()
 }
 
-/// Whether a series changes upwards as it changes downwards, as random telegraph noise and every Gaussian process do, over a
-/// quarter of `time_constant` s. Disturbances that begin at once and decay do not.
-///
-/// In a process that is the same when time runs backwards the changes are symmetrical, so that the sum of their cubes over the
-/// root of the sum of their sixth powers is about a standard normal number; neighbouring changes have correlations below 0,
-/// which lower it.
+/// True if changes up and down over `time_constant`/4 s are alike: Σd³ over √Σd⁶ is then about standard normal.
 #[must_use]
 pub(crate) fn is_reversible(series: &UniformSeries, time_constant: f64) -> bool {
     let size = ((time_constant / PER_CHANGE / series.sample_period()) as usize).max(1);
@@ -93,9 +81,7 @@ pub(crate) fn is_reversible(series: &UniformSeries, time_constant: f64) -> bool 
     sixths <= 0.0 || cubes.abs() < quantile(0.5 * REFUTED) * sixths.sqrt()
 }
 
-/// Whether visits to a level of `telegraph` noise that last no longer than a sample are as frequent and as large as `spikes`. With
-/// the rates `a` and `b` of the jumps up and down there are `ab` times a sample period of them a second, at most a quarter of that
-/// over the square of the time constant `1/(a + b)`.
+/// True if visits of at most one sample explain `spikes`: `ab`·(sample period) a second, for the jump rates `a`, `b`.
 #[must_use]
 pub(crate) fn explains_spikes(telegraph: &TelegraphNoise, spikes: &Spikes, sample_period: f64) -> bool {
     let visits_per_hour =
@@ -103,15 +89,13 @@ pub(crate) fn explains_spikes(telegraph: &TelegraphNoise, spikes: &Spikes, sampl
     spikes.rate_per_hour.low <= visits_per_hour && spikes.size.low <= telegraph.amplitude.high
 }
 
-/// Means of equal parts of a record, minus the mean of the record; `NaN` where half of the samples or more are missing.
+/// Means of equal parts less the record's mean; `NaN` if at least half of the samples are missing.
 struct PartMeans {
     means: Vec<f64>,
-    /// Variance of white noise in a mean.
     white: f64,
 }
 
 impl PartMeans {
-    /// Parts of `size` samples.
     fn new(series: &UniformSeries, size: usize) -> Self {
         let level = series.mean();
         let mean = |values: &[f64]| {
@@ -122,7 +106,7 @@ impl PartMeans {
             if 2 * count > values.len() { sum / count as f64 } else { f64::NAN }
         };
         let means: Vec<f64> = series.values().chunks_exact(size).map(mean).collect();
-        // Differences of the halves of a part, or else of neighbouring parts; few of them contain a jump.
+        // Differences within a part or of neighbouring parts, few of which contain a jump.
         let differences: Vec<f64> = if size > 1 {
             let halves = series.values().chunks_exact(size).map(|part| part.split_at(size / 2));
             halves.map(|(a, b)| 0.5 * (mean(a) - mean(b))).collect()
@@ -133,15 +117,13 @@ impl PartMeans {
     }
 }
 
-/// Variance of normal numbers of the same median distance from 0 as those of `values` that are known.
+/// Variance of normal numbers with the median magnitude of `values`.
 fn robust_variance(values: Vec<f64>) -> f64 {
     deviation_from_zero(values.into_iter().filter(|value| value.is_finite())).powi(2)
 }
 
-/// The chain, and its gain in ln likelihood over any Gaussian process; `None` if the gain or a property of the chain is below
-/// its limit.
+/// The chain and its gain in ln likelihood over any Gaussian process; `None` if a limit is not met.
 fn fit(parts: &PartMeans) -> Option<(TwoStateChain, f64)> {
-    // White noise is one of the Gaussian processes.
     let chain = TwoStateChain::fit(&parts.means, white_log_likelihood(&parts.means) + LEAST_GAIN)?;
     let around = robust_variance(chain.residuals(&parts.means));
     let jumps = chain.jumps >= FEWEST_JUMPS && chain.correlation_time() > LEAST_TIME;
@@ -155,14 +137,11 @@ fn fit(parts: &PartMeans) -> Option<(TwoStateChain, f64)> {
     (gain > LEAST_GAIN).then_some((chain.with_errors(&parts.means), gain))
 }
 
-/// The largest variance of a mean around its level.
 fn largest_variance(chain: &TwoStateChain, parts: &PartMeans) -> f64 {
     WHITE_FACTOR * parts.white + SLOW_FRACTION * chain.distance().powi(2)
 }
 
-/// Whether the means stay where they are between two jumps: over all visits to a level, the mean of the first half of a visit, less
-/// its first part, and that of the second half, less its last one, differ by chance. Disturbances that decay begin above the level
-/// and end below it.
+/// True if the means stay constant between jumps, unlike those of decaying disturbances.
 fn stays_at_levels(chain: &TwoStateChain, parts: &PartMeans) -> bool {
     let variance = largest_variance(chain, parts);
     let is_up: Vec<bool> = parts.means.iter().map(|mean| chain.is_upper(*mean)).collect();
@@ -183,15 +162,13 @@ fn stays_at_levels(chain: &TwoStateChain, parts: &PartMeans) -> bool {
     sums.iter().all(|(sum, information)| sum.abs() <= quantile(0.25 * REFUTED) * information.sqrt())
 }
 
-/// The telegraph noise of `chain`, for parts of `part_s` seconds.
 fn telegraph_noise(chain: &TwoStateChain, gain: f64, part_s: f64, unit: &'static str) -> TelegraphNoise {
     let bounded = |value: f64, error: f64| {
         let factor = (NORMAL_975 * error).exp();
         BoundedEstimate::new(value, value / factor, value * factor)
     };
     let steps = chain.correlation_time();
-    // One part in 2·steps contains a jump, and its mean is a quarter of the distance off its level on average, at either
-    // level.
+    // One part in 2·steps contains a jump and is off its level by a quarter of the distance.
     let blurred = 0.25 / steps;
     let distance = chain.distance() / (1.0 - blurred);
     TelegraphNoise {
@@ -212,14 +189,12 @@ pub(crate) mod tests {
     const SAMPLES: usize = 40_000;
     pub(crate) const PERIOD_S: f64 = 0.01;
 
-    /// White noise of deviation 1 over 400 s plus the values of `next`.
     pub(crate) fn series(seed: u64, mut next: impl FnMut(&mut ChaCha8Rng, usize) -> f64) -> UniformSeries {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let value = |at| next(&mut random, at) + random.sample::<f64, _>(StandardNormal);
         UniformSeries::new(PERIOD_S, (0..SAMPLES).map(value).collect())
     }
 
-    /// A Gaussian process of this standard deviation, with the correlation time `time_s`.
     fn markov(deviation: f64, time_s: f64) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
         let kept = (-PERIOD_S / time_s).exp();
         let mut state = 0.0;
@@ -229,7 +204,6 @@ pub(crate) mod tests {
         }
     }
 
-    /// Two levels at a distance of `amplitude`, with the correlation time `time_s`.
     pub(crate) fn telegraph(amplitude: f64, time_s: f64) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
         let mut up = false;
         move |random, _| {
@@ -238,7 +212,6 @@ pub(crate) mod tests {
         }
     }
 
-    /// Two levels with a correlation time of 0.1 s: of 40,000 samples `ab·T·40,000` begin a visit of one, 100 with the rates a = b = 5/s.
     #[test]
     fn visits_of_a_sample_are_no_spikes() {
         let estimate = |value: f64| BoundedEstimate::new(value, 0.9 * value, 1.1 * value);
@@ -308,7 +281,7 @@ pub(crate) mod tests {
             level
         });
         let markov = series(33, markov(1.0, 4.0));
-        // Disturbances of size 4 that begin at random, 25 s apart on average, and decay within 8 s.
+        // Disturbances of size 4, 25 s apart on average, that decay within 8 s.
         let mut height = 0.0;
         let decays = series(35, move |random, _| {
             height *= (-PERIOD_S / 8.0).exp();
@@ -324,7 +297,7 @@ pub(crate) mod tests {
         assert_eq!(find(&UniformSeries::new(PERIOD_S, vec![1.0; 10_000]), "g", &[]), None);
     }
 
-    /// A process of 0.4 of the white noise of a sample, over 400 to 4,000 correlation times: the kurtosis of its curve is known to 0.2 at best.
+    /// Over 400 to 4,000 correlation times the kurtosis is known to 0.2 at best.
     #[test]
     fn two_levels_are_told_from_a_gaussian_process_of_the_same_spectrum() {
         for time in [0.1, 0.3, 1.0] {

@@ -1,11 +1,7 @@
-//! Spikes: single samples that do not belong to their neighbours.
+//! Spikes: single samples that differ from the best linear interpolation by their neighbours.
 //!
-//! Each sample is compared with the best linear interpolation from its neighbours, which follows from the autocovariance of
-//! the data. In white noise that is their mean; in filtered noise, on a sinusoid or in drift it is far more precise. The
-//! interpolation error is normal, so the threshold for N samples comes from N times the normal tail; noise whose errors have a heavier tail
-//! [is no spike](Interpolation::least_beyond_tail). Behind a filter, which spreads a spike,
-//! each sample is compared with its [prediction](super::prediction) first. Where the noise is louder, as in a
-//! vibration whose level wanders, it is as many deviations of the errors around a sample.
+//! The threshold for N samples follows from the normal tail, [a heavier one](Interpolation::least_beyond_tail), or
+//! louder noise around. Behind a filter the [prediction](super::prediction) is tested first.
 
 use super::noise_levels::{CLIP, clipped_deviation};
 use super::prediction::Prediction;
@@ -25,96 +21,79 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Fewest neighbours that must be there on either side.
 const FEWEST_ON_A_SIDE: u32 = REACH as u32 / 2;
 
-/// Samples around whose median values are clipped for the autocovariance: over several of them a drift that is larger than the noise of a
-/// sample is not.
+/// Samples per median for clipping: over several of them drift exceeds the noise of a sample.
 const CLIPPED_BLOCK: usize = 256;
 
-/// The means of the neighbours before and after a spike differ by less than this fraction of it; otherwise it is a jump of
-/// the bias.
+/// Largest difference of the means before and after a spike, as a fraction of it; beyond it is a jump of the bias.
 const SETTLED: f64 = 0.5;
 
-/// Samples on either side by which the noise around a sample is judged: its level may change within some of them, and a level that is
-/// hardly higher is told by many.
+/// Samples on either side that give the noise around a sample: few for fast changes, many for small ones.
 const AROUND: [usize; 4] = [16, 32, 64, FARTHEST];
 const FARTHEST: usize = 128;
 
-/// A disturbance ends where it would have decayed, exponentially, to this part of the deviation of the interpolation error: the rest of
-/// its energy is below that of half a sample of noise for each of its time constants.
+/// Part of the deviation at which an exponential decay ends; the rest has little energy.
 const DECAYED: f64 = 0.3;
-/// Most that a disturbance is longer on either side than the samples that stand out, in the length of these.
+/// Longest extension of a disturbance on either side, in lengths of what stands out.
 const LONGEST_DECAY: f64 = 4.0;
 
-/// Highest probability by which chance puts a spike into the time of a knock, where it is taken for a part of it.
+/// Highest probability of a chance spike at the time of a knock that makes it a part of the knock.
 const COINCIDENCE: f64 = 0.05;
 
-/// Parts of normal errors beyond which the tail of the errors is looked at.
+/// Parts of normal errors beyond which the tail is examined.
 const TAILS: [f64; 2] = [1e-2, 1e-3];
 
-/// Least fraction of the spikes that is assumed to exceed the threshold; bounds the rate that the detected ones imply.
+/// Least assumed fraction of spikes above the threshold; bounds the implied rate.
 const LEAST_DETECTED: f64 = 0.05;
 
-/// What is expected of the samples of a channel, and by how much a spike exceeds its error.
 pub(crate) struct SpikeRule {
     interpolation: Interpolation,
-    /// Where a spike in front of a filter shows more by it.
+    /// Present if it shows spikes in front of a filter better.
     prediction: Option<Prediction>,
-    /// Least error of a spike, in standard deviations.
     least: f64,
-    /// Mean of most of the distances of neighbouring samples, in the channel's unit.
+    /// Trimmed mean distance of neighbouring samples, in the channel's unit.
     difference: f64,
 }
 
-/// What a rule finds in samples of its channel.
 #[derive(Clone, Default)]
 pub(crate) struct FoundSpikes {
-    /// In ascending order within what was looked at.
     spikes: Vec<FoundSpike>,
     /// Candidates that are jumps of the bias.
     jumps: usize,
 }
 
-/// A sample that its neighbours do not tell.
 #[derive(Clone, Copy)]
 struct FoundSpike {
-    /// Sample period.
     slot: u64,
-    /// By how much it exceeds what is expected, in the channel's unit, without its sign.
+    /// Magnitude of the error, in the channel's unit.
     size: f64,
-    /// The same in standard deviations of the error of a single sample, or of its prediction.
     sigmas: f64,
-    /// Whether it is what a filter, as far as it is known, has made of an earlier spike.
+    /// True if it is a filter's response to an earlier spike.
     is_response: bool,
-    /// Whether it stands out of the noise around it too.
+    /// True if it stands out of the noise around it.
     stands_out: bool,
 }
 
-/// A spike in front of a filter.
 struct FilteredSpike {
-    /// Of the first sample that it changes.
     position: usize,
-    /// Error of the prediction, without its sign, in the channel's unit and in standard deviations.
+    /// In the channel's unit.
     size: f64,
     sigmas: f64,
-    /// Whether it is what the response to a larger one leaves.
+    /// True if it is a remainder of the response to a larger one.
     is_response: bool,
 }
 
-/// Samples in a row that do not belong to the noise: longer than the interpolation reaches over, and so no spikes that a filter has
-/// spread.
+/// Outliers in a row, longer than an interpolation spans: no filtered spikes.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Disturbance {
     /// Sample periods from the first sample that stands out to the last one.
     pub certain: Range<u64>,
-    /// Those in which it may be more than a part of the noise.
+    /// Sample periods in which it may exceed a part of the noise.
     pub slots: Range<u64>,
-    /// Root mean square of the interpolation errors that stand out, in standard deviations.
     pub level: f64,
-    /// How many stand out.
     pub count: usize,
-    /// Probability that independent spikes stand as close together anywhere.
+    /// p-value of independent spikes this close together anywhere.
     pub p_value: f64,
 }
 
@@ -123,18 +102,15 @@ impl FoundSpikes {
         Self { spikes: self.spikes.iter().filter(|spike| kept(spike)).copied().collect(), jumps: self.jumps }
     }
 
-    /// Those in the sample periods `slots`.
     pub(crate) fn within(&self, slots: &Range<u64>) -> Self {
         self.kept(|spike| slots.contains(&spike.slot))
     }
 
-    /// Those in none of these stretches.
     fn outside(&self, stretches: &[Range<u64>]) -> Self {
         self.kept(|spike| !stretches.iter().any(|of| of.contains(&spike.slot)))
     }
 
-    /// Sample periods of those in `slots`, if chance puts as many there or into another stretch of this length, of `samples` samples in all: by
-    /// the rate of the events elsewhere, and one more, which is not known better. Each is of as many samples as those are.
+    /// Sample periods of the events in `slots`, if chance puts as many into a stretch of this length.
     pub(crate) fn by_chance_within(&self, slots: &Range<u64>, samples: u64) -> Vec<u64> {
         let (inside, others) = (self.within(slots), self.kept(|spike| !slots.contains(&spike.slot)));
         let events = others.events().len() as f64;
@@ -145,37 +121,31 @@ impl FoundSpikes {
         if p_value < REFUTED { Vec::new() } else { inside.slots().collect() }
     }
 
-    /// Those before a sample period. Where jumps of the bias are, is not known.
+    /// The spikes before a sample period; `jumps` is kept.
     pub(crate) fn before(&self, slot: u64) -> Self {
         Self { jumps: 0, ..self.kept(|spike| spike.slot < slot) }
     }
 
-    /// Those that are no part of louder noise. Where most stand out of the noise around them, so do the others: a burst of a few samples,
-    /// or noise that is louder by chance. Where most do not, the level wanders. A record that is read in blocks is not asked: what of a
-    /// block is left out has to be known before the next one is read.
+    /// The spikes that are no part of louder noise: all, if most stand out locally.
     pub(crate) fn out_of_noise(&self) -> Self {
         let stands_out = self.spikes.iter().filter(|spike| spike.stands_out).count();
         let wanders = 2 * stands_out < self.spikes.len();
         self.kept(|spike| spike.stands_out || !wanders)
     }
 
-    /// Adds those of later samples.
     pub(crate) fn extend(&mut self, later: Self) {
         self.spikes.extend(later.spikes);
         self.jumps += later.jumps;
     }
 
-    /// Their sample periods.
     pub(crate) fn slots(&self) -> impl Iterator<Item = u64> {
         self.spikes.iter().map(|spike| spike.slot)
     }
 
-    /// The sample period and the interpolation error of each.
     pub(crate) fn samples(&self) -> impl Iterator<Item = (u64, f64)> {
         self.spikes.iter().map(|spike| (spike.slot, spike.size))
     }
 
-    /// Positions of the samples that stand out with no more than [`REACH`] sample periods between them.
     fn events(&self) -> Vec<Range<usize>> {
         let mut events: Vec<Range<usize>> = Vec::new();
         for at in 0..self.spikes.len() {
@@ -187,8 +157,7 @@ impl FoundSpikes {
         events
     }
 
-    /// The sizes of the spikes in `samples` samples: what a filter or the platform spreads over several samples is one spike, of the
-    /// largest size. Where independent spikes stand as close together as often, each is one.
+    /// Sizes of the independent spikes in `samples` samples; a spike spread by a filter counts once.
     fn sizes_of_events(&self, samples: u64) -> Vec<f64> {
         let events = self.events();
         let joined = (self.spikes.len() - events.len()) as u64;
@@ -199,24 +168,23 @@ impl FoundSpikes {
         events.into_iter().map(|event| self.spikes[event].iter().map(|spike| spike.size).fold(0.0, f64::max)).collect()
     }
 
-    /// How many there are of which none is the response of a filter to another.
+    /// Number without filter responses.
     fn independent(&self) -> usize {
         self.spikes.iter().filter(|spike| !spike.is_response).count()
     }
 
-    /// Whether there are spikes, and more of them than jumps of the bias.
     fn are_spikes(&self) -> bool {
         self.independent() > self.jumps
     }
 }
 
 impl SpikeRule {
-    /// The rule of a channel; `None` if it has fewer than 600 samples or never changes.
+    /// `None` with fewer than 600 samples, or if the channel never changes.
     pub(crate) fn fit(series: &Series) -> Option<Self> {
         Self::fit_for(series, series.values.len() as u64)
     }
 
-    /// The same for a channel of `samples` samples in all, some of which are those of `series`.
+    /// For `samples` samples, of which `series` has some.
     pub(crate) fn fit_for(series: &Series, samples: u64) -> Option<Self> {
         if series.values.len() < 100 * REACH {
             return None;
@@ -226,14 +194,13 @@ impl SpikeRule {
         Some(Self { interpolation, prediction, least, difference: typical_difference(series) })
     }
 
-    /// Sample periods of the spikes in a part of the same channel, but for those in `louder` noise, in ascending order; none if jumps of the bias
-    /// are at least as frequent.
+    /// Sample periods outside of `louder` noise, in ascending order; none if jumps of the bias are as frequent.
     pub(crate) fn slots(&self, series: &Series, louder: &[Range<u64>]) -> Vec<u64> {
         let found = self.find_around(series, self.interpolation.mean).out_of_noise().outside(louder);
         if found.are_spikes() { found.slots().collect() } else { Vec::new() }
     }
 
-    /// What there is in a part of the same channel, whose bias may be another one. Where its noise is larger, so is a spike.
+    /// The outliers in a part of the same channel, whose bias and noise level may differ.
     pub(crate) fn find(&self, series: &Series) -> FoundSpikes {
         self.find_around(series, series.values.iter().sum::<f64>() / series.values.len().max(1) as f64)
     }
@@ -247,11 +214,10 @@ impl SpikeRule {
         interpolation.spikes(series, self.prediction.as_ref(), self.least, louder.max(1.0))
     }
 
-    /// What was found in `samples` samples as single spikes and as disturbances, in ascending order.
+    /// Separates the outliers in `samples` samples into single spikes and disturbances, in ascending order.
     ///
-    /// Samples that stand out with no more than [`REACH`] sample periods between them are of one event. Of events at the rate that is
-    /// found, the next one follows as closely with the probability `1 − exp(−rate·REACH)`. An event that is longer than an interpolation
-    /// reaches over, and that chance does not make of single ones, is a disturbance.
+    /// Outliers with at most [`REACH`] sample periods between them are one event. An event beyond chance that is longer
+    /// than an interpolation spans is a disturbance.
     pub(crate) fn separate(&self, found: FoundSpikes, samples: u64) -> (FoundSpikes, Vec<Disturbance>) {
         let events = found.events();
         let near = near_by_chance(events.len(), samples);
@@ -285,9 +251,7 @@ impl SpikeRule {
         (found.kept(|spike| is_single(&spike.slot)), disturbances)
     }
 
-    /// What `singles`, which stand out of `samples` samples, show of the `known` disturbances, those of other channels or of this one: each
-    /// of these ranges in which, or within its length of which, some stand out, and where chance puts one of the others in fewer than
-    /// one of twenty cases.
+    /// The parts of the `known` disturbances that `singles` show, with a chance below one in twenty.
     pub(crate) fn parts_of(&self, singles: &FoundSpikes, known: &[Range<u64>], samples: u64) -> Vec<Disturbance> {
         let around = |known: &Range<u64>| {
             let length = known.end - known.start;
@@ -301,7 +265,7 @@ impl SpikeRule {
             let inside: Vec<usize> = events.iter().filter(|event| is_within(event, known)).cloned().flatten().collect();
             let (first, last) = (singles.spikes[*inside.first()?].slot, singles.spikes[*inside.last()?].slot);
             let window = around(known);
-            // One more than those that are there, whose rate is not known better.
+            // The rate of the others, and one more.
             let expected = (others + 1) as f64 * (window.end - window.start) as f64 / samples.max(1) as f64;
             let squares = inside.iter().map(|&at| singles.spikes[at].sigmas.powi(2));
             let count = inside.len();
@@ -316,15 +280,13 @@ impl SpikeRule {
         known.iter().filter_map(part).collect()
     }
 
-    /// Whether chance finds as many, or one as large, in `samples` samples with less than [`SIGNIFICANCE`]. Beyond the threshold it has
-    /// one in a channel with [`REFUTED`], and two with half of its square.
+    /// True if chance finds as many, or one as large, in `samples` samples with less than [`SIGNIFICANCE`].
     fn is_beyond_chance(&self, found: &FoundSpikes, samples: u64) -> bool {
         let large = quantile(0.5 * SIGNIFICANCE / samples as f64);
         found.independent() > 1 || found.spikes.iter().any(|spike| spike.sigmas > large)
     }
 
-    /// The spikes of a channel in `unit` that was looked at for `hours`, in `samples` samples, as they are reported; `None` if there are
-    /// none, or if jumps of the bias are at least as frequent.
+    /// The reported spikes of a channel in `unit`, observed for `hours`; `None` without any.
     pub(crate) fn detection(
         &self,
         found: &FoundSpikes,
@@ -336,7 +298,6 @@ impl SpikeRule {
         }
         let sizes = &found.sizes_of_events(samples);
         let largest = found.spikes.iter().map(|spike| spike.sigmas).fold(0.0, f64::max);
-        // Of a size.
         let deviation = median(&mut found.spikes.iter().map(|spike| spike.size / spike.sigmas).collect::<Vec<f64>>());
         let size = SpikeSize::estimate(sizes, self.least * deviation, deviation);
         let count = sizes.len() as f64;
@@ -358,7 +319,6 @@ impl SpikeRule {
 }
 
 impl Disturbance {
-    /// Adds a later one that it overlaps.
     fn join(&mut self, later: Self) {
         let (own, other) = (self.count as f64, later.count as f64);
         let squares = own * self.level.powi(2) + other * later.level.powi(2);
@@ -370,7 +330,6 @@ impl Disturbance {
     }
 }
 
-/// Looks for spikes in one channel, but for stretches in which its noise is `louder` by itself. `None` if there are none, or if jumps of the bias are at least as frequent.
 #[must_use]
 pub(crate) fn find(series: &Series, louder: &[Range<u64>]) -> Option<Detection> {
     let rule = SpikeRule::fit(series)?;
@@ -378,28 +337,25 @@ pub(crate) fn find(series: &Series, louder: &[Range<u64>]) -> Option<Detection> 
     rule.detection(&rule.find(series).out_of_noise().outside(louder), looked_at, series.unit)
 }
 
-/// Probability that the next of so many independent events in `samples` samples follows within [`REACH`] sample periods.
+/// Probability that the next of `events` independent events follows within [`REACH`] sample periods.
 fn near_by_chance(events: usize, samples: u64) -> f64 {
     -(-(events as f64 * REACH as f64) / samples.max(1) as f64).exp_m1()
 }
 
-/// The best linear interpolation of a sample from its neighbours.
 struct Interpolation {
-    /// The weight of each distance, to both sides, where no neighbour is missing.
     weights: [f64; REACH],
     /// The autocovariance of the channel; `None` until it is known.
     covariance: Option<Autocovariance>,
     mean: f64,
-    /// Standard deviation of its error, at least half a count because rounding errors are not normal.
+    /// Standard deviation of its error, at least half a count.
     deviation: f64,
 }
 
 impl Interpolation {
-    /// With the prediction, where a spike in front of a filter shows more by that.
     fn fit(series: &Series) -> Option<(Self, Option<Prediction>)> {
         let mean = series.values.iter().sum::<f64>() / series.values.len() as f64;
         let mut interpolation = Self { weights: [0.5 / REACH as f64; REACH], covariance: None, mean, deviation: 0.0 };
-        // The plain mean of the neighbours finds the gross spikes, which would distort the covariance.
+        // First by the mean of the neighbours: gross spikes would distort the covariance.
         let errors = interpolation.errors(series, &series.values);
         let rough = clipped_deviation(&errors);
         let mut clean = series.values.clone();
@@ -418,15 +374,11 @@ impl Interpolation {
         Some((interpolation, prediction))
     }
 
-    /// By how many standard deviations the error of a spike in `samples` samples exceeds what chance makes of noise with a probability of
-    /// [`REFUTED`]: of normal noise, unless the errors of `series` have a heavier tail, such as those of exponential or Student's noise.
+    /// Threshold in standard deviations that chance exceeds in `samples` samples with [`REFUTED`]: in normal noise, or
+    /// in noise with the heavier tail of `series`.
     ///
-    /// Errors in noise that is louder for a while are taken by its level. A heavier tail is one of which more errors than normal ones are between
-    /// the last of 1,000 and the threshold. It falls at least as fast as
-    /// the power by which the errors beyond the last of 100 become those beyond the last of 1,000, because a tail that thins out does so faster
-    /// and faster in this scale, and the power law only in the same way. If this power law leaves as many errors beyond the threshold as there
-    /// are, they are that noise, and the threshold becomes that of the power law, or is below errors that [stand apart](standing_apart) from the
-    /// others. Spikes of one size are more than it leaves.
+    /// A heavy tail is the power law between the last of 100 and of 1,000 errors. If it explains the errors beyond the
+    /// threshold, its own threshold or a [gap](standing_apart) in the sizes applies.
     fn least_beyond_tail(&self, series: &Series, samples: u64) -> f64 {
         let normal = quantile(0.5 * REFUTED / samples as f64);
         let errors = self.errors(series, &series.values).into_iter().map(|of| of.abs() / self.deviation).collect();
@@ -435,7 +387,7 @@ impl Interpolation {
         if stands_out.is_empty() {
             return normal;
         }
-        // What stands out is in the errors of its neighbours too.
+        // An outlier is in the errors of its neighbours too.
         let is_beside = |at: usize| {
             let around = at.saturating_sub(REACH)..at + REACH + 1;
             !stands_out.contains(&at) && has_any(&stands_out, around)
@@ -472,14 +424,13 @@ impl Interpolation {
         values[position] - self.mean - pairs.sum::<f64>()
     }
 
-    /// The interpolation error of every sample, in units of the standard deviation with all neighbours times
-    /// [`deviation`](Self::deviation); 0 near an end, and where fewer than three neighbours are there on a side.
+    /// Interpolation errors in units of [`deviation`](Self::deviation); 0 near an end and with too few neighbours.
     fn errors(&self, series: &Series, values: &[f64]) -> Vec<f64> {
         let mut partial = BTreeMap::new();
         (0..values.len()).map(|position| self.normalised_error(series, values, position, &mut partial)).collect()
     }
 
-    /// One entry of [`errors`](Self::errors). `partial` keeps the interpolations for each set of neighbours.
+    /// One of [`errors`](Self::errors); `partial` caches the interpolations for each set of neighbours.
     fn normalised_error(
         &self,
         series: &Series,
@@ -519,10 +470,8 @@ impl Interpolation {
         })
     }
 
-    /// How many times as large as in the whole channel the interpolation `errors` around a sample are, each with its distance in samples;
-    /// 1 where chance explains it.
-    ///
-    /// Of n normal errors the sum of the squares has the mean n and the variance 2n, in squared standard deviations.
+    /// How many times louder than in the channel the noise around a sample is, by its `errors`; 1 if chance explains
+    /// it.
     fn louder_around(&self, errors: &[(usize, f64)]) -> f64 {
         let louder = |reach: usize| {
             let near = errors.iter().filter(|(distance, error)| *distance <= reach && *error != 0.0);
@@ -534,7 +483,6 @@ impl Interpolation {
         AROUND.map(louder).into_iter().fold(1.0, f64::max)
     }
 
-    /// The spikes of at least so many standard deviations, where the series is so many times `louder` than the channel.
     fn spikes(&self, series: &Series, prediction: Option<&Prediction>, least: f64, louder: f64) -> FoundSpikes {
         let mut values = series.values.clone();
         let filtered = prediction.map(|by| self.filtered_spikes(series, &mut values, by, least * louder));
@@ -551,7 +499,7 @@ impl Interpolation {
         let (mut larger, mut responses) = (BTreeSet::new(), Vec::new());
         let mut partial = BTreeMap::new();
         for position in candidates {
-            // Again, because a larger spike nearby may have been removed.
+            // A larger spike nearby may have been removed.
             let error = self.normalised_error(series, &values, position, &mut partial);
             if error.abs() <= threshold * louder {
                 continue;
@@ -559,7 +507,7 @@ impl Interpolation {
             let mean = |from: usize| values[from..from + REACH].iter().sum::<f64>() / REACH as f64;
             let height = (mean(position + 1) - mean(position - REACH)).abs();
             if height > SETTLED * error.abs() {
-                // What a filter spreads over the neighbours of a spike is no jump.
+                // A filter's response to a spike is no jump.
                 let is_part = |&(spike, _): &(usize, f64)| spike.abs_diff(position) <= REACH;
                 if !spikes.iter().any(is_part) && !is_response(position) {
                     jumps.push((position, height));
@@ -571,8 +519,7 @@ impl Interpolation {
             larger.insert(position);
             spikes.push((position, error.abs()));
         }
-        // What a filter spreads over the neighbours of a spike is no noise, and a jump is in the errors of the samples that are interpolated
-        // over it.
+        // Neither responses of a filter nor jumps count as louder noise.
         let mut louder_around = |position: usize| {
             let around = position.saturating_sub(FARTHEST)..(position + FARTHEST + 1).min(values.len());
             let around = around.map(|at| (at.abs_diff(position), at)).filter(|(distance, _)| *distance > REACH);
@@ -599,7 +546,7 @@ impl Interpolation {
         FoundSpikes { spikes: found, jumps: jumps.len() }
     }
 
-    /// The spikes in front of a filter, of at least so many standard deviations; they are taken off the `values`.
+    /// Spikes in front of the filter of at least `least` standard deviations; subtracts them from `values`.
     fn filtered_spikes(
         &self,
         series: &Series,
@@ -626,11 +573,7 @@ impl Interpolation {
     }
 }
 
-/// A size between those of the largest of `sizes`, at most so `many`, and of the others, from which they stand apart; `None` where none do. The
-/// sizes are in descending order.
-///
-/// Of sizes `s₁ > s₂ > …` with the tail of a power law, `i·ln(sᵢ/sᵢ₊₁)` are independent exponential variables of one mean (A. Rényi, 1953), and of
-/// a tail that thins out faster the first ones are smaller. Their means are compared by Fisher's F distribution.
+/// A size that separates at most `many` of the largest `sizes` from the rest (A. Rényi, 1953: exponential spacings).
 fn standing_apart(sizes: &[f64], many: usize) -> Option<f64> {
     let distance = |at: usize| (at + 1) as f64 * (sizes[at] / sizes[at + 1]).ln();
     let count = sizes.len().checked_sub(1)?;
@@ -647,8 +590,7 @@ fn standing_apart(sizes: &[f64], many: usize) -> Option<f64> {
     Some((sizes[widest] * sizes[widest + 1]).sqrt())
 }
 
-/// The sizes of `errors`, each over how many times as loud as in the middle of all stretches the noise around it is, where it is louder. An error
-/// counts as `most` there at most.
+/// Sizes of `errors` over the relative loudness of the noise around, at most `most` each.
 fn against_louder_noise(errors: Vec<f64>, most: f64) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0)];
     for error in &errors {
@@ -668,7 +610,7 @@ fn against_louder_noise(errors: Vec<f64>, most: f64) -> Vec<f64> {
     errors.iter().zip(levels).map(|(error, level)| error / louder(level)).collect()
 }
 
-/// Positions less than `length` from one.
+/// Positions less than `length` from `position`.
 fn nearer_than(position: usize, length: usize) -> Range<usize> {
     (position + 1).saturating_sub(length)..position + length
 }
@@ -677,8 +619,7 @@ fn has_any(positions: &BTreeSet<usize>, within: Range<usize>) -> bool {
     !within.is_empty() && positions.range(within).next().is_some()
 }
 
-/// Mean of the smaller three quarters of the distances of neighbouring samples, at least half a count as the deviation of an interpolation
-/// is. The median of coarse counts is one count or two, and not between.
+/// Mean of the smaller three quarters of the distances of neighbouring samples, at least half a count.
 fn typical_difference(series: &Series) -> f64 {
     let mut distances: Vec<f64> = series.values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
     let smaller = distances.len() * 3 / 4;
@@ -689,8 +630,7 @@ fn typical_difference(series: &Series) -> f64 {
     (distances[..smaller].iter().sum::<f64>() / smaller as f64).max(0.5 * series.resolution)
 }
 
-/// Limits the values to [`CLIP`] standard deviations from the median of their block: a disturbance that is longer than the interpolation reaches
-/// would be interpolated from its own samples. The deviation is that of the typical block, at least half a count.
+/// Limits the values to [`CLIP`] typical deviations from the median of their block.
 fn clip(values: &mut [f64], resolution: f64) {
     let (middles, mut deviations): (Vec<f64>, Vec<f64>) =
         values.chunks(CLIPPED_BLOCK).map(median_and_deviation).unzip();
@@ -700,7 +640,6 @@ fn clip(values: &mut [f64], resolution: f64) {
     }
 }
 
-/// Autocovariance at lags 0 to 2·[`REACH`].
 fn covariance(series: &Series, values: &[f64], mean: f64) -> Autocovariance {
     std::array::from_fn(|lag| {
         let pairs = (0..values.len() - lag).filter(|&at| series.is_gapless(at, at + lag));
@@ -710,11 +649,10 @@ fn covariance(series: &Series, values: &[f64], mean: f64) -> Autocovariance {
     })
 }
 
-/// The weights `a` that minimise the variance of the error: `Σ_i a_i (r(i−j) + r(i+j)) = r(j)` with the autocovariance `r`.
-/// `None` for a channel that never changes.
+/// Weights `a` of the least error variance: `Σ_i a_i (r(i−j) + r(i+j)) = r(j)` with the autocovariance `r`.
 fn weights(covariance: &Autocovariance) -> Option<[f64; REACH]> {
     let entry = |j: usize, i: usize| {
-        // A little white noise keeps the equations solvable for a pure sinusoid.
+        // White noise keeps the equations solvable for a pure sinusoid.
         let white = if i == j { LEAST_WHITE * covariance[0] } else { 0.0 };
         covariance[i.abs_diff(j)] + covariance[i + j + 2] + white
     };
@@ -723,7 +661,7 @@ fn weights(covariance: &Autocovariance) -> Option<[f64; REACH]> {
     Some(weights.into())
 }
 
-/// Size of the spikes with 95 % bounds, and the fraction of them that exceeds the threshold for each.
+/// Size of the spikes with 95 % bounds, and the fraction above the threshold for each.
 struct SpikeSize {
     value: f64,
     low: f64,
@@ -734,11 +672,7 @@ struct SpikeSize {
 }
 
 impl SpikeSize {
-    /// Estimates the size from the `sizes` above `threshold`, with interpolation errors of standard deviation `deviation`.
-    ///
-    /// Of spikes of one size `s` those are detected that the noise lifts above the threshold, so their mean is too large: it
-    /// is `s + σ·φ(a)/Q(a)` with `a = (threshold − s)/σ`, the mean of a truncated normal distribution. Sizes that scatter by
-    /// more than 1.5 σ differ from each other, and their mean is not corrected.
+    /// Size from the `sizes` above `threshold`, corrected for the selection by noise unless they scatter by 1.5 σ.
     fn estimate(sizes: &[f64], threshold: f64, deviation: f64) -> Self {
         let count = sizes.len() as f64;
         let mean = sizes.iter().sum::<f64>() / count;

@@ -1,9 +1,7 @@
-//! Outputs that stay at one value: runs of equal samples that are longer than noise makes them.
+//! Stuck outputs: runs of equal samples that are longer than noise makes them.
 //!
-//! Samples are independent from a lag `g` on from which they are no more often equal than at twice the lag: differences of a rounded
-//! angle are less often equal to their neighbours than to samples further away, and more often to these than to those behind the filter.
-//! A sample that is independent of those before has the most frequent value with a probability `p`. A run of `L` samples has `L/g`
-//! independent ones, so that chance makes one among `n` samples with a probability of no more than `n·p^(L/g − 1)`.
+//! Samples are independent from the lag `g` on at which they are equal no more often than at 2`g`. With the probability
+//! `p` of the most frequent value, chance makes a run of `L` among `n` samples with at most `n·p^(L/g − 1)`.
 
 use crate::bounds::BoundedEstimate;
 use crate::effects::findings::SIGNIFICANCE;
@@ -12,50 +10,41 @@ use crate::parallel::{self, in_parallel};
 use measurement::{MeasuredChannel, Measurement, SampleBlock};
 use std::borrow::Cow;
 
-/// As a cause of refusal.
 const CAUSE: &str = "stuck";
-/// Samples that are looked at together: their noise is taken to be one.
+/// Samples in which the noise is taken as constant.
 const TOGETHER: usize = 1 << 14;
-/// Longest lag at which samples are compared: filters average 64 samples, once or twice.
+/// Longest lag: filters average 64 samples, once or twice.
 const LONGEST_LAG: usize = 512;
-/// How many times more often than at twice the lag samples that are independent may be equal, beyond so many standard deviations of the
-/// difference.
+/// Largest ratio of equality at a lag to that at twice the lag for independent samples.
 const ALIKE: f64 = 1.1;
 const SCATTER: f64 = 4.0;
-/// Fewest samples behind a change of the value from which `p` is estimated, to a tenth of itself or of 1.
+/// Fewest changes of the value from which `p` is estimated, to a tenth.
 const FEWEST_CHANGES: usize = 100;
-/// Largest `p`: 0.683 of noise of half a count around a whole one. Of smaller noise a bias between two counts decides how often it is
-/// equal.
+/// Largest `p`; noise of half a count around a whole count has 0.683.
 const MOST_EQUAL: f64 = 0.69;
-/// Largest part of the changes that are by one count: 0.918 of noise of half a count around the middle between two, 0.895 around a whole one.
-/// Of smaller noise it is larger wherever the bias is, also where that wanders from one count to the next and `p` is a mean.
+/// Largest part of changes by one count; noise of half a count has 0.918 between two counts.
 const MOST_BY_ONE: f64 = 0.92;
-/// Fewest samples of a run.
 const FEWEST_SAMPLES: f64 = 3.0;
 
 /// Refuses the samples of stuck channels in a recording that is read in blocks.
 pub(crate) struct StuckScreen {
     channels: Vec<Option<StuckChannel>>,
-    /// Samples of the recording.
     samples: u64,
-    /// Counts of the last sample.
     last: Vec<i32>,
 }
 
-/// What is known of an inertial channel.
 struct StuckChannel {
-    /// Lag from which on samples are independent: the filter's, which does not change.
+    /// Lag from which on samples are independent; that of the filter, which does not change.
     lag: Option<usize>,
-    /// Samples of a run that chance makes with a probability of [`SIGNIFICANCE`]; `None` where that is not known.
+    /// Length of a run with the p-value [`SIGNIFICANCE`]; `None` while unknown.
     shortest: Option<u64>,
-    /// Smallest and largest count: what stays there is cut off.
+    /// Smallest and largest count; a run there is cut off, not stuck.
     extremes: Option<(i32, i32)>,
     last: Option<i32>,
     run: Run,
     found: StuckRuns,
 }
 
-/// Samples that are equal.
 #[derive(Clone, Copy, Default)]
 struct Run {
     from: u64,
@@ -63,7 +52,6 @@ struct Run {
     samples: u64,
 }
 
-/// The runs of a channel.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct StuckRuns {
     longest: Run,
@@ -72,7 +60,7 @@ pub(crate) struct StuckRuns {
 }
 
 impl StuckScreen {
-    /// For a recording of so many samples with the channels of `beginning`, its first ones.
+    /// For `samples` samples in all; `beginning` has the first ones.
     pub(crate) fn new(beginning: &Measurement, samples: u64) -> Self {
         let channel = |of: &MeasuredChannel| {
             of.profile.quantity.is_inertial().then(|| {
@@ -91,12 +79,12 @@ impl StuckScreen {
         Self { channels: in_parallel(&beginning.channels, channel), samples, last: Vec::new() }
     }
 
-    /// The next samples, those of a run refused from the one on by which chance does not make it.
+    /// The next samples; a run is refused from the sample on that makes it significant.
     pub(crate) fn screen<'b>(&mut self, block: &'b SampleBlock) -> Cow<'b, SampleBlock> {
         let mut screened = Cow::Borrowed(block);
         for from in (0..block.slots.len()).step_by(TOGETHER) {
             let positions = from..(from + TOGETHER).min(block.slots.len());
-            // Where all channels are as before, the sample was read twice.
+            // A row that repeats all channels was read twice.
             let is_new: Vec<bool> = positions
                 .clone()
                 .map(|at| {
@@ -135,14 +123,12 @@ impl StuckScreen {
         screened
     }
 
-    /// What was found until now in each channel.
     pub(crate) fn found(&self) -> Vec<StuckRuns> {
         self.channels.iter().map(|channel| channel.as_ref().map_or_else(StuckRuns::default, |of| of.found)).collect()
     }
 }
 
-/// A measurement in which the samples of stuck channels are refused, and the runs of each channel. Nothing of the second half decides what is
-/// refused in the first.
+/// Refuses the samples of stuck channels, and returns the runs; the second half does not affect the first.
 pub(crate) fn screened(measurement: Cow<Measurement>) -> (Cow<Measurement>, Vec<StuckRuns>) {
     let middle = measurement.middle();
     let mut screen = StuckScreen::new(&measurement.before(middle), measurement.len() as u64);
@@ -172,10 +158,9 @@ pub(crate) fn screened(measurement: Cow<Measurement>) -> (Cow<Measurement>, Vec<
 }
 
 impl StuckChannel {
-    /// Takes samples, each with its position, and returns those that are stuck.
     fn take(&mut self, slots: &[u64], samples: &[(usize, i32)], of_recording: u64) -> Vec<usize> {
         let counts: Vec<i32> = samples.iter().map(|(_, count)| *count).collect();
-        // Of noise that has become smaller neighbours are equal more often.
+        // Smaller noise has more equal neighbours, so the first lag stays.
         if changes(&counts, 1).count() >= FEWEST_CHANGES {
             self.lag = self.lag.or_else(|| independent_lag(&counts));
             self.shortest = self.lag.and_then(|lag| shortest_run(&counts, lag, of_recording));
@@ -199,7 +184,6 @@ impl StuckChannel {
 }
 
 impl StuckRuns {
-    /// Adds the newest sample of a run.
     fn add(&mut self, run: Run, shortest: Option<u64>) {
         let is_first = Some(run.samples) == shortest;
         self.runs += u64::from(is_first);
@@ -209,7 +193,6 @@ impl StuckRuns {
         }
     }
 
-    /// As it is reported, of a recording of so many samples.
     pub(crate) fn effect(&self, samples: u64, period_s: f64) -> Option<Effect> {
         let time = |slot: u64| BoundedEstimate::exact(slot as f64 * period_s);
         (self.runs > 0).then(|| {
@@ -226,14 +209,11 @@ impl StuckRuns {
     }
 }
 
-/// A sample that differs from the one a lag before.
 struct Change {
     position: usize,
     count: i32,
-    /// Whether the sample a lag after it is equal to it. However long a channel is stuck, there are no more such changes than a lag has
-    /// samples.
+    /// True if the sample a lag after it is equal to it.
     is_kept: bool,
-    /// Whether it differs by one count.
     is_by_one: bool,
 }
 
@@ -247,15 +227,13 @@ fn changes(counts: &[i32], lag: usize) -> impl Iterator<Item = Change> + '_ {
     })
 }
 
-/// The part of some changes that are followed by an equal sample: a probability of which nothing was seen is one of so many. `None`
-/// for too few.
+/// Part of the changes that an equal sample follows, at least 1/count; `None` for too few.
 fn share(changes: &[Change]) -> Option<f64> {
     let kept = changes.iter().filter(|change| change.is_kept).count();
     (changes.len() >= FEWEST_CHANGES).then(|| (kept as f64 + 1.0) / (changes.len() as f64 + 1.0))
 }
 
-/// That part at a lag, and its variance by the scatter from one stretch as long as the lag to the next: within a stretch one stuck output
-/// makes all changes alike.
+/// The [`share`] at a lag, with its variance from the scatter between stretches as long as the lag.
 fn share_at(counts: &[i32], lag: usize) -> Option<(f64, f64)> {
     let changes: Vec<Change> = changes(counts, lag).collect();
     let share = share(&changes)?;
@@ -265,8 +243,7 @@ fn share_at(counts: &[i32], lag: usize) -> Option<(f64, f64)> {
     Some((share, scatter / (changes.len() as f64).powi(2)))
 }
 
-/// Smallest lag from which on samples are no more often equal than at twice the lag. `None` where that is longer than [`LONGEST_LAG`], and
-/// for too few samples.
+/// Smallest lag at which samples are equal no more often than at twice the lag, up to [`LONGEST_LAG`].
 fn independent_lag(counts: &[i32]) -> Option<usize> {
     let counts = &counts[..counts.len().min(TOGETHER)];
     let lags = std::iter::successors(Some(1), |lag| Some(2 * lag)).take_while(|lag| *lag <= 2 * LONGEST_LAG);
@@ -280,8 +257,7 @@ fn independent_lag(counts: &[i32]) -> Option<usize> {
     (lag <= LONGEST_LAG).then_some(lag)
 }
 
-/// Samples of the shortest run that chance does not make among `samples` samples with the noise of `counts`,
-/// where they are independent from a lag on.
+/// Shortest run that chance does not make among `samples` samples, independent from `lag` on.
 fn shortest_run(counts: &[i32], lag: usize, samples: u64) -> Option<u64> {
     let mut by_count: Vec<Change> = changes(counts, lag).collect();
     let of_all = share(&by_count);

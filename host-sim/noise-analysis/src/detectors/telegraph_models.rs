@@ -1,52 +1,43 @@
-//! The two models between which the detector of telegraph noise decides: a hidden Markov chain of two states in white noise,
-//! and a Gaussian process with exponential autocorrelation in white noise. Both take numbers one step apart, `NaN` for a
-//! missing one.
+//! Models for telegraph noise: a hidden Markov chain of two states, and a Gaussian process with exponential
+//! autocorrelation, in white noise. Missing values are `NaN`.
 
 use std::f64::consts::PI;
 
-/// Rounds of the fit of the chain, at most; it ends when a round gains less than `SETTLED` in ln likelihood.
+/// Most rounds of the fit; it ends when a round gains less than `SETTLED` in ln likelihood.
 const ROUNDS: usize = 60;
 const SETTLED: f64 = 1e-3;
-/// What all later rounds gain, in gains of the last one, at most: the gains fall by a factor a round, which is 0.6 in the sixth and
-/// 0.85 in the fifteenth round of white noise.
+/// Bound on the gain of all later rounds, in gains of the last one.
 const LATER_GAINS: f64 = 10.0;
-/// Probability of a jump per step with which the fit begins.
 const FIRST_JUMP: f64 = 0.05;
 /// Step in the logarithm of a parameter for the curvature of the likelihood.
 const CURVATURE_STEP: f64 = 0.05;
 
-/// A Markov chain of two states, each with a level, in white noise.
 #[derive(Debug, Clone)]
 pub(super) struct TwoStateChain {
     levels: [f64; 2],
-    /// Variance around the level.
     variance: f64,
-    /// Probability of leaving each level in a step.
     leave: [f64; 2],
     pub(super) log_likelihood: f64,
-    /// Expected number of jumps.
     pub(super) jumps: f64,
     /// Standard deviations of the logarithms of correlation time and distance of the levels.
     pub(super) time_error: f64,
     pub(super) distance_error: f64,
 }
 
-/// Expected statistics of the hidden states, given the numbers and a chain.
+/// Expected statistics of the hidden states.
 #[derive(Default)]
 struct StateStatistics {
     log_likelihood: f64,
-    /// For each state, expected count, sum and sum of squares of its numbers.
+    /// Expected count, sum and sum of squares of the values in each state.
     moments: [[f64; 3]; 2],
-    /// Expected number of steps that begin in each state, and of those that leave it.
+    /// Expected numbers of steps that begin in each state and that leave it.
     steps: [f64; 2],
     left: [f64; 2],
 }
 
 impl TwoStateChain {
-    /// The likeliest chain, by expectation maximisation (L. Baum et al., "A maximization technique occurring in the
-    /// statistical analysis of probabilistic functions of Markov chains", Ann. Math. Statist. 41, 1970). Begins with the
-    /// means of the lower and of the upper half of the numbers as levels. `None` of fewer than 16 numbers, if they never
-    /// change, or if the ln likelihood does not come near `least`.
+    /// The likeliest chain by expectation maximisation (L. Baum et al., Ann. Math. Statist. 41, 1970), if it nears
+    /// `least`.
     pub(super) fn fit(values: &[f64], least: f64) -> Option<Self> {
         let mut present: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
         let half = present.len() / 2;
@@ -63,8 +54,7 @@ impl TwoStateChain {
         Self::new(levels, variance, FIRST_JUMP).climbed(values, least)
     }
 
-    /// The likeliest chain, sought from two levels with a standard deviation and a correlation time, in steps, that are known in some way:
-    /// where they are closer than the noise, it does not show them by its halves.
+    /// The likeliest chain from a known standard deviation and correlation time, in steps.
     pub(super) fn fit_near(values: &[f64], deviation: f64, steps: f64) -> Option<Self> {
         let Moments { count, mean, squares } = Moments::of(values);
         let variance = squares / count;
@@ -74,7 +64,7 @@ impl TwoStateChain {
         start.climbed(values, f64::NEG_INFINITY)
     }
 
-    /// Two equally frequent levels before they are fitted.
+    /// Initial chain with two equally frequent levels.
     fn new(levels: [f64; 2], variance: f64, leave: f64) -> Self {
         Self {
             levels,
@@ -87,7 +77,7 @@ impl TwoStateChain {
         }
     }
 
-    /// The chain after the steps of the expectation maximisation; `None` if the ln likelihood does not come near `least`.
+    /// The chain after expectation maximisation; `None` if the ln likelihood does not come near `least`.
     fn climbed(mut self, values: &[f64], least: f64) -> Option<Self> {
         for _ in 0..ROUNDS {
             if self.variance <= 0.0 {
@@ -106,7 +96,6 @@ impl TwoStateChain {
         (self.log_likelihood >= least).then_some(self)
     }
 
-    /// Sets the likeliest parameters for these expected statistics.
     fn maximise(&mut self, statistics: &StateStatistics) {
         let [lower, upper] = statistics.moments;
         let squares = |[count, sum, squares]: [f64; 3]| squares - sum * sum / count.max(f64::MIN_POSITIVE);
@@ -120,12 +109,11 @@ impl TwoStateChain {
         self.log_likelihood = statistics.log_likelihood;
     }
 
-    /// Correlation time in steps: the covariance of the chain decays by the factor 1 − p₀₁ − p₁₀ a step.
+    /// Correlation time in steps: the covariance decays by 1 − p₀₁ − p₁₀ a step.
     pub(super) fn correlation_time(&self) -> f64 {
         -1.0 / (-(self.leave[0] + self.leave[1])).ln_1p()
     }
 
-    /// Distance of the levels.
     pub(super) fn distance(&self) -> f64 {
         (self.levels[1] - self.levels[0]).abs()
     }
@@ -136,12 +124,10 @@ impl TwoStateChain {
         [self.leave[1] / both, self.leave[0] / both]
     }
 
-    /// Whether a number is nearer to the upper level.
     pub(super) fn is_upper(&self, value: f64) -> bool {
         value > 0.5 * (self.levels[0] + self.levels[1])
     }
 
-    /// Distance of each number from the nearer level.
     pub(super) fn residuals(&self, values: &[f64]) -> Vec<f64> {
         let nearer = |value: &f64| {
             let [a, b] = self.levels.map(|level| value - level);
@@ -150,7 +136,7 @@ impl TwoStateChain {
         values.iter().map(nearer).collect()
     }
 
-    /// The chain with the standard deviations of its parameters, by the curvature of the likelihood.
+    /// Adds standard deviations of the parameters, by the curvature of the likelihood.
     pub(super) fn with_errors(self, values: &[f64]) -> Self {
         let log_likelihood = |time: f64, distance: f64| {
             let middle = 0.5 * (self.levels[0] + self.levels[1]);
@@ -171,12 +157,11 @@ impl TwoStateChain {
         Self { time_error, distance_error, ..self }
     }
 
-    /// Expected statistics of the states, by the forward and the backward recursion.
+    /// By forward and backward recursion.
     fn expectation(&self, values: &[f64]) -> StateStatistics {
         let [up, down] = self.leave;
         let scale = 0.5 * (2.0 * PI * self.variance).ln();
-        // Densities of a number under both levels over that of the nearer one, and the logarithm of the latter: far from both
-        // levels the densities themselves underflow.
+        // Densities relative to the nearer level's: far from both levels the densities themselves underflow.
         let densities_of = |value: f64| {
             if value.is_nan() {
                 return ([1.0; 2], 0.0);
@@ -203,7 +188,7 @@ impl TwoStateChain {
             belief = [now[0] * (1.0 - up) + now[1] * down, now[0] * up + now[1] * (1.0 - down)];
         }
         statistics.log_likelihood += sums.value();
-        // Likelihood of the later numbers given each state, up to a factor.
+        // Likelihood of the later values given each state, up to a factor.
         let mut later = [1.0; 2];
         for (at, &value) in values.iter().enumerate().rev() {
             let now = forward[at];
@@ -232,7 +217,7 @@ impl TwoStateChain {
     }
 }
 
-/// The logarithm of a product, of whose factors few are far from 1.
+/// ln of a product, with few calls of `ln`.
 struct LogOfProduct {
     product: f64,
     log: f64,
@@ -247,7 +232,6 @@ impl Default for LogOfProduct {
 impl LogOfProduct {
     fn multiply(&mut self, factor: f64) {
         self.product *= factor;
-        // So far from the ends of the range of a float the next factor leaves it only if it is itself near them.
         if !(1e-100..1e100).contains(&self.product) {
             self.log += self.product.ln();
             self.product = 1.0;
@@ -259,22 +243,19 @@ impl LogOfProduct {
     }
 }
 
-/// Correlation times that are tried first: the shortest in steps, the longest in records. The longest is as good as a random
-/// walk.
+/// Grid of correlation times: shortest in steps, longest in records (a random walk).
 const SHORTEST: f64 = 0.5;
 const LONGEST: f64 = 30.0;
-/// Variances of the process, relative to the white variance, that are tried first.
+/// Least variance of the grid, relative to the white variance.
 const WEAKEST: f64 = 1e-3;
 const STRONGEST: f64 = 1e7;
-/// Number of values of each that are tried first, and how often the step is halved after that.
+/// Grid points per parameter, and halvings of the step after that.
 const TRIED: usize = 9;
 const HALVED: usize = 9;
 
-/// Of the values that are present.
 struct Moments {
     count: f64,
     mean: f64,
-    /// Sum of the squared distances from the mean.
     squares: f64,
 }
 
@@ -293,13 +274,12 @@ pub(super) fn white_log_likelihood(values: &[f64]) -> f64 {
     independent_log_likelihood(count, squares)
 }
 
-/// The same of so many independent Gaussian variables, by the sum of their squared distances from what is expected of each.
+/// ln likelihood of `count` independent Gaussian variables with this sum of squared residuals.
 pub(super) fn independent_log_likelihood(count: f64, squares: f64) -> f64 {
     -0.5 * count * ((2.0 * PI * squares / count).ln() + 1.0)
 }
 
-/// The highest ln likelihood of a Gaussian process with exponential autocorrelation in white noise, over all variances and
-/// correlation times.
+/// Highest ln likelihood of a Gaussian process with exponential autocorrelation in white noise.
 pub(super) fn gauss_markov_log_likelihood(values: &[f64]) -> f64 {
     let longest = LONGEST * values.len() as f64;
     let (mut step_of_time, mut step_of_ratio) =
@@ -322,8 +302,7 @@ pub(super) fn gauss_markov_log_likelihood(values: &[f64]) -> f64 {
     best.0
 }
 
-/// ln likelihood by a Kalman filter, for the correlation time in steps and the variance relative to the white noise, whose own
-/// variance is the likeliest one.
+/// By a Kalman filter: correlation time in steps, variance over the white noise's, which is profiled.
 fn kalman_log_likelihood(values: &[f64], time: f64, ratio: f64) -> f64 {
     let decay = (-1.0 / time).exp();
     // 1 − decay², without cancellation.

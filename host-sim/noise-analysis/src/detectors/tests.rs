@@ -21,7 +21,7 @@ use virtual_sensor::{Environment, InjectedEffect, OutputRegister, SensorScenario
 const GYRO: Channel = Channel::GyroY;
 const SENSED_GYRO: OutputRegister = OutputRegister::GyroY;
 
-/// White noise of a gyro sample at 204.8 Hz with the paper's N, and rounding to 0.05 deg/s.
+/// At 204.8 Hz with the paper's N and rounding to 0.05 deg/s.
 fn white() -> f64 {
     (0.0368f64.powi(2) * 204.8 + 0.05f64.powi(2) / 12.0).sqrt()
 }
@@ -49,7 +49,6 @@ impl Case {
         Series::from_measurement(&self.measurement, channel)
     }
 
-    /// The results of all detectors.
     fn detections(&self) -> Vec<Detection> {
         let channels = Channel::INERTIAL.into_iter().flat_map(|channel| {
             let series = self.series(channel);
@@ -120,17 +119,17 @@ fn spikes_are_counted_measured_and_removed() {
 
 #[test]
 fn a_spike_of_1_7_sigma_is_found_in_filtered_noise() {
-    // A disturbance after the filter, so it is added to the samples that were read.
+    // Behind the filter, so added to the recorded samples.
     let case = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2: 3 }], 200.0, 3);
     let mut series = case.series(GYRO);
     assert_eq!(spikes::find(&series, &[]), None);
-    // Two averages of 8 leave 0.29 of the white noise: 1.7 σ of the samples, but much more than the interpolation error.
+    // Two averages of 8 leave 0.29 of the white noise: 1.7 σ of the samples, far more than the interpolation error.
     series.values_mut()[20_000] += 0.5 * white();
     let detection = spikes::find(&series, &[]).unwrap();
     assert_eq!(detection.correction, Some(Correction::Exclude(vec![20_000])));
 }
 
-/// Two averages of two samples leave half of a spike in its own sample and a quarter in either neighbour, as of a sample of the noise.
+/// Two averages of two samples leave half of a spike in its sample and a quarter in either neighbour.
 #[test]
 fn spikes_before_the_filter_are_counted() {
     let spikes = InjectedEffect::Spikes { channel: SENSED_GYRO, rate_per_hour: 300.0, size: 25.0 * white() };
@@ -138,15 +137,14 @@ fn spikes_before_the_filter_are_counted() {
     assert_covers(&spikes::find(&case.series(GYRO), &[]).expect("50 spikes"), "rate", 300.0);
 }
 
-/// Behind two averages of two samples, nine times the deviation of the white noise in front of them: 4 standard deviations of an interpolation
-/// error, of which chance puts 6 into a record, and 7.8 of a prediction error.
+/// 4 standard deviations of the interpolation error, 7.8 of the prediction error.
 #[test]
 fn a_prediction_shows_spikes_that_an_interpolation_does_not() {
     let spikes = InjectedEffect::Spikes { channel: SENSED_GYRO, rate_per_hour: 300.0, size: 9.0 * white() };
     let case = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2: 1 }, spikes], 600.0, 7);
     let detection = spikes::find(&case.series(GYRO), &[]).expect("50 spikes");
     assert_covers(&detection, "rate", 300.0);
-    // The first of the samples that it changes has a quarter of it.
+    // The first changed sample has a quarter of it.
     assert_covers(&detection, "size", 0.25 * 9.0 * white());
     for (taps_log2, seed) in (1..=3).flat_map(|taps_log2| (10..15).map(move |seed| (taps_log2, seed))) {
         let case = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2 }], 200.0, seed);
@@ -154,8 +152,7 @@ fn a_prediction_shows_spikes_that_an_interpolation_does_not() {
     }
 }
 
-/// A blow that rings at 6.4 Hz and decays within 0.1 s, and a pulse of half a sine of 0.3 s: neighbouring samples differ by a fifth of the one and
-/// a twentieth of the other.
+/// A blow that rings at 6.4 Hz and decays within 0.1 s, and a half sine of 0.3 s.
 #[test]
 fn a_blow_is_not_interpolated_from_its_own_samples() {
     let rings = |since_s: f64| (-10.0 * since_s).exp() * (TAU * 6.4 * since_s).sin();
@@ -168,13 +165,12 @@ fn a_blow_is_not_interpolated_from_its_own_samples() {
         let rule = spikes::SpikeRule::fit(&series).expect("samples that change");
         let (_, disturbances) = rule.separate(rule.find(&series), series.values.len() as u64);
         let [found] = disturbances.as_slice() else { panic!("{disturbances:?}") };
-        // It is six times the noise after 2 or 4 samples, and less after 32 or 57.
+        // Six times the noise after 2 or 4 samples, less after 32 or 57.
         assert!((40_000..40_010).contains(&found.certain.start), "{found:?}");
         assert!((40_020..40_062).contains(&found.certain.end), "{found:?}");
     }
 }
 
-/// White noise, and noise whose level wanders by a factor of two in half a second.
 #[test]
 fn loud_noise_has_no_spikes_and_spikes_stand_out_of_it() {
     let mut series = Case::hiding(Vec::new(), 400.0, 9).series(GYRO);
@@ -195,8 +191,7 @@ fn loud_noise_has_no_spikes_and_spikes_stand_out_of_it() {
     );
 }
 
-/// Independent samples of exponential noise, of Laplace's and of Student's with five degrees of freedom have no spikes; ten among them that are
-/// larger than any of 30,000 samples of exponential noise, which reaches 14 in one of 40 records, are told.
+/// Exponential, Laplace and Student noise, and ten samples beyond 30,000 exponential ones.
 #[test]
 fn noise_with_heavy_tails_has_no_spikes() {
     let noise = |kind: &str, seed: u64| {
@@ -219,7 +214,6 @@ fn noise_with_heavy_tails_has_no_spikes() {
     };
     for kind in ["exponential", "Laplace", "Student"] {
         let found = (0..20).filter(|seed| spikes::find(&noise(kind, *seed), &[]).is_some()).count();
-        // Such a tail is told from that of a power law, of which it has less and less: chance makes none of them one of a spike.
         assert_eq!(found, 0, "{kind}");
     }
     let mut with_spikes = noise("exponential", 30);
@@ -243,7 +237,7 @@ fn a_step_is_located_measured_and_removed() {
     assert_eq!(bias_changes(&case.series(Channel::GyroZ)).step, None);
 }
 
-/// A bias that drifts over the middle between two counts, in noise of an eighth of one, is one count and then the next.
+/// A bias that drifts over the middle between two counts, in noise of an eighth of one.
 #[test]
 fn where_the_noise_is_below_a_count_neighbouring_counts_are_no_step() {
     let series = |counts: f64| {
@@ -264,8 +258,6 @@ fn where_the_noise_is_below_a_count_neighbouring_counts_are_no_step() {
     assert!(found(&far, 0.0) && found(&far, 1.5));
 }
 
-/// Three regressors drift alike, each with a swing of its own, and the bias follows their sum: a ramp explains it best at first, and nothing of it
-/// beside all three.
 #[test]
 fn a_ramp_that_others_explain_is_none() {
     const SAMPLES: usize = 60_000;
@@ -288,12 +280,10 @@ fn a_ramp_that_others_explain_is_none() {
         bias::find(&bias, &regressors.each_ref(), &[], &NoiseGrids::default(), &|| 0.0);
     assert_eq!((ramp, sensitivities.len()), (None, 3));
     for (_, of) in sensitivities {
-        // Four standard deviations.
         assert!((of.sensitivity - 1.0).abs() < 4.0 * of.error, "{of:?}");
     }
 }
 
-/// A step of five times the noise, and one of a third of it: alone, either is 40 standard deviations of the mean of a minute or more.
 #[test]
 fn a_small_step_hides_no_large_one() {
     let step = |time_s: f64, size: f64| InjectedEffect::BiasStep { channel: SENSED_GYRO, time_s, size };
@@ -303,7 +293,6 @@ fn a_small_step_hides_no_large_one() {
     };
     let step = found(0.2).expect("a step");
     assert!((value_of(&step, "time").value - 333.0).abs() < 0.1, "{step:?}");
-    // What it has of the second one is the part of the record after that.
     assert!((value_of(&step, "size").value / -3.0 - 1.0).abs() < 0.03, "{step:?}");
     assert_eq!(found(2.9), None);
 }
@@ -392,14 +381,12 @@ fn dependence_on_temperature_is_no_ramp() {
 fn values_of_twelve_bits_have_an_lsb_of_four_counts() {
     let series = Case::hiding(Vec::new(), 60.0, 19).series(GYRO);
     assert_eq!(effective_lsb::find(&series), None);
-    // Twelve bits instead of fourteen.
     let count = 0.05;
     let values = series.values.iter().map(|value| (value / count / 4.0).round() * 4.0 * count).collect();
     let coarse = Series { values, slots: series.slots.clone(), ..series };
     let detection = effective_lsb::find(&coarse).unwrap();
     assert_eq!(detection.effect.name(), "quantization");
     assert!((value_of(&detection, "step").value - 0.2).abs() < 1e-9);
-    // A channel that hardly ever changes has an unknown LSB.
     let values = (0..coarse.values.len()).map(|at| if at % 5_000 < 2_500 { 0.0 } else { 0.2 }).collect();
     assert_eq!(effective_lsb::find(&Series { values, slots: coarse.slots.clone(), ..coarse }), None);
 }
@@ -411,7 +398,7 @@ fn lost_and_repeated_samples_are_counted() {
     assert_covers(&detection, "fraction", 2e-3);
     assert_eq!(sampling_faults::repeated_samples(&lossy.measurement), None);
 
-    // Behind a long filter neighbouring samples are often equal, and none is repeated.
+    // A long filter makes neighbours equal often.
     let slow = Case::hiding(vec![InjectedEffect::FilterBandwidth { taps_log2: 4 }], 100.0, 11);
     assert_eq!(sampling_faults::repeated_samples(&slow.measurement), None);
 
@@ -432,14 +419,13 @@ fn a_deviating_sample_clock_is_distinguished_from_a_deviating_host_clock() {
         ..Simulation::paper(100.0, 10)
     };
     let find = |case: Case| sampling_faults::sample_clock(&case.measurement);
-    // The data sheet's tolerance is parts in a hundred, that of a host's clock parts in a hundred thousand.
+    // Tolerance of the data sheet: percent; of a host's clock: 10⁻⁵.
     let off = find(Case::of(simulation(vec![InjectedEffect::SampleClock { ratio: 0.997 }], 1.0 + 20e-6))).unwrap();
     assert_covers(&off, "rate_hz", 204.8 * 0.997);
     assert_eq!(find(Case::of(simulation(Vec::new(), 1.0 + 40e-6))), None);
 }
 
-/// Stamps of 40,000 samples at 204.8 Hz, with a jitter of `jitter_s`, by a clock whose rate over the nominal one is `ratio` of the part of
-/// the record.
+/// 40,000 stamps at 204.8 Hz, jitter in s; `ratio` is the clock's rate over nominal.
 fn stamped(jitter_s: f64, ratio: impl Fn(f64) -> f64) -> Option<Effect> {
     let mut case = Case::of(Simulation::paper(200.0, 12));
     let samples = case.measurement.len();
@@ -464,7 +450,6 @@ fn a_clock_that_changes_its_rate_is_told_from_one_that_drifts() {
             assert!(found.low < rate_hz && rate_hz < found.high, "{found:?} {rate_hz}");
         }
     }
-    // As much, but evenly over the record.
     let drifting = stamped(30e-6, |part| 1.0 - 0.001 * part);
     assert!(!matches!(drifting, Some(Effect::ClockDeviation(of)) if of.change.is_some()), "{drifting:?}");
     assert_eq!(stamped(30e-6, |_| 1.0), None);
@@ -480,7 +465,7 @@ fn tail_probabilities_agree_with_tables() {
     assert!((poisson_tail(3, 2.0) - 0.323_323_58).abs() < 1e-8);
     assert!((poisson_tail(2, 2.0) - 0.593_994_15).abs() < 1e-8);
     assert_eq!((poisson_tail(0, 2.0), poisson_tail(1, 0.0)), (1.0, 0.0));
-    // Far from the mean on either side, where terms vanish.
+    // Far from the mean, where terms vanish.
     assert_eq!((poisson_tail(2_000, 50_000.0), poisson_tail(50_000, 2_000.0)), (1.0, 0.0));
     // Exact (Garwood) bounds of a count of 10.
     let (low, high) = poisson_bounds(10.0);

@@ -1,5 +1,4 @@
-//! The bias as a function of the measured temperature that is not proportional to it: behind a first-order lag, because the
-//! sensing element warms up later than the thermometer, or with a curvature.
+//! The bias by a temperature behind a first-order lag or with a curvature.
 
 use super::bias_response::{BiasResponse, Course, FRACTIONS, interval};
 use super::block_means::BlockMeans;
@@ -9,25 +8,23 @@ use crate::effects::{TemperatureCurvature, ThermalLag};
 use crate::samples::series::Series;
 use nalgebra::DVector;
 
-/// Shortest and longest time constant of a lag, s: a package of a few grams, and a housing of a kilogram.
+/// Shortest and longest lag, s: a package of a few grams, a housing of a kilogram.
 const TIME_CONSTANTS_S: (f64, f64) = (10.0, 600.0);
-/// Time constants that are tried first, evenly on a logarithmic scale: a third apart, over which a lag of a slow course
-/// changes little.
+/// Time constants of the first grid, a third apart.
 const TIME_CONSTANTS: usize = 15;
-/// A lag beyond this part of the record cannot be told from a drift.
+/// Longest lag as a part of the record; a longer one is a drift.
 const LONGEST_PART: f64 = 0.25;
-/// By how much −2 ln likelihood must fall against the other candidates, of which a lag has one more parameter and a curvature one
-/// that the proportional response comes before: χ² of one degree of freedom at the p-value of 2·10⁻⁴ of the other candidates.
+/// Least fall of −2 ln likelihood for one more parameter: χ² at 2·10⁻⁴.
 pub(super) const ADVANTAGE: f64 = 13.8;
 
-/// The temperature in averages of a fraction of a block.
+/// Averages of the temperature over fractions of a block.
 pub(super) struct TemperatureCourse {
     measured: Course,
     period_s: f64,
 }
 
 impl TemperatureCourse {
-    /// Of a channel of temperature, for blocks of `width` sample periods; `None` of any other channel.
+    /// For blocks of `width` sample periods; `None` if the channel is no temperature.
     pub(super) fn new(series: &Series, width: u64) -> Option<Self> {
         let width = (width / FRACTIONS).max(1);
         let first = *series.values.first().filter(|_| series.unit == "degC")?;
@@ -37,7 +34,7 @@ impl TemperatureCourse {
             let (sum, count) = &mut sums[(slot / width) as usize];
             (*sum, *count) = (*sum + value, *count + 1);
         }
-        // Where samples are missing, the temperature is the last one that was measured.
+        // Missing samples repeat the last temperature.
         let mut last = first;
         let mean = |(sum, count): &(f64, u32)| {
             if *count > 0 {
@@ -49,13 +46,13 @@ impl TemperatureCourse {
         Some(Self { measured: Course { width, values }, period_s: series.period_s })
     }
 
-    /// The temperature behind a first-order lag, which had the first temperature before the record.
+    /// The temperature behind a first-order lag; before the record it was the first temperature.
     fn lagged(&self, time_constant: f64) -> Course {
         let Course { width, values } = &self.measured;
         let kept = (-(*width as f64) * self.period_s / time_constant).exp();
         let mut state = values[0];
         let next = |value: &f64| {
-            // The state in the middle of the average.
+            // State in the middle of the average.
             let before = state;
             state = kept * state + (1.0 - kept) * value;
             0.5 * (before + state)
@@ -63,15 +60,13 @@ impl TemperatureCourse {
         Course { width: *width, values: values.iter().map(next).collect() }
     }
 
-    /// The square of the temperature's distance from its mean.
     fn squared(&self) -> Course {
         let mean = self.measured.mean();
         let values = self.measured.values.iter().map(|value| (value - mean).powi(2)).collect();
         Course { width: self.measured.width, values }
     }
 
-    /// Block means of the mean of the temperature behind a lag and of that ahead by a lag in reversed time. It has no delay, and the
-    /// rounding of the thermometer is smoothed in it as it is behind the lag.
+    /// Mean of the lagged temperature and its mirror in time: smoothed like it, without delay.
     pub(super) fn smoothed_regressor(&self, time_constant: f64, blocks: &BlockMeans) -> DVector<f64> {
         let Course { width, ref values } = self.measured;
         let reversed = values.iter().rev().copied().collect();
@@ -81,17 +76,14 @@ impl TemperatureCourse {
         Course { width, values: values.map(|(behind, ahead)| 0.5 * (behind + ahead)).collect() }.in_blocks(blocks)
     }
 
-    /// Block means of the squared course.
     pub(super) fn squared_regressor(&self, blocks: &BlockMeans) -> DVector<f64> {
         self.squared().in_blocks(blocks)
     }
 
-    /// Block means of the course behind a lag.
     pub(super) fn lagged_regressor(&self, time_constant: f64, blocks: &BlockMeans) -> DVector<f64> {
         self.lagged(time_constant).in_blocks(blocks)
     }
 
-    /// The likeliest lag, s, and the regression on the course behind it.
     pub(super) fn likeliest_lag(&self, blocks: &BlockMeans, regression: &GlsRegression) -> Option<TimeConstant> {
         let longest = TIME_CONSTANTS_S
             .1
@@ -107,7 +99,6 @@ impl TemperatureCourse {
         TimeConstant::likeliest((TIME_CONSTANTS_S.0, ratio, TIME_CONSTANTS), 1.0, estimate, estimate)
     }
 
-    /// The response of a bias behind a lag.
     pub(super) fn lag_response(
         &self,
         lag: &TimeConstant,

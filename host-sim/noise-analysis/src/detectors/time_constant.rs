@@ -4,20 +4,16 @@ use super::gls_regression::RegressionEstimate;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::NORMAL_975;
 
-/// The likeliest time constant.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TimeConstant {
-    /// In the unit of the search.
     pub value: f64,
     /// Standard deviation of its logarithm.
     relative_error: f64,
-    /// Of the size with it.
     pub estimate: RegressionEstimate,
 }
 
 impl TimeConstant {
-    /// Of `count` time constants from `shortest` on, each `ratio` times the one before, the likeliest by `coarse`; then the likeliest by
-    /// `fine` around it. The curvature of the likelihood over the part `spread` of the ratio gives the error.
+    /// The likeliest of `count` time constants from `shortest` on by the factor `ratio`, refined, with its error.
     pub(super) fn likeliest(
         (shortest, ratio, count): (f64, f64, usize),
         spread: f64,
@@ -42,7 +38,7 @@ impl TimeConstant {
         Some(Self { value: place.exp(), relative_error, estimate })
     }
 
-    /// With its 95 % bounds, in a unit of which one of the search has so many.
+    /// With 95 % bounds; `unit` converts from the unit of the search.
     pub(super) fn bounds(&self, unit: f64) -> BoundedEstimate {
         let (value, times) = (unit * self.value, (NORMAL_975 * self.relative_error).exp());
         BoundedEstimate::new(value, value / times, value * times)

@@ -8,20 +8,18 @@ use super::time_constant::TimeConstant;
 use crate::effects::TurnOnTransient;
 use nalgebra::DVector;
 
-/// Shortest time constant, blocks: a shorter transient is one of a single mean.
+/// Shortest time constant, blocks; a shorter transient is one mean.
 const SHORTEST_BLOCKS: f64 = 1.0;
-/// Longest time constant, as a part of the record: within four of them it is down to a fiftieth, and what is slower is a drift.
+/// Longest time constant as a part of the record; a slower one is a drift.
 const LONGEST_PART: f64 = 0.25;
-/// Time constants that are tried first, evenly on a logarithmic scale: each is 1.5 times the one before, which lowers the statistic of one
-/// between two of them by a hundredth.
+/// Time constants of the first grid, a factor of 1.5 apart: a hundredth of the statistic is lost between two.
 const TIME_CONSTANTS: usize = 9;
 
-/// A transient that may be there, with its time constant in blocks.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Transient(TimeConstant);
 
 impl Transient {
-    /// The likeliest transient beside the regressors of `regression`, if its p-value is below [`SIGNIFICANCE`].
+    /// The likeliest transient beside the known regressors; `None` if its p-value is not below [`SIGNIFICANCE`].
     pub(super) fn likeliest(blocks: &BlockMeans, regression: &GlsRegression) -> Option<Self> {
         let longest = LONGEST_PART * (blocks.numbers.last()? + 1) as f64;
         let ratio = (longest / SHORTEST_BLOCKS).powf(1.0 / (TIME_CONSTANTS - 1) as f64);
@@ -34,21 +32,19 @@ impl Transient {
             |time_constants| regression.estimates_below(SIGNIFICANCE, &regressors(time_constants)),
             |time_constants| regression.estimates(&regressors(time_constants)),
         )?;
-        // One that is likeliest with the longest time constant is slower still: a drift.
+        // At the longest time constant it is a drift.
         (found.value < longest * (1.0 - 1e-9)).then_some(Self(found))
     }
 
-    /// The size with the likeliest time constant.
     pub(super) fn estimate(&self) -> RegressionEstimate {
         self.0.estimate
     }
 
-    /// Its block means, of size 1.
     pub(super) fn regressor(&self, blocks: &BlockMeans) -> DVector<f64> {
         regressor(self.0.value, blocks)
     }
 
-    /// The bias of the transient with the size of `estimate`, of a channel in `unit` with samples every `period_s`.
+    /// The bias of the transient with the size of `estimate`; unit of the channel, sample period in s.
     pub(super) fn response(
         &self,
         blocks: &BlockMeans,
@@ -67,7 +63,7 @@ impl Transient {
     }
 }
 
-/// Block means of a transient of size 1 with this time constant in blocks.
+/// Block means of a transient of size 1; time constant in blocks.
 fn regressor(time_constant: f64, blocks: &BlockMeans) -> DVector<f64> {
     let mean = |&number: &usize| {
         let start = -(number as f64) / time_constant;
@@ -76,7 +72,6 @@ fn regressor(time_constant: f64, blocks: &BlockMeans) -> DVector<f64> {
     DVector::from_iterator(blocks.numbers.len(), blocks.numbers.iter().map(mean))
 }
 
-/// The same in fractions of blocks, over the whole record.
 fn course(time_constant: f64, blocks: &BlockMeans) -> Course {
     let width = (blocks.width / FRACTIONS).max(1);
     let per_block = blocks.width as f64 / width as f64;
@@ -95,8 +90,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
-    /// What is found in 1,280 s at 10 Hz of white noise of deviation 1 and a walk with steps of deviation `step`, whose bias begins `size`
-    /// off and settles with a time constant of 60 s.
+    /// Effects in 1,280 s at 10 Hz: white noise of deviation 1, a walk of steps `step`, a transient of `size` and 60 s.
     fn found(seed: u64, step: f64, size: f64) -> Vec<Effect> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut walk = 0.0;
@@ -125,11 +119,10 @@ mod tests {
             sizes += u32::from((size.low..=size.high).contains(&-1.5));
             times += u32::from((time_constant_s.low..=time_constant_s.high).contains(&60.0));
         }
-        // 95 % of 20 are expected; 15 or fewer have a probability of 3·10⁻³.
+        // 19 of 20 are expected; 15 or fewer have a probability of 3·10⁻³.
         assert!(sizes > 15 && times > 15, "{sizes} {times}");
     }
 
-    /// A walk begins with a transient by chance in one of 100,000 records, or in a few of them with the time constants that are tried.
     #[test]
     fn a_walk_is_no_transient() {
         for seed in 0..100 {

@@ -1,5 +1,4 @@
-//! The bias that vibration makes: a transducer that is not quite linear turns a part of an alternating acceleration into a
-//! constant, which grows with the square of the amplitude. The bias follows the variance of the acceleration.
+//! Vibration rectification: a bias that follows the variance of an acceleration.
 
 use super::bias_response::{BiasResponse, Course, FRACTIONS, interval};
 use super::block_means::BlockMeans;
@@ -8,26 +7,22 @@ use crate::effects::VibrationRectification;
 use crate::samples::series::Series;
 use nalgebra::DVector;
 
-/// Fewest samples of which a variance is taken: it then scatters by a third of itself, √(2/16).
+/// Fewest samples of a variance; it scatters by √(2/16).
 const FEWEST: u64 = 16;
-/// By which factor the variance has to change between blocks at least. In a smaller range it is no better a clock of the record
-/// than any drift.
+/// Least ratio of the variance between blocks; a smaller range resembles any drift.
 const LEAST_CHANGE: f64 = 2.0;
-/// Number of equally shaken blocks that the vibration has to be worth: what is shorter is a knock.
+/// Least vibration in equally shaken blocks; a shorter one is a knock.
 const FEWEST_BLOCKS: f64 = 4.0;
 
-/// An acceleration that may shake a channel.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Acceleration<'a> {
     pub name: &'static str,
-    /// With its knocks, which may be vibration.
     pub series: &'a Series,
-    /// Largest sensitivity that a transducer can have, in the unit of the shaken channel over g²; `None` where it is not known.
+    /// Largest possible sensitivity, in the shaken channel's unit over g²; `None` if unknown.
     pub largest: Option<f64>,
 }
 
-/// The largest sensitivity of a channel with `range` to the variance of an acceleration with the range `of_acceleration`: at
-/// full scale what is not linear stays below what is linear.
+/// The sensitivity at which the nonlinear part equals the linear one at full scale of both ranges.
 pub(crate) fn largest_sensitivity(range: Option<f64>, of_acceleration: Option<f64>) -> Option<f64> {
     Some(range? / of_acceleration?.powi(2))
 }
@@ -39,7 +34,7 @@ pub(super) struct Vibration<'a> {
 }
 
 impl<'a> Vibration<'a> {
-    /// `None` where it does not change, or only for a moment.
+    /// `None` if it does not change, or only for a moment.
     pub(super) fn new(acceleration: Acceleration<'a>, blocks: &BlockMeans) -> Option<Self> {
         let width = (blocks.width / FRACTIONS).max(FEWEST).min(blocks.width);
         let course = Course { width, values: variances(acceleration.series, width)? };
@@ -50,17 +45,14 @@ impl<'a> Vibration<'a> {
         is_changing.then_some(Self { acceleration, course })
     }
 
-    /// Block means of the variance.
     pub(super) fn regressor(&self, blocks: &BlockMeans) -> DVector<f64> {
         self.course.in_blocks(blocks)
     }
 
-    /// Whether a transducer can have this sensitivity.
     pub(super) fn is_possible(&self, sensitivity: f64) -> bool {
         self.acceleration.largest.is_none_or(|largest| sensitivity.abs() <= largest)
     }
 
-    /// The response of a bias in `unit`.
     pub(super) fn response(&self, estimate: &RegressionEstimate, unit: &'static str) -> BiasResponse {
         let Acceleration { name, series, .. } = self.acceleration;
         let effect = VibrationRectification {
@@ -75,11 +67,10 @@ impl<'a> Vibration<'a> {
     }
 }
 
-/// Variance of the samples of each stretch of `width` sample periods around their mean; that of the stretch before where one
-/// has fewer than half of its samples. `None` if all have.
+/// Variance per `width` sample periods; the one before if fewer than half of the samples are there.
 fn variances(series: &Series, width: u64) -> Option<Vec<f64>> {
     let count = usize::try_from(series.slots.last()? / width + 1).ok()?;
-    // Sums of the values and of their squares about a value near all of them, and their number.
+    // Sums about a near value, against cancellation.
     let origin = *series.values.first()?;
     let mut sums = vec![(0.0, 0.0, 0.0); count];
     for (&slot, value) in series.slots.iter().zip(series.values.iter()) {

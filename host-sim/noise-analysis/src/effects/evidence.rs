@@ -1,6 +1,7 @@
 //! What several kinds of effects were told by.
 
-use crate::bounds::{BoundedEstimate, Parameter};
+use super::kind::{NamedParameter, named};
+use crate::bounds::BoundedEstimate;
 use serde::Serialize;
 
 /// Where the curve departs from the model without an added term.
@@ -66,7 +67,7 @@ impl Multiples {
         self.harmonics.len() + self.sidebands
     }
 
-    pub(super) fn parameter(&self) -> (&'static str, Parameter) {
-        ("harmonics", BoundedEstimate::exact(self.count() as f64).parameter(""))
+    pub(super) fn parameter(&self) -> NamedParameter {
+        named("harmonics", BoundedEstimate::exact(self.count() as f64).parameter(""))
     }
 }

@@ -5,71 +5,52 @@ use allan_core::NoiseTerm;
 use allan_core::term::Markov;
 use measurement::Quantity;
 
-/// A kind of effect.
+/// A kind of effect. Its name stands in the list of [`Effect`](super::Effect).
 pub(crate) trait Kind {
-    /// In tables and files.
-    const NAME: &'static str;
-
-    /// Its parameters by their names in tables and files.
-    fn parameters(&self) -> Vec<(&'static str, Parameter)>;
-
-    /// The estimates that say how large it is: the channel with the narrowest of these for their value shows it most clearly.
-    fn sizes(&self) -> Vec<BoundedEstimate>;
-
-    /// What two parts of a record have alike where the effect lasts, in one order for the whole kind; nothing of what happens once or is
-    /// no statement about the samples' distribution. Of lines the first is the frequency, and then come amplitude, deviation and
-    /// bandwidth.
-    fn lasting(&self) -> Vec<Option<BoundedEstimate>>;
+    fn parameters(&self) -> Vec<NamedParameter>;
 
     /// How often a part has it.
-    fn occurrence(&self) -> Occurrence;
+    fn occurrence(&self) -> Occurrence {
+        Occurrence::InChannel
+    }
 
     /// The Allan variance that it adds to its channel, at one averaging time.
-    fn avar(&self, at: &AveragingTime) -> AddedVariance;
+    fn avar(&self, _at: &AveragingTime) -> AddedVariance {
+        AddedVariance::NONE
+    }
 
-    /// What it adds to the bias of its channel in each block: factors, each with the values that it multiplies. Empty of noise.
-    fn course(&self, means: &BiasBlocks) -> Vec<(f64, Vec<f64>)>;
+    /// What it adds to the bias of its channel in each block: factors, each with the values that it multiplies. Empty for noise.
+    fn course(&self, _blocks: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
+        Vec::new()
+    }
 }
 
-/// In a [`Kind`] of noise: [`Kind::course`].
-macro_rules! no_course {
-    () => {
-        fn course(&self, _: &$crate::effects::BiasBlocks) -> Vec<(f64, Vec<f64>)> {
-            Vec::new()
-        }
-    };
+/// A parameter of an effect, and what it is for.
+pub(crate) struct NamedParameter {
+    /// In tables and files.
+    pub name: &'static str,
+    pub parameter: Parameter,
+    /// Whether it says how large the effect is.
+    pub is_size: bool,
+    /// Whether any two stretches of a record have it alike where the effect lasts. It describes the distribution of the samples, and
+    /// nothing that happens once.
+    pub lasts: bool,
 }
 
-/// In a [`Kind`] that adds no variance of its own: [`Kind::avar`] and [`Kind::course`].
-macro_rules! no_variance {
-    () => {
-        fn avar(&self, _: &$crate::effects::AveragingTime) -> $crate::effects::AddedVariance {
-            $crate::effects::AddedVariance::NONE
-        }
-
-        $crate::effects::kind::no_course!();
-    };
+/// A parameter that is neither a size nor lasting.
+pub(super) fn named(name: &'static str, parameter: Parameter) -> NamedParameter {
+    NamedParameter { name, parameter, is_size: false, lasts: false }
 }
 
-/// In a [`Kind`] with a `frequency_hz` and an `amplitude`, both of which last: [`Kind::sizes`], [`Kind::lasting`] and
-/// [`Kind::occurrence`].
-macro_rules! amplitude_at_frequency {
-    () => {
-        fn sizes(&self) -> Vec<$crate::bounds::BoundedEstimate> {
-            vec![self.amplitude.estimate()]
-        }
+impl NamedParameter {
+    pub(super) fn size(self) -> Self {
+        Self { is_size: true, ..self }
+    }
 
-        fn lasting(&self) -> Vec<Option<$crate::bounds::BoundedEstimate>> {
-            vec![Some(self.frequency_hz), Some(self.amplitude.estimate())]
-        }
-
-        fn occurrence(&self) -> $crate::effects::Occurrence {
-            $crate::effects::Occurrence::AtFrequency(self.frequency_hz)
-        }
-    };
+    pub(super) fn lasting(self) -> Self {
+        Self { lasts: true, ..self }
+    }
 }
-
-pub(super) use {amplitude_at_frequency, no_course, no_variance};
 
 /// How often a part has an effect, which decides whether two channels show the same one.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,12 +60,7 @@ pub(crate) enum Occurrence {
     /// The channels of one unit have it once.
     OnceAUnit,
     /// At a time, between the earliest and the latest possible one in s: one cause where these overlap.
-    AtTime {
-        /// s
-        from_s: f64,
-        /// s
-        to_s: f64,
-    },
+    AtTime { from_s: f64, to_s: f64 },
     /// At a frequency, Hz: one cause where each is within the bounds of the other.
     AtFrequency(BoundedEstimate),
     /// In each channel by itself.
@@ -186,5 +162,33 @@ impl BiasBlocks<'_> {
     /// `sensitivity` times the means of a channel.
     pub(crate) fn followed(&self, quantity: Quantity, axis: &str, sensitivity: f64) -> Vec<(f64, Vec<f64>)> {
         (self.of)(quantity, axis).map(|means| (sensitivity, means)).into_iter().collect()
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::{AveragingTime, Kind};
+
+    /// Asserts that the Allan variance of `kind` at these averaging factors is that of `samples`, by its definition, within `tolerance`
+    /// of itself.
+    pub(in crate::effects) fn assert_avar(
+        kind: &dyn Kind,
+        samples: &[f64],
+        period_s: f64,
+        factors: &[usize],
+        tolerance: f64,
+    ) {
+        let mut sums = vec![0.0];
+        samples.iter().for_each(|sample| sums.push(sums[sums.len() - 1] + sample));
+        for &n in factors {
+            let differences = sums.windows(2 * n + 1).map(|at| (at[2 * n] - 2.0 * at[n] + at[0]) / n as f64);
+            let count = (samples.len() + 1 - 2 * n) as f64;
+            let expected = 0.5 * differences.map(|difference| difference * difference).sum::<f64>() / count;
+            let (n, samples) = (n as u64, samples.len() as u64);
+            let at = AveragingTime { n, period_s, samples, model_avar: 0.0, adev_of: &|_, _| None };
+            let added = kind.avar(&at);
+            let ratio = (added.modelled + added.corrected) / expected;
+            assert!((ratio - 1.0).abs() < tolerance, "{n}: {ratio}");
+        }
     }
 }

@@ -1,8 +1,8 @@
 //! What departs from every model that the analysis knows: where, by how much, and what was seen.
 
 use super::evidence::CurveEvidence;
-use super::kind::{Kind, Occurrence, no_variance};
-use crate::bounds::{BoundedEstimate, Parameter};
+use super::kind::{Kind, NamedParameter, Occurrence, named};
+use crate::bounds::BoundedEstimate;
 use serde::Serialize;
 
 /// Something that no kind describes.
@@ -14,7 +14,6 @@ pub struct Unexplained {
     /// By how much the deviation there exceeds that of the model, %; `None` where it is not known to better than itself.
     #[serde(skip)]
     pub excess_percent: Option<BoundedEstimate>,
-    /// What was seen.
     pub observation: Observation,
 }
 
@@ -24,12 +23,7 @@ pub enum UnexplainedPlace {
     /// At an averaging time, s.
     AveragingTime(BoundedEstimate),
     /// At an averaging time of the curve, as by a line.
-    LineOfCurve {
-        /// s
-        tau_s: BoundedEstimate,
-        /// Hz
-        frequency_hz: BoundedEstimate,
-    },
+    LineOfCurve { tau_s: BoundedEstimate, frequency_hz: BoundedEstimate },
     /// Around a frequency of the spectrum, Hz.
     Frequency(BoundedEstimate),
 }
@@ -38,27 +32,12 @@ pub enum UnexplainedPlace {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Observation {
-    /// A point of the curve that the model does not reach.
-    PointOfCurve {
-        /// Probability anywhere in the curve by chance.
-        p_value: f64,
-    },
+    /// A point of the curve that the model does not reach, with the probability anywhere in the curve by chance.
+    PointOfCurve { p_value: f64 },
     /// A term that fits an octave of the curve, and that something else contradicts.
-    RefutedTerm {
-        /// What the curve shows of it.
-        curve: CurveEvidence,
-        /// What contradicts it.
-        by: Refutation,
-    },
-    /// A band of the spectrum that is no resonance.
-    Band {
-        /// Full width at half maximum, Hz.
-        width_hz: f64,
-        /// Significance, standard deviations.
-        sigmas: f64,
-        /// What contradicts a resonance.
-        mismatch: BandMismatch,
-    },
+    RefutedTerm { curve: CurveEvidence, by: Refutation },
+    /// A band of the spectrum that is no resonance, by its full width at half maximum.
+    Band { width_hz: f64, sigmas: f64, mismatch: BandMismatch },
     /// A level of the noise that follows the temperature.
     LevelByTemperature {
         /// Lowest and highest temperature, °C.
@@ -75,72 +54,38 @@ pub enum Refutation {
     /// A line of a few periods in the record, which its curve does not tell from a drift.
     FewPeriods,
     /// The spectrum has no line there.
-    NotInSpectrum {
-        /// Hz
-        frequency_hz: f64,
-    },
-    /// The spectrum has another shape where the term is.
-    ShapeOfSpectrum {
-        /// Probability by chance.
-        p_value: f64,
-    },
+    NotInSpectrum { frequency_hz: f64 },
+    /// The spectrum has another shape where the term is, with the probability by chance.
+    ShapeOfSpectrum { p_value: f64 },
     /// The changes up and down differ.
-    Irreversible {
-        /// Of the term, s.
-        time_constant_s: f64,
-    },
-    /// The kurtosis is that of rare disturbances.
-    RareDisturbances {
-        /// Of the term, s.
-        time_constant_s: f64,
-        /// Excess kurtosis over that of two equally frequent levels, and its standard deviation.
-        kurtosis: [f64; 2],
-    },
-    /// The kurtosis does not tell whether the process has two levels.
-    UndecidedLevels {
-        /// Of the term, s.
-        time_constant_s: f64,
-        /// Excess kurtosis over that of two equally frequent levels, and its standard deviation.
-        kurtosis: [f64; 2],
-    },
+    Irreversible { time_constant_s: f64 },
+    /// The kurtosis is that of rare disturbances: its excess over that of two equally frequent levels, and the standard deviation.
+    RareDisturbances { time_constant_s: f64, kurtosis: [f64; 2] },
+    /// The kurtosis, by the same figures, does not tell whether the process has two levels.
+    UndecidedLevels { time_constant_s: f64, kurtosis: [f64; 2] },
 }
 
 /// What contradicts a resonance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BandMismatch {
-    /// The form of its spectrum.
-    Shape {
-        /// Probability by chance.
-        p_value: f64,
-    },
+    /// The form of its spectrum, with the probability by chance.
+    Shape { p_value: f64 },
     /// The Allan deviation.
     Curve,
 }
 
 impl Kind for Unexplained {
-    const NAME: &'static str = "unexplained";
-
-    fn parameters(&self) -> Vec<(&'static str, Parameter)> {
-        let tau = self.tau_s().map(|of| ("tau", of.parameter("s")));
-        let frequency = self.frequency_hz().map(|of| ("frequency", of.parameter("Hz")));
-        let excess = self.excess_percent.map(|of| ("excess_percent", of.parameter("%")));
+    fn parameters(&self) -> Vec<NamedParameter> {
+        let tau = self.tau_s().map(|tau_s| named("tau", tau_s.parameter("s")));
+        let frequency = self.frequency_hz().map(|frequency_hz| named("frequency", frequency_hz.parameter("Hz")));
+        let excess = self.excess_percent.map(|percent| named("excess_percent", percent.parameter("%")).size());
         [tau, frequency, excess].into_iter().flatten().collect()
-    }
-
-    fn sizes(&self) -> Vec<BoundedEstimate> {
-        self.excess_percent.into_iter().collect()
-    }
-
-    fn lasting(&self) -> Vec<Option<BoundedEstimate>> {
-        Vec::new()
     }
 
     fn occurrence(&self) -> Occurrence {
         self.frequency_hz().map_or(Occurrence::InChannel, Occurrence::AtFrequency)
     }
-
-    no_variance!();
 }
 
 impl Unexplained {

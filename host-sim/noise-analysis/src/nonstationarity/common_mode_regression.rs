@@ -1,7 +1,7 @@
-//! Common-mode drift: how much of each channel the other channels explain, and the hold-out gain of subtracting it.
+//! Common-mode drift: the part of each channel that the others explain, and the hold-out gain of subtracting it.
 //!
-//! Each channel is regressed on all others by the covariances of their second differences at one octave. The weights are
-//! estimated in the first half at one octave and applied to the second half at all octaves.
+//! Each channel is regressed on all others by the Allan covariances of the first half at one octave; the weights are
+//! applied to the second half at all octaves.
 
 use crate::parallel::in_parallel;
 use crate::record::estimators::CoupledEstimators;
@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use std::ops::Range;
 
-/// Degrees of freedom that an octave needs for each weight that is estimated from it.
+/// Least degrees of freedom of an octave per weight estimated from it.
 const DEGREES_OF_FREEDOM_PER_WEIGHT: f64 = 10.0;
 
 /// The share of the common mode at one averaging time of the first half.
@@ -38,12 +38,12 @@ pub struct HoldOutGain {
 /// The regression of each channel on the others.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CommonModeRegression {
-    /// In the order of all lists by channel.
+    /// Names, in the order of all lists by channel.
     pub channels: Vec<String>,
     /// Averaging time at which the weights were estimated, s: the longest one with enough degrees of freedom.
     pub weights_tau_s: f64,
-    /// By channel: whether the weights of the first quarter reduce the variance of the second quarter at `weights_tau_s`. This
-    /// decides from the first half alone whether to use the weights.
+    /// By channel: whether the weights of the first quarter reduce the variance of the second quarter at
+    /// `weights_tau_s`, which decides whether they are used.
     pub trusted: Vec<bool>,
     /// Octave by octave, in the first half.
     pub shares: Vec<OctaveShares>,
@@ -52,7 +52,7 @@ pub struct CommonModeRegression {
 }
 
 impl CommonModeRegression {
-    /// The regression of `channels` of a recording; `None` if there are fewer than two, or too few samples for it.
+    /// The regression of `channels`; `None` for fewer than two, or too few samples.
     #[must_use]
     pub fn estimate(measurement: &Measurement, channels: &[ChannelId]) -> Option<Self> {
         let others = channels.len().checked_sub(1).filter(|&others| others > 0)?;
@@ -104,7 +104,6 @@ impl CommonModeRegression {
     }
 }
 
-/// Estimators of the first quarter, the second quarter, and the second half.
 fn quarters_and_second_half(measurement: &Measurement, channels: &[ChannelId]) -> [CoupledEstimators; 3] {
     let recorded: Vec<&MeasuredChannel> = channels.iter().map(|&channel| &measurement[channel]).collect();
     let positions_of_all: Vec<usize> = (0..channels.len()).collect();
@@ -117,7 +116,7 @@ fn quarters_and_second_half(measurement: &Measurement, channels: &[ChannelId]) -
         }
         part
     };
-    // The longest one first, beside which the others are computed.
+    // The longest one first: the others are computed beside it.
     let parts = [quarter(2)..measurement.len(), 0..quarter(1), quarter(1)..quarter(2)];
     let mut parts = in_parallel(&parts, part).into_iter();
     let [second_half, first, second] =
@@ -125,16 +124,14 @@ fn quarters_and_second_half(measurement: &Measurement, channels: &[ChannelId]) -
     [first, second, second_half]
 }
 
-/// The weight of every channel in the prediction of channel `of`, 0 of itself; `None` where the covariances of the others
-/// are singular.
+/// Weight of every channel in the prediction of channel `of` (0 for itself); `None` if the covariances are singular.
 fn weights(covariances: &DMatrix<f64>, of: usize) -> Option<DVector<f64>> {
     let others = covariances.clone().remove_row(of).remove_column(of);
     let with_others = covariances.column(of).into_owned().remove_row(of);
     Some(others.cholesky()?.solve(&with_others).insert_row(of, 0.0))
 }
 
-/// The part of the variance of channel `of` that is left when its prediction by the others is subtracted; `None` if the
-/// channel has no variance.
+/// Part of the variance of channel `of` that its prediction leaves; `None` without variance.
 fn remaining_variance(covariances: &DMatrix<f64>, of: usize, weights: &DVector<f64>) -> Option<f64> {
     let mut combination = -weights;
     combination[of] = 1.0;
@@ -151,7 +148,6 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use std::collections::BTreeMap;
 
-    /// `columns` of counts at 100 Hz without a gap.
     fn measurement(columns: Vec<(&str, Vec<i32>)>) -> Measurement {
         let profile = adis16405::profile(0.05);
         let samples = columns[0].1.len() as u64;
@@ -170,7 +166,7 @@ mod tests {
 
     #[test]
     fn a_common_walk_is_explained_by_its_share_of_the_variance_and_removed() {
-        /// White noise of every channel and step of the walk, counts.
+        /// White noise of every channel, and step of the walk, counts.
         const WHITE: f64 = 20.0;
         const STEP: f64 = 1.0;
         let mut random = ChaCha8Rng::seed_from_u64(5);
@@ -203,7 +199,7 @@ mod tests {
             .find(|octave| octave.tau_s == found.weights_tau_s)
             .expect("the octave at which the weights were estimated");
         assert!(at_weights.ratio[1] < 0.5 && at_weights.ratio[2] < 0.5, "{at_weights:?}");
-        // At short averaging times the white noise of the other channel is added to the channel's own.
+        // At short averaging times the other channel adds its white noise.
         assert!((found.gains[0].ratio[1] - 2f64.sqrt()).abs() < 0.1, "{:?}", found.gains[0]);
     }
 

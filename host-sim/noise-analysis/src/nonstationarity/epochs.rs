@@ -1,4 +1,4 @@
-//! Curves of the halves, quarters and epochs of a channel's record, and whether the noise differs between the quarters.
+//! Curves of the halves, quarters and epochs of a record, and the comparison of the quarters.
 
 use crate::OCTAVES;
 use crate::fit::signal_share::SignalShare;
@@ -14,36 +14,30 @@ use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use std::ops::Range;
 
-/// Highest probability, over all that is compared in a channel, at which stationary noise is taken to be non-stationary.
+/// p-value, over all comparisons in a channel, below which noise is non-stationary.
 pub(crate) const SIGNIFICANCE: f64 = 0.01;
 
-/// An epoch's Allan variance is used up to averaging factors of a `MIN_AVERAGES`th of its samples.
+/// Least number of averages in an epoch at an averaging factor that is used.
 pub(crate) const MIN_AVERAGES: u64 = 64;
 
-/// Curves of the halves, of the quarters of the first half, and of epochs, in the channel's unit.
-///
-/// The first half is what models are fitted to; the second half is unseen.
+/// Curves in the channel's unit. Models are fitted to the first half; the second half is unseen.
 #[derive(Debug, Clone)]
 pub(crate) struct EpochCurves {
-    /// The two quarters of the first half, the earlier first.
     pub quarters: [Curve<OCTAVES>; 2],
-    /// Second half of the record.
     pub unseen: Curve<OCTAVES>,
-    /// Samples in an epoch: a power of 2.
+    /// Samples in an epoch, a power of 2.
     pub epoch: u64,
-    /// Length of an epoch, s.
     pub epoch_s: f64,
-    /// Epochs up to the middle of the record; the sample periods that are left over lie before the first.
+    /// Epochs up to the middle; the remainder lies before the first.
     pub fitted_epochs: Vec<Curve<OCTAVES>>,
-    /// Epochs from the middle on; the sample periods that are left over lie behind the last.
+    /// Epochs from the middle on; the remainder lies behind the last.
     pub unseen_epochs: Vec<Curve<OCTAVES>>,
-    /// Sample periods of the series in each of these.
+    /// Their sample periods.
     pub(crate) ranges: [Vec<Range<u64>>; 2],
 }
 
 impl EpochCurves {
-    /// Curves of a series whose second half begins with the sample period `middle`, of at least 24,576 sample periods (two halves
-    /// of twelve shortest epochs). `None` of a shorter one, and where the channel does not change for a whole epoch of the first half.
+    /// Curves of a series, halved at `middle`; `None` below 24,576 sample periods, or if constant for an epoch.
     #[must_use]
     pub(crate) fn from_series(series: &Series, middle: u64) -> Option<Self> {
         let to = series.span.end;
@@ -61,13 +55,11 @@ impl EpochCurves {
         curves.quarters.iter().chain(&curves.fitted_epochs).all(changes).then_some(curves)
     }
 
-    /// Whether the channel changes in every epoch of the second half.
     pub(crate) fn changes_in_second_half(&self) -> bool {
         self.unseen_epochs.iter().all(changes)
     }
 
-    /// The same curves of a channel by averaging factors in samples, where the series has means, with those of the samples at `shorter`
-    /// averaging times.
+    /// The curves by averaging factors in samples if the series has means, with `shorter` ones of the samples.
     #[must_use]
     pub(crate) fn in_samples(self, shorter: &SampleCurves) -> Self {
         let in_samples = |means: &Curve<OCTAVES>, slots: Range<u64>| {
@@ -92,7 +84,7 @@ impl EpochCurves {
         }
     }
 
-    /// The same curves without the `signals` of the first half, which go on in the second.
+    /// The curves without the `signals` of the first half, which continue in the second.
     #[must_use]
     pub(crate) fn without(mut self, signals: &SignalShare) -> Self {
         if signals.is_empty() {
@@ -111,17 +103,16 @@ impl EpochCurves {
         self
     }
 
-    /// Epochs of the later quarter of the first half.
     #[must_use]
     pub(crate) fn latest_epochs(&self) -> &[Curve<OCTAVES>] {
         &self.fitted_epochs[self.fitted_epochs.len() / 2..]
     }
 
-    /// The curve of the later quarter with the median of its epochs at the octaves with at least 64 averages in an epoch.
+    /// The later quarter's curve with the median of its epochs, at octaves with at least 64 averages in an epoch.
     ///
-    /// Some minutes of vibration raise the mean of the quarter and hardly the median of its epochs. The median of variances
-    /// with `ν` degrees of freedom is low by the factor `(1 − 2/(9ν))³` (E. Wilson and M. Hilferty, 1931), which is divided
-    /// out. The median scatters by a fourth more than the mean; the confidence bounds do not include that.
+    /// Some minutes of vibration hardly change it. The median of variances with `ν` degrees of freedom is low by `(1 −
+    /// 2/(9ν))³` (E. Wilson and M. Hilferty, 1931), which is divided out. Its scatter, a fourth above that of the mean,
+    /// is not in the confidence bounds.
     #[must_use]
     pub(crate) fn median_curve(&self) -> Curve<OCTAVES> {
         let mut curve = self.quarters[1].clone();
@@ -130,19 +121,17 @@ impl EpochCurves {
     }
 }
 
-/// Whether a channel changes in the stretch of this curve.
 fn changes(curve: &Curve<OCTAVES>) -> bool {
     curve.points().iter().any(|point| point.avar > 0.0)
 }
 
-/// The curves of the two quarters up to the sample period `middle`.
 fn quarter_curves(series: &Series, middle: u64) -> [Curve<OCTAVES>; 2] {
     let from = series.span.start;
     let quarter = from + middle.saturating_sub(from) / 2;
     [curve(series, from..quarter), curve(series, quarter..middle)]
 }
 
-/// The curve of the sample periods `slots`, without correlated rounding errors.
+/// The curve of `slots`, without correlated rounding errors.
 pub(super) fn curve(series: &Series, slots: Range<u64>) -> Curve<OCTAVES> {
     let position = |slot: u64| series.slots.partition_point(|&of| of < slot);
     let range = position(slots.start)..position(slots.end);
@@ -164,22 +153,17 @@ fn median_avar<const POINTS: usize>(epochs: &[Curve<POINTS>], n: u64) -> Option<
     Some(middle / (1.0 - 2.0 / (9.0 * edf)).powi(3))
 }
 
-/// A curve that models are compared with, at its octaves with `n ≤ M/8`, and the degrees of freedom of its points.
-///
-/// These are those of one model, that of the channel, whichever model is compared: a model with uncertain points gains
-/// nothing by them.
+/// The octaves of a curve with `n ≤ M/8`, for comparison with models at the degrees of freedom of one.
 pub(crate) struct ComparedCurve {
     points: Vec<(AllanPoint, f64)>,
 }
 
 impl ComparedCurve {
     pub(crate) fn new<const POINTS: usize>(curve: &Curve<POINTS>, model: &Model) -> Self {
-        // A variance of 0, of counts that repeat with this averaging time, has no logarithm.
         let points = curve.points().iter().filter(|point| point.n <= curve.samples() / 8 && point.avar > 0.0);
         Self { points: points.map(|point| (*point, model.edf(point))).collect() }
     }
 
-    /// Number of octaves.
     pub(crate) fn len(&self) -> usize {
         self.points.len()
     }
@@ -194,14 +178,14 @@ impl ComparedCurve {
     }
 }
 
-/// Comparison of two stretches of a channel, at the octave at which they differ most.
+/// Comparison of two stretches at the octave at which they differ most.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Stationarity {
     /// Averaging time, s.
     pub tau_s: f64,
     /// Allan variance of the later stretch over that of the earlier one.
     pub variance_ratio: f64,
-    /// Probability that stretches of the same noise differ as clearly at any octave.
+    /// Probability of as clear a difference at any octave in the same noise.
     pub p_value: f64,
 }
 
@@ -209,24 +193,23 @@ pub struct Stationarity {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FittedPart {
-    /// All of it.
     FirstHalf,
-    /// Its later half, which is nearer in time to the second half: the noise is non-stationary.
+    /// The later quarter, nearer in time: the noise is non-stationary.
     LaterQuarter,
 }
 
 impl Stationarity {
-    /// Compares two stretches octave by octave, up to an eighth of the shorter one. `None` where no octave can be compared.
+    /// Compares two stretches octave by octave, up to an eighth of the shorter one. `None` if no octave can be
+    /// compared.
     ///
-    /// The ratio of two variances of the same noise has Fisher's distribution with their degrees of freedom, by `model`,
-    /// which describes both stretches together. The probability is that of the clearest octave times the number of octaves
-    /// (Bonferroni), which holds for correlated octaves too.
+    /// The ratio of two variances has Fisher's distribution, with degrees of freedom by `model`. The p-value of the
+    /// clearest octave is multiplied by the number of octaves (Bonferroni).
     #[must_use]
     pub fn compare<const POINTS: usize>(earlier: &Curve<POINTS>, later: &Curve<POINTS>, model: &Model) -> Option<Self> {
         let longest = earlier.samples().min(later.samples()) / 8;
         let compare = |(before, after): (&AllanPoint, &AllanPoint)| {
             let ratio = after.avar / before.avar;
-            // Counts that repeat with an averaging time have no variance at it.
+            // Repeated counts have no variance at some averaging times.
             if !(ratio.is_finite() && ratio > 0.0) {
                 return None;
             }
@@ -240,7 +223,7 @@ impl Stationarity {
         Some(Self { p_value: (clearest.p_value * octaves.len() as f64).min(1.0), ..*clearest })
     }
 
-    /// Whether the stretches have different noise.
+    /// True if the stretches have different noise.
     #[must_use]
     pub fn is_nonstationary(&self) -> bool {
         self.p_value < SIGNIFICANCE
@@ -248,7 +231,7 @@ impl Stationarity {
 }
 
 impl FittedPart {
-    /// The part to use by the comparison of the two quarters of the first half.
+    /// The part to fit to, by the comparison of the two quarters of the first half.
     #[must_use]
     pub fn select(quarters: Option<Stationarity>) -> Self {
         match quarters {

@@ -1,31 +1,30 @@
-//! Prediction of the second half with tracked parameters, epoch by epoch, and the baselines that it is compared with.
+//! Prediction of the second half with tracked parameters, epoch by epoch, and its baselines.
 //!
-//! The terms of the model and their shapes are those of the first half; only the parameters that moved there are tracked.
-//! The parameters of each epoch are predicted from the epochs before it, and updated with the epoch afterwards. Over many
-//! epochs the mean of the predictions, which lag by one epoch, is nearly the mean of the parameters: the error of the pooled
-//! curve is therefore too small. The error of the single epochs, one step ahead, is not.
+//! Only parameters that changed in the first half are tracked, each epoch predicted from those before it. The pooled
+//! error is too small, because the mean of lagging predictions is nearly that of the parameters; the one-step error is
+//! not.
 
 use super::epochs::{ComparedCurve, EpochCurves, MIN_AVERAGES, SIGNIFICANCE};
 use super::tracked_parameters::{MAX_LEVEL, PARAMETERS, ParameterVector, TrackedModel, TrackedSet, minimum};
 use allan_core::{Curve, Model};
 use serde::Serialize;
 
-/// Rounds of the search in [`beyond_drift`], one parameter after the other, and its first step.
+/// Rounds of the coordinate search in [`beyond_drift`], and its first step.
 const ROUNDS: usize = 8;
 const FIRST_STEP: f64 = 0.01;
 
 /// Deviances per point on the second half of a model with tracked parameters.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TrackingErrors {
-    /// Of the mean of all predicted curves against the curve of the second half.
+    /// The mean of all predicted curves against the curve of the second half.
     pub pooled: f64,
-    /// Mean over the epochs of each one's own, against its prediction.
+    /// Mean over the epochs, each against its own prediction.
     pub one_step: f64,
-    /// The same of the model that is not tracked.
+    /// [`one_step`](Self::one_step) for the model without tracking.
     pub one_step_static: f64,
 }
 
-/// The parameters to track, by the epochs of the first half alone. The line is tracked only together with the level.
+/// Selects the parameters to track, by the first half alone. The line is tracked only together with the level.
 #[must_use]
 pub(crate) fn select_tracked<const POINTS: usize>(model: &TrackedModel, fitted: &[Curve<POINTS>]) -> TrackedSet {
     let level = model.test_movement(fitted, TrackedSet::Nothing, TrackedSet::Level);
@@ -36,7 +35,7 @@ pub(crate) fn select_tracked<const POINTS: usize>(model: &TrackedModel, fitted: 
     }
 }
 
-/// Tracks the parameters `tracked` through the epochs of both halves; the errors are those on the second half `half`.
+/// Tracks the parameters through the epochs of both halves; the errors are those on the second `half`.
 #[must_use]
 pub(crate) fn track<const POINTS: usize>(
     model: &TrackedModel,
@@ -55,7 +54,7 @@ pub(crate) fn track<const POINTS: usize>(
     }
 }
 
-/// The model of each epoch of the second half, with the parameters that the epochs before it predict.
+/// The model of each epoch of the second half, predicted from the epochs before.
 fn predictions<const POINTS: usize>(
     model: &TrackedModel,
     tracked: TrackedSet,
@@ -73,22 +72,18 @@ fn predictions<const POINTS: usize>(
     predicted.iter().map(|parameters: &ParameterVector| model.at(*parameters)).collect()
 }
 
-/// Mean Allan variance of models at the averaging factor `n`.
 pub(crate) fn mean_avar(models: &[Model], n: u64) -> f64 {
     models.iter().map(|model| model.avar(n)).sum::<f64>() / models.len() as f64
 }
 
-/// Variance of the step from each `(value, error)` to the next, less the variances of the errors.
+/// Variance of the step between `(value, error)`s, less the variances of the errors.
 fn step_variance(measured: &[(f64, f64)]) -> f64 {
     let squares =
         measured.windows(2).map(|pair| (pair[1].0 - pair[0].0).powi(2) - pair[0].1.powi(2) - pair[1].1.powi(2));
     (squares.sum::<f64>() / (measured.len().max(2) - 1) as f64).max(0.0)
 }
 
-/// Predicts each `(value, error)` from those before it.
-///
-/// By a Kalman filter of a random walk that is measured with these errors (the local level model of structural time
-/// series); the variance of its step is that of the first `fitted` values.
+/// Predicts each `(value, error)` by a Kalman filter of a random walk with the steps of the first `fitted` values.
 fn predict_one_step(measured: &[(f64, f64)], fitted: usize) -> Vec<f64> {
     let step = step_variance(&measured[..fitted]);
     let (mut level, mut variance) = measured.first().map_or((0.0, 0.0), |&(value, error)| (value, error * error));
@@ -105,11 +100,9 @@ fn predict_one_step(measured: &[(f64, f64)], fitted: usize) -> Vec<f64> {
     predicted
 }
 
-/// Standard deviation of the difference between each parameter's mean over `unseen` epochs and its mean over the last
-/// `used` epochs of the first half, if the parameter goes on as a random walk with the steps of the first half.
-///
-/// With steps of variance `q`, the means over `L` epochs and over the `H` that follow differ by a variance of about
-/// `q·(L + H)/3`.
+/// Standard deviation of the difference between a parameter's means over `unseen` epochs and over the last `used` ones,
+/// if its random walk continues. With steps of variance `q`, the means over `L` epochs and over the following `H`
+/// differ by about `q·(L + H)/3`.
 #[must_use]
 pub(crate) fn expected_drift<const POINTS: usize>(
     model: &TrackedModel,
@@ -125,8 +118,7 @@ pub(crate) fn expected_drift<const POINTS: usize>(
     })
 }
 
-/// Deviance per point of a model on `half`, with parameters that may differ by `drift` (standard deviations): the minimum
-/// over the parameters `x` of the model's deviance and their cost `(x/σ)²`. Without drift the plain deviance per point.
+/// Deviance per point on `half` of a model whose parameters may differ by `drift` σ at the cost `(x/σ)²`.
 #[must_use]
 pub(crate) fn beyond_drift<const POINTS: usize>(
     model: &TrackedModel,
@@ -158,14 +150,14 @@ pub(crate) fn beyond_drift<const POINTS: usize>(
 /// Deviances per point on the second half of two predictions without added terms.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Baselines {
-    /// Of the baseline model with its white noise tracked: what tracking alone explains.
+    /// The baseline model with its white noise tracked: the gain of tracking alone.
     pub baseline_tracked: f64,
-    /// Of the curve of the epoch before, with the baseline model at the averaging times that an epoch is too short for.
+    /// The curve of the epoch before; the baseline model at averaging times too long for an epoch.
     pub persistence: f64,
 }
 
 impl Baselines {
-    /// `baseline` is the baseline model, fitted to the first half; `model` gives the degrees of freedom.
+    /// `baseline` was fitted to the first half; `model` gives the degrees of freedom.
     #[must_use]
     pub(crate) fn new(curves: &EpochCurves, baseline: &Model, model: &Model) -> Self {
         let half = ComparedCurve::new(&curves.unseen, model);

@@ -1,31 +1,28 @@
 //! Prediction intervals of the noise of the next epoch, octave by octave.
 //!
-//! The logarithm of an octave's Allan variance is a random walk that each epoch measures (the local level model of
-//! structural time series; A. Harvey, 1989). How large its steps are is not known: the predictions for all sizes of the step
-//! are averaged with the probabilities that the epochs so far give to them, beginning with equal ones.
+//! The logarithm of an octave's Allan variance is a random walk measured by each epoch (local level model; A. Harvey,
+//! 1989). Predictions for all step variances are averaged by their posterior probabilities, equal at first.
 
 use super::epochs::{EpochCurves, MIN_AVERAGES};
 use allan_core::{AllanPoint, Curve, Model};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-/// Variances of the step that are tried, over the variance of an epoch's estimate: 0, and powers of 4 from a step that cannot
-/// be told from none in thirty epochs to one that doubles or halves the Allan variance of 10⁴ degrees of freedom.
+/// Step variances over the variance of an epoch's estimate: 0, and powers of 4.
 const STEPS: [f64; 11] = [0.0, 1.0 / 64.0, 1.0 / 16.0, 0.25, 1.0, 4.0, 16.0, 64.0, 256.0, 1024.0, 4096.0];
 /// Probability on either side of a prediction interval of 95 %.
 const TAIL: f64 = 0.025;
 
-/// How many octaves of the epochs of the second half lie within their 95 % prediction intervals.
+/// Octaves of the second half's epochs within their 95 % prediction intervals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct IntervalCoverage {
     /// Octaves that were predicted, in all epochs of the second half.
     pub octaves: usize,
-    /// Those within the interval that the epochs before gave.
     pub within: usize,
 }
 
 impl IntervalCoverage {
-    /// Predicts each octave of each epoch of the second half from all epochs before it; `model` gives the degrees of freedom.
+    /// Predicts each octave of each epoch of the second half; `model` gives the degrees of freedom.
     #[must_use]
     pub(crate) fn of_second_half(curves: &EpochCurves, model: &Model) -> Self {
         let (mut octaves, mut within) = (0, 0);
@@ -51,8 +48,7 @@ impl IntervalCoverage {
     }
 }
 
-/// Variance of the logarithm of a variance with `edf` degrees of freedom: the trigamma function of half of them, by its
-/// asymptotic series (Abramowitz and Stegun, 6.4.12); to 10⁻⁴ of it with ten and more.
+/// Variance of ln of a variance with `edf` degrees of freedom: trigamma of `edf/2` (Abramowitz and Stegun, 6.4.12).
 fn log_variance(edf: f64) -> f64 {
     let x = edf / 2.0;
     1.0 / x + 0.5 / (x * x) + 1.0 / (6.0 * x * x * x)
@@ -66,18 +62,16 @@ fn update(level: &mut Option<LocalLevel>, measured: Option<(f64, f64)>) {
     }
 }
 
-/// Kalman filters of a random walk, one for each variance of its step.
+/// A Kalman filter of a random walk.
 struct LocalLevel {
     filters: Vec<StepFilter>,
 }
 
 struct StepFilter {
-    /// Variance of the step.
     step: f64,
-    /// Prediction of the next value, and its variance without that of the measurement.
+    /// Predicted value, and its variance without that of the measurement.
     level: f64,
     variance: f64,
-    /// Logarithm of the likelihood of the values so far.
     log_likelihood: f64,
 }
 

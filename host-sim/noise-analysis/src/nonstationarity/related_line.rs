@@ -1,7 +1,6 @@
-//! A line whose frequency moves, and a line of another channel that moves with it at a ratio of small whole numbers.
+//! A line of another channel whose frequency moves with a channel's line, at a ratio of small whole numbers.
 //!
-//! A mechanical or electrical source shows in several channels and at multiples of its frequency. If the first half has
-//! such a related line, its frequency in the second half predicts the frequency of the channel's own line there.
+//! Its frequency in the second half predicts that of the channel's own line there.
 
 use super::epochs::{ComparedCurve, EpochCurves, SIGNIFICANCE};
 use super::prediction::mean_avar;
@@ -15,43 +14,39 @@ use allan_core::Model;
 use serde::Serialize;
 use std::ops::Range;
 
-/// Frequencies of the related line over the line's that are tried.
+/// Ratios of the related line's frequency to the line's.
 const RATIOS: [(u8, u8); 5] = [(1, 3), (1, 2), (1, 1), (2, 1), (3, 1)];
-/// Half-width of the band around its mean frequency in which a line is searched, as a part of the frequency.
+/// Half-width of the searched band, over the frequency.
 const BAND: f64 = 0.18;
-/// Half-width of the band whose power is that of the line, as a part of the frequency.
+/// Half-width of the band with the line's power, over the frequency.
 const LINE: f64 = 0.05;
-/// Resolution of the spectra, as a part of the frequency.
+/// Resolution of the spectra, over the frequency.
 const RESOLUTION: f64 = 0.005;
-/// Highest frequency that is searched, as a part of the sample rate: the band around a higher one would reach the Nyquist
-/// frequency.
+/// Highest frequency searched, over the sample rate: the band stays below the Nyquist frequency.
 const MAX_FREQUENCY: f64 = 0.4;
-/// Rounds of the fit along the related line's frequencies, one parameter after the other, and its first step.
+/// Rounds of the coordinate search, and its first step.
 const ROUNDS: usize = 12;
 const FIRST_STEP: f64 = 0.02;
 
-/// A channel that may have a line.
 pub(crate) struct LineSource<'a> {
     pub name: &'static str,
     pub series: &'a Series,
-    /// Where `series` has means of samples, what is known of these.
+    /// Curves of the samples, if `series` has means.
     pub samples: &'a SampleCurves,
 }
 
-/// A line of another channel that moves with the line of a channel.
+/// A line of another channel that moves with this channel's.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RelatedLine {
-    /// Name of the other channel.
     pub channel: String,
-    /// Its frequency over the line's, as a fraction.
+    /// Frequency over the line's, as a fraction.
     pub ratio: (u8, u8),
-    /// Correlation of the two frequencies' changes from epoch to epoch, in the first half.
+    /// Correlation of both frequencies' changes between epochs of the first half.
     pub correlation: f64,
     /// Probability of as much between unrelated lines, in any channel at any ratio.
     pub p_value: f64,
-    /// Mean of the line's frequency over the related line's, epoch by epoch, in the first half.
+    /// Mean over the epochs of the first half.
     pub measured_ratio: f64,
-    /// Standard deviation of that ratio.
     pub measured_ratio_deviation: f64,
     /// Frequency of the line, Hz, in the epochs of the first half.
     pub line_hz: Vec<f64>,
@@ -59,14 +54,12 @@ pub struct RelatedLine {
     pub related_fitted_hz: Vec<f64>,
     /// Frequency of the related line, Hz, in the epochs of the second half.
     pub related_unseen_hz: Vec<f64>,
-    /// Deviance per point on the second half of the model whose line is where the *second half of the other channel* has the
-    /// related line.
+    /// Deviance per point on the second half, with the line where the other channel's second half has the related line.
     pub unseen: f64,
 }
 
 impl RelatedLine {
-    /// Searches all other channels for a line that moves with the tracked line of channel `of`; `None` if no line is
-    /// tracked or none moves with it.
+    /// Searches the other channels for a line that moves with the tracked line of channel `of`.
     pub(crate) fn find(channels: &[LineSource], of: usize, model: &TrackedModel, curves: &EpochCurves) -> Option<Self> {
         let near = model.line_frequency()?;
         let frequencies = |channel: usize, near: f64, epochs: &[Range<u64>]| -> Option<Vec<f64>> {
@@ -82,7 +75,7 @@ impl RelatedLine {
         let tried = candidates.iter().filter_map(|&(channel, ratio)| {
             let near = mean * f64::from(ratio.0) / f64::from(ratio.1);
             let related = frequencies(channel, near, fitted)?;
-            // A line that moves the other way is not related, and hides none that is.
+            // A line that moves the other way must not hide a related one.
             let (correlation, chance) =
                 correlation(&changes(&line), &changes(&related)).filter(|(correlation, _)| *correlation >= 0.0)?;
             let p_value = (chance * candidates.len() as f64).min(1.0);
@@ -111,8 +104,7 @@ impl RelatedLine {
     }
 }
 
-/// Centroid of the strongest line of the spectrum of the sample periods `slots` around `near` Hz, above the median of that
-/// band, Hz. `None` if there is no line.
+/// Centroid, Hz, of the strongest line around `near` Hz in the sample periods `slots`, above the band's median.
 fn centroid(channel: &LineSource, slots: Range<u64>, near: f64) -> Option<f64> {
     let welch = spectrum(channel, slots, near)?;
     let band: Vec<(f64, f64)> = welch.points().filter(|(f, _)| (f / near - 1.0).abs() < BAND).collect();
@@ -128,7 +120,7 @@ fn centroid(channel: &LineSource, slots: Range<u64>, near: f64) -> Option<f64> {
     (sum > 0.0).then(|| moment / sum)
 }
 
-/// The spectrum of the sample periods `slots` of a channel, which resolves a line near `near` Hz; `None` if the samples do not show such.
+/// Spectrum of the sample periods `slots` that resolves a line near `near` Hz; `None` if the samples do not suffice.
 fn spectrum(channel: &LineSource, slots: Range<u64>, near: f64) -> Option<Welch> {
     let LineSource { series, samples, .. } = channel;
     let rate = 1.0 / series.period_s;
@@ -148,19 +140,18 @@ fn spectrum(channel: &LineSource, slots: Range<u64>, near: f64) -> Option<Welch>
     Welch::estimate(&UniformSeries::from_series(&stretch), length)
 }
 
-/// Changes of the logarithm from epoch to epoch: unrelated drifts correlate, their changes do not.
+/// Changes of ln f between epochs; unrelated drifts correlate, their changes do not.
 fn changes(frequencies: &[f64]) -> Vec<f64> {
     frequencies.windows(2).map(|pair| (pair[1] / pair[0]).ln()).collect()
 }
 
-/// Mean and standard deviation.
 fn moments(values: &[f64]) -> (f64, f64) {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
     (mean, (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt())
 }
 
-/// Pearson's correlation, and the probability of as much with either sign between independent normal numbers.
+/// Pearson's correlation and its two-sided p-value between independent normal numbers.
 fn correlation(a: &[f64], b: &[f64]) -> Option<(f64, f64)> {
     let ((mean_a, deviation_a), (mean_b, deviation_b)) = (moments(a), moments(b));
     let degrees_of_freedom = a.len() as f64 - 2.0;
@@ -171,16 +162,13 @@ fn correlation(a: &[f64], b: &[f64]) -> Option<(f64, f64)> {
     is_known.then(|| (correlation, 2.0 * student_tail(t.abs(), degrees_of_freedom)))
 }
 
-/// Deviance per point on the second half of the model whose line moves with the related line.
-///
-/// The ratio of the frequencies, the width of the line without its movement, its amplitude, and the level of the white
-/// noise are fitted to the later quarter of the first half, with the related line's frequencies there.
+/// Deviance per point on the second half of the model whose line moves with the related one.
 fn predict(tracked: &TrackedModel, curves: &EpochCurves, [fitted, unseen]: [&[f64]; 2]) -> f64 {
     let Some(near) = tracked.line_frequency() else { return f64::NAN };
     let quarter = ComparedCurve::new(&curves.quarters[1], tracked.model());
     let recent = &fitted[fitted.len() / 2..];
     let start = (recent.len() as f64 * near / recent.iter().sum::<f64>()).ln();
-    // Logarithms: of level, frequency over the related line's, width and amplitude.
+    // Logarithms of level, frequency ratio, width and amplitude.
     let mut shape = [0.0, start, -0.5, 0.0];
     let deviance = |shape: [f64; 4], frequencies: &[f64], curve: &ComparedCurve| {
         let model = |f: &f64| tracked.with_line_shape(shape[0], shape[1] + (f / near).ln(), shape[2], shape[3]);

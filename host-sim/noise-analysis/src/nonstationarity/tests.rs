@@ -1,4 +1,4 @@
-//! On simulated noise: stationary noise is left as it is, parameters that move are found and tracked.
+//! Stationary noise stays as it is; changing parameters are found and tracked.
 
 use super::epochs::{ComparedCurve, SIGNIFICANCE, curve};
 use super::prediction::{beyond_drift, expected_drift, select_tracked, track};
@@ -15,9 +15,8 @@ use std::f64::consts::PI;
 
 const PERIOD: f64 = 0.01;
 const SAMPLES: usize = 1 << 16;
-/// Records of each test of false alarms.
 const RECORDS: u64 = 200;
-/// 200 times `SIGNIFICANCE` is 2; a Poisson number of that mean exceeds 8 once in 4,000 times.
+/// 200 times `SIGNIFICANCE` is 2; a Poisson number exceeds 8 once in 4,000 times.
 const MOST_FALSE_ALARMS: usize = 8;
 
 /// A channel with steps of 1/16 of its white noise.
@@ -32,7 +31,6 @@ fn series(mut value: impl FnMut(usize) -> f64) -> Series {
     }
 }
 
-/// The curves of a record, and that of its first half.
 struct Record {
     curves: EpochCurves,
     fitted: Curve<OCTAVES>,
@@ -62,7 +60,7 @@ fn drifting(seed: u64, level: impl Fn(usize) -> f64) -> Series {
     })
 }
 
-/// White noise and a narrow-band oscillation, as an autoregression of second order, at `frequency` Hz.
+/// White noise and a narrow-band oscillation at `frequency` Hz (autoregression of second order).
 fn oscillating(seed: u64, frequency: impl Fn(usize) -> f64) -> Series {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let (mut re, mut im) = (0.0, 0.0);
@@ -104,8 +102,7 @@ fn quarters_of_the_same_oscillation_are_found_equal() {
 
 #[test]
 fn a_higher_level_is_found_and_the_later_quarter_selected() {
-    // The first octave of a quarter has 2/3 of 16,384 degrees of freedom: a ratio of variances is known to 1.9 %, so
-    // 12 % are clear, though seven octaves were looked at.
+    // 2/3 of 16,384 degrees of freedom: a ratio of variances is known to 1.9 %, so 12 % are clear at seven octaves.
     let curves = epoch_curves(&drifting(1, |at| if at < SAMPLES / 4 { 1.0 } else { 1.06 })).expect("long enough");
     let model = fit(&curves.fitted, &NoiseTerm::BASELINE);
     let found = Stationarity::compare(&curves.quarters[0], &curves.quarters[1], &model).expect("octaves");
@@ -132,7 +129,7 @@ fn epochs_of_the_same_noise_do_not_move() {
 
 #[test]
 fn the_standard_deviation_of_an_epochs_level_is_true() {
-    // The level of 16 epochs of each of 20 records, in its own standard deviations: of variance 1 within 5 σ of a χ².
+    // 16 epochs of each of 20 records: the variance 1 of normalised levels within 5 σ of a χ².
     let (mut squares, mut count) = (0.0, 0.0);
     for seed in 0..20 {
         let curves = epoch_curves(&drifting(seed, |_| 1.0)).expect("long enough");
@@ -146,7 +143,6 @@ fn the_standard_deviation_of_an_epochs_level_is_true() {
     assert!((squares / count - 1.0).abs() < 5.0 * (2.0_f64 / count).sqrt(), "{}", squares / count);
 }
 
-/// N and K of [`drifting`], by their definitions.
 fn truth() -> Model {
     use allan_core::model::FittedTerm;
     let white = FittedTerm::exact(NoiseTerm::AngleRandomWalk, PERIOD.sqrt());
@@ -156,7 +152,6 @@ fn truth() -> Model {
 
 #[test]
 fn a_line_that_moves_is_tracked() {
-    // From 22 Hz to 18 Hz, the middle of the record at 20 Hz.
     let falling = |at: usize| 22.0 - 4.0 * at as f64 / SAMPLES as f64;
     let curves = epoch_curves(&oscillating(7, falling)).expect("long enough");
     let start = NoiseTerm::Resonance(Resonance { frequency: 21.0, bandwidth: 1.0 });
@@ -169,7 +164,7 @@ fn a_line_that_moves_is_tracked() {
         let epoch = curves.epoch as usize;
         let expected = falling(SAMPLES / 2 - (epochs.len() - k) * epoch + epoch / 2);
         let error = (centre * estimate.parameters[1].exp() - expected) / (centre * estimate.error[1]);
-        // One of 16 is beyond 4 σ once in 1,000 times; the fitted width of the line is that of its path as well.
+        // One of 16 is beyond 4 σ once in 1,000 times; the fitted width includes the path.
         assert!(error.abs() < 4.0, "epoch {k}: {error} σ from {expected} Hz");
     }
     assert_eq!(select_tracked(&model, epochs), TrackedSet::LevelAndLine);
@@ -200,7 +195,7 @@ fn a_short_record_has_no_epochs() {
 
 #[test]
 fn a_burst_is_not_in_the_median_curve() {
-    // One of the eight epochs of the later quarter with half as much again of white noise.
+    // One of eight epochs with 2.25 times the variance.
     let burst = SAMPLES / 4 + 10_000..SAMPLES / 4 + 11_500;
     let (mut means, mut medians, mut quiet) = (Vec::new(), Vec::new(), Vec::new());
     for seed in 0..20 {
@@ -215,17 +210,13 @@ fn a_burst_is_not_in_the_median_curve() {
         quiet.push(shortest(&drifting(seed, |_| 1.0))[1]);
     }
     let average = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
-    // 1,500 of 16,384 samples with 2.25 times the variance add 11.4 %. A quarter's variance is known to
-    // √(3/16,384) = 1.4 %, the median of its epochs to 1.7 %, the average of 20 to 0.3 and 0.4 %: four of these.
+    // 1,500 of 16,384 samples with 2.25 times the variance add 11.4 %, known to 0.3 % or 0.4 %: four of these.
     assert!((average(&means) - 1.114).abs() < 0.013, "{}", average(&means));
     assert!((average(&quiet) - 1.0).abs() < 0.016, "{}", average(&quiet));
-    // One of eight epochs above all others moves the median from between the 4th and the 5th to between the 5th and the
-    // 6th, at most: by 0.3 of an epoch's 3.8 %.
     let moved = average(&medians) / average(&quiet);
     assert!((1.0..1.03).contains(&moved), "{moved}");
 }
 
-/// Deviance per point of a model on the second half.
 fn plain_deviance(model: &TrackedModel, curves: &EpochCurves) -> f64 {
     ComparedCurve::new(&curves.unseen, model.model()).deviance_per_point(|n| model.model().avar(n))
 }
@@ -253,7 +244,7 @@ fn a_random_walk_of_the_level_has_the_expected_drift() {
         beyond += beyond_drift(&model, drift, &curves.unseen);
         records += 1.0;
     }
-    // χ²(40)/40 is between 0.3 and 2 but once in 5,000 times, and 15 steps know their own variance to a third or so.
+    // χ²(40)/40 is outside of 0.3 … 2 once in 5,000 times; 15 steps know their variance to a third.
     assert!((0.3..2.5).contains(&(squares / records)), "{}", squares / records);
     assert!(plain / records > 5.0, "{}", plain / records);
     assert!(beyond / records < 2.0, "{}", beyond / records);
@@ -267,8 +258,7 @@ fn without_drift_the_plain_deviance_is_left() {
     assert_eq!(beyond_drift(&model, [0.0, 0.0], &curves.unseen), plain);
 }
 
-/// Share of the octaves of the second halves of 40 records that lie within their prediction intervals; the level of epoch `k`
-/// of a record is `level(random, k)` times the one before.
+/// Share of the octaves of 40 second halves within their intervals; `level(random, k)` is over the epoch before.
 fn coverage(level: impl Fn(&mut ChaCha8Rng, usize) -> f64) -> f64 {
     let epoch = 2_048;
     let (mut octaves, mut within) = (0, 0);
@@ -290,10 +280,7 @@ fn coverage(level: impl Fn(&mut ChaCha8Rng, usize) -> f64) -> f64 {
 
 #[test]
 fn prediction_intervals_hold_in_95_percent_of_octaves() {
-    // Of 3,840 octaves the share has the standard deviation √(0.05·0.95/3,840) = 0.35 % if they are independent; octaves of one
-    // epoch are correlated by a half next to each other, and those of one level wholly: at most 6 times the variance, 0.9 %.
-    // The averages over the variances of the step make the intervals some tenths of a percent too wide where it is small.
-    // ±2 % are two of these standard deviations and what the target of 93 to 97 % allows.
+    // The share of 3,840 correlated octaves has a standard deviation of at most 0.9 %: ±2 % are two of these.
     let still = coverage(|_, _| 1.0);
     assert!((0.93..0.97).contains(&still), "constant: {still}");
     let walking = coverage(|random, _| {
@@ -305,7 +292,6 @@ fn prediction_intervals_hold_in_95_percent_of_octaves() {
 
 #[test]
 fn related_epochs_are_those_of_the_same_time() {
-    // The second sample of the record and 100 others are missing: the epochs keep their sample periods.
     let mut series = drifting(5, |_| 1.0);
     let missing: Vec<u64> = (1..102).collect();
     series = series.without(&missing);

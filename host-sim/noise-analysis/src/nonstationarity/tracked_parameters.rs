@@ -1,4 +1,4 @@
-//! A model whose white noise and one of whose lines may change from epoch to epoch.
+//! A model whose white noise, and one of whose lines, may change between epochs.
 
 use super::epochs::SIGNIFICANCE;
 use crate::fit::noise_terms::is_white;
@@ -10,42 +10,36 @@ use allan_core::{AllanPoint, Curve, Model, NoiseTerm};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// Number of parameters that can be tracked.
 pub(crate) const PARAMETERS: usize = 2;
-/// To which parameters are fitted, in their logarithm.
+/// Accuracy of ln of a parameter.
 const ACCURACY: f64 = 1e-5;
-/// Largest change of a line's frequency from its mean, in ln f.
+/// Largest change of a line's frequency, in ln f.
 const MAX_LINE: f64 = 0.3;
-/// Largest change of the level, in ln of the variance: a factor of about 20.
+/// Largest change of the level, in ln of the variance.
 pub(crate) const MAX_LEVEL: f64 = 3.0;
-/// Largest bandwidth of a line that is tracked, as a part of its frequency.
+/// Largest relative bandwidth of a tracked line.
 const MAX_BANDWIDTH: f64 = 0.25;
-/// Largest standard deviation of ln f, in the median of the epochs, of a line that is tracked.
+/// Largest median over the epochs of the standard deviation of ln f of a tracked line.
 const MAX_LINE_ERROR: f64 = 0.02;
-/// Distance in ln f of the frequencies from which the search starts.
+/// Spacing in ln f of the starting points of the search.
 const GUESS_STEP: f64 = 0.02;
 
-/// The differences of an epoch from the model, or their standard deviations: ln of the variance of the white noise, and ln
-/// of the line's frequency.
+/// Differences of an epoch from the model, or their errors: ln of the white variance, ln of the line's frequency.
 pub(crate) type ParameterVector = [f64; PARAMETERS];
 
-/// A model, and which of its lines is tracked.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TrackedModel {
     model: Model,
     line: Option<usize>,
 }
 
-/// The tracked parameters of an epoch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct EpochEstimate {
-    /// At the minimum of the deviance.
     pub parameters: ParameterVector,
-    /// Standard deviations.
     pub error: ParameterVector,
     /// `Σ edf·(ln(m/v) + v/m − 1)` there.
     pub deviance: f64,
-    /// Mean decrease of the deviance by chance with the last parameter that was set free.
+    /// Mean decrease of the deviance by chance with the last free parameter.
     scatter: f64,
 }
 
@@ -53,31 +47,27 @@ pub(crate) struct EpochEstimate {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TrackedSet {
-    /// Nothing.
     Nothing,
-    /// The level of the white noise.
     Level,
-    /// The level and the frequency of the line.
     LevelAndLine,
 }
 
-/// Test of whether a parameter moves among the epochs of the first half.
+/// Test of a change of a parameter among the epochs of the first half.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct MovementTest {
-    /// Mean decrease of the deviance of an epoch, over that by chance.
+    /// Mean decrease of an epoch's deviance over that by chance.
     pub gain: f64,
-    /// Probability of as much if the parameter does not move.
+    /// Probability of as much without a change.
     pub p_value: f64,
 }
 
 impl TrackedModel {
-    /// A model none of whose lines is tracked.
     #[must_use]
     pub(crate) fn without_line(model: Model) -> Self {
         Self { model, line: None }
     }
 
-    /// `model` with the one of its lines that moves most clearly among `epochs`, if one does, and the test of that line.
+    /// Selects the line that moves most clearly among `epochs`, if any, with its test.
     #[must_use]
     pub(crate) fn select_line<const POINTS: usize>(
         model: Model,
@@ -108,13 +98,12 @@ impl TrackedModel {
         }
     }
 
-    /// The model with all parameters at their means.
     #[must_use]
     pub(crate) fn model(&self) -> &Model {
         &self.model
     }
 
-    /// Mean frequency of the line that is tracked, Hz.
+    /// Mean frequency of the tracked line, Hz.
     #[must_use]
     pub(crate) fn line_frequency(&self) -> Option<f64> {
         match self.model.terms()[self.line?].kind.shape() {
@@ -123,13 +112,11 @@ impl TrackedModel {
         }
     }
 
-    /// All parameters that can be tracked.
     #[must_use]
     pub(crate) fn largest_set(&self) -> TrackedSet {
         if self.line.is_some() { TrackedSet::LevelAndLine } else { TrackedSet::Level }
     }
 
-    /// The model with the parameters of an epoch.
     #[must_use]
     pub(crate) fn at(&self, [level, line]: ParameterVector) -> Model {
         let moved = |(at, term): (usize, &FittedTerm)| {
@@ -145,8 +132,7 @@ impl TrackedModel {
         Model::new(self.model.sample_period(), self.model.terms().iter().enumerate().map(moved))
     }
 
-    /// The model with the parameters of an epoch, and with the logarithms of the line's width and amplitude changed by
-    /// `width` and `amplitude`.
+    /// The model with an epoch's parameters, and changes of ln width and ln amplitude of the line.
     pub(crate) fn with_line_shape(&self, level: f64, line: f64, width: f64, amplitude: f64) -> Model {
         let moved = self.at([level, line]);
         let changed = |(at, term): (usize, &FittedTerm)| {
@@ -162,9 +148,7 @@ impl TrackedModel {
         Model::new(moved.sample_period(), moved.terms().iter().enumerate().map(changed))
     }
 
-    /// Tests whether the epochs need the parameters `more`, which are one more than `fewer`.
-    ///
-    /// If that parameter does not move, each epoch's deviance decreases by χ² of one degree of freedom times its scatter.
+    /// Tests if the epochs need the parameters `more`, one more than `fewer`, by the decrease of each epoch's deviance.
     #[must_use]
     pub(crate) fn test_movement<const POINTS: usize>(
         &self,
@@ -178,12 +162,12 @@ impl TrackedModel {
         };
         let sum: f64 = epochs.iter().map(decrease).sum();
         let count = epochs.len() as f64;
-        // `count` is above 0 for an `EpochCurves`.
+        // `count` > 0 in an `EpochCurves`.
         let p_value = ChiSquared::new(count).map_or(1.0, |chi_squared| chi_squared.sf(sum.max(0.0)));
         MovementTest { gain: sum / count, p_value }
     }
 
-    /// The parameters of an epoch; those that are not in `tracked` are 0.
+    /// The parameters of an epoch; 0 if not in `tracked`.
     #[must_use]
     pub(crate) fn estimate<const POINTS: usize>(&self, epoch: &Curve<POINTS>, tracked: TrackedSet) -> EpochEstimate {
         let points: Vec<(&AllanPoint, f64)> = epoch
@@ -196,7 +180,7 @@ impl TrackedModel {
             let model = self.at(parameters);
             points.iter().map(|(point, _)| model.avar(point.n)).collect()
         };
-        // Allan variance of the white noise: the difference between the models with its variance doubled and as it is.
+        // White Allan variance: the difference by doubling it.
         let white: Vec<f64> =
             avars([2f64.ln(), 0.0]).iter().zip(avars([0.0; 2])).map(|(twice, once)| twice - once).collect();
         let deviance = |level: f64, avars: &[f64]| {
@@ -230,8 +214,7 @@ impl TrackedModel {
         EpochEstimate { parameters, error, deviance, scatter }
     }
 
-    /// Standard deviations by the sandwich estimator `H⁻¹·S·H⁻¹`, and the factor by which the correlation of the points
-    /// increases the variance along the last parameter.
+    /// Sandwich estimator `H⁻¹·S·H⁻¹`: standard deviations, and the factor by correlated points on the last variance.
     fn uncertainty(
         &self,
         points: &[(&AllanPoint, f64)],
@@ -247,7 +230,6 @@ impl TrackedModel {
             };
             (at(STEP) - at(-STEP)) / (2.0 * STEP)
         };
-        // The slope of each point in its standard deviations.
         let tangent = |index: usize| -> Vec<f64> {
             points.iter().map(|(point, edf)| (edf / 2.0).sqrt() * slope(index, point)).collect()
         };
@@ -291,7 +273,7 @@ fn shifted(kind: NoiseTerm, factor: f64) -> NoiseTerm {
     }
 }
 
-/// Where `of` is least near `start`, at most `farthest` from 0.
+/// Argument within ±`farthest` at which `of` is least near `start`.
 pub(crate) fn minimum(of: impl Fn(f64) -> f64, start: f64, step: f64, farthest: f64) -> f64 {
     downhill(of, (start, step), farthest, ACCURACY)
 }

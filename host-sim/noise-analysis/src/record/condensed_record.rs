@@ -1,5 +1,5 @@
-//! A recording as it is analysed: the means of as many samples in a row as leave few enough of them, and what is known of the samples
-//! beside. A short recording has one sample a mean.
+//! A recording as it is analysed: means of consecutive samples, and findings about the samples themselves. A short
+//! recording has one sample per mean.
 
 use crate::detectors::stuck_output;
 use crate::effects::Effect;
@@ -19,49 +19,42 @@ pub struct CondensedRecord<'a> {
     pub(crate) description: RecordingDescription,
     /// Means of [`samples_per_mean`](Self::samples_per_mean) samples each.
     pub(crate) means: Cow<'a, Measurement>,
-    /// The first samples, as recorded, of a record of which not all samples are kept.
+    /// The first samples, if not all are kept.
     pub(crate) first: Option<Measurement>,
-    /// 1 where all samples are kept.
+    /// 1 if all samples are kept.
     pub(crate) samples_per_mean: u64,
-    /// Sample periods of `means` that no channel uses: their sample equals the one before in all channels.
+    /// Sample periods of `means` that repeat the sample before in all channels; no channel uses them.
     pub(crate) repeated: Vec<u64>,
     pub(crate) channels: PerChannel<CondensedChannel>,
 }
 
-/// Lines that means do not show. They are sought when they are first asked for: where that takes one channel longer than the others, these
-/// go on with their fits.
+/// Lines that means do not show, sought when first asked for, so that other channels need not wait.
 pub(crate) type FasterLines = Arc<LazyLock<Vec<MergedLine>, Box<dyn FnOnce() -> Vec<MergedLine> + Send>>>;
 
-/// What is known of the samples of one channel beside their means.
 #[derive(Clone)]
 pub(crate) struct CondensedChannel {
     pub samples: SampleCurves,
-    /// How many counts the smallest step of the values of a mean has.
     pub counts_per_step: u32,
-    /// Whether spikes can be looked for: not in means, from which they are left out, and not in values that are cut off, which are no
-    /// noise around which a sample could be a spike.
+    /// True if spikes can be sought: not in means, and not in values that are cut off.
     pub can_show_spikes: bool,
     pub faster_lines: FasterLines,
-    /// Those of the first half alone.
+    /// Lines of the first half alone.
     pub faster_lines_of_first_half: FasterLines,
-    /// What only the samples themselves show, in an inertial channel.
+    /// Effects that only the samples themselves show, in an inertial channel.
     pub effects: Vec<Effect>,
-    /// The same of the first half of the recording, as far as it is known.
     pub effects_of_first_half: Vec<Effect>,
-    /// Samples of the first half that are left out of the means as spikes or knocks, and how far each is from its neighbours, in the
-    /// channel's unit.
+    /// Spikes and knocks of the first half that are left out of the means: sample period and distance from its
+    /// neighbours, in the channel's unit.
     pub screened: Vec<(u64, f64)>,
-    /// Samples that are refused in the channel alone, by cause.
+    /// Refused samples of this channel alone, by cause.
     pub refused: BTreeMap<&'static str, u64>,
 }
 
-/// The lines that `find` finds.
 pub(crate) fn faster_lines(find: impl FnOnce() -> Vec<MergedLine> + Send + 'static) -> FasterLines {
     Arc::new(LazyLock::new(Box::new(find)))
 }
 
 impl<'a> CondensedRecord<'a> {
-    /// A record all of whose samples are kept.
     pub(crate) fn of_samples(measurement: Cow<'a, Measurement>) -> Self {
         let (measurement, stuck) = stuck_output::screened(measurement);
         let shown = SampleEffects::detect(&measurement);
@@ -92,7 +85,7 @@ impl<'a> CondensedRecord<'a> {
         }
     }
 
-    /// The record as it would be had it ended in its middle: nothing of the second half decides what is in it.
+    /// The record up to its middle, without influence of the second half.
     pub(crate) fn first_half(&self) -> CondensedRecord<'static> {
         let half = self.means.before(self.means.middle());
         if self.samples_per_mean == 1 {
@@ -114,18 +107,16 @@ impl<'a> CondensedRecord<'a> {
         }
     }
 
-    /// The first samples, or all of them.
     pub(crate) fn first_samples(&self) -> &Measurement {
         self.first.as_ref().unwrap_or(&self.means)
     }
 
-    /// The spectrum of the samples of a channel in some means; `None` where all samples are kept, or have none.
+    /// Spectrum of a channel's samples in some means; `None` if all samples are kept, or without samples.
     pub(crate) fn spectrum_within(&self, channel: ChannelId, means: Range<u64>) -> Option<Welch> {
         let samples = &self.channels[channel].samples;
         (self.samples_per_mean > 1).then(|| samples.spectrum_within(samples.slots_of(means))).flatten()
     }
 
-    /// Whether effects are traced in a channel: in the inertial ones.
     pub(crate) fn is_traced(&self, channel: ChannelId) -> bool {
         self.means[channel].profile.quantity.is_inertial()
     }

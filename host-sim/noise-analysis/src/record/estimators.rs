@@ -1,8 +1,6 @@
-//! Estimators of several channels of a recording: Allan variances of the whole as it was measured, and Allan variances and
-//! covariances of its two halves.
+//! Estimators of several channels: Allan variances of the whole recording, and variances and covariances of its halves.
 //!
-//! All channels are on one time grid. A sample that one channel lacks is missing in that channel alone; products of two
-//! channels are taken where both have a sample.
+//! All channels share one time grid; covariances use the samples that both channels have.
 
 use crate::OCTAVES;
 use crate::parallel::in_parallel;
@@ -19,16 +17,15 @@ use allan_core::{Coupling, Curve};
 use measurement::{ChannelId, ChannelProfile, MeasuredChannel, Measurement, PerChannel, Quantity};
 use nalgebra::DMatrix;
 
-/// Cascades of channels on a common time grid, each with gaps of its own, and the Allan covariance of every pair of the first of them.
+/// Cascades of channels on a common time grid, and the Allan covariances of the coupled pairs.
 #[derive(Clone)]
 pub(crate) struct CoupledEstimators {
     cascades: Vec<GappedCascade>,
     couplings: Vec<CoupledPair>,
-    /// Of each cascade, while a sample is taken.
+    /// Per cascade, while a sample is taken.
     newest: Vec<Option<NewestDifferences<OCTAVES>>>,
 }
 
-/// The covariance of two channels, by their positions.
 #[derive(Clone)]
 struct CoupledPair {
     channels: [usize; 2],
@@ -36,12 +33,11 @@ struct CoupledPair {
 }
 
 impl CoupledEstimators {
-    /// Estimators of so many channels, of which those at the positions `coupled` have a covariance with each other.
+    /// `channels` estimators; those at the positions `coupled` have covariances with each other.
     pub(crate) fn new(channels: usize, coupled: &[usize]) -> Self {
         Self::of_pairs(channels, pairs(coupled))
     }
 
-    /// Estimators of so many channels, of which these pairs have a covariance.
     fn of_pairs(channels: usize, pairs: impl Iterator<Item = [usize; 2]>) -> Self {
         Self {
             cascades: vec![GappedCascade::default(); channels],
@@ -50,7 +46,7 @@ impl CoupledEstimators {
         }
     }
 
-    /// Takes the sample of every channel in the next sample period; `None` where a channel has none.
+    /// Takes each channel's sample of the next sample period.
     pub(crate) fn push(&mut self, values: impl Iterator<Item = Option<i32>>) {
         self.newest.clear();
         for (cascade, value) in self.cascades.iter_mut().zip(values) {
@@ -58,32 +54,28 @@ impl CoupledEstimators {
             self.newest.push(cascade.has_latest().then(|| NewestDifferences::of(cascade.cascade())));
         }
         for CoupledPair { channels: [a, b], coupling } in &mut self.couplings {
-            // Products are taken where both channels have a sample.
             if let (Some(a), Some(b)) = (&self.newest[*a], &self.newest[*b]) {
                 coupling.observe_differences(a, b);
             }
         }
     }
 
-    /// Records that the samples of `missing` sample periods are missing in every channel.
     pub(crate) fn gap(&mut self, missing: u32) {
         self.cascades.iter_mut().for_each(|cascade| cascade.miss(missing.into()));
     }
 
-    /// The estimators of these samples followed, after a gap, by those of `later`.
+    /// These estimators, then those of `later` behind a gap.
     pub(crate) fn followed_by(mut self, later: &Self) -> Self {
         self.cascades.iter_mut().zip(&later.cascades).for_each(|(cascade, later)| cascade.merge(later));
         self.couplings.iter_mut().zip(&later.couplings).for_each(|(pair, later)| pair.coupling.merge(&later.coupling));
         self
     }
 
-    /// The cascade of a channel.
     pub(crate) fn cascade(&self, channel: usize) -> &GappedCascade {
         &self.cascades[channel]
     }
 
-    /// Covariances of the second differences of all channels at one octave, up to a common factor, 0 of channels that are not coupled;
-    /// `None` where the octave has no differences.
+    /// Covariances of second differences at one octave, up to a common factor, 0 if not coupled; `None` without any.
     pub(crate) fn covariances(&self, octave: usize) -> Option<DMatrix<f64>> {
         let mut covariances = DMatrix::zeros(self.cascades.len(), self.cascades.len());
         for (i, cascade) in self.cascades.iter().enumerate() {
@@ -99,46 +91,41 @@ impl CoupledEstimators {
     }
 }
 
-/// All pairs of these channels.
 fn pairs<T: Copy>(coupled: &[T]) -> impl Iterator<Item = [T; 2]> {
     coupled.iter().enumerate().flat_map(|(at, &a)| coupled[..at].iter().map(move |&b| [a, b]))
 }
 
-/// Estimators of one half of a recording, or of both halves, in physical units.
+/// Estimators of one half or both halves of a recording, in physical units.
 #[derive(Clone)]
 pub(crate) struct RecordPart {
     pub channels: PerChannel<ChannelProfile>,
     estimators: CoupledEstimators,
-    /// Smallest distance of two values, in the channel's unit: one count, or several.
+    /// Smallest distance of two values, in the channel's unit.
     resolutions: PerChannel<f64>,
     period_s: f64,
-    /// Samples of a mean, where the estimators have means; otherwise 1.
     samples_per_mean: u64,
     /// Least averaging factor of the covariances, samples.
     until: u64,
-    /// What is known of the samples beside the estimators.
     samples: PerChannel<CurveOfSamples>,
 }
 
-/// The curve of the samples of a channel whose estimators have means of them.
+/// The curve of the samples of a channel that is estimated from means.
 #[derive(Clone)]
 struct CurveOfSamples {
     curve: Curve<OCTAVES>,
-    /// Samples that were replaced because they are missing.
     replaced: u64,
-    /// Averaging factor from which on the curve is that of the means, samples; `None` where that of the samples is complete.
+    /// Averaging factor from which on the curve is that of the means; `None` if that of the samples is complete.
     means_from: Option<u64>,
-    /// What the knocks and spikes that are left out of the means add to it, by averaging factor in samples.
+    /// Added variance of the knocks and spikes that the means leave out, by averaging factor in samples.
     events: Vec<(u64, f64)>,
 }
 
 impl CurveOfSamples {
-    /// Where the estimators have all samples.
+    /// For estimators that have all samples.
     const fn none() -> Self {
         Self { curve: Curve::empty(), replaced: 0, means_from: Some(1), events: Vec::new() }
     }
 
-    /// The curve, continued by that of the means.
     fn continued(&self, means: &Curve<OCTAVES>, samples_per_mean: u64) -> Curve<OCTAVES> {
         let Some(means_from) = self.means_from else { return self.curve.clone() };
         let mut curve = self.curve.clone().continued_by_means(means, samples_per_mean, means_from);
@@ -150,34 +137,30 @@ impl CurveOfSamples {
     }
 }
 
-/// The curves of the recording as measured, and its estimators without what the whole record shows.
+/// Curves as measured, and estimators without the effects of the whole record.
 pub(crate) struct RecordEstimators {
-    /// Of the recording as measured, without preprocessing.
     pub measured: PerChannel<Curve<OCTAVES>>,
-    /// Both halves, with a gap between them.
     pub both: RecordPart,
-    /// The second half alone.
     pub second: RecordPart,
 }
 
-/// The estimators of the two halves without what the first half shows: nothing of the second half decides what is left of either.
+/// Estimators of the two halves, without influence of the second half on exclusions.
 pub(crate) struct HalfEstimators {
-    /// As they were recorded.
     pub recorded: [RecordPart; 2],
-    /// With the bias that the first half foretells subtracted.
+    /// Less the bias that the first half predicts.
     pub foretold: [RecordPart; 2],
-    /// The same without knocks and spikes by the rules of the first half.
+    /// Also without knocks and spikes by the rules of the first half.
     pub ruled: [RecordPart; 2],
 }
 
 impl RecordEstimators {
-    /// Estimates from the means of `record`, and from the curves of its samples at shorter averaging times.
+    /// Estimates from the means of `record`, and from its samples' curves at shorter averaging times.
     pub(crate) fn estimate(record: &CondensedRecord, preprocessing: &Preprocessing) -> Self {
         let [halves] = half_parts(record, record, preprocessing, [Exclusion::ByWhole]);
         Self::new(record, halves)
     }
 
-    /// The same, and the halves by what the `first_half` shows.
+    /// [`estimate`](Self::estimate), and the halves by the `first_half`.
     pub(crate) fn estimate_with_halves(
         record: &CondensedRecord,
         first_half: &CondensedRecord,
@@ -202,7 +185,6 @@ impl RecordEstimators {
         (Self::new(record, whole), halves)
     }
 
-    /// From the halves without what the whole record shows.
     fn new(record: &CondensedRecord, [first, second]: [RecordPart; 2]) -> Self {
         let both = first.followed_by(&second);
         let of_both = |channel: ChannelId| {
@@ -224,7 +206,7 @@ impl RecordEstimators {
     }
 }
 
-/// What the `samples` of a half show; the means lack the knocks and spikes, and something may be subtracted from them.
+/// Curve of the `samples` of a half; the means lack knocks and spikes, and may be corrected.
 fn of_half(samples: &SampleCurves, half: usize, exclusion: Exclusion, is_corrected: bool) -> CurveOfSamples {
     let (curve, replaced, means_from) = (samples.half(half, exclusion), samples.replaced(exclusion), samples.until());
     let lacks_events = exclusion.keeps_events() && samples.samples_per_mean > 1;
@@ -240,12 +222,10 @@ fn of_half(samples: &SampleCurves, half: usize, exclusion: Exclusion, is_correct
     CurveOfSamples { curve, replaced, means_from: Some(means_from), events }
 }
 
-/// What may be left out of a recording and subtracted from it.
 const EXCLUSIONS: [Exclusion; 4] =
     [Exclusion::Nothing, Exclusion::BiasOfFirstHalf, Exclusion::ByFirstHalf, Exclusion::ByWhole];
 
-/// The halves of a record for each of these exclusions, by its means alone. The resolution of the channels, unless it is by the whole record, is
-/// that of the `first_half`.
+/// The halves of a record for each exclusion, by its means alone, with the resolution of the `first_half`.
 fn half_parts<const COUNT: usize>(
     record: &CondensedRecord,
     first_half: &CondensedRecord,
@@ -266,12 +246,11 @@ fn half_parts<const COUNT: usize>(
     })
 }
 
-/// Which exclusions leave a channel the same samples: nothing is estimated twice.
+/// Exclusions that leave a channel the same samples, so that nothing is estimated twice.
 struct AlikeExclusions<const COUNT: usize> {
     exclusions: [Exclusion; COUNT],
-    /// For each exclusion and channel, the number of the first exclusion that does.
+    /// Number of the first exclusion alike, by exclusion and channel.
     first: [Vec<usize>; COUNT],
-    /// Pairs of channels whose covariance is asked for.
     coupled: Vec<[usize; 2]>,
 }
 
@@ -280,7 +259,7 @@ impl<const COUNT: usize> AlikeExclusions<COUNT> {
         let quantity = |channel: ChannelId| measurement[channel].profile.quantity;
         let is_coupled = |of: Quantity| of.is_inertial() || of.is_environment();
         let coupled: Vec<ChannelId> = measurement.ids().filter(|&channel| is_coupled(quantity(channel))).collect();
-        // No rate is a covariate of another one.
+        // Rates are not covariates of each other.
         let is_rate = |channel: &ChannelId| quantity(*channel) == Quantity::AngularRate;
         let coupled = pairs(&coupled).filter(|pair| !pair.iter().all(is_rate));
         let first = exclusions.map(|of| {
@@ -291,19 +270,19 @@ impl<const COUNT: usize> AlikeExclusions<COUNT> {
         Self { exclusions, first, coupled: coupled.map(|pair| pair.map(ChannelId::position)).collect() }
     }
 
-    /// The number of the first exclusion that leaves both channels the same samples as the one of this number.
+    /// Number of the first exclusion that leaves both channels the same samples as `of`.
     fn first_of_pair(&self, of: usize, pair: &[usize; 2]) -> usize {
         let is_alike =
             |other: &usize| pair.iter().all(|&channel| self.first[*other][channel] == self.first[of][channel]);
         (0..of).find(is_alike).unwrap_or(of)
     }
 
-    /// The pairs of channels of which no exclusion before this one leaves the same samples.
+    /// Pairs of channels that no earlier exclusion leaves the same samples.
     fn own_pairs(&self, of: usize) -> impl Iterator<Item = [usize; 2]> {
         self.coupled.iter().copied().filter(move |pair| self.first_of_pair(of, pair) == of)
     }
 
-    /// The estimators for an exclusion, from its own ones and those of the exclusions before it.
+    /// Estimators of an exclusion, from its own and those of the exclusions before.
     fn estimators<'e>(&self, of: usize, own: impl Fn(usize) -> &'e CoupledEstimators) -> CoupledEstimators {
         let cascade = |(channel, &first): (usize, &usize)| own(first).cascades[channel].clone();
         let coupling = |pair: &[usize; 2]| {
@@ -317,7 +296,7 @@ impl<const COUNT: usize> AlikeExclusions<COUNT> {
     }
 }
 
-/// The estimators of a half of a recording, by time, of the channels and the pairs that are an exclusion's own.
+/// Estimators of a half, for the channels and pairs that are an exclusion's own.
 fn own_estimators<const COUNT: usize>(
     measurement: &Measurement,
     preprocessing: &Preprocessing,
@@ -339,7 +318,7 @@ fn own_estimators<const COUNT: usize>(
             let channel = &measurement[id];
             let excluded = preprocessing.excluded(id, exclusion);
             let is_corrected = preprocessing.corrects(id, exclusion);
-            // An offset of all samples is in no difference, and large ones would leave no room for steps.
+            // An offset is in no difference, and a large one would leave no room for steps.
             let origin = channel.used_samples(&measurement.slots).next().map_or(0, |(_, count)| count);
             RecordedSamples {
                 id,
@@ -358,7 +337,7 @@ fn own_estimators<const COUNT: usize>(
     };
     for position in positions {
         let slot = measurement.slots[position];
-        // Of a gap over the middle, each half has the samples on its side.
+        // A gap over the middle is split between the halves.
         let own = u32::try_from(slot - begins_at).unwrap_or(u32::MAX);
         estimators.gap(measurement.missing_before(position).min(own));
         estimators.push(recorded.iter().zip(&is_own).map(|(of, is_own)| {
@@ -376,25 +355,22 @@ fn own_estimators<const COUNT: usize>(
     estimators
 }
 
-/// A half of a recording, by time.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Half {
     First,
     Second,
 }
 
-/// A channel's samples, and whether each is left out.
 struct RecordedSamples<'a> {
     id: ChannelId,
     channel: &'a MeasuredChannel,
-    /// Counts from which its samples are counted.
     origin: i32,
     is_excluded: Vec<bool>,
-    /// Whether an offset is subtracted from any of them.
+    /// True if an offset is subtracted from any sample.
     is_corrected: bool,
 }
 
-/// For each sample of a channel whether it was refused or its sample period is one of `excluded`.
+/// Per sample, whether it is refused or in `excluded`.
 fn positions(measurement: &Measurement, channel: &MeasuredChannel, excluded: &[u64]) -> Vec<bool> {
     let mut is_excluded = vec![false; channel.counts.len()];
     let refused = channel.refused.values().flatten().copied();
@@ -408,7 +384,7 @@ fn positions(measurement: &Measurement, channel: &MeasuredChannel, excluded: &[u
 }
 
 impl RecordPart {
-    /// With these estimators of the means of `record`; the resolution of each channel is that which `shows_resolution` has.
+    /// From the means of `record`; resolutions are those of `shows_resolution`.
     fn of_means(record: &CondensedRecord, shows_resolution: &CondensedRecord, estimators: CoupledEstimators) -> Self {
         let measurement = record.means.as_ref();
         Self {
@@ -422,12 +398,11 @@ impl RecordPart {
         }
     }
 
-    /// This part followed, after a gap, by `later`.
     pub(crate) fn followed_by(&self, later: &Self) -> Self {
         Self { estimators: self.estimators.clone().followed_by(&later.estimators), ..self.clone() }
     }
 
-    /// Of channels that are not coupled, whose estimators have counts of [`STEPS_PER_COUNT`] steps.
+    /// For uncoupled channels, in counts of [`STEPS_PER_COUNT`] steps.
     pub(crate) fn new(channels: PerChannel<ChannelProfile>, cascades: Vec<GappedCascade>, period_s: f64) -> Self {
         Self {
             resolutions: channels.map(|channel| channel.lsb),
@@ -440,23 +415,19 @@ impl RecordPart {
         }
     }
 
-    /// The part with what is known of the samples of `record` beside its means.
     fn with_samples(self, record: &CondensedRecord, samples: impl Fn(ChannelId) -> CurveOfSamples) -> Self {
         let until = record.channels.iter().map(|of| of.samples.until()).max().unwrap_or(1);
         Self { until, samples: record.channels.ids().map(samples).collect(), ..self }
     }
 
-    /// Seconds between samples.
     pub(crate) fn sample_period(&self) -> f64 {
         self.period_s / self.samples_per_mean as f64
     }
 
-    /// Least averaging factor at which the covariances of channels are known, samples.
     pub(crate) fn coupled_from(&self) -> u64 {
         self.until
     }
 
-    /// Channels whose covariance with `channel` is known, in their order.
     pub(crate) fn coupled_with(&self, channel: ChannelId) -> impl Iterator<Item = ChannelId> {
         self.channels.ids().filter(move |&other| other != channel && self.pair(channel, other).is_some())
     }
@@ -472,7 +443,7 @@ impl RecordPart {
         self.samples[channel].continued(&own, self.samples_per_mean)
     }
 
-    /// The rounding errors of a channel; white where its noise is not traced, as it is of a gyro or accelerometer alone.
+    /// The rounding errors of a channel; white unless it is a gyro or accelerometer.
     pub(crate) fn rounding(&self, channel: ChannelId) -> Rounding {
         let resolution = self.resolution(channel);
         match self.channels[channel].quantity {
@@ -481,12 +452,11 @@ impl RecordPart {
         }
     }
 
-    /// Allan variances of a channel without correlated rounding errors: what models are fitted to and compared with.
+    /// Allan variances without correlated rounding errors, for fits and comparisons.
     pub(crate) fn curve_before_rounding(&self, channel: ChannelId) -> Curve<OCTAVES> {
         self.rounding(channel).subtracted_from(self.curve(channel))
     }
 
-    /// Samples of a channel that were replaced because they are missing.
     pub(crate) fn replaced(&self, channel: ChannelId) -> u64 {
         match self.samples_per_mean {
             1 => self.estimators.cascade(channel.position()).cascade().replaced(),
@@ -494,12 +464,11 @@ impl RecordPart {
         }
     }
 
-    /// Smallest distance of two values of a channel, in its unit.
     pub(crate) fn resolution(&self, channel: ChannelId) -> f64 {
         self.resolutions[channel]
     }
 
-    /// Allan covariances of two channels, in the product of their units; none of channels that are not coupled.
+    /// Allan covariances, in the product of both units; none if not coupled.
     pub(crate) fn covariance(&self, a: ChannelId, b: ChannelId) -> CovarianceCurve<OCTAVES> {
         let Some(pair) = self.pair(a, b) else { return CovarianceCurve::new() };
         let mut points = pair.coupling.points();
@@ -511,7 +480,7 @@ impl RecordPart {
         points
     }
 
-    /// Physical size of 1 in what the estimators take.
+    /// Physical size of 1 in the estimators.
     fn step_size(&self, channel: ChannelId) -> f64 {
         self.channels[channel].lsb / STEPS_PER_COUNT
     }

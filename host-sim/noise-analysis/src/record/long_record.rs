@@ -1,5 +1,5 @@
-//! What is kept of a recording that is too long to be kept: the means of as many samples in a row as leave 2¹⁷ of them, the
-//! curves at averaging times that are too short for the means, and the first samples.
+//! A recording that is too long for memory: means of consecutive samples, 2¹⁷ at most, curves at shorter averaging
+//! times, and the first samples.
 //!
 //! ```text
 //! first samples ─► SampleEffects: resolution, repeated samples, sample clock
@@ -11,8 +11,8 @@
 //!        └───────────────────────────┴─► StreamedCurves ─► curves at averaging times below 8 means
 //! ```
 //!
-//! The second differences of means are those of the samples at longer averaging times, so that the two curves of a channel are
-//! one. Memory does not depend on the length of the recording.
+//! Second differences of means are those of the samples at longer averaging times, so both curves of a channel join.
+//! Memory does not grow with the recording.
 
 use crate::detectors::output_range::ValueCounts;
 use crate::detectors::spikes::SpikeRule;
@@ -36,30 +36,26 @@ use measurement::{
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Samples of the longest recording that is analysed without being condensed.
+/// Samples of the longest recording that is not condensed.
 pub const MOST_SAMPLES: u64 = 1 << 18;
-/// The same of a recording of which more than [`MOST_LOST`] of the samples are missing: the means of fewer samples have more noise.
+/// Samples of the longest one that lacks more than [`MOST_LOST`]: means of fewer samples have more noise.
 pub const MOST_SAMPLES_WITH_LOSSES: u64 = 1 << 20;
-/// Largest part of the samples of a shorter recording that may be missing where it is condensed.
+/// Largest part of missing samples of a shorter recording that is condensed.
 pub const MOST_LOST: f64 = 1.0 / 32.0;
-/// Samples that are taken at a time of a recording that is in memory.
+/// Samples taken at a time of a recording in memory.
 const BLOCK: usize = 1 << 14;
-/// Means of a longer recording, at most.
+/// Most means of a longer recording.
 const MOST_MEANS: u64 = 1 << 17;
-/// Sample periods at the start of the recording whose samples are analysed.
+/// Sample periods at the start whose samples are analysed.
 const FIRST_PERIODS: u64 = 1 << 16;
-/// Sample periods of each of the stretches whose spectra are averaged: a line is known to a 2¹⁶th of the sample rate or better.
+/// Sample periods per averaged spectrum; a line is known to a 2¹⁶th of the sample rate.
 const STRETCH_PERIODS: u64 = 1 << 16;
-/// Steps into which a count is divided for a mean, as a power of two: the rounding of the means of 256 samples is then a 16th of the
-/// deviation of the mean of their roundings, `1/√(12·256)` of a count.
+/// Steps of a count in a mean, as a power of two: a 16th of the deviation `1/√(12·256)` of a mean of 256.
 const MEAN_STEPS_LOG2: u32 = 8;
-/// Largest mean in steps.
 const LARGEST_MEAN: f64 = i32::MAX as f64;
-/// Least part of the samples of a mean that is there.
 const LEAST_FILL: f64 = 0.5;
-/// Means are rates of at least this many times the highest frequency at which a line is sought in them.
+/// Least rate of the means over the highest frequency of a line sought in them.
 const MEANS_PER_PERIOD: f64 = 2.5;
-/// A block mean at this place has no sample.
 const MISSING: i32 = i32::MIN;
 
 /// Reads a long recording block by block.
@@ -70,7 +66,6 @@ pub struct LongRecordReader {
     /// First sample period of the second half.
     middle: u64,
     stuck: StuckScreen,
-    /// What is known at the end of the first half.
     first_half: Option<FirstHalfFindings>,
     recorded: Vec<RecordedChannel>,
     screen: SampleScreen,
@@ -80,26 +75,21 @@ pub struct LongRecordReader {
     gaps: usize,
 }
 
-/// What is known of the channels when the first half was read.
+/// Findings in the channels when the first half was read.
 #[derive(Default)]
 struct FirstHalfFindings {
     stuck: Vec<StuckRuns>,
-    /// The spectra of the inertial channels.
     stacked: Vec<Option<StackedSpectrum>>,
-    /// Whether the screen leaves out a sample.
     is_screened: Vec<bool>,
 }
 
-/// What the samples of a channel at the start of the recording show.
 struct FastFindings {
     effects: Vec<Effect>,
-    /// Smallest distance of two values, in the channel's unit.
     resolution: f64,
 }
 
 impl FastFindings {
-    /// Of the channel with this profile, which is `first` among the first samples, of which `shown` is known; `changed_clock` is
-    /// known of more of them.
+    /// For the channel with this profile; `shown` is known of the `first` samples, `changed_clock` of more.
     fn new(
         profile: &ChannelProfile,
         first: Option<ChannelId>,
@@ -115,7 +105,7 @@ impl FastFindings {
     }
 }
 
-/// Whether only the samples themselves show an effect, and the first of them as well as all.
+/// True if only the samples themselves show an effect, the first ones as well as all.
 fn is_fast(effect: &Effect) -> bool {
     matches!(
         effect,
@@ -123,21 +113,17 @@ fn is_fast(effect: &Effect) -> bool {
     )
 }
 
-/// What is kept of one channel as it was recorded.
 struct RecordedChannel {
     curves: StreamedCurves,
     values: ValueCounts,
 }
 
-/// What is kept of one channel without what the screen leaves out.
 struct ScreenedChannel {
     curves: StreamedCurves,
     means: Means,
-    /// Of the inertial channels.
     spectra: Option<SampleSpectra>,
 }
 
-/// Spectra of the samples of a channel.
 struct SampleSpectra {
     stacked: StackedSpectrum,
     epochs: EpochSpectra,
@@ -154,7 +140,7 @@ impl ScreenedChannel {
     }
 }
 
-/// The lines of a spectrum of samples, of the first `periods` sample periods, that are too fast for their means.
+/// Lines of a samples' spectrum over `periods` sample periods that are too fast for the means.
 fn lines_above_means(
     stacked: StackedSpectrum,
     description: &RecordingDescription,
@@ -170,7 +156,7 @@ fn lines_above_means(
     }
 }
 
-/// A measurement of which only means are kept; `None` where its analysis needs all samples.
+/// The means of a measurement; `None` if its analysis needs all samples.
 pub(crate) fn condensed_from(measurement: &Measurement) -> Option<CondensedRecord<'static>> {
     let (samples, periods) = (measurement.len() as u64, measurement.periods());
     let has_losses = lost_part(samples, periods) > MOST_LOST;
@@ -183,7 +169,7 @@ pub(crate) fn condensed_from(measurement: &Measurement) -> Option<CondensedRecor
 }
 
 impl LongRecordReader {
-    /// For the recording of this description, which begins with the samples of `beginning`.
+    /// For the recording of this description that begins with the samples of `beginning`.
     #[must_use]
     pub fn new(description: RecordingDescription, beginning: &Measurement) -> Self {
         let first = beginning.before(FIRST_PERIODS);
@@ -193,7 +179,7 @@ impl LongRecordReader {
         let means = description.periods / samples_per_mean;
         let middle = means / 2 * samples_per_mean;
         let epochs: Vec<u64> = epoch_starts(means).map(|start| start * samples_per_mean).collect();
-        // The same channels, of which the size of a count may be another one.
+        // The LSB of the same channel may differ.
         let of_first: Vec<Option<ChannelId>> = description.channels.iter().map(|of| first.named(of.name)).collect();
         let shown = SampleEffects::detect(&first);
         let changes = |effect: &Effect| matches!(effect, Effect::ClockDeviation(of) if of.change.is_some());
@@ -249,7 +235,7 @@ impl LongRecordReader {
         }
     }
 
-    /// Takes the next samples, the channels on as many threads as there are cores.
+    /// Takes the next samples, the channels in parallel.
     pub fn push(&mut self, block: &SampleBlock) {
         for &slot in &block.slots {
             self.gaps += usize::from(self.last.is_some_and(|last| slot > last + 1));
@@ -265,7 +251,6 @@ impl LongRecordReader {
         self.push_to_half(&block.part(of_first_half..block.slots.len()));
     }
 
-    /// Takes samples of one half.
     fn push_to_half(&mut self, block: &SampleBlock) {
         let block = self.stuck.screen(block);
         let Self { recorded, screen, screened, .. } = self;
@@ -278,7 +263,7 @@ impl LongRecordReader {
         parallel::both(as_recorded, || screen.push(&block, |block| push_screened(screened, block)));
     }
 
-    /// Ends the first half: nothing that follows decides what is known of it.
+    /// Ends the first half: later samples do not affect its findings.
     fn end_first_half(&mut self) {
         let Self { stuck, recorded, screen, screened, .. } = self;
         push_screened(screened, &screen.finish_part());
@@ -293,7 +278,7 @@ impl LongRecordReader {
         });
     }
 
-    /// The recording, all of which was read.
+    /// The condensed recording.
     #[must_use]
     pub fn finish(mut self) -> CondensedRecord<'static> {
         if self.first_half.is_none() {
@@ -378,8 +363,7 @@ impl LongRecordReader {
     }
 }
 
-/// The means with which the quarters of the first half, the second half and the epochs of a record of so many begin, and the one
-/// behind the last epoch.
+/// First means of the quarters of the first half, of the second half and of the epochs, and the end of the last one.
 fn epoch_starts(means: u64) -> impl Iterator<Item = u64> {
     let middle = means / 2;
     let ranges = epochs(0..means, middle).into_iter().flat_map(|(_, ranges)| ranges).flatten();
@@ -425,21 +409,20 @@ fn measurement_of_means(
     }
 }
 
-/// Means of samples in a row, of one channel.
 struct Means {
     samples_per_mean: u64,
-    /// Means that the record has; what is left over at its end is in none.
+    /// Most means; the remainder at the end is dropped.
     most: u64,
     /// Steps of a count, as a power of two.
     steps_log2: u32,
-    /// In steps, [`MISSING`] where too few samples are there.
+    /// In steps; [`MISSING`] without enough samples.
     counts: Vec<i32>,
     sum: i64,
     present: u64,
 }
 
 impl Means {
-    /// For a channel whose first samples reach to `largest` counts; it may reach four times as far.
+    /// For first samples of up to `largest` counts; later ones may be four times as large.
     fn new(samples_per_mean: u64, most: u64, largest: u32) -> Self {
         let room = (LARGEST_MEAN / (4.0 * f64::from(largest.max(1)))).max(1.0).log2() as u32;
         let steps_log2 = MEAN_STEPS_LOG2.min(room);
@@ -452,13 +435,13 @@ impl Means {
             self.sum += i64::from(count);
             self.present += 1;
         }
-        // The last mean is complete with the last sample period of the record.
+        // The last sample period completes the last mean.
         if let Some(&last) = slots.last() {
             self.end_before((last + 1) / self.samples_per_mean);
         }
     }
 
-    /// Ends the means before the one of this number.
+    /// Ends all means before `number`.
     fn end_before(&mut self, number: u64) {
         let number = number.min(self.most);
         while (self.counts.len() as u64) < number {

@@ -1,9 +1,8 @@
-//! Preprocessing: what the detectors find in the samples of each channel, and the series without it.
+//! Preprocessing: the findings of the detectors in each channel, and the series without them.
 //!
-//! Repeated samples become gaps of every channel, knocks and spikes gaps of the channel that shows them; a bias step is
-//! subtracted, and so is a response to vibration, or to temperature behind a lag or with a curvature. A ramp is reported and
-//! stays in the samples, because the noise model has a term for it. A sensitivity to temperature or supply stays in them too,
-//! and is kept for the regression on covariates.
+//! Repeated samples become gaps of every channel, knocks and spikes gaps of their own; steps and responses to vibration
+//! or temperature are subtracted. Ramps stay in the samples (a noise term), and so do sensitivities to temperature or
+//! supply (covariate regression).
 
 use crate::detectors::bias::{self, BiasChanges, BiasSensitivity};
 use crate::detectors::bias_response::BiasResponse;
@@ -29,47 +28,41 @@ use std::sync::Arc;
 
 /// Effects in the samples, and the corrections that remove them.
 pub(crate) struct Preprocessing {
-    /// Sample periods of all samples.
     slots: Arc<[u64]>,
     by_whole: Shown,
-    /// What the first half shows, applied to both halves; `None` where that was not asked for.
+    /// Findings of the first half, applied to both halves; `None` if not asked for.
     by_first_half: Option<Shown>,
     effects: PerChannel<Vec<Effect>>,
 }
 
-/// What the samples of a part of the recording show.
 struct Shown {
-    /// How many counts the smallest step of the values of each channel has.
+    /// Counts of the smallest step of each channel.
     counts_per_step: PerChannel<u32>,
-    /// Sample periods that no channel uses: their sample equals the one before in all channels.
     repeated: Vec<u64>,
     channels: PerChannel<ShownInChannel>,
 }
 
-/// What the samples of one channel show; nothing in one that is not inertial.
 #[derive(Default)]
 struct ShownInChannel {
-    /// Sample periods that the channel does not use, in ascending order.
+    /// Excluded sample periods, in ascending order.
     knocks: Vec<u64>,
     spikes: Vec<u64>,
     bias: ChannelBias,
 }
 
-/// What changes the bias of a channel.
 #[derive(Default, PartialEq)]
 struct ChannelBias {
-    /// The first sample period from which on an offset is subtracted, and the offset in the channel's unit.
+    /// First sample period with an offset, and the offset in the channel's unit.
     offset: Option<(u64, f64)>,
     has_ramp: bool,
-    /// Responses to temperature and vibration that are subtracted.
+    /// Subtracted responses to temperature and vibration.
     responses: Vec<BiasResponse>,
-    /// The temperature, the supply or the specific force that it depends on, and how much.
+    /// The temperature, supply or force that the bias depends on, with the sensitivity.
     sensitivities: Vec<(ChannelId, BiasSensitivity)>,
 }
 
 impl Preprocessing {
-    /// Looks for knocks, spikes, steps, ramps and sensitivities in the inertial channels of a record, and in its `first_half` alone. Nothing
-    /// of the second half decides what the first one shows.
+    /// Finds knocks, spikes, steps, ramps and sensitivities in the inertial channels, and in the `first_half` alone.
     pub(crate) fn detect(
         record: &CondensedRecord,
         first_half: Option<&CondensedRecord>,
@@ -80,7 +73,7 @@ impl Preprocessing {
         let by_first_half = || {
             first_half.map(|half| {
                 let middle = measurement.middle();
-                // What is read twice in the second half is no sample of it, whatever the first half shows.
+                // Repeated samples of the second half are dropped by either exclusion.
                 let repeated = record.repeated.iter().copied().filter(|slot| *slot >= middle);
                 let repeated = half.repeated.iter().copied().chain(repeated).collect();
                 Shown::by_first_half(record, half, &slots, repeated, noise_grids)
@@ -91,28 +84,26 @@ impl Preprocessing {
         Self { slots, by_whole, by_first_half, effects }
     }
 
-    /// What a part of the record shows; `None` where nothing of it is used, or it was not asked for.
+    /// Findings of a part; `None` if unused or not asked for.
     fn shown(&self, exclusion: Exclusion) -> Option<&Shown> {
         if exclusion == Exclusion::ByWhole { Some(&self.by_whole) } else { self.by_first_half.as_ref() }
     }
 
-    /// What changes the bias of a channel and is subtracted.
     fn bias(&self, channel: ChannelId, exclusion: Exclusion) -> Option<&ChannelBias> {
         if exclusion == Exclusion::Nothing { None } else { Some(&self.shown(exclusion)?.channels[channel].bias) }
     }
 
-    /// Whether `exclusion` leaves out a sample of a channel, beyond those that were read twice.
+    /// True if `exclusion` drops samples of a channel beyond repeated ones.
     pub(crate) fn excludes(&self, channel: ChannelId, exclusion: Exclusion) -> bool {
         !self.events(channel, exclusion).is_empty()
     }
 
-    /// Sample periods of the knocks and spikes that are left out of a channel.
     fn events(&self, channel: ChannelId, exclusion: Exclusion) -> Vec<u64> {
         let shown = self.shown(exclusion).filter(|_| !exclusion.keeps_events());
         shown.map(|shown| shown.channels[channel].events()).unwrap_or_default()
     }
 
-    /// Whether the series of a channel is the same for two exclusions.
+    /// True if two exclusions leave a channel the same series.
     pub(crate) fn leaves_the_same(&self, channel: ChannelId, one: Exclusion, other: Exclusion) -> bool {
         let subtracted = |exclusion| {
             let bias = self.bias(channel, exclusion);
@@ -124,20 +115,19 @@ impl Preprocessing {
             && self.excluded(channel, one) == self.excluded(channel, other)
     }
 
-    /// Sample periods that a channel does not use, in ascending order.
     pub(crate) fn excluded(&self, channel: ChannelId, exclusion: Exclusion) -> Vec<u64> {
         let repeated = self.shown(exclusion).map_or(&[][..], |shown| &shown.repeated);
         merged([repeated, &self.events(channel, exclusion)])
     }
 
-    /// Sample periods of the spikes and knocks of a channel before that of the `middle`, by the rules of the first half.
+    /// Sample periods of a channel's spikes and knocks before `middle`, by the rules of the first half.
     pub(crate) fn excluded_events(&self, channel: ChannelId, middle: u64) -> Vec<u64> {
         let mut slots = self.events(channel, Exclusion::ByFirstHalf);
         slots.truncate(slots.partition_point(|&slot| slot < middle));
         slots
     }
 
-    /// Samples of a channel that arrived and are not used, by cause.
+    /// Unused samples of a channel that arrived, by cause.
     pub(crate) fn refused(&self, channel: ChannelId) -> impl Iterator<Item = (&'static str, u64)> {
         let Shown { repeated, channels, .. } = &self.by_whole;
         let own = &channels[channel];
@@ -145,29 +135,25 @@ impl Preprocessing {
         causes.map(|(cause, slots)| (cause, slots.len() as u64)).into_iter().filter(|(_, count)| *count > 0)
     }
 
-    /// Whether anything is subtracted from samples of a channel.
     pub(crate) fn corrects(&self, channel: ChannelId, exclusion: Exclusion) -> bool {
         self.bias(channel, exclusion).is_some_and(|bias| bias.offset.is_some() || !bias.responses.is_empty())
     }
 
-    /// What is subtracted from the sample of the sample period `slot`, in the channel's unit.
+    /// Correction of the sample in `slot`, in the channel's unit.
     pub(crate) fn offset(&self, channel: ChannelId, exclusion: Exclusion, slot: u64) -> f64 {
         let Some(ChannelBias { offset, responses, .. }) = self.bias(channel, exclusion) else { return 0.0 };
         let step = offset.iter().filter(|(from, _)| slot >= *from).map(|(_, size)| *size);
         step.chain(responses.iter().map(|response| response.bias(slot))).sum()
     }
 
-    /// How many counts the smallest step of the values of a channel has.
     fn counts_per_step(&self, channel: ChannelId, exclusion: Exclusion) -> u32 {
         self.shown(exclusion).map_or(1, |shown| shown.counts_per_step[channel])
     }
 
-    /// A channel's series as measured, with its resolution.
     pub(crate) fn measured(&self, measurement: &Measurement, channel: ChannelId) -> Series {
         measured(measurement, channel, &self.slots, self.by_whole.counts_per_step[channel])
     }
 
-    /// A channel's series after preprocessing.
     pub(crate) fn series(&self, measurement: &Measurement, channel: ChannelId, exclusion: Exclusion) -> Series {
         let mut series = measured(measurement, channel, &self.slots, self.counts_per_step(channel, exclusion));
         if let Some(ChannelBias { offset, responses, .. }) = self.bias(channel, exclusion) {
@@ -182,29 +168,24 @@ impl Preprocessing {
         series.without(&self.excluded(channel, exclusion))
     }
 
-    /// Whether a ramp was found in a channel, by the first half or by the whole record.
     pub(crate) fn has_ramp(&self, channel: ChannelId, exclusion: Exclusion) -> bool {
         self.bias(channel, exclusion).is_some_and(|bias| bias.has_ramp)
     }
 
-    /// The temperature and supply that a channel depends on, and how much, by the first half or by the whole record.
     pub(crate) fn sensitivities(&self, channel: ChannelId, exclusion: Exclusion) -> &[(ChannelId, BiasSensitivity)] {
         self.bias(channel, exclusion).map_or(&[], |bias| &bias.sensitivities)
     }
 
-    /// The effects of a channel.
     pub(crate) fn effects(&self, channel: ChannelId) -> &[Effect] {
         &self.effects[channel]
     }
 }
 
-/// A channel's series as measured, whose smallest step has so many counts.
 fn measured(measurement: &Measurement, channel: ChannelId, slots: &Arc<[u64]>, counts_per_step: u32) -> Series {
     let series = Series::with_shared_slots(measurement, channel, || Arc::clone(slots));
     series.with_counts_per_step(counts_per_step)
 }
 
-/// The series of all channels as measured.
 fn all_measured(
     measurement: &Measurement,
     slots: &Arc<[u64]>,
@@ -214,7 +195,7 @@ fn all_measured(
 }
 
 impl Shown {
-    /// What the whole record shows, and the effects of each channel.
+    /// The findings in the whole record, and the effects of each channel.
     fn by_whole(
         record: &CondensedRecord,
         slots: &Arc<[u64]>,
@@ -225,7 +206,7 @@ impl Shown {
         let series = all_measured(measurement, slots, &counts_per_step);
         let [loud] = loud_stretches(record, &record.repeated, [&series]);
         let once = series.map(|of| of.clone().without(&record.repeated));
-        // What a channel may depend on, without its own knocks.
+        // Covariates, without their own knocks.
         let quiet = without_knocks(&once, &loud);
         let of_channel = |channel: ChannelId| {
             if !record.is_traced(channel) {
@@ -247,7 +228,7 @@ impl Shown {
         (shown, effects.into())
     }
 
-    /// What the `first_half` of a record shows, with the knocks and spikes of both halves by its rules, without the samples `repeated`.
+    /// The findings in the `first_half`, with the knocks and spikes of both halves by its rules.
     fn by_first_half(
         record: &CondensedRecord,
         first_half: &CondensedRecord,
@@ -283,14 +264,12 @@ impl Shown {
 }
 
 impl ShownInChannel {
-    /// Sample periods of its knocks and spikes.
     fn events(&self) -> Vec<u64> {
         merged([&self.knocks, &self.spikes])
     }
 }
 
-/// What changes the bias of `channel` in a part of the record, without its spikes: `series` are those of all channels, `quiet` without their
-/// knocks.
+/// Changes of the bias of `channel` without its spikes; `quiet` are all `series` without their knocks.
 fn bias_of(
     measurement: &Measurement,
     channel: ChannelId,
@@ -301,7 +280,7 @@ fn bias_of(
     let regressors: Vec<ChannelId> =
         measurement.ids().filter(|&regressor| may_depend(measurement, channel, regressor)).collect();
     let others: Vec<&Series> = regressors.iter().map(|&regressor| &quiet[regressor]).collect();
-    // That rounding cannot make of a slow change: any step, where the noise reaches from one count to the next.
+    // The least step that rounding cannot make of a slow change.
     let smallest_step = LazyCell::new(|| {
         find_noise_below_count(&series[channel], measurement.profile.dithered_avar_counts2)
             .map_or(0.0, |_| NEIGHBOURING_COUNTS * series[channel].resolution)
@@ -311,8 +290,7 @@ fn bias_of(
     let accelerations = accelerations(measurement, series, channel);
     let found = bias::find(&without_lines(own.clone()), &others, &accelerations, noise_grids, &least_step);
     let own = offset(&found).into_iter().fold(own, |own, (from, size)| own.lowered_from(from, size));
-    // The differences, or what follows the force at each frequency, measure a sensitivity to motion better; the slow part of an
-    // accelerometer's signal is its own drift.
+    // Differences, or the force at each frequency, determine a sensitivity to motion better.
     let is_force = |at: &usize| measurement[regressors[*at]].profile.quantity == Quantity::SpecificForce;
     let is_slow = |regressor: ChannelId| measurement[regressor].profile.quantity.is_environment();
     let forces: Vec<usize> = (0..regressors.len()).filter(is_force).collect();
@@ -329,7 +307,7 @@ fn bias_of(
     (bias, found)
 }
 
-/// The first sample period behind a step, and its size.
+/// First sample period behind a step, and its size.
 fn offset(found: &BiasChanges) -> Option<(u64, f64)> {
     match found.step.as_ref()?.correction {
         Some(Correction::Offset { from, size }) => Some((from, size)),
@@ -337,7 +315,6 @@ fn offset(found: &BiasChanges) -> Option<(u64, f64)> {
     }
 }
 
-/// The series without the knocks of each channel.
 fn without_knocks(series: &PerChannel<Series>, loud: &PerChannel<LoudStretches>) -> PerChannel<Series> {
     let of = |(channel, series): (ChannelId, &Series)| {
         let knocks = &loud[channel].knocks;
@@ -346,7 +323,6 @@ fn without_knocks(series: &PerChannel<Series>, loud: &PerChannel<LoudStretches>)
     series.with_ids().map(of).collect()
 }
 
-/// The knocks of a channel as they are reported.
 fn knock_detections(
     measurement: &Measurement,
     loud: &PerChannel<LoudStretches>,
@@ -362,8 +338,7 @@ fn knock_detections(
     loud[channel].knocks.iter().map(detection).collect()
 }
 
-/// Where channels are loud in each of the `parts` of a record, in the order of time, by the rules of the first part, of which `record` has what
-/// else is known; nowhere in one that is not inertial.
+/// Loud stretches of each of the `parts` of a record, by the rules of the first part; none in other channels.
 fn loud_stretches<const PARTS: usize>(
     record: &CondensedRecord,
     repeated: &[u64],
@@ -386,7 +361,7 @@ fn loud_stretches<const PARTS: usize>(
     })
 }
 
-/// The accelerometers, of which these are the `series`, as what may shake `channel`.
+/// The accelerometers that may shake `channel`.
 fn accelerations<'s>(
     measurement: &Measurement,
     series: &'s PerChannel<Series>,
@@ -400,8 +375,7 @@ fn accelerations<'s>(
     measurement.of_quantity(Quantity::SpecificForce).map(acceleration).collect()
 }
 
-/// A series without sinusoids, of which those of a few periods are ramps and steps to the regressions on its block means, and faster
-/// ones are noise; the series itself where a long gap splits it.
+/// Without sinusoids, to regressions ramps, steps or noise; unchanged if a long gap splits the series.
 fn without_lines(series: Series) -> Series {
     let uniform = UniformSeries::from_series(&series);
     if uniform.values().len() as u64 != series.span.end.saturating_sub(series.span.start) {
@@ -414,7 +388,7 @@ fn without_lines(series: Series) -> Series {
     Series { values, ..series }
 }
 
-/// Both lists in ascending order, without duplicates.
+/// Merges ascending lists, without duplicates.
 fn merged(lists: [&[u64]; 2]) -> Vec<u64> {
     let mut all = lists.concat();
     all.sort_unstable();
@@ -422,8 +396,7 @@ fn merged(lists: [&[u64]; 2]) -> Vec<u64> {
     all
 }
 
-/// Whether the bias of `channel` may depend on `regressor`: on temperature and supply, and that of a gyroscope on the
-/// specific force.
+/// True if the bias of `channel` may depend on `regressor`: temperature, supply, force on a gyroscope.
 fn may_depend(measurement: &Measurement, channel: ChannelId, regressor: ChannelId) -> bool {
     let [channel, regressor] = [channel, regressor].map(|of| measurement[of].profile.quantity);
     let motion = regressor == Quantity::SpecificForce && channel == Quantity::AngularRate;

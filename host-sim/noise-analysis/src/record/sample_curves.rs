@@ -1,4 +1,4 @@
-//! The curves of the samples of a channel at the averaging times that are too short for the means that are kept of them.
+//! Curves of a channel's samples at averaging times too short for its means.
 
 use crate::samples::exclusion::Exclusion;
 use crate::samples::gapped_cascade::GappedCascade;
@@ -10,39 +10,33 @@ use allan_core::Curve;
 use measurement::{ChannelId, Measurement};
 use std::ops::Range;
 
-/// The curve of the means is used from this averaging factor on, in means: from there on it has as many differences as that of the
-/// samples ([`OVERLAP`] in an averaging time).
+/// Averaging factor, in means, from which the means' curve has as many differences ([`OVERLAP`]).
 const LEAST_FACTOR: u64 = OVERLAP as u64;
 
-/// Estimators of parts of the record that follow each other, each with its first sample period.
+/// Estimators of consecutive parts, each with its first sample period.
 pub(crate) type Parts = Vec<(u64, GappedCascade)>;
 
-/// The curves of the samples of a channel; of one all of whose samples are kept, only the whole curve.
+/// The curves of a channel's samples; only the whole curve if all samples are kept.
 #[derive(Clone)]
 pub(crate) struct SampleCurves {
-    /// Samples of a mean.
     pub samples_per_mean: u64,
     /// Smallest distance of two values, in the channel's unit.
     pub resolution: f64,
-    /// The whole curve as recorded.
     pub measured: Curve<OCTAVES>,
-    /// With all samples, and without those that the screen leaves out.
+    /// With all samples; `screened` lacks those that the screen drops.
     pub recorded: Parts,
     pub screened: Parts,
-    /// First sample period of the second half.
     pub middle: u64,
-    /// Spectra of the samples in the parts of `screened`.
     pub spectra: PartSpectra,
-    /// Whether the screen leaves out a sample, of the whole record and of its first half.
+    /// True if the screen drops a sample of the whole record, and of its first half.
     pub is_screened: bool,
     pub is_first_half_screened: bool,
     pub period_s: f64,
-    /// Size of a count, in the channel's unit.
     pub lsb: f64,
 }
 
 impl SampleCurves {
-    /// Of a channel all of whose samples are kept.
+    /// For a channel all of whose samples are kept.
     pub(crate) fn of_all(measurement: &Measurement, channel: ChannelId, resolution: f64) -> Self {
         let (period_s, lsb) = (measurement.period_s(), measurement[channel].profile.lsb);
         let cascade = GappedCascade::of_channel(&measurement.slots, &measurement[channel]);
@@ -61,7 +55,6 @@ impl SampleCurves {
         }
     }
 
-    /// Those of the first half of the record.
     pub(crate) fn of_first_half(&self) -> Self {
         let first = |parts: &Parts| parts.iter().filter(|(start, _)| *start < self.middle).cloned().collect();
         let middle = self.slots_of(0..self.middle / self.samples_per_mean / 2).end;
@@ -74,38 +67,36 @@ impl SampleCurves {
         }
     }
 
-    /// Sample periods of some means.
     pub(crate) fn slots_of(&self, means: Range<u64>) -> Range<u64> {
         means.start * self.samples_per_mean..means.end * self.samples_per_mean
     }
 
-    /// Averaging factor from which on the curve is that of the means, samples.
+    /// Averaging factor from which the curve is that of the means, samples.
     pub(crate) fn until(&self) -> u64 {
         if self.samples_per_mean == 1 { 1 } else { LEAST_FACTOR * self.samples_per_mean }
     }
 
-    /// The curve of `means`, with `shorter`, that of the samples, at averaging times that are too short for it.
+    /// The curve of `means`, with `shorter` averaging times by the samples.
     pub(crate) fn continued(&self, shorter: Curve<OCTAVES>, means: &Curve<OCTAVES>) -> Curve<OCTAVES> {
         shorter.continued_by_means(means, self.samples_per_mean, self.until())
     }
 
-    /// The curve of `means` alone, by averaging factors in samples.
+    /// The curve of `means` by averaging factors in samples.
     pub(crate) fn in_samples(&self, means: &Curve<OCTAVES>) -> Curve<OCTAVES> {
         Curve::empty().continued_by_means(means, self.samples_per_mean, 0)
     }
 
-    /// The curve of a half as recorded, or without spikes and repeated samples; 0 is the first half.
+    /// The curve of a half (0 is the first), as recorded or screened.
     pub(crate) fn half(&self, half: usize, exclusion: Exclusion) -> Curve<OCTAVES> {
         let slots = if half == 0 { 0..self.middle } else { self.middle..u64::MAX };
         self.curve(self.parts(exclusion).iter().filter(|(start, _)| slots.contains(start)))
     }
 
-    /// The curve of both halves.
     pub(crate) fn both(&self, exclusion: Exclusion) -> Curve<OCTAVES> {
         self.curve(self.parts(exclusion))
     }
 
-    /// The curve of some sample periods; `None` where they are not whole parts.
+    /// The curve of some sample periods; `None` unless they are whole parts.
     pub(crate) fn within(&self, slots: Range<u64>, exclusion: Exclusion) -> Option<Curve<OCTAVES>> {
         let parts = self.parts(exclusion);
         let from = parts.iter().position(|(start, _)| *start == slots.start)?;
@@ -114,12 +105,11 @@ impl SampleCurves {
         is_whole.then(|| self.curve(&parts[from..to]))
     }
 
-    /// The spectrum of the samples of the parts that begin in some sample periods; `None` where they have none.
+    /// Spectrum of the parts that begin in some sample periods; `None` without samples.
     pub(crate) fn spectrum_within(&self, slots: Range<u64>) -> Option<Welch> {
         Welch::joined(self.spectra.iter().filter(|(start, _)| slots.contains(start)).map(|(_, spectrum)| spectrum))
     }
 
-    /// Samples that were replaced because they are missing.
     pub(crate) fn replaced(&self, exclusion: Exclusion) -> u64 {
         self.parts(exclusion).iter().map(|(_, part)| part.cascade().replaced()).sum()
     }

@@ -1,5 +1,4 @@
-//! What only the samples of a recording show, and not their means: faults of the sampling, the resolution of each channel, and
-//! whether its output can express its noise and its range.
+//! Effects that only the samples show: sampling faults, resolution, and limits of the output.
 
 use crate::detectors::effective_lsb;
 use crate::detectors::output_range::{ValueCounts, find_noise_below_count};
@@ -10,46 +9,41 @@ use crate::record::sampling_faults;
 use crate::samples::series::Series;
 use measurement::{ChannelId, Measurement, PerChannel};
 
-/// What the samples show.
 pub(crate) struct SampleEffects {
-    /// Of every channel: lost and repeated samples, the sample clock.
+    /// Every channel's: lost and repeated samples, sample clock.
     recording: Vec<Detection>,
     channels: PerChannel<SamplesOfChannel>,
 }
 
-/// What the samples of one channel show.
 struct SamplesOfChannel {
     is_inertial: bool,
     counts_per_step: u32,
-    /// Of an inertial channel: a resolution of several counts, values that are cut off, noise below a count, missing codes.
+    /// An inertial channel's: coarse resolution, saturation, noise below a count, missing codes.
     found: Vec<Detection>,
 }
 
 impl SampleEffects {
-    /// What the samples show in all inertial channels, and the steps of all channels.
     pub(crate) fn detect(measurement: &Measurement) -> Self {
         let channels = per_channel(measurement.ids(), |channel| SamplesOfChannel::detect(measurement, channel));
         Self { recording: sampling_faults::detect(measurement), channels }
     }
 
-    /// Sample periods whose sample equals the one before in all channels.
     pub(crate) fn repeated(&self) -> Vec<u64> {
         self.recording.iter().flat_map(Detection::excluded).copied().collect()
     }
 
-    /// How many counts the smallest step of a channel's values has.
     pub(crate) fn counts_per_step(&self, channel: ChannelId) -> u32 {
         self.channels[channel].counts_per_step
     }
 
-    /// What the samples show in one channel, if it is inertial; what concerns every channel first.
+    /// Findings in an inertial channel; those of every channel first.
     pub(crate) fn of(&self, channel: ChannelId) -> impl Iterator<Item = &Effect> {
         let SamplesOfChannel { is_inertial, found, .. } = &self.channels[channel];
         let all = self.recording.iter().chain(found);
         all.filter(|_| *is_inertial).map(|detection| &detection.effect)
     }
 
-    /// Whether values of a channel are cut off: they are no noise around which a sample could be a spike.
+    /// True if values are cut off: then spikes cannot be told from noise.
     pub(crate) fn is_saturated(&self, channel: ChannelId) -> bool {
         self.of(channel).any(|effect| matches!(effect, Effect::Saturation(_)))
     }

@@ -1,4 +1,4 @@
-//! Leaves spikes, knocks and repeated samples out of a recording that is read in blocks, by rules that are known beforehand.
+//! Drops spikes, knocks and repeated samples of a recording that is read in blocks, by known rules.
 
 use crate::detectors::knocks::Knock;
 use crate::detectors::spikes::{FoundSpikes, SpikeRule};
@@ -9,23 +9,21 @@ use crate::samples::series::Series;
 use measurement::{ChannelProfile, MeasuredChannel, SampleBlock};
 use std::ops::Range;
 
-/// Samples that are looked at together: the bias around which a spike stands out is that of their mean.
+/// Samples examined together, around whose mean a spike stands out.
 const TOGETHER: usize = 1 << 16;
 
-/// Marks spikes, knocks of a few samples and repeated samples.
+/// Marks spikes, short knocks and repeated samples.
 pub(crate) struct SampleScreen {
-    /// Of each channel, the rule for its spikes, if any are sought, and what it has found.
+    /// Per channel, the rule for its spikes, if they are sought.
     rules: Vec<Option<SpikeRule>>,
     found: Vec<FoundSpikes>,
     leaves_out_repeated: bool,
-    /// Samples that were not passed on, behind a few that were.
+    /// Samples not yet passed on, behind a few that were.
     held: SampleBlock,
-    /// How many of these were.
     settled: usize,
 }
 
 impl SampleScreen {
-    /// For these channels, each with the rule for its spikes.
     pub(crate) fn new(channels: &[ChannelProfile], rules: Vec<Option<SpikeRule>>, leaves_out_repeated: bool) -> Self {
         let empty = |profile: &ChannelProfile| MeasuredChannel::new(*profile, Vec::new());
         let held = SampleBlock { slots: Vec::new(), channels: channels.iter().map(empty).collect() };
@@ -33,8 +31,8 @@ impl SampleScreen {
         Self { rules, found, leaves_out_repeated, held, settled: 0 }
     }
 
-    /// Takes the next samples, and passes on those whose neighbours on both sides are known. Spikes, knocks and repeated samples are
-    /// refused in these.
+    /// Takes the next samples; passes on those whose neighbours are known, with spikes, knocks and repeated ones
+    /// refused.
     pub(crate) fn push(&mut self, block: &SampleBlock, mut pass: impl FnMut(&SampleBlock)) {
         let mut from = 0;
         while from < block.slots.len() {
@@ -50,7 +48,7 @@ impl SampleScreen {
         }
     }
 
-    /// The samples that are left at the end of a part of the record. What follows has no part in what stands out of them.
+    /// The remaining samples of a part of the record; what follows does not affect them.
     pub(crate) fn finish_part(&mut self) -> SampleBlock {
         let end = self.held.slots.len();
         let settled = self.settle(end);
@@ -59,13 +57,13 @@ impl SampleScreen {
         settled
     }
 
-    /// The spikes and knocks of each channel in the first `periods` sample periods of `period_s` s each.
+    /// The spikes and knocks of each channel in the first `periods` sample periods of `period_s` s.
     pub(crate) fn effects(&self, periods: u64, period_s: f64) -> Vec<Vec<Effect>> {
         let hours = periods as f64 * period_s / 3600.0;
         let of_channel = |((rule, found), channel): ((&Option<SpikeRule>, &FoundSpikes), &MeasuredChannel)| {
             let Some(rule) = rule else { return (None, Vec::new()) };
             let (singles, disturbances) = rule.separate(found.before(periods), periods);
-            // Where they are no spikes in the whole recording, those of a part of it are none.
+            // If they are no spikes in the whole recording, those of a part are none.
             let spikes = rule.detection(found, (hours, periods), channel.profile.unit);
             let spikes = spikes.and_then(|_| rule.detection(&singles, (hours, periods), channel.profile.unit));
             (spikes.map(|found| found.effect), disturbances.into_iter().map(Knock::from).collect::<Vec<Knock>>())
@@ -84,12 +82,12 @@ impl SampleScreen {
             .collect()
     }
 
-    /// What stands out in each channel before the sample period `middle`, with its distance from its neighbours.
+    /// The outliers of each channel before the sample period `middle`, with their distances from the neighbours.
     pub(crate) fn found_before(&self, middle: u64) -> impl Iterator<Item = Vec<(u64, f64)>> {
         self.found.iter().map(move |found| found.before(middle).samples().collect())
     }
 
-    /// The samples up to `end` that were not passed on, with those refused that are spikes, of a knock, or repeated.
+    /// The samples up to `end`, with the outliers refused.
     fn settle(&mut self, end: usize) -> SampleBlock {
         let mut settled = self.held.part(self.settled..end);
         let numbered: Vec<usize> = (0..self.rules.len()).collect();
@@ -125,7 +123,6 @@ impl SampleScreen {
     }
 }
 
-/// Adds the samples that follow.
 fn append(block: &mut SampleBlock, later: SampleBlock) {
     let offset = block.slots.len();
     block.slots.extend(later.slots);
@@ -137,7 +134,6 @@ fn append(block: &mut SampleBlock, later: SampleBlock) {
     }
 }
 
-/// The samples of a channel in a block.
 fn series(block: &SampleBlock, at: usize) -> Series {
     let channel = &block.channels[at];
     let profile = channel.profile;
@@ -148,7 +144,7 @@ fn series(block: &SampleBlock, at: usize) -> Series {
         slots: slots.into(),
         values: values.into(),
         span,
-        // Spikes are told by the order of samples alone.
+        // Only the order of the samples counts.
         period_s: 1.0,
         resolution: profile.lsb,
         unit: profile.unit,

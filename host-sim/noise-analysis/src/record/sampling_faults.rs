@@ -1,4 +1,4 @@
-//! Detectors of faults of the sampling: lost samples, repeated samples, and a sample rate other than the nominal one.
+//! Faults of the sampling: lost samples, repeated samples, a wrong sample rate.
 
 use crate::bounds::{BoundedEstimate, MeasuredValue};
 use crate::distributions::{poisson_bounds, poisson_tail, upper_tail};
@@ -7,25 +7,24 @@ use crate::effects::{ClockDeviation, DroppedSamples, RateChange, RepeatedSamples
 use measurement::{Measurement, SensorProfile, repeated_fraction};
 use std::collections::BTreeMap;
 
-/// How many times more often than in independent channels equal neighbours may occur by chance.
+/// Factor on the chance of equal neighbours, for dependent channels.
 const DEPENDENCE: f64 = 3.0;
-/// A measured rate is compared with the nearest usual rate only if it deviates from it by at most this part.
+/// Largest relative deviation from a usual rate.
 const MAX_RATE_DEVIATION: f64 = 0.04;
-/// Round rates at which hosts read: a power of ten times a power of two with these exponents, or a power of two in Hz.
+/// Usual rates of hosts: powers of ten times these powers of two, and powers of two, in Hz.
 const DOUBLINGS: std::ops::RangeInclusive<i32> = -3..=3;
-/// The standard deviation of the rate is estimated from the rates of so many segments.
+/// Segments whose rates give the standard deviation of the rate.
 const SEGMENTS: usize = 8;
-/// Parts of a record whose rates are compared with each other, at most, and the fewest samples of one.
+/// Most parts whose rates are compared, and the fewest samples of one.
 const RATE_SEGMENTS: usize = 64;
 const MIN_SEGMENT: usize = 100;
-/// Fewest parts before and after a change of the rate.
 const SHORTEST_PART: usize = 4;
-/// By how many standard deviations the scatter of steady rates may exceed that of neighbours.
+/// Standard deviations by which the scatter of steady rates may exceed that of neighbours.
 const WANDERING: f64 = 4.0;
-/// Shortest recording, in samples, whose sample rate is compared.
+/// Shortest recording, samples, whose rate is compared.
 const MIN_SAMPLES: usize = 100 * SEGMENTS;
 
-/// Lost samples, repeated samples and a wrong sample rate, as far as they are found, in this order.
+/// Lost samples, repeated samples and a wrong sample rate, in this order.
 #[must_use]
 pub(crate) fn detect(measurement: &Measurement) -> Vec<Detection> {
     [lost_samples_of(measurement), repeated_samples(measurement), sample_clock(measurement)]
@@ -38,8 +37,7 @@ pub(crate) fn lost_samples_of(measurement: &Measurement) -> Option<Detection> {
     lost_samples(measurement.len() as u64, &measurement.dropped, measurement.gaps())
 }
 
-/// Samples that never arrived, beside the `used` ones: the sample indices or time stamps have room for them. A single one is
-/// reported, because only a loss leaves such room.
+/// Samples that never arrived beside the `used` ones, by sample indices or time stamps; a single one counts.
 #[must_use]
 pub(crate) fn lost_samples(used: u64, dropped: &BTreeMap<&'static str, u64>, gaps: usize) -> Option<Detection> {
     let missing = dropped.get("gap").copied().unwrap_or(0);
@@ -48,7 +46,7 @@ pub(crate) fn lost_samples(used: u64, dropped: &BTreeMap<&'static str, u64>, gap
     }
     let all = (used + dropped.values().sum::<u64>()) as f64;
     let missing = missing as f64;
-    // The events that are counted are the gaps, each of several samples.
+    // The events are gaps of several samples each.
     let per_gap = missing / (gaps.max(1) as f64);
     let (low, high) = poisson_bounds(gaps.max(1) as f64);
     let fraction = |count: f64| (count / all).min(1.0);
@@ -61,7 +59,7 @@ pub(crate) fn lost_samples(used: u64, dropped: &BTreeMap<&'static str, u64>, gap
     Some(Detection { effect: lost.into(), correction: None })
 }
 
-/// Samples that equal the sample before in all channels, if there are more of them than by chance.
+/// Samples that repeat the one before in all channels, beyond chance.
 #[must_use]
 pub(crate) fn repeated_samples(measurement: &Measurement) -> Option<Detection> {
     let channels = &measurement.channels;
@@ -99,8 +97,7 @@ pub(crate) fn repeated_samples(measurement: &Measurement) -> Option<Detection> {
     Some(Detection { effect: repeated.into(), correction: Some(Correction::Exclude(positions)) })
 }
 
-/// Compares the sample rate by the time stamps with the stated rate, or without one with the nearest rate that the sensor
-/// can be set to or that hosts usually read at; and its parts with each other. A sensor without a data sheet has no rate of its own.
+/// Compares the rate by the time stamps with the stated or the nearest usual one; and its parts with each other.
 #[must_use]
 pub(crate) fn sample_clock(measurement: &Measurement) -> Option<Detection> {
     let MeasuredValue { value: measured, error } = rate_by_time_stamps(measurement)?;
@@ -119,8 +116,7 @@ pub(crate) fn sample_clock(measurement: &Measurement) -> Option<Detection> {
     Some(Detection { effect: clock.into(), correction: None })
 }
 
-/// The sample rate by the time stamps, Hz: its standard deviation is that of the segments' rates and
-/// [`SensorProfile::host_clock_error`]. `None` without time stamps or with fewer than [`MIN_SAMPLES`].
+/// The rate by the time stamps, Hz, with [`SensorProfile::host_clock_error`]; `None` for fewer than [`MIN_SAMPLES`].
 #[must_use]
 pub(crate) fn rate_by_time_stamps(measurement: &Measurement) -> Option<MeasuredValue> {
     let rates = segment_rates(measurement, SEGMENTS)?;
@@ -130,8 +126,7 @@ pub(crate) fn rate_by_time_stamps(measurement: &Measurement) -> Option<MeasuredV
     Some(MeasuredValue { value: measured, error: scatter.sqrt().hypot(host) })
 }
 
-/// The rates of so many parts of the record, Hz, each by its time stamps. `None` without time stamps, with fewer than
-/// [`MIN_SAMPLES`], or where stamps do not grow.
+/// Rates of segments by their time stamps, Hz; `None` without increasing stamps or with fewer than [`MIN_SAMPLES`].
 fn segment_rates(measurement: &Measurement, segments: usize) -> Option<Vec<f64>> {
     let (times, slots) = (measurement.times_s.as_ref()?, &measurement.slots);
     let of_segment = |segment: usize| {
@@ -141,11 +136,10 @@ fn segment_rates(measurement: &Measurement, segments: usize) -> Option<Vec<f64>>
     (slots.len() >= MIN_SAMPLES).then(|| (0..segments).map(of_segment).collect())?
 }
 
-/// A rate that becomes another one: at the time for which the rates before and after it scatter least about their means.
+/// A rate that changes once, beyond chance and the host's clock.
 ///
-/// They have to differ by more than chance and the host's clock explain. What is left has to scatter as neighbours differ: a clock that
-/// wanders or drifts has no such time. The ratio of both variances is 1 ± 1/√n for n independent rates (J. von Neumann, "Distribution
-/// of the ratio of the mean square successive difference to the variance", Ann. Math. Stat. 12, 1941).
+/// The rest has to scatter as neighbours differ, unlike a clock that wanders. The ratio of both variances is 1 ± 1/√n
+/// (J. von Neumann, Ann. Math. Statist. 12, 1941).
 fn rate_change(measurement: &Measurement) -> Option<RateChange> {
     let segments = RATE_SEGMENTS.min(measurement.len() / MIN_SEGMENT);
     if segments < 4 * SHORTEST_PART {
@@ -153,7 +147,7 @@ fn rate_change(measurement: &Measurement) -> Option<RateChange> {
     }
     let rates = segment_rates(measurement, segments)?;
     let squares = |rates: &[f64]| variance(rates) * (rates.len() - 1) as f64;
-    // The part in which the rate changes belongs to neither.
+    // The part with the change belongs to neither.
     let left = |at: usize| squares(&rates[..at]) + squares(&rates[at + 1..]);
     let at = (SHORTEST_PART..segments - SHORTEST_PART).min_by(|a, b| left(*a).total_cmp(&left(*b)))?;
     let (before, after) = (&rates[..at], &rates[at + 1..]);
@@ -168,7 +162,7 @@ fn rate_change(measurement: &Measurement) -> Option<RateChange> {
     let [earlier, later] = [before, after].map(part);
     let sigmas = (later.value - earlier.value).abs() / earlier.error.hypot(later.error);
     let places = (segments - 2 * SHORTEST_PART) as f64;
-    // As much as the host's clock may be off, both may wander.
+    // Both may wander by the error of the host's clock.
     let tolerated = of_neighbours.max((host * earlier.value).powi(2));
     let is_steady = of_all < (1.0 + WANDERING / count.sqrt()) * tolerated;
     let is_change = places * 2.0 * upper_tail(sigmas) < SIGNIFICANCE;
@@ -177,7 +171,7 @@ fn rate_change(measurement: &Measurement) -> Option<RateChange> {
         measurement.slots[position] as f64 / measurement.sample_rate_hz
     };
     let [from_s, to_s] = [at, at + 1].map(time_s);
-    // The rate of the part between them is the mean of both, each for its time.
+    // The part between has the mean of both rates, weighted by time.
     let of_part = ((rates[at] - later.value) / (earlier.value - later.value)).clamp(0.0, 1.0);
     (is_steady && is_change).then(|| RateChange {
         time_s: BoundedEstimate::new(from_s + of_part * (to_s - from_s), from_s, to_s),
@@ -187,7 +181,7 @@ fn rate_change(measurement: &Measurement) -> Option<RateChange> {
     })
 }
 
-/// The nearest rate, in Hz, that the sensor can be set to or that is round; `None` where its rates are not known.
+/// The nearest usual rate, Hz, of the sensor or of hosts; `None` if its rates are unknown.
 fn nearest_usual_rate(profile: &SensorProfile, measured: f64) -> Option<f64> {
     let native = profile.nearest_native_rate_hz(measured)?;
     let decade = |power: i32| DOUBLINGS.map(move |doublings| 10f64.powi(power) * 2f64.powi(doublings));
@@ -196,7 +190,7 @@ fn nearest_usual_rate(profile: &SensorProfile, measured: f64) -> Option<f64> {
     std::iter::once(native).chain(round).min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
-/// Sample rate in Hz: one over the slope of the least-squares line of the time stamps over the sample periods.
+/// Sample rate, Hz: 1/slope of the least-squares line of the stamps over the sample periods.
 fn rate(slots: &[u64], times: &[f64]) -> Option<f64> {
     let (&first, &start_s) = (slots.first()?, times.first()?);
     let points = || slots.iter().zip(times).map(|(slot, time)| ((slot - first) as f64, time - start_s));
@@ -224,14 +218,14 @@ mod tests {
     use super::nearest_usual_rate;
     use measurement::SensorProfile;
 
-    /// The ADIS16405 samples at 1638.4 Hz over whole numbers from 2 on, and at 52.85 Hz over whole numbers (data sheet).
+    /// The ADIS16405 samples at 1638.4 Hz/n, n ≥ 2, and at 52.85 Hz/n (data sheet).
     #[test]
     fn the_nearest_usual_rate_is_one_of_the_sensor_or_a_round_one() {
         for (measured, usual) in [(816.43, 819.2), (204.1, 204.8), (100.02, 100.0), (101.9, 102.4), (199.5, 200.0)] {
             let nearest = nearest_usual_rate(&measurement::adis16405::profile(0.05), measured).expect("a part's rates");
             assert!((nearest / usual - 1.0).abs() < 1e-4, "{measured}: {nearest}");
         }
-        // Loops, phones and parts without a profile run at any rate.
+        // Parts without a profile run at any rate.
         for rate_hz in (10..5000).map(|tenths| f64::from(tenths) / 10.0) {
             assert_eq!(nearest_usual_rate(&SensorProfile::generic(), rate_hz), None, "{rate_hz}");
         }

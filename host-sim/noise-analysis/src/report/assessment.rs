@@ -5,7 +5,6 @@
 pub mod innovations;
 pub mod navigation;
 pub mod record_length;
-mod spectral_white_noise;
 
 pub use innovations::Innovations;
 
@@ -14,7 +13,6 @@ use crate::fit::noise_terms::{is_filter, is_white, white_noise_of_process};
 pub use crate::fit::sample_coefficients::CoefficientsFrom;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
-use crate::spectra::{Welch, correlation_time};
 use crate::units::{Conversion, GRAVITY, conversions};
 use allan_core::model::FittedTerm;
 use allan_core::term::{MovingAverageFilter, Resonance, Sinusoid};
@@ -22,7 +20,6 @@ use allan_core::{Model, NoiseTerm};
 use innovations::filter_innovations;
 use navigation::{CALIBRATION_S, IntegratedError, integrated_errors};
 use serde::Serialize;
-use spectral_white_noise::WELCH_SAMPLES;
 use std::f64::consts::PI;
 
 /// Least part of a line that means of samples have.
@@ -42,15 +39,6 @@ pub struct Assessment {
     pub drift: Vec<NavigationDrift>,
     /// Of a Kalman filter built from the model, on the second half of the record.
     pub innovations: Option<Innovations>,
-    /// N by Welch's spectrum of the whole record, without the Allan variance; absent where the record does not identify it.
-    pub angle_random_walk_by_spectrum: Option<Parameter>,
-    /// Why the record does not identify N by the spectrum, or why that differs from N of the fit by more than both
-    /// intervals allow.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub angle_random_walk_by_spectrum_note: Option<String>,
-    /// Correlation time of the model's Markov process by the autocorrelation of the whole record.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub markov_time_by_autocorrelation: Option<Parameter>,
     /// Record length at which each coefficient is known to ±20 % by a fit to all of it.
     pub record: Vec<RecordLength>,
 }
@@ -109,34 +97,22 @@ pub struct AssessedModels<'a> {
 
 impl Assessment {
     /// Assesses the models of the channel whose samples, or means of them, are `series`; those of the second half with what the first half's
-    /// model foretells are `unseen`. Of means `samples` has the spectrum of the samples and the smallest distance of two of them.
+    /// model foretells are `unseen`.
     #[must_use]
-    pub fn new(series: &Series, unseen: &Series, samples: Option<(&Welch, f64)>, models: AssessedModels) -> Self {
+    pub fn new(series: &Series, unseen: &Series, models: AssessedModels) -> Self {
         let AssessedModels { refitted, coefficients_from, uncompensated, of_first_half } = models;
         let whole = UniformSeries::from_series(series);
         let unseen = UniformSeries::from_series(unseen);
-        let markov_time_by_autocorrelation = correlation_time(&whole, &sampled_every(refitted, whole.sample_period()))
-            .map(|time| Parameter::new(time.value, time.low, time.high, "s"));
         if !is_known(refitted) {
             return Self::unknown(!series.values.is_empty());
         }
         let of_series = |model: &Model| sampled_every(model, whole.sample_period());
-        let by_spectrum = match samples {
-            Some((welch, resolution)) => spectral_white_noise::estimate(Some(welch), refitted, resolution, series.unit),
-            None => {
-                let welch = Welch::estimate(&whole, WELCH_SAMPLES);
-                spectral_white_noise::estimate(welch.as_ref(), &of_series(refitted), series.resolution, series.unit)
-            }
-        };
         Self {
             coefficients: coefficients(refitted, series.unit, series.resolution),
             coefficients_note: None,
             coefficients_from,
             drift: drift(&of_series(uncompensated), series.unit, &unseen),
             innovations: filter_innovations(&of_series(of_first_half), &unseen),
-            angle_random_walk_by_spectrum: by_spectrum.angle_random_walk,
-            angle_random_walk_by_spectrum_note: by_spectrum.note,
-            markov_time_by_autocorrelation,
             record: record_lengths(refitted, whole.duration()),
         }
     }

@@ -254,7 +254,7 @@ impl<'a> BlockMeans<'a> {
         };
         let blocks = BiasBlocks { time_s: &bias.time_s, of: &of };
         let parts: Vec<(f64, Vec<f64>)> =
-            channel.effects.iter().flat_map(|shown| shown.effect.course(&blocks)).collect();
+            channel.effects.iter().flat_map(|shown| shown.effect.kind().course(&blocks)).collect();
         if parts.is_empty() {
             return Vec::new();
         }

@@ -31,6 +31,6 @@ impl Cause {
     /// The least width of the interval of a size over its value.
     fn width(&self, at: usize) -> f64 {
         let relative = |of: BoundedEstimate| (of.value != 0.0).then(|| (of.high - of.low) / of.value.abs());
-        self.shown[at].effect.sizes().into_iter().filter_map(relative).fold(f64::INFINITY, f64::min)
+        self.shown[at].effect.sizes().filter_map(relative).fold(f64::INFINITY, f64::min)
     }
 }

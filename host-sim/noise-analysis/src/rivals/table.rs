@@ -548,10 +548,10 @@ fn is_shown(effect: &Effect, duration_s: f64) -> bool {
         Effect::CommonMode(of) => Some(of.time_constant_s),
         _ => None,
     };
-    let excludes_0 = |of: &BoundedEstimate| of.low > 0.0 || of.high < 0.0;
+    let excludes_0 = |of: BoundedEstimate| of.low > 0.0 || of.high < 0.0;
     // Of several axes some may be 0, and the size of what is unexplained is told as it is.
     let may_be_0 = matches!(effect, Effect::AccelerationSensitivity(_) | Effect::Unexplained(_));
-    time_constant_s.is_none_or(|of| of.value < duration_s) && (may_be_0 || effect.sizes().iter().all(excludes_0))
+    time_constant_s.is_none_or(|of| of.value < duration_s) && (may_be_0 || effect.sizes().all(excludes_0))
 }
 
 /// What contradicts a term of the curve.

@@ -2,15 +2,13 @@
 
 use std::ops::Range;
 
-/// Longest epoch, samples: five minutes at 100 Hz.
+/// Samples; five minutes at 100 Hz.
 const LONGEST_EPOCH: u64 = 1 << 15;
-/// Shortest epoch, samples, whose curve separates the white noise from a line.
+/// Samples; its curve separates white noise from a line.
 const SHORTEST_EPOCH: u64 = 1 << 10;
-/// Fewest epochs of a half.
 const MIN_EPOCHS: u64 = 12;
 
-/// Sample periods in an epoch, a power of 2, and those of each epoch up to the middle of a record and from there on; `None` of a record
-/// that is too short.
+/// Sample periods in an epoch, a power of 2, and the epochs of both halves; `None` if the record is too short.
 pub(crate) fn epochs(record: Range<u64>, middle: u64) -> Option<(u64, [Vec<Range<u64>>; 2])> {
     let half = middle.checked_sub(record.start)?.min(record.end.checked_sub(middle)?);
     let epoch = (half / MIN_EPOCHS).min(LONGEST_EPOCH).checked_ilog2().map(|log2| 1 << log2)?;

@@ -1,21 +1,19 @@
-//! Which samples of a recording are left out, and what is subtracted from the others.
+//! Samples that are left out of a recording, and corrections of the others.
 
-/// What of a recording is left out and subtracted. Samples that were read twice are always left out.
+/// Exclusions and corrections. Repeated samples are always left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Exclusion {
-    /// Nothing: the recording as it was made.
+    /// The recording as it was made.
     Nothing,
-    /// The steps and responses that the first half shows are subtracted, in both halves; knocks and spikes stay.
+    /// Steps and responses of the first half are subtracted in both halves; knocks and spikes stay.
     BiasOfFirstHalf,
-    /// As [`BiasOfFirstHalf`](Self::BiasOfFirstHalf), without the knocks and spikes by rules that were fitted to the first half, in both
-    /// halves.
+    /// [`BiasOfFirstHalf`](Self::BiasOfFirstHalf), without knocks and spikes by rules fitted to the first half.
     ByFirstHalf,
-    /// What the whole record shows.
+    /// All findings of the whole record.
     ByWhole,
 }
 
 impl Exclusion {
-    /// Whether knocks and spikes stay.
     pub(crate) fn keeps_events(self) -> bool {
         matches!(self, Self::Nothing | Self::BiasOfFirstHalf)
     }

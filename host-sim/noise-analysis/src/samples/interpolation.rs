@@ -1,53 +1,44 @@
-//! The best linear interpolation of a sample from those of its neighbours that are there, by the autocovariance of the
-//! channel.
-//!
-//! In white noise it is the mean of the channel, in filtered noise or drift it is close to the sample.
+//! The best linear interpolation of a sample from its present neighbours, by the autocovariance of the channel.
 
 use nalgebra::{DMatrix, DVector};
 
-/// White noise, as a part of the variance, that keeps the equations solvable for a pure sinusoid: the least that does.
+/// White noise over the variance, in increasing order, that keeps the equations of a sinusoid solvable.
 const WHITE: [f64; 5] = [LEAST_WHITE, 1e-7, 1e-5, 1e-3, 1e-1];
 pub(crate) const LEAST_WHITE: f64 = 1e-9;
 
-/// Neighbours on each side.
 pub(crate) const REACH: usize = 6;
 
 /// Autocovariance at lags 0 to 2·[`REACH`].
 pub(crate) type Autocovariance = [f64; 2 * REACH + 1];
 
-/// Which of the 2·[`REACH`] neighbours of a sample are there: bit `k` and bit `REACH + k` for those `k + 1` samples before and
-/// after it.
+/// Present neighbours of a sample: bits `k` and `REACH + k` for those `k + 1` samples before and after it.
 pub(crate) type Neighbours = u16;
 
 pub(crate) const ALL_NEIGHBOURS: Neighbours = (1 << (2 * REACH)) - 1;
-/// The best linear interpolation from some of the neighbours.
 #[derive(Debug, Clone)]
 pub(crate) struct PartialInterpolation {
-    /// In the order of the bits.
     pub weights: [f64; 2 * REACH],
-    /// Standard deviation of its error over that with all neighbours.
+    /// Standard deviation of the error over that with all neighbours.
     pub scale: f64,
 }
 
 impl PartialInterpolation {
-    /// The plain mean.
     pub(crate) fn mean(present: Neighbours) -> Self {
         let weight = 1.0 / f64::from(present.count_ones());
         let weights = std::array::from_fn(|bit| if present >> bit & 1 == 1 { weight } else { 0.0 });
         Self { weights, scale: 1.0 }
     }
 
-    /// By the autocovariance; `None` where the equations have no solution.
+    /// `None` if the equations have no solution.
     pub(crate) fn best(covariance: &Autocovariance, present: Neighbours) -> Option<Self> {
         let (weights, variance) = Self::solve(covariance, present)?;
         let (_, complete) = Self::solve(covariance, ALL_NEIGHBOURS)?;
-        // Of a pure sinusoid nothing is left but rounding errors of either sign.
+        // A pure sinusoid leaves only rounding errors.
         let least = LEAST_WHITE * covariance[0];
         let scale = (variance.max(least) / complete.max(least)).sqrt();
         scale.is_finite().then_some(Self { weights, scale })
     }
 
-    /// Weights, and the variance of the error.
     fn solve(covariance: &Autocovariance, present: Neighbours) -> Option<([f64; 2 * REACH], f64)> {
         let bits: Vec<usize> = (0..2 * REACH).filter(|bit| present >> bit & 1 == 1).collect();
         let offset = |bit: usize| if bit < REACH { -(bit as i64) - 1 } else { (bit - REACH) as i64 + 1 };

@@ -1,45 +1,37 @@
-//! What replacing missing samples adds to the Allan variance of white noise where gaps are near to each other.
+//! The variance that closing neighbouring gaps adds to the Allan variance of white noise.
 //!
-//! A gap of `m` samples is closed with `m` times the mean of `k` samples around it. In a window much longer than its gaps white noise
-//! then has the variance of the sum of all samples, each with the weight `1 + Σ m/k` of the gaps that it closes: per sample period of
-//! which a share `p` is missing, `1 + p + Σ m²/k + 2 Σ (m/k)·(m'/k')` of the complete window, where the last sum is over the samples
-//! that close two gaps. The estimator takes off what a gap with `k = 2m` samples of its own adds, `p + Σ m/2`; what is left is that of
-//! fewer samples and of common ones.
+//! A gap of `m` samples is closed with `m` times the mean of `k` samples around it. Per sample period with a share `p`
+//! missing, a long window then has `1 + p + Σ m²/k + 2 Σ (m/k)·(m'/k')` of the complete one; the last sum is over
+//! samples that close two gaps. The estimator subtracts the part of separate gaps (`k = 2m`), `p + Σ m/2`.
 
 use crate::OCTAVES;
 use allan_core::Curve;
 
-/// Averaging factor of the estimator at which a gap of one sample is bridged, as a power of two; one of `m` samples is from `m` times as
-/// much on.
+/// Averaging factor, as a power of two, at which a gap of one sample is bridged; `m` times as much for `m` samples.
 const SHORTEST_BRIDGING: usize = 3;
 
-/// The gaps of a series that are nearer to each other than the samples which close them reach.
+/// Gaps nearer to each other than the samples that close them reach.
 #[derive(Clone, Default)]
 pub(crate) struct NeighbouringGaps {
-    /// By the shortest octave that bridges them, in variances of a sample.
+    /// In variances of a sample, by the shortest octave that bridges them.
     added: [f64; OCTAVES],
-    /// Samples since the last gap.
     samples: u64,
-    /// The last gap.
     before: Option<ClosedGap>,
 }
 
-/// A gap that samples around it close.
 #[derive(Clone, Copy)]
 struct ClosedGap {
-    /// Weight that each of these has besides its own.
+    /// Additional weight of each sample that closes it.
     weight: f64,
     /// Shortest octave that bridges it.
     octave: usize,
 }
 
 impl NeighbouringGaps {
-    /// Records that samples follow each other.
     pub(crate) fn push(&mut self, samples: u64) {
         self.samples += samples;
     }
 
-    /// Records that `missing` samples are missing before the next one.
     pub(crate) fn close(&mut self, missing: u64) {
         let samples = std::mem::take(&mut self.samples);
         let before = self.before.take();
@@ -47,7 +39,7 @@ impl NeighbouringGaps {
         if samples == 0 || octave >= OCTAVES {
             return;
         }
-        // The samples before the gap, as far as they go back to the one before, and the next one.
+        // The samples back to the gap before, and the next one.
         let closing = (2 * missing - 1).min(samples) + 1;
         let (gap, weight) = (missing as f64, missing as f64 / closing as f64);
         self.added[octave] += gap * weight - 0.5 * gap;
@@ -58,13 +50,12 @@ impl NeighbouringGaps {
         self.before = Some(ClosedGap { weight, octave });
     }
 
-    /// Adds those of a later stretch.
     pub(crate) fn merge(&mut self, later: &Self) {
         self.added.iter_mut().zip(later.added).for_each(|(added, later)| *added += later);
         (self.samples, self.before) = (later.samples, later.before);
     }
 
-    /// Takes what they add off the curve of a series of so many sample periods.
+    /// Subtracts the added variance from a curve of `periods` sample periods.
     pub(crate) fn take_off(&self, curve: &mut Curve<OCTAVES>, periods: u64) {
         let Some(white) = curve.points().first().filter(|point| point.n == 1).map(|point| point.avar) else { return };
         if self.added.iter().all(|added| *added == 0.0) {

@@ -1,52 +1,46 @@
-//! The errors of rounding to counts: white noise, or correlated.
+//! The errors of rounding to counts: white, or correlated behind a long filter whose every value is read.
 //!
-//! Behind a long filter of which every value is read, neighbouring samples differ by a small part of a count, and their rounding errors
-//! by as little. For normal differences with a mean square of D(k) counts² at lag k, and a mean that is anywhere between two
-//! counts, the errors have a covariance of
+//! For normal differences with a mean square of D(k) counts² at lag k, their covariance is
 //!
 //! ```text
 //! r(k) = Σ exp(−2π²m²·D(k))/(2π²m²) counts², m = 1, 2, …
 //! ```
 //!
-//! and are uncorrelated with the noise (A. B. Sripad, D. L. Snyder, IEEE Trans. ASSP 25, 1977). D(k) is found from the curve, an octave
-//! after the other, as that with which the rounded samples have the measured Allan variance.
+//! uncorrelated with the noise (A. B. Sripad, D. L. Snyder, IEEE Trans. ASSP 25, 1977). D(k) follows from the curve,
+//! octave by octave.
 
 use crate::OCTAVES;
 use crate::distributions::ROUNDING;
 use allan_core::{AllanPoint, Curve};
 use std::f64::consts::PI;
 
-/// A channel is dithered if its Allan variance exceeds the [limit](dithered_avar) at any of the first octaves, this many.
-/// Behind a filter neighbouring samples are correlated, so that the limit is exceeded only at longer averaging times: the longest filters
-/// average 64 samples.
+/// First octaves, any of which may exceed the [limit](dithered_avar) in a dithered channel.
 pub(crate) const DITHERED_OCTAVES: usize = 7;
-/// Counts between two levels up to which they are neighbouring counts: the next ones are two apart.
+/// Distance of two levels up to which they are neighbouring counts.
 pub(crate) const NEIGHBOURING_COUNTS: f64 = 1.5;
-/// Mean square of a difference, counts², beyond which its rounding errors are uncorrelated to 0.2 %.
+/// Mean square of a difference, counts², beyond which errors are uncorrelated to 0.2 %.
 const UNCORRELATED: f64 = 0.3;
-/// Mean square of a difference, counts², below which it reaches over more than one count once in 10¹² times.
+/// Mean square of a difference, counts², that crosses more than one count once in 10¹² times.
 const WITHIN_A_COUNT: f64 = 0.02;
-/// Terms of the sum: the next one is below 10⁻⁷ counts² where differences are larger than that.
+/// Terms of the sum; the next one is below 10⁻⁷ counts².
 const HARMONICS: u32 = 5;
-/// Frequencies at which the density is known; between them it is a straight line, to 0.2 % of errors that are correlated over 20 samples.
+/// Frequencies of the tabulated density; linear between them, to 0.2 %.
 const DENSITIES: usize = 1025;
-/// Mean squares between which a solution is sought, counts².
+/// Bounds of the mean square, counts².
 const SOUGHT: [f64; 2] = [1e-9, 1e3];
-/// Halvings of that interval: to 10⁻⁹ of the value.
+/// Bisections, to 10⁻⁹ of the value.
 const HALVINGS: usize = 40;
 
-/// The rounding errors of the samples of a channel.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Rounding {
-    /// Size of a count; 0 where the values are not known to be rounded.
+    /// Size of a count; 0 if the values are not known to be rounded.
     resolution: f64,
-    /// Seconds between samples.
+    /// Sample period, s.
     period: f64,
-    /// `None` of white errors.
+    /// `None` if white.
     correlated: Option<Correlation>,
 }
 
-/// Errors that are correlated.
 #[derive(Debug, Clone, PartialEq)]
 struct Correlation {
     /// Covariances at lags of 1, 2, … samples, counts²; 0 beyond.
@@ -56,13 +50,11 @@ struct Correlation {
 }
 
 impl Rounding {
-    /// Of samples every `period` seconds with counts of `resolution`, uncorrelated.
     pub(crate) const fn white(resolution: f64, period: f64) -> Self {
         Self { resolution, period, correlated: None }
     }
 
-    /// By a curve with counts of `resolution`. White where the errors of neighbouring samples are not correlated, and where those of
-    /// samples far apart are: there the noise does not reach from one count to the next.
+    /// White if the errors of neighbours are uncorrelated, or if the noise stays below a count of `resolution`.
     pub(crate) fn of_curve(curve: &Curve<OCTAVES>, resolution: f64) -> Self {
         let white = Self::white(resolution, curve.sample_period());
         let correlated = squares(curve, resolution).map(|squares| {
@@ -73,14 +65,13 @@ impl Rounding {
         Self { correlated, ..white }
     }
 
-    /// Two-sided density of errors with these covariances at one of [`DENSITIES`] frequencies.
     fn two_sided(&self, at: usize, covariances: &[f64]) -> f64 {
         let phase = PI * at as f64 / (DENSITIES - 1) as f64;
         let of_lag = |(lag, of): (i32, &f64)| 2.0 * of * (f64::from(lag) * phase).cos();
         self.period * self.resolution.powi(2) * (ROUNDING + (1..).zip(covariances).map(of_lag).sum::<f64>())
     }
 
-    /// One-sided density at a frequency in Hz, unit²/Hz.
+    /// One-sided density, unit²/Hz, at a frequency in Hz.
     pub(crate) fn density(&self, frequency: f64) -> f64 {
         let Some(Correlation { densities, .. }) = &self.correlated else {
             return 2.0 * self.period * self.variance();
@@ -91,17 +82,16 @@ impl Rounding {
         2.0 * (densities[below] + part * (densities[below + 1] - densities[below]))
     }
 
-    /// Their variance, unit²; 0 where the values are not known to be rounded.
+    /// Variance, unit²; 0 if the values are not known to be rounded.
     pub(crate) fn variance(&self) -> f64 {
         ROUNDING * self.resolution.powi(2)
     }
 
-    /// Whether they are correlated.
     pub(crate) fn is_correlated(&self) -> bool {
         self.correlated.is_some()
     }
 
-    /// A curve without errors that are correlated.
+    /// A curve without correlated errors.
     pub(crate) fn subtracted_from(&self, mut curve: Curve<OCTAVES>) -> Curve<OCTAVES> {
         if self.is_correlated() {
             curve.subtract_rounding(|n| self.correlated_avar(n));
@@ -109,7 +99,7 @@ impl Rounding {
         curve
     }
 
-    /// What correlated errors add to the Allan variance at the averaging factor `n`; 0 of white ones, which are a part of white noise.
+    /// Allan variance of correlated errors at the averaging factor `n`; 0 of white ones, which belong to white noise.
     pub(crate) fn correlated_avar(&self, n: u64) -> f64 {
         let Some(Correlation { covariances, .. }) = &self.correlated else { return 0.0 };
         let correlated = (1..2 * n).zip(covariances).map(|(lag, covariance)| 2.0 * share(n, lag) * covariance);
@@ -117,21 +107,18 @@ impl Rounding {
     }
 }
 
-/// The Allan variance of means of `n` samples, counts², above which the noise reaches from one count to the next, where that of samples is
-/// `of_samples`: the noise before the rounding is the same, and that of the rounding an n-th.
+/// Least Allan variance, counts², of dithered means of `n` samples, if that of samples is `of_samples`.
 pub(crate) fn dithered_avar(of_samples: f64, n: u64) -> f64 {
     of_samples - ROUNDING * (1.0 - 1.0 / n as f64)
 }
 
-/// Whether the noise of the first `octaves` of a curve reaches from one count of `resolution` to the next at an averaging time, so that
-/// rounding adds white noise and nothing else; `of_samples` as [`dithered_avar`] has it.
+/// True if the noise of the first `octaves` dithers counts of `resolution`; `of_samples` as in [`dithered_avar`].
 pub(crate) fn is_dithered(curve: &Curve<OCTAVES>, resolution: f64, of_samples: f64, octaves: usize) -> bool {
     let exceeds = |at: &AllanPoint| at.avar > dithered_avar(of_samples, at.n) * resolution * resolution;
     curve.points().iter().take(octaves).any(exceeds)
 }
 
-/// Mean squares of the differences of samples at lags of 1, 2, …, counts², as far as the errors are correlated. `None` where those of
-/// neighbouring samples are not, or those of samples far apart are.
+/// Mean squares of differences at the lags of correlated errors, counts²; `None` if all lags are, or none.
 fn squares(curve: &Curve<OCTAVES>, resolution: f64) -> Option<Vec<f64>> {
     let mut squares: Vec<f64> = Vec::new();
     let octaves = curve.points().iter().zip(0..DITHERED_OCTAVES);
@@ -158,28 +145,26 @@ fn squares(curve: &Curve<OCTAVES>, resolution: f64) -> Option<Vec<f64>> {
     None
 }
 
-/// The mean square at `lag`, by a power law from `last`, that at lag `known`, to `square` at lag 2n − 1.
+/// Mean square at `lag`, on a power law from `last` at lag `known` to `square` at lag 2n − 1.
 fn power_law(known: usize, last: Option<f64>, n: u64, square: f64, lag: usize) -> f64 {
     let Some(last) = last else { return square };
     let along = (lag as f64 / known as f64).ln() / ((2 * n - 1) as f64 / known as f64).ln();
     last * (square / last).powf(along)
 }
 
-/// Share of a lag below 2n in the Allan variance at the averaging factor `n`, which is the sum over all lags of this times the mean
-/// square of the differences at that lag.
+/// Weight of the mean square at a lag below 2n in the Allan variance at the averaging factor `n`.
 fn share(n: u64, lag: u64) -> f64 {
     let (n, lag) = (n as f64, lag as f64);
     let products = if lag < n { 3.0 * lag - 2.0 * n } else { 2.0 * n - lag };
     0.5 * products / (n * n)
 }
 
-/// What rounding adds to differences of this mean square, counts²: the mean distance where they cross at most one border of two
-/// counts, which changes the rounded value by one count each time.
+/// Added mean square by rounding, counts², of differences that cross at most one border of two counts.
 fn added(square: f64) -> f64 {
     if square < WITHIN_A_COUNT { (2.0 * square / PI).sqrt() - square } else { 2.0 * (ROUNDING - covariance(square)) }
 }
 
-/// Covariance of the rounding errors of two samples whose difference has this mean square, counts².
+/// Covariance of two rounding errors, by the mean square of the difference, counts².
 fn covariance(square: f64) -> f64 {
     if square < WITHIN_A_COUNT {
         return ROUNDING - 0.5 * added(square);
@@ -201,7 +186,7 @@ mod tests {
 
     const SAMPLES: usize = 1 << 19;
 
-    /// White noise of `deviation` counts behind two averages over `taps` values, in 256ths of a count.
+    /// White noise of `deviation` counts behind two averages over `taps` values, in 1/256 count.
     fn filtered(taps: usize, deviation: f64, seed: u64) -> Vec<i32> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = || -> f64 {
@@ -221,11 +206,9 @@ mod tests {
         cascade.curve(1.0).scaled(unit)
     }
 
-    /// The same noise with and without rounding, of 2.1, 0.9 and 0.8 counts behind the averages. What rounding adds to a measured curve
-    /// is its variance and twice its covariance with the noise, whose expectation is 0: with as many independent
-    /// differences as there are twice the averaging times, and no more than there are of 8 samples, over which the errors are correlated,
-    /// four standard deviations of that are the tolerance, and 2 % for the power law between the octaves. At one sample,
-    /// where the rounded noise has up to thirteen times the variance of the unrounded one, that is found to 5 %.
+    /// Noise of 2.1, 0.9 and 0.8 counts behind the averages, with and without rounding. Tolerance: four standard
+    /// deviations of twice the covariance of rounding and noise (errors correlate over 8 samples), and 2 % for the
+    /// power law; 5 % at one sample.
     #[test]
     fn the_rounding_of_slow_noise_is_that_of_the_same_noise_unrounded() {
         for (taps, deviation) in [(64, 21.0), (32, 6.0), (16, 4.0)] {
@@ -245,7 +228,6 @@ mod tests {
         }
     }
 
-    /// White noise of a count, which no filter makes slow, has no such errors; and none are told of noise below a count.
     #[test]
     fn the_rounding_of_white_noise_and_of_noise_below_a_count_is_white() {
         for deviation in [1.0, 0.1] {
@@ -254,8 +236,6 @@ mod tests {
         }
     }
 
-    /// At long averaging times the Allan variance of a process with a short memory is its density at low frequencies over the averaging
-    /// time, and the density of all frequencies together is the variance of the errors.
     #[test]
     fn the_density_is_that_of_the_allan_variance_and_of_the_variance() {
         let fine = filtered(32, 6.0, 1);
@@ -267,12 +247,11 @@ mod tests {
         assert!((mean / (0.25 / 12.0) - 1.0).abs() < 1e-3, "{mean}");
     }
 
-    /// Both forms are those of one sum: where they meet they agree.
     #[test]
     fn the_forms_of_the_covariance_meet() {
         let (below, above) = (covariance(WITHIN_A_COUNT * (1.0 - 1e-9)), covariance(WITHIN_A_COUNT));
         assert!((below - above).abs() < 1e-6, "{below} {above}");
-        // Errors at no distance are the same error, that of a uniform distribution.
+        // At distance 0: the variance of a uniform distribution.
         assert!((covariance(0.0) - 1.0 / 12.0).abs() < 1e-12);
     }
 }

@@ -5,21 +5,20 @@ use measurement::{ChannelId, MeasuredChannel, Measurement};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// The samples of one channel, each with the sample period in which it was taken. A copy shares them until it is changed.
+/// The samples of one channel, each with its sample period. A copy shares them until it is changed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// Sample period of each sample, counted from the first; strictly increasing. A step of more than 1 is a gap.
+    /// Sample periods from the first sample on, strictly increasing; a step of more than 1 is a gap.
     pub slots: Arc<[u64]>,
     /// One value for each slot, in [`unit`](Self::unit).
     pub values: Arc<[f64]>,
-    /// Sample periods of the record, or of the part of it, that the series is from: those of `slots` and of samples that are
-    /// missing. Series of channels that were recorded together have the same span.
+    /// Sample periods of the record, or of its part, with or without samples. Channels recorded together have the same
+    /// span.
     pub span: Range<u64>,
     /// Sample period, s.
     pub period_s: f64,
-    /// Smallest distance of two values, in [`unit`](Self::unit): one count, unless the values are known to be coarser.
+    /// Smallest distance of two values, in [`unit`](Self::unit): one count, or several.
     pub resolution: f64,
-    /// Unit of the values.
     pub unit: &'static str,
 }
 
@@ -30,7 +29,7 @@ impl Series {
         Self::with_shared_slots(measurement, channel, || measurement.slots.as_slice().into())
     }
 
-    /// The same; `slots` gives the sample periods of all samples, which the series shares if none of the channel was refused.
+    /// `slots` are the sample periods of all samples, shared if none is refused.
     pub(crate) fn with_shared_slots(
         measurement: &Measurement,
         channel: ChannelId,
@@ -57,13 +56,13 @@ impl Series {
         }
     }
 
-    /// The same values, known to be multiples of `counts` counts.
+    /// The values as multiples of `counts` counts.
     #[must_use]
     pub fn with_counts_per_step(self, counts: u32) -> Self {
         Self { resolution: self.resolution * f64::from(counts), ..self }
     }
 
-    /// The values, to change them; a copy no longer shares them.
+    /// Mutable values; a copy stops sharing them.
     pub fn values_mut(&mut self) -> &mut [f64] {
         Arc::make_mut(&mut self.values)
     }
@@ -98,7 +97,7 @@ impl Series {
         }
     }
 
-    /// The samples of the sample periods for which `is_kept` holds, which is asked for each in ascending order.
+    /// The samples for whose sample periods, in ascending order, `is_kept` holds.
     #[must_use]
     pub fn filtered(mut self, mut is_kept: impl FnMut(u64) -> bool) -> Self {
         let kept: Vec<usize> = (0..self.slots.len()).filter(|&position| is_kept(self.slots[position])).collect();
@@ -109,14 +108,14 @@ impl Series {
         self
     }
 
-    /// The samples without those of the sample periods `slots`, which are in ascending order.
+    /// Without the samples in `slots`, which are in ascending order.
     #[must_use]
     pub fn without(self, slots: &[u64]) -> Self {
         let mut has = membership(slots);
         if slots.is_empty() { self } else { self.filtered(|slot| !has(slot)) }
     }
 
-    /// The samples of the sample periods in which each of `others` has one too.
+    /// The samples for which each of `others` has one in the same sample period.
     #[must_use]
     pub fn in_common(self, others: &[&Series]) -> Self {
         let mut others: Vec<_> = others.iter().map(|other| membership(&other.slots)).collect();
@@ -130,7 +129,7 @@ impl Series {
         self.slots.iter().filter(|slot| has(**slot)).count()
     }
 
-    /// The samples from the sample period `slot` on less `offset`.
+    /// The samples, less `offset` from `slot` on.
     #[must_use]
     pub fn lowered_from(mut self, slot: u64, offset: f64) -> Self {
         let from = self.slots.partition_point(|&of| of < slot);
@@ -138,7 +137,7 @@ impl Series {
         self
     }
 
-    /// The series without the effect that `correction` removes.
+    /// The series with the correction applied.
     #[must_use]
     pub fn corrected(self, correction: &Correction) -> Self {
         match correction {
@@ -147,13 +146,13 @@ impl Series {
         }
     }
 
-    /// Whether the samples from `first` to `last` follow each other without a gap.
+    /// True if no sample is missing from `first` to `last`.
     pub fn is_gapless(&self, first: usize, last: usize) -> bool {
         self.slots[last] - self.slots[first] == (last - first) as u64
     }
 }
 
-/// Whether each of some sample periods is among `slots`; both are in ascending order.
+/// True if each of ascending sample periods is in `slots`, also ascending.
 fn membership(slots: &[u64]) -> impl FnMut(u64) -> bool {
     let mut rest = slots;
     move |slot| {

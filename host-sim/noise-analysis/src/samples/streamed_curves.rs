@@ -1,32 +1,25 @@
-//! Curves of a channel whose samples come in blocks and are not kept: of the whole record, and of parts that follow each other in
-//! time.
+//! Curves of a channel whose samples come in blocks: of the record, and of consecutive parts.
 
 use crate::samples::gapped_cascade::GappedCascade;
 use measurement::MeasuredChannel;
 use std::collections::BTreeMap;
 
-/// The estimators take integers: a count is divided into so many steps, because a bias step that preprocessing subtracts is
-/// not a whole number of counts.
+/// Integer steps of a count: a subtracted bias is not a whole number of counts.
 pub(crate) const STEPS_PER_COUNT: f64 = 16.0;
 
-/// The estimators of one channel.
 #[derive(Clone)]
 pub(crate) struct StreamedCurves {
     whole: GappedCascade,
-    /// In steps of a count, as those of a recording in memory.
     parts: Vec<GappedCascade>,
     /// First sample period of each part but the first.
     boundaries: Vec<u64>,
-    /// The first count, from which the steps of the parts are counted: an offset is in no difference, and a large one would leave no
-    /// room for them.
+    /// The first count, subtracted from all: an offset is in no difference, and a large one leaves no room.
     origin: Option<i32>,
-    /// Sample period of the last sample.
     last: Option<u64>,
-    /// Samples that are refused in this channel alone, by cause.
     pub refused: BTreeMap<&'static str, u64>,
 }
 
-/// The estimator of parts that follow each other, with a gap between them.
+/// The estimator of consecutive parts, with gaps between them.
 pub(crate) fn joined<'a>(parts: impl IntoIterator<Item = &'a GappedCascade>) -> GappedCascade {
     let mut parts = parts.into_iter();
     let mut joined = parts.next().cloned().unwrap_or_default();
@@ -35,7 +28,7 @@ pub(crate) fn joined<'a>(parts: impl IntoIterator<Item = &'a GappedCascade>) -> 
 }
 
 impl StreamedCurves {
-    /// Without samples; `boundaries` are the first sample periods of each part but the first, in ascending order.
+    /// `boundaries`, ascending, are the first sample periods of each part but the first.
     pub(crate) fn new(boundaries: &[u64]) -> Self {
         Self {
             whole: GappedCascade::default(),
@@ -47,23 +40,20 @@ impl StreamedCurves {
         }
     }
 
-    /// The estimator of the whole record, in counts.
     pub(crate) const fn whole(&self) -> &GappedCascade {
         &self.whole
     }
 
-    /// The first sample period of each part and its estimator, in steps of a count ([`STEPS_PER_COUNT`]).
+    /// First sample period and estimator of each part, in steps of a count ([`STEPS_PER_COUNT`]).
     pub(crate) fn parts(&self) -> impl Iterator<Item = (u64, &GappedCascade)> {
         let starts = std::iter::once(0).chain(self.boundaries.iter().copied());
         starts.zip(&self.parts)
     }
 
-    /// The estimator of the part of this number, in steps of a count.
     pub(crate) fn part(&self, number: usize) -> GappedCascade {
         self.parts.get(number).cloned().unwrap_or_default()
     }
 
-    /// Takes the next samples of the channel, which were taken in the sample periods `slots`.
     pub(crate) fn push(&mut self, slots: &[u64], channel: &MeasuredChannel) {
         for (&cause, positions) in &channel.refused {
             *self.refused.entry(cause).or_insert(0) += positions.len() as u64;
@@ -80,7 +70,7 @@ impl StreamedCurves {
             let part_from = part.checked_sub(1).map_or(0, |before| self.boundaries[before]);
             let part_end =
                 self.boundaries.get(part).map_or(slots.len(), |&to| slots.partition_point(|&slot| slot < to));
-            // The samples from `first` on that follow each other in one part and are used; the one behind them may be refused.
+            // A run of used samples in one part; the next one may be refused.
             let refused_at = refused.peek().copied().unwrap_or(usize::MAX).min(part_end);
             let follows = |&at: &usize| slots[at] - slots[at - 1] == 1;
             let end = (first + 1..refused_at).take_while(follows).last().map_or(first, |last| last) + 1;
@@ -88,7 +78,7 @@ impl StreamedCurves {
             let of_part = &mut self.parts[part];
             if missing > 0 {
                 self.whole.miss(missing);
-                // Of a gap over a boundary, each part has the samples on its side.
+                // A gap over a boundary is split between the parts.
                 of_part.miss(missing.min(slot - part_from));
             }
             if refused.next_if_eq(&first).is_some() {

@@ -1,4 +1,4 @@
-//! A channel sampled at a constant period, with missing samples as `NaN`: the input of transforms and filters.
+//! A uniformly sampled channel for transforms and filters; missing samples are `NaN`.
 
 use crate::samples::interpolation::{ALL_NEIGHBOURS, Autocovariance, Neighbours, PartialInterpolation, REACH};
 use crate::samples::rounding::Rounding;
@@ -7,35 +7,32 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Samples one period apart; `NaN` marks a missing sample.
+/// Samples one period apart; `NaN` is a missing one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UniformSeries {
     sample_period: f64,
     values: Vec<f64>,
-    /// Of the samples that the values are made of.
+    /// Rounding of the samples behind the values.
     rounding: Rounding,
-    /// Values of the sensor for each of these.
     read_every: u32,
 }
 
-/// Gaps of up to so many samples never split a series.
+/// Longest gap, samples, that never splits a series.
 const SHORT_GAP: u64 = 16;
-/// Least number of samples of a part for each sample of its longest gap. The gap leaves side lobes of an eighth of a
-/// sinusoid's amplitude or less.
+/// Least samples of a part per sample of its longest gap. The side lobes of a sinusoid are then an eighth or less.
 const SAMPLES_PER_GAP: u64 = 8;
 
 impl UniformSeries {
-    /// `values` taken every `sample_period` seconds; a value that is not finite counts as missing.
+    /// `values` every `sample_period` seconds; one that is not finite is missing.
     #[must_use]
     pub fn new(sample_period: f64, values: Vec<f64>) -> Self {
         Self { sample_period, values, rounding: Rounding::default(), read_every: 1 }
     }
 
-    /// The samples of a channel over the whole span of its record, with a `NaN` for each missing one.
+    /// The samples over the span of the record; long gaps split it, and the part with the most samples is returned.
     ///
-    /// Long gaps split it, and only the part with the most samples is returned: drift and lines of a record that is mostly
-    /// gaps leak to all frequencies. A gap is long if it has more than an eighth of the samples of the longest part between
-    /// such gaps.
+    /// A gap is long with more than an eighth of the samples of the longest part between such gaps: drift and lines of
+    /// a record with large gaps leak to all frequencies.
     #[must_use]
     pub fn from_series(series: &Series) -> Self {
         let slots = &series.slots;
@@ -57,27 +54,23 @@ impl UniformSeries {
         Self::new(series.period_s, values).with_rounding(Rounding::white(series.resolution, series.period_s))
     }
 
-    /// The same values, of samples with these rounding errors.
     pub(crate) fn with_rounding(self, rounding: Rounding) -> Self {
         Self { rounding, ..self }
     }
 
-    /// The errors of rounding the samples to counts.
     pub(crate) fn rounding(&self) -> &Rounding {
         &self.rounding
     }
 
-    /// The same values, each of them one of so many of the sensor.
     pub(crate) fn with_one_of(self, read_every: u32) -> Self {
         Self { read_every, ..self }
     }
 
-    /// Of how many values of the sensor each sample is one; 1 where they are means, or where that is not known.
+    /// Sensor values per sample; 1 for means, or if unknown.
     pub(crate) fn read_every(&self) -> u32 {
         self.read_every
     }
 
-    /// The series with other values at the same times.
     pub(crate) fn with_values(&self, values: Vec<f64>) -> Self {
         Self { values, rounding: self.rounding.clone(), ..*self }
     }
@@ -88,7 +81,7 @@ impl UniformSeries {
         self.sample_period
     }
 
-    /// All samples in order, `NaN` for a missing one.
+    /// In order; `NaN` for a missing sample.
     #[must_use]
     pub fn values(&self) -> &[f64] {
         &self.values
@@ -100,7 +93,7 @@ impl UniformSeries {
         self.values.iter().filter(|value| value.is_finite()).count()
     }
 
-    /// The longest part whose gaps [`interpolated`](Self::interpolated) closes, as it is.
+    /// The longest part whose gaps [`interpolated`](Self::interpolated) closes.
     pub(crate) fn longest_interpolated(&self) -> Self {
         let (closed, _) = self.interpolated();
         let mut from = 0;
@@ -114,24 +107,22 @@ impl UniformSeries {
         self.with_values(self.values[longest].to_vec())
     }
 
-    /// Number of values, missing ones included, times the sample period, s.
+    /// Sample periods, missing ones included, in s.
     #[must_use]
     pub fn duration(&self) -> f64 {
         self.sample_period * self.values.len() as f64
     }
 
-    /// Mean of the samples that are not missing; 0 if all are.
+    /// Mean of the present samples; 0 without any.
     #[must_use]
     pub fn mean(&self) -> f64 {
         mean(self.values.iter().copied())
     }
 
-    /// The series with gaps of up to six samples closed, for transforms: each missing sample is the best linear
-    /// interpolation from those of the six before it and the six after it that are there. Longer gaps, and the ends, stay
-    /// missing. With it the share of all samples that was replaced.
+    /// The series with gaps of up to six samples closed by the best linear interpolation from six neighbours on either
+    /// side, and the replaced share.
     ///
-    /// A transform that takes missing samples for zeros spreads their share of the power over all frequencies, and hides what
-    /// is small behind a filter or beside drift.
+    /// Zeros in their place would spread power over all frequencies.
     #[must_use]
     pub fn interpolated(&self) -> (Cow<'_, Self>, f64) {
         let missing: Vec<usize> = (0..self.values.len()).filter(|&at| !self.values[at].is_finite()).collect();
@@ -154,7 +145,6 @@ impl UniformSeries {
             let present = neighbours.iter().enumerate().fold(0, |present: Neighbours, (bit, neighbour)| {
                 present | Neighbours::from(neighbour.is_some()) << bit
             });
-            // Distances to the samples at either end of the gap.
             let [before, after] = [present & (ALL_NEIGHBOURS >> REACH), present >> REACH];
             if before == 0 || after == 0 || (before.trailing_zeros() + after.trailing_zeros()) as usize + 1 > REACH {
                 continue;
@@ -169,7 +159,7 @@ impl UniformSeries {
         (Cow::Owned(self.with_values(values)), replaced as f64 / self.values.len() as f64)
     }
 
-    /// Autocovariance around `level`, of the pairs that are there.
+    /// Around `level`, from the pairs that are present.
     fn autocovariance(&self, level: f64) -> Autocovariance {
         std::array::from_fn(|lag| {
             let pairs = self.values.iter().zip(&self.values[lag.min(self.values.len())..]);
@@ -195,12 +185,10 @@ impl UniformSeries {
         self.with_values(self.values.iter().enumerate().map(|(at, value)| value - line(at)).collect())
     }
 
-    /// Block averages at a rate at which rounding acts as noise. The block is the smallest power of two such that fewer
-    /// than half of all pairs of samples one block apart are equal; no whole block, and so no value, remains of a series
-    /// that never changes.
+    /// Block averages over the smallest power of two for which fewer than half of the pairs a block apart are equal:
+    /// rounding then acts as noise.
     ///
-    /// Where the output stays at one step of the quantizer for several samples, the rounding error is correlated and
-    /// would show as lines.
+    /// A series that never changes has no values left.
     #[must_use]
     pub(crate) fn averaged_until_dithered(self) -> Self {
         let equal_apart = |distance: usize| {
@@ -217,8 +205,7 @@ impl UniformSeries {
         if size == 1 { self } else { self.averaged(size) }
     }
 
-    /// Means of blocks of `size` samples, at `size` times the period: of the samples that are there, where at least half are. An
-    /// incomplete block at the end is left out.
+    /// Means of blocks of `size` samples with at least half of them; an incomplete block at the end is dropped.
     #[must_use]
     pub(crate) fn averaged(&self, size: usize) -> Self {
         let average = |chunk: &[f64]| {
@@ -231,14 +218,13 @@ impl UniformSeries {
         Self {
             sample_period: self.sample_period * size as f64,
             values: self.values.chunks_exact(size).map(average).collect(),
-            // An average has less of the error, at a lower rate.
             rounding: self.rounding.clone(),
             read_every: if size > 1 { 1 } else { self.read_every },
         }
     }
 }
 
-/// The positions of the longest part without a long gap, and the length of the gaps up to which none is long, samples.
+/// Positions of the longest part without a long gap, and the longest gap, samples, that is not long.
 fn longest_part(slots: &[u64]) -> (Range<usize>, u64) {
     let longest_without = |longest_gap: u64| {
         let mut longest = 0..0;
@@ -257,7 +243,7 @@ fn longest_part(slots: &[u64]) -> (Range<usize>, u64) {
     while longest_gap > SHORT_GAP {
         let part = longest_without(longest_gap);
         let (samples, first) = (part.len() as u64, part.start);
-        // Nor may many shorter gaps make up nearly all of it.
+        // Many shorter gaps must not make up nearly all of it.
         let is_filled = part.end > first && slots[part.end - 1] - slots[first] <= SHORT_GAP * samples;
         if is_filled && samples >= SAMPLES_PER_GAP * longest_gap {
             return (part, longest_gap);
@@ -267,7 +253,7 @@ fn longest_part(slots: &[u64]) -> (Range<usize>, u64) {
     (longest_without(SHORT_GAP), SHORT_GAP)
 }
 
-/// Mean of the finite values; 0 if there are none.
+/// Mean of the finite values; 0 without any.
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) =
         values.filter(|value| value.is_finite()).fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
@@ -302,7 +288,7 @@ mod tests {
         for at in (20..1980).filter(|&at| is_lost(at) && !missing.contains(&at)) {
             assert!((closed.values()[at] - wave(at)).abs() < 0.02, "{at}: {}", closed.values()[at]);
         }
-        // Uniform in ±0.5, by a multiplicative sequence.
+        // A multiplicative sequence, uniform in ±0.5.
         let white = |at: usize| (at as f64 * 0.754_877_666 * (at as f64 + 3.0)).fract() - 0.5;
         let with_losses = lossy(&white);
         let (closed, _) = with_losses.interpolated();
@@ -312,7 +298,7 @@ mod tests {
 
     #[test]
     fn averages_until_neighbours_are_rarely_equal() {
-        // Each value lasts ten samples: four samples apart six of ten are equal, eight apart two.
+        // Each value lasts ten samples: four apart six of ten are equal, eight apart two.
         let values: Vec<f64> = (0..1000).map(|at| f64::from(at / 10 % 3)).collect();
         let averaged = UniformSeries::new(0.5, values).averaged_until_dithered();
         assert_eq!((averaged.sample_period(), averaged.values().len()), (4.0, 125));
@@ -342,11 +328,11 @@ mod tests {
         let far = UniformSeries::from_series(&series(vec![0, 1 << 40, (1 << 40) + 1]));
         assert_eq!(far.values(), [2.0, 3.0]);
         assert!(UniformSeries::from_series(&series(vec![])).values().is_empty());
-        // Stretches of 1000 samples: gaps of up to 125 samples leave them together.
+        // Stretches of 1000 samples: gaps of up to 125 leave them together.
         let stretches = |gap: u64| (0..5000).map(|at: u64| at + at / 1000 * gap).collect();
         assert_eq!(UniformSeries::from_series(&series(stretches(125))).values().len(), 5500);
         assert_eq!(UniformSeries::from_series(&series(stretches(1000))).values().len(), 1000);
-        // A sample of each thousand is no record that is mostly gaps.
+        // One sample in a thousand is no record with gaps.
         assert!(UniformSeries::from_series(&series((0..5000).map(|at| 1000 * at).collect())).values().len() < 20);
     }
 }

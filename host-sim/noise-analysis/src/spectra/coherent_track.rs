@@ -1,38 +1,33 @@
 //! The whole record along a frequency that runs evenly, as one coherent sum.
 //!
-//! A line along which the spectra of short segments have no larger sum than chance has somewhere may still be one whose phases agree from
-//! segment to segment: the samples, turned back by its phase, are then a constant. Of all tests for a sinusoid with such a run this is the
-//! most powerful one (the matched filter; the coherent follow-up of the candidates of a semi-coherent search: P. Brady and T. Creighton,
-//! "Searching for periodic sources with LIGO. II", Phys. Rev. D 61, 2000).
+//! Turned back by its phase, a line is a constant: the matched filter, more powerful than sums of segments (P. Brady
+//! and T. Creighton, Phys. Rev. D 61, 2000).
 
 use crate::samples::uniform_series::UniformSeries;
 use fourier::Complex;
 use std::f64::consts::{PI, TAU};
 
-/// Blocks to a segment: half their rate is twice the resolution of a segment.
+/// Blocks per segment: half their rate is twice its resolution.
 const BLOCKS_OF_SEGMENT: usize = 2;
-/// Farthest that the frequency at the beginning is off, and the run over the record, in resolutions of a segment: half of one is an ordinate
-/// of its spectrum, and the line goes from ordinate to ordinate in steps.
+/// Largest error of the first frequency and of the run, in resolutions of a segment.
 const FREQUENCY_OFF: f64 = 0.625;
 const RUN_OFF: f64 = 0.75;
-/// Steps of the run, in resolutions of the record: between two of them 2 % of the power is lost.
+/// Step of the run, in resolutions of the record; 2 % of the power is lost between two.
 const RUN_STEP: f64 = 2.0;
-/// Ordinates to a resolution of the record.
 const PADDING: usize = 2;
 
-/// The coherent sum of a record along a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct CoherentTrack {
     /// At the beginning and at the end of the record, Hz.
     pub frequencies: [f64; 2],
-    /// Square of the sum over that of the noise around the line: an exponential variable of mean 1 without a line.
+    /// Squared sum over that of the noise around: exponential of mean 1 without a line.
     pub power: f64,
-    /// Frequencies and runs that a search over all of them would have tried.
+    /// Frequencies and runs of a complete search.
     pub trials: f64,
 }
 
 impl CoherentTrack {
-    /// The largest sum near a line from the first to the second of `frequencies`, Hz, as the spectra of so many `segments` have shown it.
+    /// The largest sum near a line between two `frequencies`, Hz, that the spectra of `segments` have shown.
     pub(super) fn near(series: &UniformSeries, frequencies: [f64; 2], segments: usize) -> Option<Self> {
         let count = BLOCKS_OF_SEGMENT * segments;
         let size = series.values().len() / count;
@@ -58,18 +53,17 @@ impl CoherentTrack {
             let mut spectrum_of = |part: fn(&Complex<f64>) -> f64, output: &mut [Complex<f64>]| {
                 input.fill(0.0);
                 input.iter_mut().zip(&turned).for_each(|(slot, value)| *slot = part(value));
-                // An error means buffers of the wrong length; these are the planner's own.
                 transform.process(&mut input, output).ok()
             };
             spectrum_of(|value| value.re, &mut of_real)?;
             spectrum_of(|value| value.im, &mut of_imaginary)?;
             let turn = Complex::new(0.0, 1.0);
-            // Of a complex series from the spectra of its parts, at an ordinate and at its negative.
+            // A complex series from the spectra of its parts.
             let power = |offset: i32| {
                 let at = offset.unsigned_abs() as usize;
                 let (real, imaginary) = (of_real[at], of_imaginary[at]);
                 let sum = if offset < 0 { real.conj() + turn * imaginary.conj() } else { real + turn * imaginary };
-                // A block has sin(πx)/(πx) of a frequency of x of its rate.
+                // A block has sin(πx)/(πx) of a frequency x times its rate.
                 let phase = PI * at as f64 / (PADDING * count) as f64;
                 sum.norm_sqr() * if at == 0 { 1.0 } else { (phase / phase.sin()).powi(2) }
             };
@@ -84,7 +78,7 @@ impl CoherentTrack {
                 best = Some(Self {
                     frequencies: [begins, ends].map(|turns| turns / duration_s),
                     power: largest / mean,
-                    // Half as many frequencies as samples, and up to half a resolution of a segment a segment up or down.
+                    // Half as many frequencies as samples; half a resolution per segment up or down.
                     trials: 0.5 * length as f64 * (segments * segments) as f64,
                 });
             }
@@ -98,8 +92,7 @@ impl CoherentTrack {
     }
 }
 
-/// Sums over blocks of `size` values of a record, each turned back by the phase of a line with `first` turns a record at the beginning and
-/// `run` more at the end.
+/// Sums over blocks of `size` values, turned back by a line with `first` turns a record, and `run` more at the end.
 fn turned_back(values: &[f64], size: usize, first: f64, run: f64) -> Vec<Complex<f64>> {
     let step = 1.0 / values.len() as f64;
     let mut phasor = Complex::cis(-TAU * (0.5 * first * step + 0.125 * run * step * step));

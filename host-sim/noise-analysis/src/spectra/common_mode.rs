@@ -1,8 +1,7 @@
-//! Common-mode drift: a Markov process that several channels share, by the spectra of their mean and of their differences.
+//! Common-mode drift: a Markov process that several channels share.
 //!
-//! The differences from the mean do not contain what all channels share alike, and their noise, scaled, has the same
-//! spectrum as the noise of the mean. So they give the spectrum that the mean would have without the shared process,
-//! whatever the noise of the channels is.
+//! Differences from the mean lack what is shared; their scaled noise spectrum is that of the mean without the shared
+//! process.
 
 use super::markov_spectrum::{MarkovEstimate, MarkovFit, OWN, SHARED, TERMS, most_likely, time_constants};
 use super::periodogram::{SineTapered, low_frequency_bands};
@@ -11,39 +10,37 @@ use super::whittle::SpectralBand;
 use crate::samples::uniform_series::UniformSeries;
 use std::f64::consts::PI;
 
-/// Samples whose means are transformed: up to [`HIGHEST`] the mean over a block lowers a density by 2 % at most.
+/// Samples per mean; at [`HIGHEST`] it lowers a density by 2 %.
 const BLOCK: usize = 4;
-/// Highest frequency, as a fraction of the rate of the blocks, and over the length of the filter's impulse response: there a Bartlett
-/// window lowers a density by `1 − sinc⁴(1/8)`, a tenth.
+/// Highest frequency over the block rate, and over 1/(length of the impulse response).
 const HIGHEST: f64 = 0.08;
 const HIGHEST_BY_FILTER: f64 = 0.25;
-/// Shortest time constant, in lengths of the filter's impulse response: neighbouring samples of every channel are correlated by it.
+/// Shortest time constant, in lengths of the impulse response, which correlates neighbours.
 const FILTER_LENGTHS: f64 = 4.0;
 /// Fewest bands for a fit of four densities and a time constant.
 const FEWEST_BANDS: usize = 16;
-/// Time constants that are tried: the shortest in blocks, the longest as a fraction of the record.
+/// Time constants: the shortest in blocks, the longest as a fraction of the record.
 const SHORTEST: f64 = 4.0;
 const LONGEST: f64 = 0.5;
-/// Most channels of which all sets with all signs are tried: 36 ways.
+/// Most channels of which all sets with all signs are tried: 36.
 const MOST_TOGETHER: usize = 4;
 /// Ways in which three channels can share a process.
 const WAYS_OF_THREE: f64 = 10.0;
-/// The test whether anything is shared tries only every third time constant.
+/// Stride over the time constants in the test for anything shared.
 const COARSE: usize = 3;
 
-/// Fourier transforms of channels that may share a process, all of one length.
+/// Fourier transforms of channels, of one length.
 pub(crate) struct CrossSpectra {
-    /// Of a block, s.
+    /// Block period, s.
     period: f64,
     duration: f64,
-    /// Of the impulse response of the filter that the channels have, s.
+    /// Length of the channels' impulse response, s.
     filter_length: f64,
     channels: Vec<SineTapered>,
 }
 
 impl CrossSpectra {
-    /// Transforms the channels, which have a filter with an impulse response of `filter_length` s; `None` if there are none, or if
-    /// their lengths differ.
+    /// `filter_length` of the impulse response in s; `None` without channels, or for different lengths.
     #[must_use]
     pub(crate) fn new(channels: &[UniformSeries], filter_length: f64) -> Option<Self> {
         let first = channels.first()?;
@@ -58,9 +55,7 @@ impl CrossSpectra {
         })
     }
 
-    /// The set of two or more channels for which a shared process gains most ln likelihood: its members, and the gain, less the logarithm of how
-    /// many times as many ways of sharing it were tried as three channels have. Of more than [`MOST_TOGETHER`] channels, the likeliest pair
-    /// grows by the member with which it gains most.
+    /// The set of channels whose shared process gains most, with the gain less ln of the ways over those of three.
     #[must_use]
     pub(crate) fn most_likely_set(&self) -> Option<(Vec<usize>, f64)> {
         let count = self.channels.len();
@@ -93,8 +88,7 @@ impl CrossSpectra {
         Some((members, gain - (tried as f64 / WAYS_OF_THREE).max(1.0).ln()))
     }
 
-    /// The gain of `members` under the likeliest signs of the shared process, and their bands. The sign of the first member
-    /// is positive. Of more than [`MOST_TOGETHER`] members, each has the sign that is likelier for it and the first one alone.
+    /// Gain of `members` under the likeliest signs, of which the first is positive, with their bands.
     fn likeliest_signs(&self, members: &[usize]) -> Option<(f64, Vec<SpectralBand>)> {
         let of_pair = |(at, &member): (usize, &usize)| {
             let pair = [members[0], member];
@@ -110,7 +104,7 @@ impl CrossSpectra {
         bands.map(|bands| (self.gain(&bands), bands)).max_by(|(a, _), (b, _)| a.total_cmp(b))
     }
 
-    /// The shared Markov process that makes the spectra of `members` likeliest; `None` if the samples are too few.
+    /// The likeliest Markov process that `members` share; `None` for too few samples.
     #[must_use]
     pub(crate) fn fit_markov(&self, members: &[usize]) -> Option<MarkovEstimate> {
         let (_, bands) = self.likeliest_signs(members)?;
@@ -120,8 +114,7 @@ impl CrossSpectra {
         most_likely(&fits, without.objective)
     }
 
-    /// Bands of the mean, which contains the process, followed by those of the differences. The sign of a member is negative
-    /// where its bit in `negative` is set.
+    /// Bands of the mean, which contains the process, then of the differences; bits of `negative` are negative signs.
     fn bands(&self, members: &[usize], negative: usize) -> Option<Vec<SpectralBand>> {
         let resolution = self.channels[0].resolution();
         let highest = (HIGHEST / self.period).min(HIGHEST_BY_FILTER / self.filter_length);
@@ -152,7 +145,6 @@ impl CrossSpectra {
         (ranges.len() >= FEWEST_BANDS && bands.iter().all(|band| band.density > 0.0)).then_some(bands)
     }
 
-    /// Gain in ln likelihood of the bands by a shared process.
     fn gain(&self, bands: &[SpectralBand]) -> f64 {
         let least = |shared: bool| {
             let fits = self.time_constants().step_by(COARSE);
@@ -162,13 +154,12 @@ impl CrossSpectra {
         least(false) - least(true)
     }
 
-    /// Time constants that are tried, s.
     fn time_constants(&self) -> impl Iterator<Item = f64> {
         let shortest = (SHORTEST * self.period).max(FILTER_LENGTHS * self.filter_length);
         time_constants(shortest, LONGEST * self.duration)
     }
 
-    /// Fits N, B, K, white noise that the members share, and processes with this time constant to the bands of the mean followed by those of the differences.
+    /// Fits N, B, K, shared white noise and processes of time constant `time` to the bands.
     fn fit(&self, bands: &[SpectralBand], time: f64, processes: Processes) -> MarkovFit {
         let basis = |(at, band): (usize, &SpectralBand)| {
             let [white, flicker, walk, process] = shapes(band.frequency, self.period, time);
@@ -184,22 +175,18 @@ impl CrossSpectra {
     }
 }
 
-/// Signs that a shared process may have in `members`, the first of which has the positive one, as far as they are tried.
+/// Number of sign patterns to try; the first member's sign is positive.
 fn signs(members: &[usize]) -> usize {
     if members.len() <= MOST_TOGETHER { 1 << members.len().saturating_sub(1) } else { 1 }
 }
 
-/// Which Markov processes a fit has.
 #[derive(Clone, Copy)]
 struct Processes {
-    /// One in each channel.
     own: bool,
-    /// One in the mean.
     shared: bool,
 }
 
-/// One-sided densities: 1 of white noise, 1/f and a sampled random walk, which are 1 at 1 Hz, and of a Markov process of
-/// variance 1 with this time constant.
+/// One-sided densities: white noise of 1; 1/f and a sampled walk, 1 at 1 Hz; a Markov process of variance 1.
 fn shapes(frequency: f64, period: f64, time: f64) -> [f64; 4] {
     let walk = walk_amplitude(frequency, period);
     let kept = (-period / time).exp();
@@ -217,7 +204,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
-    /// Two channels of white noise of deviation 1 at 10 Hz, and a process of deviation 0.5 that both have.
+    /// White noise of deviation 1 at 10 Hz, and a shared process of deviation 0.5.
     #[test]
     fn measures_the_process_that_two_channels_share() {
         let (mut inside, runs) = (0, 8);
@@ -236,15 +223,14 @@ mod tests {
             let shared = transforms.fit_markov(&[0, 1]).unwrap();
             let covers = |of: BoundedEstimate, truth: f64| usize::from((of.low..=of.high).contains(&truth));
             inside += covers(shared.deviation, 0.5) + covers(shared.time_constant, 20.0);
-            // 4,000 s are 100 correlation times: the deviation is known to some 7 %, the time to some 15 %.
+            // 100 correlation times: the deviation is known to 7 %, the time to 15 %.
             assert!((shared.deviation.value / 0.5).ln().abs() < 0.25, "{seed}: {shared:?}");
             assert!((shared.time_constant.value / 20.0).ln().abs() < 0.5, "{seed}: {shared:?}");
         }
-        // 95 % of 16 are expected; 11 or fewer have a probability of one in ten thousand.
+        // 95 % of 16; 11 or fewer have a probability of 10⁻⁴.
         assert!(inside >= 12, "{inside}");
     }
 
-    /// All sets with all signs of twelve channels would be 266,000.
     #[test]
     fn many_channels_share_a_process() {
         let mut random = ChaCha8Rng::seed_from_u64(7);
@@ -254,14 +240,13 @@ mod tests {
             let mut normal = || random.sample::<f64, _>(StandardNormal);
             process = kept * process + 0.4 * (1.0 - kept * kept).sqrt() * normal();
             for (number, channel) in channels.iter_mut().enumerate() {
-                // Every third channel has nothing of it, and the others with changing signs.
+                // Every third channel lacks it; the signs of the others alternate.
                 let weight = [1.0, -1.0, 0.0][number % 3];
                 channel.push(weight * process + normal());
             }
         }
         let spectra = CrossSpectra::new(&channels.map(|values| UniformSeries::new(0.1, values)), 0.0).unwrap();
         let (members, gain) = spectra.most_likely_set().unwrap();
-        // The last one adds little to what the others show.
         assert!(members.iter().all(|member| member % 3 < 2) && members.len() >= 6, "{members:?}");
         assert!(gain > 50.0, "{gain}");
     }
@@ -285,7 +270,6 @@ mod tests {
         assert!(members == [0, 1, 2] && gain > 20.0, "{members:?} {gain}");
         let (members, gain) = transforms(2, [1.0, 0.0, 1.0]).most_likely_set().unwrap();
         assert!(members == [0, 2] && gain > 15.0, "{members:?} {gain}");
-        // White noise that all three have is no drift.
         for seed in 10..20 {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             let mut channels = [const { Vec::new() }; 3];
@@ -296,18 +280,15 @@ mod tests {
             }
             let spectra = CrossSpectra::new(&channels.map(|values| UniformSeries::new(0.1, values)), 0.0).unwrap();
             let gain = spectra.most_likely_set().unwrap().1;
-            // That of chance, by which a drift is told in one of 5,000.
             assert!(gain < 11.3, "{seed}: {gain}");
         }
-        // Without a process, and with one in a single channel.
         for (seed, weights) in [(3, [0.0; 3]), (4, [5.0, 0.0, 0.0])] {
             let gain = transforms(seed, weights).most_likely_set().unwrap().1;
             assert!(gain < 5.0, "{seed}: {gain}");
         }
     }
 
-    /// Three channels of independent white noise behind two moving averages of 64 samples at 204.8 Hz over 450 s, 0.625 s of noise that
-    /// is correlated by them and shared by none; and with a process of 40 s that all have.
+    /// White noise behind two moving averages of 64 samples over 450 s; then with a shared process of 40 s.
     #[test]
     fn a_filter_is_nothing_that_channels_share() {
         const TAPS: usize = 64;
@@ -338,7 +319,6 @@ mod tests {
             CrossSpectra::new(&channels, length).unwrap().most_likely_set().unwrap().1
         };
         for seed in 0..4 {
-            // The limits of the other test.
             let (alone, together) = (gain(seed, 0.0), gain(seed, 0.3));
             assert!(alone < 5.0 && together > 15.0, "{seed}: {alone} {together}");
         }

@@ -1,13 +1,8 @@
-//! Disturbances that begin at once and decay, at any times (shot noise).
+//! Shot noise: disturbances that begin at once and decay, at random times.
 //!
-//! Their spectrum is that of a Markov process, so that no second moment tells the two apart. The block means of a record are passed
-//! through the matched filter for an exponential decay in noise of the record's own spectrum (G. Turin, "An introduction to matched
-//! filters", IRE Trans. IT-6, 1960), for several time constants, and the third Hermite polynomials `z³ − 3z` of the output are summed. For
-//! standard normal numbers with the correlation ρ the mean product of two is 6ρ³ (F. Mehler, J. reine angew. Math. 66, 1866), so that the
-//! variance of the sum in any Gaussian noise follows from the autocorrelation of the filtered noise alone.
-//!
-//! The same sum for a decay in reversed time is as large, up to its sign, where the process is the same both ways, as random telegraph
-//! noise and single samples are, and for a sawtooth.
+//! Its spectrum is that of a Markov process, so third moments decide: the sum of `z³ − 3z` of the block means behind
+//! matched filters (G. Turin, IRE Trans. IT-6, 1960). In Gaussian noise its variance is the sum of 6ρ³ (F. Mehler, J.
+//! reine angew. Math. 66, 1866). In processes that are reversible in time the reversed filter has as large a sum.
 
 mod campbell;
 mod matched_filter;
@@ -21,44 +16,40 @@ use campbell::CampbellEstimate;
 use matched_filter::WhitenedRecord;
 use std::f64::consts::SQRT_2;
 
-/// Blocks of the record, at least.
+/// Fewest blocks of the record.
 const BLOCKS: usize = 4096;
-/// Time constants of the filters: 1, 2, 4 … 64 blocks. At a factor of √2 from the true one a filter has 97 % of its response.
+/// Number of time constants: 1, 2, 4 … 64 blocks, at most √2 off, where 97 % of the response is left.
 const TIMES: u32 = 7;
-/// Largest response that is counted, in standard deviations: a single large disturbance is no process.
+/// Largest response that counts, in standard deviations, against single large disturbances.
 const LARGEST: f64 = 4.0;
-/// Probability by chance of what is left of the sum without the largest disturbance, at most.
+/// Largest p-value without the largest disturbance.
 const LEFT_BY_CHANCE: f64 = 0.01;
-/// Probability by which the sums of the two directions differ by chance as much, at most, where the process is the same both ways: of
-/// sums of variance 1, and by the scatter of the differences over stretches of four time constants, each by itself. A process whose third
-/// moment is not 0 is rare enough for this.
+/// Largest p-value of the difference of the two directions, by the variance 1 and by the scatter over stretches.
 const DIRECTION_BY_CHANCE: f64 = 0.05;
-/// Largest part that the sum of the reversed filter has of the other: strong disturbances change the noise that the filters are made for.
+/// Largest ratio of the reversed filter's sum: strong disturbances change the noise that the filters assume.
 const LARGEST_REVERSED: f64 = 0.75;
 
-/// Disturbances of one direction that decay.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct DecayingDisturbances {
-    /// Of the decay, s.
+    /// s
     pub time_constant: BoundedEstimate,
-    /// In the unit of the series; below 0 of disturbances downwards.
+    /// In the unit of the series; negative downwards.
     pub size: BoundedEstimate,
     /// 1/s
     pub rate_hz: BoundedEstimate,
-    /// Standard deviation of the sum of all, in the unit of the series.
+    /// Standard deviation of their sum, in the unit of the series.
     pub deviation: BoundedEstimate,
-    /// Sum over the responses in its standard deviations, above 0 where the disturbances go upwards; that of the reversed filter.
+    /// Sum in its standard deviations, positive upwards; and that of the reversed filter.
     pub sum: f64,
     pub reversed: f64,
-    /// Probability of such a sum for any of the filters by chance.
+    /// Probability by chance for any of the filters.
     pub p_value: f64,
 }
 
 impl DecayingDisturbances {
-    /// Those of a record; `None` if chance, a single disturbance or a process that is the same both ways explains them.
+    /// `None` if chance, a single disturbance or a reversible process explains them.
     pub(crate) fn find(series: &UniformSeries) -> Option<Self> {
         let sample_period = series.sample_period();
-        // Of a channel that never changes nothing is left.
         let series = series.clone().averaged_until_dithered();
         let size = series.values().len() / BLOCKS;
         if size == 0 {
@@ -68,8 +59,7 @@ impl DecayingDisturbances {
         let record = WhitenedRecord::new(blocks.values())?;
         let responses = (0..TIMES).filter_map(|power| Response::new(&record, f64::from(1_u32 << power), false));
         let best = responses.max_by(|a, b| a.sum.abs().total_cmp(&b.sum.abs()))?;
-        // Either direction of each filter. The sum of many terms is nearly normal: of 1,500 simulated records of white and flicker noise
-        // 1 % have a largest one above 3.1 and 0.1 % above 3.8, against 3.2 and 3.8 of normal ones.
+        // Either direction of each filter. Nearly normal: 1 % of simulated records exceed 3.1, against 3.2.
         let p_value = 2.0 * f64::from(TIMES) * upper_tail(best.sum.abs());
         if p_value > SIGNIFICANCE || best.sum_without_largest() < quantile(LEFT_BY_CHANCE) {
             return None;
@@ -95,18 +85,14 @@ impl DecayingDisturbances {
     }
 }
 
-/// What one filter responds.
 struct Response {
-    /// Time constant, blocks.
     time: f64,
-    /// In standard deviations of it in Gaussian noise.
+    /// In its standard deviations in Gaussian noise.
     sum: f64,
-    /// The sum's, of each block.
     terms: Vec<f64>,
 }
 
 impl Response {
-    /// Of the filter for a decay of `time` blocks, or for one in reversed time.
     fn new(record: &WhitenedRecord, time: f64, is_reversed: bool) -> Option<Self> {
         let filtered = record.filtered(time, is_reversed)?;
         let variance = filtered.covariance.first()?;
@@ -123,7 +109,7 @@ impl Response {
         (deviation > 0.0 && sum.is_finite()).then_some(Self { time, sum, terms })
     }
 
-    /// The absolute value of the sum less the largest part that a stretch of two time constants on either side of a block has.
+    /// Absolute sum less the largest part within two time constants of a block.
     fn sum_without_largest(&self) -> f64 {
         let width = (4.0 * self.time) as usize + 1;
         let width = width.min(self.terms.len());
@@ -136,7 +122,7 @@ impl Response {
         self.sum.abs() - largest
     }
 
-    /// Whether the absolute sum is larger than that of the filter in reversed time, beyond what chance does.
+    /// True if the absolute sum exceeds the reversed filter's beyond chance.
     fn exceeds(&self, reversed: &Self) -> bool {
         let (own, other) = (self.sum.abs(), reversed.sum.abs());
         let differences = self.terms.iter().zip(&reversed.terms);
@@ -159,14 +145,13 @@ mod tests {
 
     const PERIOD_S: f64 = 0.05;
 
-    /// White noise of deviation 1 at 20 Hz over 410 s, with the values of `next`.
     fn series(seed: u64, mut next: impl FnMut(&mut ChaCha8Rng, usize) -> f64) -> UniformSeries {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let value = |at| next(&mut random, at) + random.sample::<f64, _>(StandardNormal);
         UniformSeries::new(PERIOD_S, (0..2 * BLOCKS).map(value).collect())
     }
 
-    /// Some 20 disturbances of this height, each of which decays within 3 s.
+    /// Some 20 disturbances of this height that decay within 3 s.
     fn decays(height: f64) -> impl FnMut(&mut ChaCha8Rng, usize) -> f64 {
         let mut level = 0.0;
         move |random, _| {
@@ -181,15 +166,15 @@ mod tests {
     #[test]
     fn disturbances_that_decay_are_found_in_either_direction() {
         for (seed, height) in [(1, 1.0), (2, -1.0), (3, 0.8), (4, -5.0)] {
-            // The response to one of height 1 is √(3 s/2/0.05 s), 5.5 standard deviations.
+            // Response to height 1: √(3 s/2/0.05 s) = 5.5 standard deviations.
             let found = DecayingDisturbances::find(&series(seed, decays(height))).expect("twenty clear ones");
             assert_eq!(found.sum > 0.0, height > 0.0, "{found:?}");
-            // To the next filter but one: their sums differ little.
+            // Sums of neighbouring filters differ little.
             assert!((found.time_constant.value / 3.0).log2().abs() < 2.0, "{found:?}");
         }
     }
 
-    /// Disturbances of this size, `rate` of them a sample on average, that decay with a time constant in samples.
+    /// `rate` per sample, time constant in samples.
     fn shot_noise(seed: u64, [rate, size, time_constant]: [f64; 3]) -> UniformSeries {
         let (mut level, mut next, kept) = (0.0, 0.0, (-1.0 / time_constant).exp());
         series(seed, move |random, at| {
@@ -202,7 +187,7 @@ mod tests {
         })
     }
 
-    /// Intervals of 95 % hold the truth in fewer than 87 of 100 records with a probability of 10⁻³ (binomial distribution).
+    /// Fewer than 87 of 100 have a probability of 10⁻³ (binomial distribution).
     #[test]
     fn intervals_hold_the_truth() {
         for [count, size, time_constant] in

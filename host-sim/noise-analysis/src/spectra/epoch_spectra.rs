@@ -1,31 +1,30 @@
-//! Spectra of parts of a record whose samples are not kept, such as its epochs.
+//! Spectra of parts of a record, such as epochs, whose samples are not kept.
 
 use super::welch::{Welch, WelchSum};
 use crate::samples::uniform_series::UniformSeries;
 use std::sync::Arc;
 
-/// Samples of a segment: lines between a hundredth and two fifths of the sample rate are resolved to a 20th of their frequency or better.
+/// Samples of a segment: lines from 1/100 to 2/5 of the sample rate are resolved to a 20th.
 const SEGMENT: usize = 2048;
 
-/// Spectra of parts that follow each other, each with the first sample period of its part; parts without a whole segment have none.
+/// Spectra of consecutive parts with their first sample periods; none for a part without a whole segment.
 pub(crate) type PartSpectra = Arc<Vec<(u64, Welch)>>;
 
-/// Averages the spectra of the segments of each part.
 pub(crate) struct EpochSpectra {
     sample_period: f64,
-    /// First sample periods of the parts that are still to come, the last one first.
+    /// First sample periods of later parts, the last one first.
     later: Vec<u64>,
-    /// First sample period of the part that is read.
+    /// First sample period of the current part.
     part: u64,
     sum: WelchSum,
-    /// First sample period of the segment, and its samples, `NaN` where one is missing.
+    /// First sample period of the segment, and its samples, `NaN` if missing.
     from: u64,
     segment: Vec<f64>,
     finished: Vec<(u64, Welch)>,
 }
 
 impl EpochSpectra {
-    /// `boundaries` are the first sample periods of each part but the first, in ascending order.
+    /// `boundaries`, ascending, are the first sample periods of each part but the first.
     pub(crate) fn new(sample_period: f64, boundaries: &[u64]) -> Self {
         Self {
             sample_period,
@@ -38,7 +37,6 @@ impl EpochSpectra {
         }
     }
 
-    /// Takes the next sample, which was taken in the sample period `slot`.
     pub(crate) fn push(&mut self, slot: u64, value: f64) {
         while let Some(next) = self.later.pop_if(|next| *next <= slot) {
             self.end_part(next);
@@ -47,7 +45,7 @@ impl EpochSpectra {
             self.end_segment();
             let is_empty = self.segment.iter().all(|value| value.is_nan());
             if is_empty && slot >= self.from + SEGMENT as u64 {
-                // Of a long gap, the segments without samples.
+                // Skips the segments within a long gap.
                 let half = SEGMENT as u64 / 2;
                 self.from += (slot - self.from) / half * half;
             }
@@ -55,13 +53,12 @@ impl EpochSpectra {
         self.segment[(slot - self.from) as usize] = value;
     }
 
-    /// The spectra of all parts, where the last one ends with the sample period `end`.
+    /// The spectra of all parts; the last one ends with the sample period `end`.
     pub(crate) fn finish(mut self, end: u64) -> PartSpectra {
         self.end_part(end);
         Arc::new(self.finished)
     }
 
-    /// Adds the spectrum of the segment, and begins the one that overlaps it by half.
     fn end_segment(&mut self) {
         let segment = UniformSeries::new(self.sample_period, self.segment.clone());
         let (filled, _) = segment.interpolated();
@@ -71,7 +68,6 @@ impl EpochSpectra {
         self.from += SEGMENT as u64 / 2;
     }
 
-    /// Ends the part before the sample period `next`.
     fn end_part(&mut self, next: u64) {
         if self.from + SEGMENT as u64 <= next {
             self.end_segment();
@@ -92,7 +88,6 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
-    /// Parts with lost samples and a gap of twenty segments, against the estimate of all samples of each part at once.
     #[test]
     fn parts_have_the_spectra_of_their_samples() {
         let boundaries = [10_000_u64, 30_000, 90_000];
@@ -114,7 +109,7 @@ mod tests {
             let expected = Welch::estimate(&part, SEGMENT).expect("whole segments");
             assert_eq!(spectrum.segments(), expected.segments());
             for ((_, density), (_, expected)) in spectrum.points().zip(expected.points()) {
-                // The interpolated samples are by the correlation of a segment instead of the part: 1 in 8,000, off by 1/√2,048.
+                // The interpolation uses the segment's correlation: 1 in 8,000 samples, off by 1/√2,048.
                 assert!((density - expected).abs() < 1e-3 * (density + expected) + 1e-5, "{density} {expected}");
             }
         }

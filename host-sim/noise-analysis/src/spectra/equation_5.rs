@@ -1,4 +1,4 @@
-//! The Allan deviation from a measured spectrum, by the relation of IEEE Std 952 that is equation (5) of the paper.
+//! The Allan deviation from a measured spectrum by equation (5) of the paper (IEEE Std 952).
 
 use super::welch::Welch;
 use crate::samples::uniform_series::UniformSeries;
@@ -8,25 +8,22 @@ use std::f64::consts::PI;
 const SHORTEST: usize = 1 << 10;
 /// Each segment length over the one before.
 const LENGTH_STEP: usize = 8;
-/// Least segment length over the averaging time. Below 2.5 cycles per segment of length T the removed mean and the window
-/// change the spectrum; white noise has none of its Allan variance there, a random walk the part 7.5·τ/T, here 12 %.
+/// Least segment length over the averaging time. A random walk loses 7.5·τ/T = 12 % of its variance below 2.5 cycles.
 const SEGMENT_PER_TAU: u64 = 64;
-/// The same at the longest averaging times, which segments about as long as the record have to show. The largest part of the
-/// integrand, at f = 0.37/τ, is then at the sixth point of the spectrum.
+/// [`SEGMENT_PER_TAU`] at the longest averaging times, with segments about as long as the record.
 const LEAST_SEGMENT_PER_TAU: u64 = 16;
 
-/// The Allan deviation of `series` at the averaging factors `factors` by σ²(τ) = 4·∫ S(f)·sin⁴(πfτ)/(πfτ)² df, with the
-/// measured two-sided density S: what the Allan variance has to be if the spectrum is right, without a difference of averages.
+/// σ²(τ) = 4·∫ S(f)·sin⁴(πfτ)/(πfτ)² df of `series` at the averaging factors `factors`, with the measured two-sided
+/// density S.
 ///
-/// `None` for averaging times of more than a sixteenth of the record, which the spectrum does not resolve, and of a record
-/// without a segment of 1,024 samples of which half are there.
+/// `None` for averaging times of more than a sixteenth of the record, which the spectrum does not resolve, and of a
+/// record without a segment of 1,024 samples of which half are there.
 #[must_use]
 pub fn allan_deviations_by_spectrum(series: &UniformSeries, factors: &[u64]) -> Vec<Option<f64>> {
     let longest = series.values().len();
     let mut lengths: Vec<usize> = std::iter::successors(Some(SHORTEST), |length| Some(length * LENGTH_STEP))
         .take_while(|of| *of <= longest)
         .collect();
-    // The longest power of two in the record, for the longest averaging times.
     if let Some(last) = longest.checked_ilog2().map(|log2| 1 << log2)
         && last >= SHORTEST
         && lengths.last() != Some(&last)
@@ -51,22 +48,20 @@ pub fn allan_deviations_by_spectrum(series: &UniformSeries, factors: &[u64]) -> 
     deviations
 }
 
-/// The integral over a spectrum at the averaging factor `n`.
+/// The integral at the averaging factor `n`.
 fn allan_variance(welch: &Welch, n: u64) -> f64 {
     let last = 0.5 / welch.sample_period();
     let term = |(frequency, density): (f64, f64)| {
-        // The point at half the sample rate stands for half an interval.
+        // The point at half the sample rate has half an interval.
         let part = if frequency < last * (1.0 - 1e-9) { 1.0 } else { 0.5 };
         part * weight(PI * frequency * welch.sample_period(), n) * density
     };
     welch.resolution() * welch.points().map(term).sum::<f64>()
 }
 
-/// Weight of the one-sided density in the Allan variance at `phase` = πf·dt and the averaging factor `n`.
+/// Weight of the one-sided density at `phase` = πf·dt and the averaging factor `n`.
 ///
-/// The one-sided density is twice the two-sided one, so the factor is 2. A mean of `n` samples has the transfer function
-/// sin(πfτ)/(n·sin(πf·dt)) where that of a continuous signal has sin(πfτ)/(πfτ), and the integral ends at half the sample
-/// rate, because the density of the samples contains what is aliased from above.
+/// Twice for one-sided; sin(πfτ)/(n·sin(πf·dt)) is the mean of `n` samples, whose density includes aliases.
 fn weight(phase: f64, n: u64) -> f64 {
     let n = n as f64;
     if phase == 0.0 { 0.0 } else { 2.0 * (n * phase).sin().powi(4) / (n * phase.sin()).powi(2) }

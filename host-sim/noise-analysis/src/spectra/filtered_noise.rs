@@ -1,22 +1,21 @@
-//! The expected squares of the cosine coefficients of white noise behind a filter.
+//! Expected squared cosine coefficients of white noise behind a filter.
 
 use allan_core::term::{MovingAverageFilter, Process};
 use std::f64::consts::PI;
 
-/// White noise behind a filter, in samples or in means of so many of them.
+/// White noise behind a filter, in samples or in means of several.
 pub(super) struct FilteredNoise {
-    /// Covariance at each lag of the samples or means, times the seconds between them, for a coefficient of 1.
+    /// Covariance at each lag times the period, for a coefficient of 1.
     covariances: Vec<f64>,
     /// Seconds between samples or means.
     period: f64,
 }
 
 impl FilteredNoise {
-    /// Of samples every `sample_period` seconds.
     pub(super) fn new(filter: &MovingAverageFilter, sample_period: f64, samples_per_mean: u64) -> Self {
         let count = samples_per_mean as f64;
         let reach = (f64::from(filter.stages) * f64::from(filter.taps) / filter.decimation / count).ceil() as u32;
-        // The covariance is half the second difference of the variance of sums.
+        // Half the second difference of the variance of sums.
         let sums: Vec<f64> =
             (0..=reach + 1).map(|means| filter.sum_variance(count * f64::from(means), sample_period)).collect();
         let covariance = |lag: usize| (sums[lag + 1] - 2.0 * sums[lag] + sums[lag.abs_diff(1)]) / 2.0;
@@ -32,15 +31,13 @@ impl FilteredNoise {
         self.sum(2.0 * PI * frequency * self.period, |_, turned, _| turned.0)
     }
 
-    /// Expected square of the coefficient of this order of `count` values, times the seconds between them: the density, and what the ends
-    /// of the record leak into the nulls of the filter.
+    /// Expected square of the coefficient of this order times the period: the density, and leakage into its nulls.
     pub(super) fn expected(&self, order: f64, count: usize) -> f64 {
         let of = count as f64;
         self.sum(PI * order / of, |lag, (cosine, sine), first| ((of - lag) * cosine - sine / first) / of)
     }
 
-    /// The covariance at lag 0, and twice the others times what `weight` makes of the lag, the cosine and sine of so many times the angle,
-    /// and the sine of the angle.
+    /// Covariance at lag 0, and twice the others times `weight` of lag, (cos, sin) of lag·angle, and sin(angle).
     fn sum(&self, angle: f64, weight: impl Fn(f64, (f64, f64), f64) -> f64) -> f64 {
         let Some((at_zero, at_lags)) = self.covariances.split_first() else { return 0.0 };
         let (sine, cosine) = angle.sin_cos();
@@ -57,13 +54,11 @@ impl FilteredNoise {
 mod tests {
     use super::*;
 
-    /// The cosine of an order at a sample, with which the coefficients of white noise have its variance.
     fn cosine(order: usize, at: usize, count: usize) -> f64 {
         (2.0 / count as f64).sqrt() * (PI * (order * (2 * at + 1)) as f64 / (2 * count) as f64).cos()
     }
 
-    /// White noise of variance 1/dt behind two averages over 4 values has the covariances of the triangle (1, 2, 3, 4, 3, 2, 1)/16 with
-    /// itself, 44, 40, 31, 20, 10, 4 and 1 of 256.
+    /// The triangle (1, 2, 3, 4, 3, 2, 1)/16 has the autocovariance 44, 40, 31, 20, 10, 4, 1 of 256.
     #[test]
     fn coefficients_of_filtered_noise_have_the_squares_of_its_covariance() {
         let covariances = [44.0, 40.0, 31.0, 20.0, 10.0, 4.0, 1.0].map(|of| of / 256.0);
@@ -79,8 +74,7 @@ mod tests {
         }
     }
 
-    /// The density of the samples is that of the process, and that of means the one of the samples with its aliases, by what a mean
-    /// lets through.
+    /// The density of means is that of the samples times the gain of a mean, with aliases.
     #[test]
     fn the_density_of_means_is_that_of_the_samples_with_its_aliases() {
         let (filter, period) = (MovingAverageFilter { stages: 2, taps: 16, decimation: 3.7 }, 0.01);

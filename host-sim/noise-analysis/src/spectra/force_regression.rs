@@ -1,9 +1,7 @@
-//! Sensitivity of a gyroscope to the specific force, by the cosine transforms of its rate and of the force along each axis.
+//! Sensitivity of a gyroscope to the specific force, by cosine transforms of its rate and of the forces.
 //!
-//! At each order of the transform the rate is `Σ βᵢ·cᵢ + e`, with the forces `cᵢ`. An order has the weight of 1 over the variance of `e`
-//! at the orders around it, so that a sinusoid, a resonance or a slow drift of the rate takes away the orders that it has, where it would
-//! take whole octaves of the Allan variance. The sensitivity is a vector, and is tested as one. It is the same for slow and for fast
-//! motion: what the forces and the rate share otherwise, as by a rotation that tilts the sensor, is not.
+//! At each order the rate is `Σ βᵢ·cᵢ + e` with weight 1/var(e) around it, so lines and drift take few orders away. The
+//! sensitivity is tested as a vector. It is equal for slow and fast motion; a rotation that tilts the sensor is not.
 
 use crate::detectors::bias::BiasSensitivity;
 use crate::distributions::{DESCRIBED, NORMAL_975, chi_squared_tail};
@@ -14,65 +12,57 @@ use crate::spectra::transforms::cosine_transform;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
-/// Most values of a transform, means of more samples in a longer record: faster motion has thousands of degrees of freedom, and its
-/// octaves show the sensitivity.
+/// Most values of a transform; a longer record has means of samples.
 const MOST_VALUES: usize = 1 << 16;
-/// Fewest values.
 const FEWEST_VALUES: usize = 256;
-/// Fewest orders of equal share that show motion along an axis: fewer are drift, and the fit itself would make their rest small.
+/// Fewest orders of equal share of motion along an axis; fewer are drift.
 const FEWEST_ORDERS: f64 = 20.0;
-/// Orders on either side of one by which a variance around it is known: a quarter of its own, of these at least and at most.
+/// Orders on either side for a local variance: a quarter of the order, within these bounds.
 const AROUND: (usize, usize) = (8, 16);
-/// An order is one of motion where the force around it has so many times the variance of the accelerometer's white noise.
+/// Least force variance of an order of motion, over the accelerometer's white noise.
 const MOTION: f64 = 2.0;
-/// Stretches of a spectrum of which the one of the least variance shows the white noise.
+/// Stretches of a spectrum; the least variance among them is the white noise.
 const STRETCHES: usize = 16;
-/// Weights and sensitivities are found by turns; the variance of `e` is then known to a part of its scatter.
+/// Alternations between weights and sensitivities.
 const TURNS: usize = 3;
-/// Groups of orders, from slow to fast motion, that have to show the same sensitivity.
+/// Groups of orders, slow to fast, that have to agree.
 const GROUPS: usize = 4;
 
-/// The sensitivities of `rate`, in its unit per g, to those of the `forces` that it follows, by their places. None where they share too
-/// little, or something else.
+/// The sensitivities of `rate`, in its unit per g, to those of the `forces` that it follows, by their positions.
 pub(crate) fn force_sensitivities(rate: &Series, forces: &[&Series]) -> Vec<(usize, BiasSensitivity)> {
     let Some(regression) = ForceRegression::new(rate, forces) else { return Vec::new() };
     regression.sensitivities().unwrap_or_default()
 }
 
-/// The transforms of a rate and of the forces that it may follow.
 struct ForceRegression {
     rate: Vec<f64>,
     forces: Vec<Force>,
 }
 
-/// The transform of the force along one axis.
 struct Force {
-    /// Its place among those that were given.
+    /// Position among the given forces.
     place: usize,
     /// 0 at orders without motion.
     motion: Vec<f64>,
-    /// Variance of the accelerometer's white noise at each order.
+    /// Variance of the accelerometer's white noise per order.
     noise: f64,
 }
 
-/// The normal equations of some orders.
 struct Equations {
-    /// Without the accelerometers' noise, which would make the sensitivities too small.
+    /// Without the accelerometers' noise, which would bias the sensitivities.
     matrix: DMatrix<f64>,
     right: DVector<f64>,
-    /// Covariance of the right side, to which the noise adds.
+    /// Covariance of the right side, with that noise.
     scatter: DMatrix<f64>,
 }
 
-/// Their solution.
 struct Solution {
     sensitivities: DVector<f64>,
-    /// Inverse of their covariance.
     information: DMatrix<f64>,
 }
 
 impl ForceRegression {
-    /// `None` where there are too few samples, a gap splits them, or no force shows motion.
+    /// `None` for too few samples, a gap, or no motion.
     fn new(rate: &Series, forces: &[&Series]) -> Option<Self> {
         let size = (rate.span.end - rate.span.start).div_ceil(MOST_VALUES as u64).max(1) as usize;
         let rate = transformed(rate, size)?;
@@ -97,7 +87,7 @@ impl ForceRegression {
             found = self.equations(&variances, orders()).solve()?;
         }
         variances = around(&self.without(&found.sensitivities));
-        // Twice the gain in ln likelihood, which chance distributes as χ² of so many axes.
+        // Twice the gain in ln likelihood: χ² of as many axes.
         let gain: f64 =
             orders().filter(|&order| variances[order] > 0.0).map(|at| (before[at] / variances[at]).ln()).sum();
         if chi_squared_tail(gain, axes) >= SIGNIFICANCE {
@@ -123,7 +113,7 @@ impl ForceRegression {
         Some(self.forces.iter().enumerate().filter_map(of_axis).collect())
     }
 
-    /// The transform of the rate without what follows the forces.
+    /// The transform of the rate without the forces' part.
     fn without(&self, sensitivities: &DVector<f64>) -> Vec<f64> {
         let followed = |order: usize| {
             self.forces.iter().zip(sensitivities.iter()).map(|(of, by)| by * of.motion[order]).sum::<f64>()
@@ -131,7 +121,6 @@ impl ForceRegression {
         self.rate.iter().enumerate().map(|(order, rate)| rate - followed(order)).collect()
     }
 
-    /// The normal equations of `orders`, where the rest of the rate has these `variances`.
     fn equations(&self, variances: &[f64], orders: Range<usize>) -> Equations {
         let axes = self.forces.len();
         let mut matrix = DMatrix::zeros(axes, axes);
@@ -150,7 +139,7 @@ impl ForceRegression {
         Equations { matrix: &matrix - noise, right, scatter: matrix }
     }
 
-    /// Orders in a row, each with the same part of all that orders add.
+    /// Consecutive orders with equal parts of the information.
     fn groups(&self, variances: &[f64]) -> impl Iterator<Item = Range<usize>> {
         let mut sums = vec![0.0];
         sums.extend((1..self.rate.len()).scan(0.0, |sum, order| {
@@ -167,7 +156,6 @@ impl ForceRegression {
 }
 
 impl Force {
-    /// `None` without motion.
     fn new(place: usize, mut motion: Vec<f64>) -> Option<Self> {
         let variances = around(&motion);
         let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
@@ -180,13 +168,13 @@ impl Force {
         motion.iter().any(|of| *of != 0.0).then_some(Self { place, motion, noise })
     }
 
-    /// What an order adds to the normal equations.
+    /// Share of an order in the normal equations.
     fn share(&self, variances: &[f64], order: usize) -> f64 {
         let square = self.motion[order].powi(2);
         if square > 0.0 && variances[order] > 0.0 { square / variances[order] } else { 0.0 }
     }
 
-    /// Number of orders of equal share that would add as much with as little scatter.
+    /// Effective number of orders of equal share.
     fn orders(&self, variances: &[f64]) -> f64 {
         let shares = (1..self.motion.len()).map(|order| self.share(variances, order));
         let (sum, squares) = shares.fold((0.0, 0.0), |(sum, squares), of| (sum + of, squares + of * of));
@@ -195,7 +183,6 @@ impl Force {
 }
 
 impl Equations {
-    /// `None` where the forces are too similar.
     fn solve(&self) -> Option<Solution> {
         let sensitivities = self.matrix.clone().cholesky()?.solve(&self.right);
         let information = &self.matrix * self.scatter.clone().cholesky()?.solve(&self.matrix);
@@ -203,8 +190,7 @@ impl Equations {
     }
 }
 
-/// The cosine transform of means of `size` samples about their straight line, 0 where samples are missing; `None` where a long gap splits the
-/// series, or there are too few samples.
+/// Cosine transform of means of `size` samples about their straight line, 0 if missing; `None` with a long gap.
 fn transformed(series: &Series, size: usize) -> Option<Vec<f64>> {
     let uniform = UniformSeries::from_series(series);
     let is_whole = uniform.values().len() as u64 == series.span.end - series.span.start;
@@ -215,7 +201,7 @@ fn transformed(series: &Series, size: usize) -> Option<Vec<f64>> {
     Some(cosine_transform(values.values().iter().map(|value| if value.is_finite() { *value } else { 0.0 })))
 }
 
-/// The mean square of a transform around each order; 0 at the order 0, which is the mean.
+/// Mean square around each order; 0 at order 0.
 fn around(transform: &[f64]) -> Vec<f64> {
     let mut sums = vec![0.0];
     sums.extend(transform.iter().skip(1).scan(0.0, |sum, value| {
@@ -240,7 +226,7 @@ mod tests {
 
     const SAMPLES: usize = 16_384;
     const PERIOD_S: f64 = 0.01;
-    /// Per g, along x, y and z: the white noise of the rate has the deviation 1.
+    /// Per g along x, y, z, for white noise of deviation 1.
     const SENSITIVITY: [f64; 3] = [3.0, 0.0, -2.0];
 
     fn series(values: Vec<f64>, unit: &'static str) -> Series {
@@ -253,7 +239,6 @@ mod tests {
         random.sample(StandardNormal)
     }
 
-    /// White noise of this deviation, and a walk with steps of another.
     fn noise(random: &mut ChaCha8Rng, white: f64, step: f64) -> Vec<f64> {
         let mut walk = 0.0;
         let value = |_| {
@@ -278,7 +263,7 @@ mod tests {
         one.iter().zip(other).map(|(one, other)| one + factor * other).collect()
     }
 
-    /// What the regression finds of a rate beside a strong sinusoid of 1 Hz, which follows `followed` of three motions.
+    /// Beside a sinusoid of 1 Hz, the rate follows `followed` of three motions.
     fn found(seed: u64, followed: impl Fn(&[Vec<f64>; 3]) -> Vec<f64>) -> Vec<(usize, BiasSensitivity)> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let motions = [(); 3].map(|()| motion(&mut random));
@@ -298,12 +283,10 @@ mod tests {
                 covered += u32::from((of.sensitivity - SENSITIVITY[place]).abs() <= NORMAL_975 * of.error);
             }
         }
-        // Two axes of 20 records, and by chance one of 20 times the third. 95 % of the intervals are expected to hold the truth: 34 or fewer
-        // of 40 do with a probability of 1 %.
+        // Two axes of 20 records, one more by chance; 34 or fewer of 40 intervals hold with a probability of 1 %.
         assert!((40..=44).contains(&shown) && covered >= 35, "{covered} of {shown}");
     }
 
-    /// Twenty records with motion, and as many in which the accelerometers and the rate drift.
     #[test]
     fn drift_and_motion_are_no_sensitivity() {
         for seed in 0..20 {
@@ -323,7 +306,7 @@ mod tests {
         }
     }
 
-    /// A sensor that is tilted measures a part of gravity that grows with the integral of its rate.
+    /// The tilt measures gravity by the integral of the rate.
     #[test]
     fn a_rotation_that_tilts_the_sensor_is_no_sensitivity() {
         for seed in 0..20 {

@@ -1,15 +1,15 @@
-//! The sinusoids that a search has taken out of a record, fitted together, and how the amplitude and the phase of each change.
+//! The sinusoids taken out of a record, fitted together, and their changes over the record.
 
 use super::line_envelope::{MOST_PERIODS, Modulation, is_same};
 use super::line_models::Sine;
 use super::whitened_spectrum::{Resonance, SpectralLine, sine_line};
 use crate::samples::uniform_series::UniformSeries;
 
-/// Fits of neighbouring sinusoids, one after the other: each leaves the part of the error that the taper passes from one to the next.
+/// Refits of neighbouring sinusoids in turn.
 const REFITS: usize = 3;
-/// Sinusoids that are closer, in resolutions, are one and a residue of it: the taper's lobe hides the phase between them.
+/// Distance, resolutions, below which one is a residue of the other within the taper's lobe.
 const LOBE: f64 = 2.5;
-/// On the skirts of a resonance, within so many of its widths, the noise is not white.
+/// Widths of a resonance within which the noise is not white.
 const SKIRTS: f64 = 20.0;
 
 /// In the order in which they were taken.
@@ -18,12 +18,11 @@ pub(super) struct FoundSines {
     found: Vec<FoundSine>,
 }
 
-/// One of them.
 #[derive(Clone)]
 struct FoundSine {
     line: SpectralLine,
     sine: Sine,
-    /// Of the noise around it, unit²/Hz.
+    /// Noise around it, unit²/Hz.
     density: f64,
 }
 
@@ -32,19 +31,18 @@ impl FoundSines {
         self.found.len()
     }
 
-    /// Takes a sinusoid, a `line` of the spectrum, out of the `series`. Returns what is left, of the sinusoids near it too.
+    /// Takes a sinusoid, a `line` of the spectrum, out of the `series`; returns the rest.
     pub(super) fn take(&mut self, line: SpectralLine, sine: Sine, series: &UniformSeries) -> UniformSeries {
         self.take_over(2.0 * sine.density(series) / line.statistic, line, sine, series)
     }
 
-    /// As [`take`](Self::take), over noise of a known density.
+    /// [`take`](Self::take) with a known noise density.
     fn take_over(&mut self, density: f64, line: SpectralLine, sine: Sine, series: &UniformSeries) -> UniformSeries {
         self.found.push(FoundSine { line, sine, density });
         self.refit_near_the_last(sine.subtracted_from(series))
     }
 
-    /// Takes the two sidebands of a sinusoid out of the `series`, if a change of that sinusoid is likelier than the `resonance`: two lines at
-    /// equal distances from a third that was taken are a band around it. Returns what is left.
+    /// Takes the two sidebands of a sinusoid out of the `series` if its modulation is likelier than the `resonance`.
     pub(super) fn take_sidebands(&mut self, resonance: &SpectralLine, series: &UniformSeries) -> Option<UniformSeries> {
         let duration = series.duration();
         let is_in_band = |found: &&FoundSine| {
@@ -66,8 +64,7 @@ impl FoundSines {
         Some(left)
     }
 
-    /// Fits the last sinusoid and those near it again, each to the record without the others, of which `rest` is left: one that was fitted
-    /// before the others were known has part of them, and leaves part of itself. Returns what is left then.
+    /// Refits the last sinusoid and its neighbours, each to the record without the others; returns the rest.
     fn refit_near_the_last(&mut self, mut rest: UniformSeries) -> UniformSeries {
         let duration = rest.duration();
         let Some((last, others)) = self.found.split_last_mut() else { return rest };
@@ -92,8 +89,7 @@ impl FoundSines {
         rest
     }
 
-    /// The lines, each with the way in which it changes over the record of which `rest` is left, without those that are sidebands of
-    /// another.
+    /// The lines with their changes, without sidebands of others; `rest` is the record without the lines.
     pub(super) fn into_lines(self, rest: &UniformSeries, resonances: &[Resonance]) -> Vec<SpectralLine> {
         let Self { mut found } = self;
         let duration = rest.duration();
@@ -126,12 +122,11 @@ impl FoundSines {
 }
 
 impl FoundSine {
-    /// Whether it is another line than one at `frequency`, Hz, in a record of `duration` s, and may be a sideband of that.
+    /// True if a line at `frequency`, Hz, is distinct but near enough for a sideband.
     fn is_near(&self, frequency: f64, duration: f64) -> bool {
         (1.0..=MOST_PERIODS as f64 + 1.0).contains(&self.resolutions_from(frequency, duration))
     }
 
-    /// Its distance from a frequency, Hz, in resolutions of a record of `duration` s.
     fn resolutions_from(&self, frequency: f64, duration: f64) -> f64 {
         (self.sine.frequency - frequency).abs() * duration
     }
@@ -141,7 +136,6 @@ impl FoundSine {
     }
 }
 
-/// Whether a frequency, Hz, is on the skirts of a resonance; `false` for a line without a width.
 pub(super) fn is_on_skirts(frequency: f64, resonance: &SpectralLine) -> bool {
     let distance = (resonance.frequency.value - frequency).abs();
     resonance.width.is_some_and(|width| distance < SKIRTS * width.value)
@@ -157,7 +151,7 @@ mod tests {
     use rand_distr::StandardNormal;
     use std::f64::consts::{PI, TAU};
 
-    /// 400 s at 50 Hz: white noise of deviation 1 and a sine of this amplitude at 7.3 Hz, with an envelope by the part of the record.
+    /// 400 s at 50 Hz: white noise of deviation 1 and a sine at 7.3 Hz with an envelope by the part of the record.
     fn enveloped(seed: u64, amplitude: f64, envelope: impl Fn(f64) -> f64) -> UniformSeries {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let value = |at: u32| {
@@ -168,13 +162,12 @@ mod tests {
         UniformSeries::new(0.02, (0..20_000).map(value).collect())
     }
 
-    /// The same, which swells and fades by half so many times.
+    /// The amplitude swells and fades by half, `changes` times.
     fn series(seed: u64, amplitude: f64, changes: f64) -> UniformSeries {
         enveloped(seed, amplitude, |part| 1.0 + 0.5 * (TAU * changes * part).sin())
     }
 
-    /// Sidebands of a quarter of the line, 4 to 9 resolutions away, together have a larger statistic than one of them: 20,000/2·0.3²/16, 56,
-    /// each at an amplitude of 0.3, and 6,000 at 3.
+    /// Sidebands of a quarter of the line, 4 to 9 resolutions away, with a statistic of 56 (amplitude 0.3) to 6,000.
     #[test]
     fn two_sidebands_near_a_line_are_a_change_of_it_and_no_band() {
         for seed in 1..=6 {
@@ -184,13 +177,13 @@ mod tests {
                 let change = line.modulation.expect("56 times the noise or more");
                 assert_eq!((line.width, change.of_phase), (None, false));
                 assert!((change.frequency.value * 400.0 - changes).abs() < 0.3, "{changes}: {change:?}");
-                // Of a statistic of 112 the depth is known to 10 %.
+                // A statistic of 112 gives the depth to 10 %.
                 assert!((change.depth.value - 0.5).abs() < 0.15, "{changes}: {change:?}");
             }
         }
     }
 
-    /// A line that is on for half of the time has half of its amplitude, and sidebands of 1/π of it on either side: a depth of 4/π.
+    /// On for half of the time: half of the amplitude, sidebands of 1/π, depth 4/π.
     #[test]
     fn a_line_that_is_switched_is_no_band() {
         for seed in 1..=6 {
@@ -201,14 +194,14 @@ mod tests {
                 let change = line.modulation.expect("two sidebands of 80 times the noise or more");
                 assert_eq!((line.width, change.of_phase), (None, false));
                 assert!((change.frequency.value * 400.0 - changes).abs() < 0.3, "{changes}: {change:?}");
-                // At an amplitude of 0.4 the ordinates are 130 times the noise: the line and its sidebands are known to 6 %, the depth to 0.1.
+                // At an amplitude of 0.4 the ordinates are 130 times the noise, the depth known to 0.1.
                 let most = 0.12 / amplitude;
                 assert!((change.depth.value - 1.27).abs() < most, "{changes}: {change:?}");
             }
         }
     }
 
-    /// Noise behind a resonance of this deviation, so many resolutions wide, in white noise.
+    /// White noise and a resonance of this deviation and width in resolutions.
     fn band(seed: u64, width: f64, deviation: f64) -> UniformSeries {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let kept = (-PI * width / 20_000.0).exp();
@@ -222,7 +215,7 @@ mod tests {
         UniformSeries::new(0.02, (0..20_000).map(&mut value).collect())
     }
 
-    /// A change is tried at 1 of 100 false alarms: of 360 bands more than nine have one in 1 of 200 cases.
+    /// Tried at 1 of 100 false alarms: more than nine of 360 occur in 1 of 200 cases.
     #[test]
     fn a_narrow_band_is_no_line_that_changes() {
         let bands = [4.0, 8.0, 16.0].into_iter().flat_map(|width| [0.3, 1.0, 3.0].map(|deviation| (width, deviation)));
@@ -231,7 +224,7 @@ mod tests {
         assert!(changing <= 9, "{changing}");
     }
 
-    /// Two sines three resolutions apart, which one fit after the other takes for one at their mean: 0.1 resolutions off.
+    /// Two sines three resolutions apart; a single fit is 0.1 resolutions off.
     #[test]
     fn neighbours_are_fitted_together() {
         let value = |at: u32| {

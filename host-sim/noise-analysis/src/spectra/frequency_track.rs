@@ -1,10 +1,8 @@
-//! A line whose frequency runs evenly from one end of the record to the other.
+//! A line whose frequency runs evenly over the record (chirp).
 //!
-//! In the spectrum of the whole record its power is spread over all the frequencies that it passes. In the spectra of short segments it is
-//! in one or two ordinates of each, which lie on a straight line over time. The ordinates of all such lines are summed, for
-//! every first frequency and every slope (J. Taylor, "A sensitive method for detecting dispersed radio emission", Astron.
-//! Astrophys. Suppl. 15, 1974: each sum is one of two sums over half as many segments). Of the lengths of segments, that is the
-//! best in which the frequency runs by half of the segment's resolution. Where the sums leave it open, the phases of the segments decide.
+//! Spectra of short segments have it on a straight line; the ordinates of all such lines are summed (J. Taylor, Astron.
+//! Astrophys. Suppl. 15, 1974). The best segment length has a run of half its resolution. The phases of the segments
+//! decide doubtful sums.
 
 use super::coherent_track::CoherentTrack;
 use crate::bounds::BoundedEstimate;
@@ -12,56 +10,48 @@ use crate::distributions::{NORMAL_975, chi_squared_tail, exponential_sum_tail};
 use crate::effects::findings::SIGNIFICANCE;
 use crate::samples::uniform_series::UniformSeries;
 
-/// Numbers of segments that are tried.
 const SEGMENTS: [usize; 4] = [32, 64, 128, 256];
 /// Fewest samples of a segment.
 const FEWEST_SAMPLES: usize = 256;
-/// Ordinates to a resolution of a segment: between two of them a line loses at most 0.9 dB.
+/// Ordinates per resolution; a line between two loses at most 0.9 dB.
 const PADDING: usize = 2;
-/// Lowest frequency, in resolutions of a segment: below, drift leaks.
+/// Lowest frequency, resolutions of a segment, above leaking drift.
 const LOWEST: usize = 4;
-/// Fewest ordinates by which the frequency runs over the record: a line that keeps its frequency is in the mean over time.
+/// Fewest ordinates of the run; a steady line is in the mean over time.
 const FEWEST_ORDINATES: usize = 8;
-/// Ordinates on each side of one whose mean is the noise of a segment there, and the nearest of them, which have the line itself and are left
-/// out. What drifts over a segment leaks into the frequencies where there is little noise, and by another amount into each segment: a mean
-/// over all frequencies would be that of the leakage alone.
+/// Ordinates per side whose mean is the noise of a segment, and the nearest, left out.
 const NEIGHBOURS: usize = 32;
 const NEAREST: usize = 4;
-/// Probability above which chance explains that the sums beside a line scatter more than those of independent ordinates.
+/// p-value above which chance explains the scatter of sums beside a line.
 const SCATTER_BY_CHANCE: f64 = 0.05;
-/// Largest ordinate over the noise that is counted, more than chance has in a day's record: a short disturbance is no track.
+/// Cap on an ordinate over the noise, against short disturbances.
 const LARGEST: f64 = 32.0;
-/// Part of a line's power that is left in the ordinates of a straight track, and its bounds: between two ordinates, and where the track goes
-/// from one to the next, up to half is lost.
+/// Part of a line's power in a straight track's ordinates, with bounds.
 const LEFT: BoundedEstimate = BoundedEstimate::new(0.7, 0.5, 1.0);
-/// Number of lines with such a sum that chance has, at most, where the phases are tried.
+/// Most expected chance lines at which the phases are tried.
 const MOST_BY_CHANCE: f64 = 3.0;
 
-/// A line whose frequency runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FrequencyTrack {
     /// At the beginning and at the end of the record, Hz.
     pub frequencies: [f64; 2],
-    /// Half an ordinate of a segment, Hz: by how much they may be off.
+    /// Half an ordinate of a segment, Hz.
     pub error: f64,
-    /// Mean of the ordinates on the track over the noise, less 1, and its standard deviation.
+    /// Mean ordinate on the track over the noise, less 1, and its standard deviation.
     pub excess: f64,
     pub excess_error: f64,
-    /// Length of the record, s.
     pub duration_s: f64,
-    /// Amplitude of the line, by its power over that of the noise at the same frequencies.
+    /// By the line's power over that of the noise.
     pub amplitude: BoundedEstimate,
-    /// Number of segments.
     pub segments: f64,
-    /// Power that a sinusoid of the same energy has over the noise in the spectrum of the whole record, at least: some is lost between the
-    /// ordinates.
+    /// Least power, over the noise, of a sinusoid of the same energy in the whole record.
     pub energy: f64,
     /// Probability of such a mean anywhere by chance.
     pub p_value: f64,
 }
 
 impl FrequencyTrack {
-    /// The clearest track in a record; `None` if chance explains it.
+    /// The clearest track; `None` if chance explains it.
     pub(crate) fn find(series: &UniformSeries) -> Option<Self> {
         let series = series.clone().averaged_until_dithered().detrended();
         let found = SEGMENTS.into_iter().filter_map(|segments| Self::in_segments(&series, segments));
@@ -77,7 +67,7 @@ impl FrequencyTrack {
         })
     }
 
-    /// The same by the coherent sum of all segments.
+    /// By the coherent sum of all segments.
     fn coherent(&self, series: &UniformSeries) -> Option<Self> {
         let found = CoherentTrack::near(series, self.frequencies, self.segments as usize)?;
         let p_value = found.by_chance();
@@ -92,7 +82,7 @@ impl FrequencyTrack {
         let (is_rising, line) = if rising.sum > falling.sum { (true, rising) } else { (false, falling) };
         let columns = spectrogram.rows[0].len();
         let scatter = spectrogram.scatter_beside(&line, is_rising);
-        // Rising and falling, from every ordinate by every number of them.
+        // Rising and falling, from every ordinate, by every number of ordinates.
         let trials = (2 * columns * segments) as f64;
         let count = segments as f64;
         let low = spectrogram.frequency(line.first);
@@ -117,20 +107,18 @@ impl FrequencyTrack {
         })
     }
 
-    /// Whether a frequency, Hz, is one that the track passes.
     pub(crate) fn passes(&self, frequency: f64) -> bool {
         let [first, last] = self.frequencies;
         (first.min(last) - self.error..=first.max(last) + self.error).contains(&frequency)
     }
 }
 
-/// Spectra of equal segments over their mean at each frequency, and in each segment over the mean of the neighbouring frequencies.
+/// Segment spectra over their mean in time and over neighbouring frequencies.
 struct Spectrogram {
-    /// Of each segment, from the lowest frequency on.
+    /// By segment, from the lowest frequency on.
     rows: Vec<Vec<f32>>,
-    /// Mean of the ordinates of all segments, from the lowest frequency on: squares of sums over a segment.
+    /// Mean over the segments, from the lowest frequency on.
     means: Vec<f32>,
-    /// Samples of a segment.
     size: usize,
     /// Hz between ordinates.
     spacing: f64,
@@ -150,7 +138,6 @@ impl Spectrogram {
             for (slot, value) in input.iter_mut().zip(values) {
                 *slot = if value.is_finite() { *value } else { 0.0 };
             }
-            // An error means buffers of the wrong length; these are the planner's own.
             transform.process(&mut input, &mut output).ok()?;
             rows.push(output[PADDING * LOWEST..output.len() - 1].iter().map(|bin| bin.norm_sqr() as f32).collect());
         }
@@ -165,17 +152,14 @@ impl Spectrogram {
             }
             let levels = levels_of_neighbours(row);
             for (power, level) in row.iter_mut().zip(levels) {
-                // A segment without samples says nothing: each ordinate is what noise has on average.
+                // A segment without samples has the expected noise.
                 *power = if level > 0.0 { (f64::from(*power) / level).min(LARGEST) as f32 } else { 1.0 };
             }
         }
         Some(Self { rows, means: by_column, size, spacing: 1.0 / ((PADDING * size) as f64 * series.sample_period()) })
     }
 
-    /// Variance of the sums over parallel lines beside this one, over that of as many exponential variables of mean 1; 1 where chance
-    /// explains it.
-    ///
-    /// On the skirt of a band whose level wanders the ordinates of a segment are larger or smaller together than their neighbours tell.
+    /// Variance of the sums along parallel lines, over that of independent ordinates; 1 if chance explains it.
     fn scatter_beside(&self, line: &Line, is_rising: bool) -> f64 {
         let last = self.rows.len() - 1;
         let sum = |first: usize| {
@@ -191,15 +175,13 @@ impl Spectrogram {
         let freedom = sums.len() as f64 - 1.0;
         let mean = sums.iter().sum::<f64>() / sums.len() as f64;
         let scatter = sums.iter().map(|sum| (sum - mean).powi(2)).sum::<f64>() / (freedom * self.rows.len() as f64);
-        // Sums of many variables are nearly normal.
         let is_of_chance = chi_squared_tail(freedom * scatter, freedom) > SCATTER_BY_CHANCE;
         if is_of_chance { 1.0 } else { scatter }
     }
 
-    /// Amplitude of a sinusoid that exceeds the noise along a line by this part of it.
+    /// Amplitude A of a sinusoid, `(A·size/2)²`, that exceeds the noise along a line by `excess`.
     ///
-    /// A sinusoid of amplitude A has `(A·size/2)²`. The mean at a frequency has the line too, in two ordinates of each segment that lies
-    /// there; steady lines that the track crosses are no part of its median.
+    /// The mean at a frequency includes the line itself; the median excludes crossed lines.
     fn amplitude(&self, line: &Line, excess: f64) -> f64 {
         let mut crossed = self.means[line.first..=(line.first + line.drift).min(self.means.len() - 1)].to_vec();
         crossed.sort_by(f32::total_cmp);
@@ -209,14 +191,12 @@ impl Spectrogram {
         2.0 * power.sqrt() / self.size as f64
     }
 
-    /// Of an ordinate, Hz.
     fn frequency(&self, column: usize) -> f64 {
         (PADDING * LOWEST + column) as f64 * self.spacing
     }
 }
 
-/// The noise at each ordinate by its neighbours, so that an exponential variable over it is 1 on average: over the mean of n others it is
-/// n/(n − 1).
+/// Noise at each ordinate by n neighbours, times n/(n − 1) so that the ratio averages 1.
 fn levels_of_neighbours(ordinates: &[f32]) -> Vec<f64> {
     let mut sums = vec![0.0];
     sums.extend(ordinates.iter().scan(0.0, |sum, power| {
@@ -235,7 +215,6 @@ fn levels_of_neighbours(ordinates: &[f32]) -> Vec<f64> {
     (0..ordinates.len()).map(level).collect()
 }
 
-/// A straight line through rows of ordinates.
 #[derive(Debug, Clone, Copy)]
 struct Line {
     first: usize,
@@ -244,11 +223,10 @@ struct Line {
     sum: f32,
 }
 
-/// The line with the largest sum over all rows, whose number is a power of two, of those that rise by at least
-/// [`FEWEST_ORDINATES`] and by at most one ordinate a row.
+/// The line with the largest sum over a power of two of rows, rising by [`FEWEST_ORDINATES`] to one ordinate a row.
 fn strongest_line(rows: Vec<Vec<f32>>) -> Line {
     let columns = rows[0].len();
-    // Of each group of rows the sums by the drift over it.
+    // Sums of each group of rows, by the drift over it.
     let mut groups: Vec<Vec<Vec<f32>>> = rows.into_iter().map(|row| vec![row]).collect();
     while groups.len() > 1 {
         groups = groups
@@ -291,7 +269,7 @@ mod tests {
     const SAMPLES: usize = 1 << 17;
     const RATE_HZ: f64 = 200.0;
 
-    /// White noise of deviation 1 with a sinusoid of this amplitude from one frequency to another, and a steady one.
+    /// White noise of deviation 1, a running and a steady sinusoid.
     fn series(seed: u64, amplitude: f64, [first, last]: [f64; 2]) -> UniformSeries {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let duration_s = SAMPLES as f64 / RATE_HZ;
@@ -306,18 +284,16 @@ mod tests {
     #[test]
     fn a_frequency_that_runs_up_or_down_is_found() {
         for (seed, frequencies) in [(1, [5.0, 15.0]), (2, [50.0, 20.0]), (3, [3.0, 6.0])] {
-            // 0.07²·SAMPLES/4 = 160 over 128 segments at most: an excess of 1, less than half of which is lost between the ordinates, is
-            // five and more standard deviations.
+            // 0.07²·SAMPLES/4 = 160 over 128 segments: an excess above 0.5, five standard deviations.
             let found = FrequencyTrack::find(&series(seed, 0.07, frequencies)).expect("clear");
             for (found_hz, expected) in found.frequencies.into_iter().zip(frequencies) {
-                // Two ordinates of the longest spectra that resolve it, of 128 segments: 0.2 Hz.
+                // Two ordinates of the longest spectra: 0.2 Hz.
                 assert!((found_hz - expected).abs() < 0.5, "{found:?}");
             }
             assert!(found.passes(0.5 * (frequencies[0] + frequencies[1])) && !found.passes(90.0));
         }
     }
 
-    /// A gap of a sixteenth of the record covers segments of every length.
     #[test]
     fn a_gap_hides_no_running_frequency() {
         let mut values = series(4, 0.1, [5.0, 15.0]).values().to_vec();
@@ -328,7 +304,6 @@ mod tests {
         }
     }
 
-    /// The part of the power that is left is within its bounds for every track, and what the scatter of the sum adds is on top of that.
     #[test]
     fn the_amplitude_is_within_its_bounds() {
         for seed in 60..80 {
@@ -341,8 +316,7 @@ mod tests {
 
     #[test]
     fn a_weak_line_is_found_by_its_phases() {
-        // 0.05²·SAMPLES/4 = 82 over the noise, where all frequencies and runs have 34 by chance. Over 128 segments an excess of 0.65, less a
-        // third that is lost between the ordinates, is 4.9 standard deviations, too few for one of all lines.
+        // 0.05²·SAMPLES/4 = 82 over the noise; chance anywhere: 34. Over 128 segments 4.9 standard deviations, too few.
         let frequencies = [8.0, 20.0];
         let (mut found, mut by_segments) = (0, 0);
         for seed in 40..52 {
@@ -353,7 +327,7 @@ mod tests {
             let is_clear = alone.map(|track| 4.0 * track.p_value).any(|p_value| p_value < SIGNIFICANCE);
             by_segments += usize::from(is_clear);
             for (found_hz, expected) in track.frequencies.into_iter().zip(frequencies) {
-                // An ordinate of the segments, 0.1 Hz, or some resolutions of the run over 655 s.
+                // An ordinate of the segments, 0.1 Hz, or some resolutions of the record.
                 assert!((found_hz - expected).abs() < if is_clear { 0.5 } else { 0.01 }, "{track:?}");
             }
         }
@@ -361,8 +335,7 @@ mod tests {
         assert!(found >= 6 && by_segments + 3 <= found, "{found} {by_segments}");
     }
 
-    /// A Markov process and white noise behind an average over 64 samples, rounded to steps of half its deviation: above the filter's range
-    /// the spectrum of a segment holds the rounding and what leaks of the process.
+    /// Behind an average over 64 samples only rounding and leakage are left above the filter's range.
     #[test]
     fn slow_noise_that_leaks_into_a_quiet_range_is_none() {
         let (time_constant_s, taps, step) = (11.6, 64, 0.058);
@@ -384,8 +357,7 @@ mod tests {
         }
     }
 
-    /// A band 3 Hz wide at 10 Hz, twice as large as the noise, whose level wanders by a factor of e within 15 s: its skirt leaks into each of
-    /// the shortest segments by another amount. By sums of as many independent ordinates one of three has a track.
+    /// A band 3 Hz wide whose level wanders by e within 15 s leaks differently into each short segment.
     #[test]
     fn the_skirt_of_a_band_that_swells_is_none() {
         let is_found = |seed: &u64| {

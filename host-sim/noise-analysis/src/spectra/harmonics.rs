@@ -1,8 +1,7 @@
-//! The harmonics of a periodic signal above those by which it is found.
+//! Higher harmonics of a periodic signal than those by which it was found.
 //!
-//! The fall of a sawtooth and the edges of short pulses have harmonics far above the eighth, of which each is weaker than the noise. They are
-//! sought octave by octave, by the mean of all harmonics of an octave over the mean half-way between them. The frequency is the one at
-//! which all of them together have the largest power over the noise; each octave tells it as much better as the next one needs it.
+//! Each may be weaker than the noise, so they are sought octave by octave by their mean over that half-way between. The
+//! frequency is that of the largest total power.
 
 use super::line_models::PhaseSums;
 use crate::bounds::BoundedEstimate;
@@ -11,22 +10,19 @@ use crate::samples::uniform_series::UniformSeries;
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
-/// Largest probability by chance that the harmonics of an octave exceed the noise as much as they do.
+/// Largest p-value of the harmonics of an octave.
 const BY_CHANCE: f64 = 1e-3;
-/// Means of blocks to a period of the highest harmonic that is sought in them: they have 0.97 of its amplitude.
+/// Means per period of the highest harmonic: 0.97 of its amplitude.
 const BLOCKS_PER_PERIOD: f64 = 8.0;
-/// Steps of the highest harmonic to a resolution where the frequency is sought, and how many of them on each side of what is known: a resolution.
+/// Steps per resolution of the highest harmonic, and on each side of the known frequency.
 const STEPS: f64 = 8.0;
 
-/// Variance of a frequency under the taper over that without it: Σt²·Σw²t²/(Σwt²)², counted from the middle of the record.
+/// Variance of a frequency by the taper: Σt²·Σw²t²/(Σwt²)² from the middle.
 const TAPERED: f64 = 1.12;
 
-/// The harmonics of a signal, from the first one on.
 pub(super) struct Harmonics {
-    /// Of the fundamental, Hz.
     fundamental: f64,
     harmonics: Vec<Harmonic>,
-    /// Of the record, Hz.
     resolution: f64,
 }
 
@@ -39,14 +35,13 @@ struct Harmonic {
 }
 
 impl Harmonic {
-    /// Its ordinate over the noise, for a fundamental in Hz.
     fn over_noise(&self, fundamental: f64) -> f64 {
         self.sums.power_at(self.number * fundamental) / self.noise
     }
 }
 
 impl Harmonics {
-    /// Those of a fundamental, in Hz, of which the first `known` are there.
+    /// For a fundamental in Hz whose first `known` harmonics are significant.
     pub(super) fn measure(series: &UniformSeries, fundamental: f64, known: usize) -> Self {
         let mut found = Self { fundamental, harmonics: Vec::new(), resolution: 1.0 / series.duration() };
         let mut numbers = 1..=known;
@@ -63,7 +58,7 @@ impl Harmonics {
         found
     }
 
-    /// The harmonics of these numbers; `None` where the samples are too far apart for them.
+    /// `None` if the sample rate is too low.
     fn octave(&self, series: &UniformSeries, numbers: RangeInclusive<usize>) -> Option<Vec<Harmonic>> {
         let highest = self.fundamental * *numbers.end() as f64;
         let samples = 1.0 / (BLOCKS_PER_PERIOD * highest * series.sample_period());
@@ -76,7 +71,7 @@ impl Harmonics {
         (noise > 0.0).then(|| numbers.into_iter().map(harmonic).collect())
     }
 
-    /// The fundamental near the one that is known at which the harmonics have the largest power over the noise, Hz.
+    /// The fundamental near the known one with the largest total power, Hz.
     fn strongest_fundamental(&self) -> f64 {
         let step = self.resolution / (STEPS * self.harmonics.len() as f64);
         let power = |steps: f64| {
@@ -85,17 +80,13 @@ impl Harmonics {
         };
         let powers = (-(STEPS as i32)..=STEPS as i32).map(|steps| (f64::from(steps), power(f64::from(steps))));
         let (best, largest) = powers.fold((0.0, 0.0), |best, of| if of.1 > best.1 { of } else { best });
-        // Maximum of the parabola through three points.
         let [left, right] = [power(best - 1.0), power(best + 1.0)];
         let curvature = 2.0 * largest - left - right;
         let shift = if curvature > 0.0 { (0.5 * (right - left) / curvature).clamp(-1.0, 1.0) } else { 0.0 };
         self.fundamental + (best + shift) * step
     }
 
-    /// Frequency of the fundamental, Hz; `None` if the harmonics do not exceed the noise.
-    ///
-    /// The summit of |S + N|² by the signal's transform S and the noise's N: the slope has the noise of S·N and of N·N, of S² + 1 over the
-    /// noise, and the curvature S². Where S² is large this is the Cramér-Rao bound, 3/(2π²S²T²) of a sinusoid over T.
+    /// Frequency of the fundamental, Hz (Cramér-Rao bound); `None` if the harmonics do not exceed the noise.
     pub(super) fn frequency(&self) -> Option<BoundedEstimate> {
         let of = self.fundamental;
         let (mut whole, mut excess) = (0.0, 0.0);
@@ -108,7 +99,7 @@ impl Harmonics {
         (excess > 0.0).then_some(BoundedEstimate::new(of, of - error, of + error))
     }
 
-    /// Amplitudes from the first one on, in the unit of the series: 0 of one that has less than the noise.
+    /// Amplitudes from the first one on, in the unit of the series: 0 below the noise.
     pub(super) fn amplitudes(&self) -> impl Iterator<Item = f64> {
         self.harmonics.iter().map(|harmonic| {
             let over_noise = harmonic.over_noise(self.fundamental);

@@ -1,10 +1,8 @@
-//! The envelope of a line over a record: that of a sinusoid is constant in amplitude and phase.
+//! The envelope of a line: changes of its amplitude and phase over the record.
 //!
-//! What a record holds beside the line, multiplied with the line's rotating phasor, is an in-phase part, by which the amplitude
-//! changes, and a quadrature, by which the phase does. In noise the ordinates of both are exponential variables. An
-//! amplitude that swells and fades has one in-phase ordinate that is the coherent sum of two sidebands, each of which may be too weak
-//! for a line of its own. An amplitude or a phase that wanders, as that of an oscillator does, has ordinates that fall as 1/f² to those
-//! of the noise (D. B. Leeson, "A simple model of feedback oscillator noise spectrum", Proc. IEEE 54, 1966).
+//! The rest of the record times the line's rotating phasor has an in-phase part (amplitude) and a quadrature (phase).
+//! In noise their ordinates are exponential; a change is the coherent sum of two sidebands. Wandering falls as 1/f² to
+//! the noise (D. B. Leeson, Proc. IEEE 54, 1966).
 
 use super::line_models::{Sine, for_each_phase};
 use super::periodogram::taper;
@@ -15,54 +13,50 @@ use crate::samples::uniform_series::UniformSeries;
 use fourier::Complex;
 use std::f64::consts::{PI, TAU};
 
-/// Blocks of the record in whose sums the changes are sought, at least: the sums lose `(π·64/1024)²/3`, 1.3 %, of the power of the
-/// fastest change.
+/// Fewest blocks; the fastest change loses `(π·64/1024)²/3` = 1.3 % of its power.
 const BLOCKS: usize = 1024;
-/// Fastest change that is sought, in periods per record.
+/// Fastest change, periods per record.
 pub(super) const MOST_PERIODS: usize = 64;
-/// Slowest change that is sought, in periods per record: fewer are a line whose amplitude or frequency drifts.
+/// Slowest change, periods per record; slower ones are drift of the line.
 const FEWEST_PERIODS: usize = 3;
-/// The fastest change is slower than this part of the line itself: so near to the line its noise is as good as white.
+/// Least ratio of the line's frequency to the change's.
 const OF_FREQUENCY: usize = 8;
-/// Distance in resolutions from a change, and from a multiple of it, within which an ordinate is no measure of what is beside them.
+/// Resolutions around a change and its multiples that do not count as noise.
 const OF_MULTIPLE: f64 = 0.75;
-/// Most peaks of the envelope that are compared with what is beside them: that of the change is among the highest.
+/// Most peaks that are compared with their surroundings.
 const MOST_PEAKS: usize = 8;
-/// Ordinates to a resolution: between two of them a change loses at most 0.9 dB.
+/// Ordinates per resolution; a line between two loses at most 0.9 dB.
 const PADDING: usize = 2;
-/// Probability that the envelope of one sinusoid in noise has such an ordinate anywhere. It is tried for each line of a record, not at each
-/// frequency: six channels with two lines each have a false change in one record of a hundred.
+/// False-alarm probability per line. Six channels with two lines each have one in a hundred records.
 const FALSE_ALARM: f64 = 0.001;
-/// Largest part that the change of the phase has of that of the amplitude, or the reverse, in power, where another line is as far away as
-/// they are fast: one line alone on one side of another is half a change of either.
+/// Largest ratio, in power, of the other kind of change; a single line at that distance is half of either.
 const LARGEST_OTHER: f64 = 0.25;
 
-/// Distances of the three points, in ordinates, the vertex of whose parabola is the maximum, one after the other.
+/// Spacings, in ordinates, of successive parabolas around the maximum.
 const AROUND: [f64; 3] = [0.5, 0.15, 0.05];
 
-/// Distance in resolutions within which two frequencies are one, and a line is a sideband of a change.
+/// Resolutions within which two frequencies are one.
 const SAME: f64 = 1.5;
 
-/// A change of the amplitude or of the phase of a line, to and fro.
+/// A periodic change of a line's amplitude or phase.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Modulation {
     /// Hz.
     pub frequency: MeasuredValue,
-    /// Deviation of the line alone over that of all the lines that were merged with it.
+    /// Deviation of the line alone over that of all lines merged with it.
     pub of_line: f64,
-    /// Amplitude of the change over that of the line, or of the phase in rad.
+    /// Relative amplitude of the change, or of the phase in rad.
     pub depth: MeasuredValue,
-    /// Whether the phase changes, and not the amplitude.
+    /// True if the phase changes, not the amplitude.
     pub of_phase: bool,
-    /// −2 log-likelihood ratio of the line without the change against the line with it.
+    /// −2 log-likelihood ratio of the line without the change against with it.
     pub statistic: f64,
-    /// The same of the change and its multiples that stand out of the noise: a line that is switched on and off has those of a rectangle.
+    /// [`statistic`](Self::statistic) with significant multiples, as of a switched line.
     pub with_multiples: f64,
 }
 
 impl Modulation {
-    /// Whether a line at a distance from the modulated one, in Hz, is one of the sidebands in a record of `duration` s: at a multiple of
-    /// the change, which a change has that is no sinusoid.
+    /// True if a line at a distance, Hz, from the modulated one is a sideband, at a multiple of the change.
     pub(super) fn is_sideband(&self, distance: f64, duration: f64) -> bool {
         let highest = highest_multiple(0.5 * self.statistic);
         let multiple = (distance.abs() / self.frequency.value).round().clamp(1.0, highest);
@@ -70,8 +64,7 @@ impl Modulation {
         (distance.abs() - multiple * self.frequency.value).abs() < (SAME / duration).hypot(NORMAL_975 * error)
     }
 
-    /// The change of `sine` that `rest`, the record without the sine, shows most clearly; `None` if it may be noise of the one-sided
-    /// `density` around the sine, unit²/Hz, or a line of its own where `has_line` says that there is one at such a distance, Hz.
+    /// The clearest change of `sine` in `rest`; `None` if noise of `density`, unit²/Hz, or another line explains it.
     pub(super) fn find(
         sine: &Sine,
         rest: &UniformSeries,
@@ -122,7 +115,7 @@ impl Modulation {
     }
 }
 
-/// The two parts of what changes a line; as a number, its position in what both have.
+/// In-phase part and quadrature; as a number, an index.
 #[derive(Clone, Copy)]
 enum Part {
     InPhase,
@@ -133,15 +126,15 @@ impl Part {
     const BOTH: [Self; 2] = [Self::InPhase, Self::Quadrature];
 }
 
-/// The sums over blocks of a record, under its taper, times the phasor of a sine.
+/// Sums over blocks under the taper, times the phasor of a sine.
 #[derive(Clone)]
 struct Envelope {
     blocks: Vec<Complex<f64>>,
-    /// Weights of the samples of each block, of all, and squares of all.
+    /// Weights of each block, of all, and squares of all.
     weights: Vec<f64>,
     weight: f64,
     squares: f64,
-    /// Turns from one block to the next one of a change of one period a record.
+    /// Turns per block of a change of one period a record.
     turns: f64,
 }
 
@@ -165,14 +158,13 @@ impl Envelope {
         Self { blocks, weights, weight, squares, turns: size as f64 / length as f64 }
     }
 
-    /// Phasors of a change of so many periods a record, in the middle of each block. Over a thousand blocks one loses ten bits.
+    /// Phasors of a change of `periods` a record, in the middle of each block.
     fn phasors(&self, periods: f64) -> impl Iterator<Item = Complex<f64>> {
         let turns = TAU * self.turns * periods;
         let turn = Complex::cis(turns);
         std::iter::successors(Some(Complex::cis(0.5 * turns)), move |phasor| Some(phasor * turn))
     }
 
-    /// The sums of both parts, over the phasor of a change.
     fn sums(&self, periods: f64) -> [Complex<f64>; 2] {
         let mut sums = [Complex::ZERO; 2];
         for (block, phasor) in self.blocks.iter().zip(self.phasors(periods)) {
@@ -190,7 +182,7 @@ impl Envelope {
         self.powers(periods)[part as usize]
     }
 
-    /// The maximum of the power near so many `periods` a record.
+    /// The maximum near `periods` a record.
     fn vertex(&self, part: Part, periods: f64) -> f64 {
         AROUND.into_iter().fold(periods, |at, step| {
             let [left, middle, right] = [at - step, at, at + step].map(|at| self.power(part, at));
@@ -199,7 +191,6 @@ impl Envelope {
         })
     }
 
-    /// The same without a change of so many periods a record.
     fn without(&self, part: Part, periods: f64) -> Self {
         let size = 2.0 * self.sums(periods)[part as usize] / self.weight;
         let turned = match part {
@@ -212,18 +203,17 @@ impl Envelope {
     }
 }
 
-/// Whether chance gives an exponential variable of mean 1 as large as this in so many trials with a probability of [`FALSE_ALARM`] or less.
+/// True if an exponential variable of mean 1 in so many trials is significant by [`FALSE_ALARM`].
 fn is_seen(ratio: f64, trials: f64) -> bool {
     trials * (-ratio).exp() <= FALSE_ALARM
 }
 
-/// The exponential variable of mean 1 that chance exceeds as often as the power of a change of so many `periods` a record, where the part
-/// wanders as its ordinates up to `most` do. `unit` is the power of the noise around the line.
+/// Exponential variable of mean 1 that is as rare as the power of a change of `periods` a record, beside wandering
+/// shown by ordinates up to `most`.
 ///
-/// What is beside the change is the noise and a random walk, whose density is known to one part in √m, `m` being the number of ordinates
-/// that show it: over it a power has Fisher's distribution of 2 and 2m degrees of freedom, whose tail is `(1 + r/m)^−m`.
+/// `unit` is the noise around the line. Over noise and a random walk known by m ordinates, the tail is `(1 + r/m)^−m`.
 ///
-/// Of the multiples of the change those count that are [seen](is_seen).
+/// Significant multiples of the change count too.
 fn over_wandering(envelope: &Envelope, part: Part, periods: f64, most: usize, unit: f64) -> OverLevel {
     let rest = envelope.without(part, periods);
     let power = envelope.power(part, periods) / unit;
@@ -255,20 +245,18 @@ fn over_wandering(envelope: &Envelope, part: Part, periods: f64, most: usize, un
     OverLevel { ratio: by_chance(periods, power), multiples }
 }
 
-/// A change and its multiples, in exponential variables of mean 1 that chance exceeds as often.
+/// Equivalent exponential variables of a change and its multiples.
 struct OverLevel {
     ratio: f64,
-    /// The sum of those of the multiples that are not chance.
+    /// The sum over significant multiples.
     multiples: f64,
 }
 
-/// Highest multiple of a change, whose power is `ratio` times the noise, with sidebands that are above the noise: those of a line that is
-/// switched on and off fall as one over the multiple, and each of the two has half the power.
+/// Highest significant multiple of a change whose power is `ratio` times the noise, as of a switched line.
 fn highest_multiple(ratio: f64) -> f64 {
     (0.5 * ratio).sqrt().floor().max(1.0)
 }
 
-/// Whether two distances from a line, Hz, are one in a record of `duration` s.
 pub(super) fn is_same(one: f64, other: f64, duration: f64) -> bool {
     (one - other).abs() < SAME / duration
 }
@@ -282,8 +270,7 @@ mod tests {
 
     const SAMPLES: usize = 20_000;
 
-    /// The change of a sine of amplitude 0.3 at 7.3 Hz in white noise of deviation 1 at 50 Hz, whose amplitude and phase change by these
-    /// parts 5.3 times in the record.
+    /// A sine of 0.3 at 7.3 Hz in white noise at 50 Hz, whose amplitude or phase changes 5.3 times in the record.
     fn found(seed: u64, amplitude: f64, phase: f64) -> Option<Modulation> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let value = |at: usize| {
@@ -300,8 +287,7 @@ mod tests {
     fn changes_of_amplitude_and_of_phase_are_told_apart() {
         for seed in 0..4 {
             for (amplitude, phase) in [(0.5, 0.0), (0.0, 0.5)] {
-                // Expected ratio 0.09·20,000/8·0.25 = 56, of which the taper and the distance to the ordinate leave 47: the depth is known
-                // to 10 %, and 10 % too low.
+                // Expected 0.09·20,000/8·0.25 = 56, less 10 %: the depth is known to 10 %.
                 let found = found(seed, amplitude, phase).expect("47 times the noise");
                 assert!((found.frequency.value * 400.0 - 5.3).abs() < 0.6, "{found:?}");
                 assert!((found.depth.value / 0.5 - 1.0).abs() < 0.5, "{found:?}");
@@ -312,8 +298,7 @@ mod tests {
         }
     }
 
-    /// The phase of a line of 12 times the noise makes a random walk of 0.7 rad in the record: its ordinates are far above the noise, and
-    /// none is above the others. With a change of half a rad beside it, 5.3 times in the record, that one is.
+    /// A random walk of 0.7 rad; then with a change of half a rad beside it.
     #[test]
     fn a_phase_that_wanders_is_no_change_of_it() {
         let changed = |seed: u64, depth: f64| {
@@ -329,7 +314,7 @@ mod tests {
             let sine = Sine::fit_near(&series, 7.3, 0.5 / series.duration());
             Modulation::find(&sine, &sine.subtracted_from(&series), 2.0 * 0.02, |_| false)
         };
-        // One of a thousand is expected, and 3 or more of 60 have a probability of 0.003 %.
+        // 3 or more of 60 have a probability of 0.003 %.
         let wrong = (0..60).filter(|&seed| changed(seed, 0.0).is_some()).count();
         assert!(wrong < 3, "{wrong} of 60");
         let found = (0..10).filter_map(|seed| changed(seed, 0.5)).filter(|found| found.of_phase);
@@ -339,7 +324,7 @@ mod tests {
 
     #[test]
     fn a_line_beside_another_is_no_change_of_it() {
-        // Two of equal amplitude, 12 resolutions apart, without noise: half of the power of the other one is in either part.
+        // Two equal lines, 12 resolutions apart: half of the other's power is in either part.
         let value = |at: usize| {
             let turns = 7.3 * 0.02 * at as f64;
             (TAU * turns).sin() + (TAU * (turns + 12.0 * at as f64 / SAMPLES as f64)).cos()
@@ -355,7 +340,6 @@ mod tests {
         assert_eq!(Modulation::find(&sine, &rest, 0.04, |of| is_same(of, distance, series.duration())), None);
     }
 
-    /// A line that is on for half of the time has sidebands at the odd multiples of the frequency at which it is switched.
     #[test]
     fn lines_at_multiples_of_a_change_are_its_sidebands() {
         let change = |turns: f64| MeasuredValue { value: turns / 400.0, error: 0.01 / 400.0 };
@@ -364,7 +348,7 @@ mod tests {
             Modulation { frequency, of_line: 1.0, depth, of_phase: false, statistic: 100.0, with_multiples: 100.0 };
         let is_sideband = |turns: f64| found.is_sideband(turns / 400.0, 400.0);
         assert!([8.0, -24.0, 40.5].into_iter().all(is_sideband));
-        // The fifth has one part in 25 of 25 times the noise; that of eleven is above it where the first has 250 times the noise.
+        // The fifth has one part in 25 of 25 times the noise.
         assert!(![4.0, 20.0, 88.0].into_iter().any(is_sideband));
         let clearer = Modulation { statistic: 1000.0, ..found };
         assert!(clearer.is_sideband(88.0 / 400.0, 400.0));
@@ -373,7 +357,7 @@ mod tests {
     #[test]
     fn steady_sines_have_none() {
         let false_alarms = (100..400).filter(|&seed| found(seed, 0.0, 0.0).is_some()).count();
-        // 0.3 of 300 are expected at most; four or more have a probability of 0.03 %.
+        // Four or more of 300 have a probability of 0.03 %.
         assert!(false_alarms <= 3, "{false_alarms}");
     }
 }

@@ -1,4 +1,4 @@
-//! The two models of a line: a sinusoid, fitted to the samples, and a resonance, fitted to the spectrum.
+//! Models of a line: a sinusoid, fitted to the samples, and a resonance, fitted to the spectrum.
 
 use super::periodogram::taper;
 use super::whittle::departure_by_chance;
@@ -8,10 +8,10 @@ use nalgebra::{Matrix4, Vector4};
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
-/// Samples after which the rotating phasor is computed anew: its recursion loses about one bit in a thousand steps.
+/// Samples per recomputation of the rotating phasor, which loses a bit in a thousand steps.
 const STEPS: usize = 512;
 
-/// `cosine·cos(2πft) + sine·sin(2πft)`, with `t` counted from the first sample; fitted under the periodogram's taper.
+/// `cosine·cos(2πft) + sine·sin(2πft)`, t from the first sample, fitted under the taper.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sine {
     pub frequency: f64,
@@ -22,12 +22,11 @@ pub(super) struct Sine {
 }
 
 impl Sine {
-    /// The least-squares sinusoid near `frequency`, in Hz, which may be off by up to half of `spacing`, the reciprocal of twice the
-    /// length of the series or less.
+    /// The least-squares sinusoid within `spacing`/2 of `frequency`, Hz; `spacing` is at most 1/(2·length).
     pub(super) fn fit_near(series: &UniformSeries, frequency: f64, spacing: f64) -> Self {
         let sums = PhaseSums::new(series, frequency);
         let (mut frequency, mut power) = (frequency, sums.power_at(frequency));
-        // Maximum of the parabola through three points of decreasing distance.
+        // Parabolas of decreasing width.
         for step in [0.3 * spacing, 0.1 * spacing, 0.03 * spacing] {
             let [left, right] = [-step, step].map(|offset| sums.power_at(frequency + offset));
             let curvature = 2.0 * power - left - right;
@@ -41,13 +40,11 @@ impl Sine {
         sums.fit_at(frequency)
     }
 
-    /// The same sinusoid `delay` s later.
     pub(super) fn delayed(self, delay: f64) -> Self {
         let (sine, cosine) = (TAU * self.frequency * delay).sin_cos();
         Self { cosine: self.cosine * cosine - self.sine * sine, sine: self.cosine * sine + self.sine * cosine, ..self }
     }
 
-    /// The same sinusoid, so many times as large.
     pub(super) fn scaled(self, factor: f64) -> Self {
         let [cosine, sine] = [self.cosine, self.sine].map(|part| factor * part);
         Self { cosine, sine, power: factor * factor * self.power, ..self }
@@ -62,17 +59,15 @@ impl Sine {
         self.sine.atan2(self.cosine)
     }
 
-    /// The ordinate of a periodogram at the sinusoid's own frequency, unit²/Hz.
+    /// Periodogram ordinate at its frequency, unit²/Hz.
     pub(super) fn density(&self, series: &UniformSeries) -> f64 {
         2.0 * self.power * series.sample_period()
     }
 
-    /// The same sinusoid with the opposite sign.
     pub(super) fn negative(self) -> Self {
         self.scaled(-1.0)
     }
 
-    /// The series without the sinusoid.
     pub(super) fn subtracted_from(&self, series: &UniformSeries) -> UniformSeries {
         let mut values = Vec::with_capacity(series.values().len());
         for_each_phase(series, self.frequency, |_, value, cosine, sine| {
@@ -82,28 +77,22 @@ impl Sine {
     }
 }
 
-/// Blocks that the sums of a series are kept in, at least. Between the frequency of the sums and one that is half an ordinate of
-/// the padded periodogram away, the phase turns by a quarter of a turn over the series, and so by π/4/1024 between the middle
-/// of a block and its ends. Taking the phase of the middle for all of a block changes a sum by a sixth of the square of that:
-/// 10⁻⁷.
+/// Fewest blocks of sums; the phase of a frequency turns by π/4/1024 within half a block: an error of 10⁻⁷.
 const BLOCKS: usize = 1024;
 
-/// Sums over blocks of a series, from which the least-squares sinusoid of any frequency near that of the sums follows without
-/// another pass over the samples.
+/// Sums over blocks that give the least-squares sinusoid of any nearby frequency without another pass.
 pub(super) struct PhaseSums {
-    /// ω of the sums over 2π, Hz.
+    /// ω/2π of the sums, Hz.
     frequency: f64,
-    /// Middle of the first block, s after the first sample of the series, and time from one block to the next.
+    /// Middle of the first block, s from the first sample, and block period.
     first_s: f64,
     block_s: f64,
-    /// Sum of the squares of the taper's weights.
     squared_weights: f64,
     blocks: Vec<BlockSums>,
 }
 
-/// Over the samples y of a block under the taper w.
+/// Sums over a block's samples y under the taper w.
 struct BlockSums {
-    /// Σw.
     weight: f64,
     /// Σwe^(−2iωt).
     double: Complex<f64>,
@@ -112,7 +101,6 @@ struct BlockSums {
 }
 
 impl PhaseSums {
-    /// Of the frequencies near one in Hz.
     pub(super) fn new(series: &UniformSeries, frequency: f64) -> Self {
         let length = series.values().len();
         let size = (length / BLOCKS).clamp(1, STEPS);
@@ -134,7 +122,7 @@ impl PhaseSums {
         Self { frequency, first_s, block_s, squared_weights, blocks }
     }
 
-    /// Calls `visit` with every block and the phasor by which the phase of `frequency`, in Hz, differs there from that of the sums.
+    /// Calls `visit` with every block and its phasor relative to the sums' frequency.
     fn for_each_block(&self, frequency: f64, mut visit: impl FnMut(&BlockSums, Complex<f64>)) {
         let offset = -TAU * (frequency - self.frequency);
         let turn = Complex::cis(offset * self.block_s);
@@ -154,7 +142,6 @@ impl PhaseSums {
         product.norm_sqr() / self.squared_weights
     }
 
-    /// The least-squares sinusoid of one frequency, in Hz.
     pub(super) fn fit_at(&self, frequency: f64) -> Sine {
         let (mut weight, mut double, mut product) = (0.0, Complex::<f64>::ZERO, Complex::<f64>::ZERO);
         self.for_each_block(frequency, |block, turned| {
@@ -162,7 +149,7 @@ impl PhaseSums {
             double += block.double * turned * turned;
             product += block.product * turned;
         });
-        // cos² = (1 + cos 2ωt)/2, sin² = (1 − cos 2ωt)/2, cos·sin = sin(2ωt)/2.
+        // cos² = (1 + cos 2ωt)/2 and so on.
         let (cc, ss, cs) = (0.5 * (weight + double.re), 0.5 * (weight - double.re), -0.5 * double.im);
         let (yc, ys) = (product.re, -product.im);
         let determinant = cc * ss - cs * cs;
@@ -186,11 +173,11 @@ pub(super) fn transform_at(values: &[f64], turn: f64) -> Complex<f64> {
     sum
 }
 
-/// As [`for_each_phase`], with a phase of `turn` turns from one value to the next.
+/// [`for_each_phase`] with `turn` turns per value.
 fn for_each_turn(values: &[f64], turn: f64, mut visit: impl FnMut(usize, f64, f64, f64)) {
     let (step_sine, step_cosine) = (TAU * turn).sin_cos();
     for (block, values) in values.chunks(STEPS).enumerate() {
-        // Whole turns are dropped before the multiplication by 2π, which would cost them digits.
+        // Whole turns are dropped before the multiplication, which would cost digits.
         let (mut sine, mut cosine) = (TAU * (turn * (block * STEPS) as f64).fract()).sin_cos();
         for (at, value) in values.iter().enumerate() {
             visit(block * STEPS + at, *value, cosine, sine);
@@ -199,18 +186,17 @@ fn for_each_turn(values: &[f64], turn: f64, mut visit: impl FnMut(usize, f64, f6
     }
 }
 
-/// Half-width of the region that a resonance is fitted to, in widths of the line; at least [`LEAST`] ordinates.
+/// Half-width of the fitted region, in widths; at least [`LEAST`] ordinates.
 const REACH: f64 = 6.0;
 const LEAST: f64 = 16.0;
-/// Neighbouring ordinates of the region are averaged into this many groups, at most.
+/// Most groups of averaged ordinates.
 const GROUPS: usize = 256;
-/// Steps of the Levenberg-Marquardt iteration, at most.
+/// Most Levenberg-Marquardt steps.
 const ROUNDS: usize = 60;
-/// Narrowest width that is tried, in resolutions.
+/// Narrowest width, resolutions.
 const NARROWEST: f64 = 0.5;
 
-/// `level·(1 + height/(1 + (2(k − centre)/width)²))` over the ordinates `k` of a whitened spectrum, with the same line at
-/// `−centre`; fitted by Whittle's likelihood.
+/// `level·(1 + height/(1 + (2(k − centre)/width)²))` over the ordinates `k`, and its mirror; by Whittle's likelihood.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lorentz {
     pub level: f64,
@@ -225,21 +211,18 @@ pub(super) struct Lorentz {
     pub height_and_width: f64,
     /// −2 log-likelihood ratio of the level alone against level and line.
     pub statistic: f64,
-    /// Probability that ordinates around this very curve deviate from it as far.
+    /// p-value of the ordinates' deviation from this curve.
     pub shape_p_value: f64,
 }
 
-/// The mean of some neighbouring ordinates.
 struct Group {
-    /// Mean position, in resolutions.
     position: f64,
     density: f64,
     ordinates: f64,
 }
 
 impl Lorentz {
-    /// The likeliest curve near `centre` with about `width`, both in resolutions, over the ordinates at `bins` of a whitened `spectrum`, each
-    /// the mean of `looks` exponential variables; `None` if the fit fails.
+    /// The likeliest curve near `centre` and `width`, resolutions, over `bins`, means of `looks` exponential variables.
     pub(super) fn fit(
         spectrum: &dyn Fn(Range<usize>) -> Vec<f64>,
         bins: Range<usize>,
@@ -255,13 +238,12 @@ impl Lorentz {
             is_enough.then(|| Self::fit_groups(&groups(&spectrum(low..high + 1), low, looks), centre, width, reach))?
         };
         let near = within(centre, width, REACH * width)?;
-        // The skirts of a high line exceed the level far beyond its width.
+        // Skirts of a high line.
         let skirts = near.width * near.height.sqrt().max(REACH);
         let reach = skirts.min(bins.end as f64 / 8.0);
         within(near.centre, near.width, reach).or(Some(near))
     }
 
-    /// As [`fit`](Self::fit), to groups of the ordinates within `reach` of the centre.
     fn fit_groups(groups: &[Group], centre: f64, width: f64, reach: f64) -> Option<Self> {
         let weight: f64 = groups.iter().map(|group| group.ordinates).sum();
         let mean = |groups: &mut dyn Iterator<Item = &Group>| {
@@ -273,7 +255,7 @@ impl Lorentz {
         let everything = mean(&mut groups.iter());
         let floor = mean(&mut groups.iter().filter(|group| (group.position - centre).abs() > 0.6 * reach));
         let summit = mean(&mut around(groups, centre, width).iter().copied());
-        // The mean of a Lorentz curve over its full width is π/4 of its height.
+        // Mean over the full width: π/4 of the height.
         let height = ((summit / floor - 1.0) * 4.0 / PI).max(0.1);
         let mut parameters = Vector4::new(floor.ln(), height.ln(), centre, width.ln());
         let mut likelihood = log_likelihood(groups, &parameters);
@@ -312,13 +294,13 @@ impl Lorentz {
         })
     }
 
-    /// Whether centre, height or width differ from those of an estimate of the same line by more than half their standard deviations.
+    /// True if centre, height or width differ by more than half a standard deviation.
     pub(super) fn differs_from(&self, other: &Self) -> bool {
         let changes = [(self.height / other.height).ln(), self.centre - other.centre, (self.width / other.width).ln()];
         changes.iter().zip(self.errors).any(|(change, error)| change.abs() > 0.5 * error)
     }
 
-    /// Factor on the ordinate at `position` that removes the line and leaves the level.
+    /// Factor on the ordinate at `position` that removes the line.
     pub(super) fn deflation(&self, position: f64) -> f64 {
         1.0 / (1.0 + self.height * bell(position, self.centre, self.width))
     }
@@ -330,7 +312,7 @@ impl Lorentz {
     }
 }
 
-/// The groups within half a width of the centre, or else the nearest one.
+/// Groups within half a width of the centre, at least one.
 fn around(groups: &[Group], centre: f64, width: f64) -> Vec<&Group> {
     let distance = |group: &&Group| (group.position - centre).abs();
     let inside: Vec<&Group> = groups.iter().filter(|group| distance(group) <= width / 2.0).collect();
@@ -341,7 +323,7 @@ fn around(groups: &[Group], centre: f64, width: f64) -> Vec<&Group> {
     }
 }
 
-/// Lorentz curves of height 1 at the positive and at the negative frequency of a damped oscillation.
+/// Height 1 at the positive and at the negative frequency.
 fn bell(position: f64, centre: f64, width: f64) -> f64 {
     let at = |centre: f64| 1.0 / (1.0 + (2.0 * (position - centre) / width).powi(2));
     at(centre) + at(-centre)
@@ -357,7 +339,7 @@ fn groups(ordinates: &[f64], first: usize, looks: f64) -> Vec<Group> {
     ordinates.chunks(size).enumerate().map(group).collect()
 }
 
-/// A Lorentz curve by its parameters: `ln level`, `ln height`, `centre` and `ln width`.
+/// Parameters `ln level`, `ln height`, `centre`, `ln width`.
 struct LorentzCurve {
     level: f64,
     height: f64,
@@ -371,7 +353,6 @@ impl LorentzCurve {
         Self { level, height, centre: parameters[2], width }
     }
 
-    /// What the line adds to the level in a group.
     fn line(&self, group: &Group) -> f64 {
         self.level * self.height * bell(group.position, self.centre, self.width)
     }
@@ -380,13 +361,12 @@ impl LorentzCurve {
         self.level + self.line(group)
     }
 
-    /// Density in a group and its derivatives by the parameters.
     fn slopes(&self, group: &Group) -> (f64, Vector4<f64>) {
         let offset = 2.0 * (group.position - self.centre) / self.width;
         let near = 1.0 / (1.0 + offset * offset);
         let line = self.line(group);
         let density = self.level + line;
-        // The derivatives neglect the line at the negative frequency, which hardly changes with the parameters.
+        // The derivatives neglect the negative frequency.
         let slope = self.level * self.height * near * near * offset;
         (density, Vector4::new(density, line, 4.0 * slope / self.width, 2.0 * slope * offset))
     }
@@ -401,14 +381,13 @@ fn log_likelihood(groups: &[Group], parameters: &Vector4<f64>) -> f64 {
     groups.iter().map(of_group).sum()
 }
 
-/// Probability that ordinates of the modelled density deviate from it as far.
+/// p-value of the ordinates' deviation from the modelled density.
 fn shape_p_value(groups: &[Group], parameters: &Vector4<f64>) -> f64 {
     let curve = LorentzCurve::new(parameters);
     let over_density = |group: &Group| (group.density / curve.density(group), group.ordinates);
     departure_by_chance(&groups.iter().map(over_density).collect::<Vec<_>>())
 }
 
-/// Fisher's information and the score.
 fn normal_equations(groups: &[Group], parameters: &Vector4<f64>) -> (Matrix4<f64>, Vector4<f64>) {
     let (mut information, mut score) = (Matrix4::zeros(), Vector4::zeros());
     let curve = LorentzCurve::new(parameters);
@@ -435,7 +414,7 @@ mod tests {
         assert!((sine.amplitude() - 3.0).abs() < 1e-4);
         let rest = sine.subtracted_from(&series);
         assert!(rest.values().iter().filter(|value| value.is_finite()).all(|value| value.abs() < 1e-3));
-        // Without a taper an ordinate of M samples is A²·M·dt/2; a Tukey window over a tenth keeps (1 − 0.05)²/(1 − 0.0625).
+        // A²·M·dt/2 without a taper; a Tukey window over a tenth keeps (1 − 0.05)²/(1 − 0.0625).
         let ordinate = 9.0 * series.present() as f64 / 2.0 * 0.95 * 0.95 / 0.9375;
         assert!((sine.density(&series) / ordinate - 1.0).abs() < 1e-3);
     }

@@ -1,10 +1,8 @@
-//! Lines in a spectrum: sinusoids, and resonances that are wider than the record's resolution.
+//! Lines in a spectrum: sinusoids, and resonances wider than the record resolves.
 //!
-//! A sinusoid is tested by the likelihood ratio of its least-squares fit against a locally white background. The p-value
-//! accounts for all the frequencies that were searched (R. Baluev, "Assessing the statistical significance of periodogram
-//! peaks", MNRAS 385, 2008) and for the uncertainty of the background. A resonance is sought in averages over 4, 16, 64 …
-//! ordinates. A peak is taken for the model with the larger likelihood. What is at half of the sample rate itself is tested by
-//! [itself](super::alternation).
+//! A sinusoid is tested by the likelihood ratio against a locally white background, over all frequencies (R. Baluev,
+//! MNRAS 385, 2008). A resonance is sought in averages over 4, 16, 64 … ordinates; the likelier model is taken. Half
+//! the sample rate has a [test of its own](super::alternation).
 
 use super::alternation::Alternation;
 use super::found_sines::{FoundSines, is_on_skirts};
@@ -17,45 +15,38 @@ use crate::effects::findings::SIGNIFICANCE;
 use crate::samples::uniform_series::UniformSeries;
 use std::f64::consts::{LN_2, PI};
 
-/// Largest number of lines that are returned.
 pub(super) const MOST: usize = 6;
-/// Largest number of resonances that are refitted when one is added: each refit fits the background of the whole spectrum.
+/// Most resonances refitted when one is added: each fits the background again.
 const REFITTED: usize = 2;
-/// Least part of a line's statistic in that of a resonance on whose skirts it lies: a weaker one is a residue of that.
+/// Least statistic over that of a resonance on whose skirts a line lies; less is a residue.
 const RESIDUE: f64 = 0.02;
 
-/// Fewest periods of a sinusoid in a record, where it is all of the slow variation.
+/// Fewest periods of a sinusoid that is all of the slow variation.
 const FEWEST_SLOW_PERIODS: usize = 2;
-/// Least part of the slow variation, over what it leaves, of such a sinusoid. A random walk has most of its variation in the
-/// lowest ordinates: that one of two periods or more holds all but a thousandth has a probability below 10⁻⁶.
+/// Least slow variation of such a sinusoid over the rest; a walk has it with a probability below 10⁻⁶.
 const SLOW_GAIN: f64 = 1000.0;
-/// Largest part of the slow variation that the first fit of such a sinusoid leaves. A straight line has at most the part `6/(πm)²` of a
-/// sinusoid of `m` periods, 0.15 of one of two, which is missing in the series that the first fit is given.
+/// Largest part of the slow variation after the first fit; the straight line takes 0.15 of two periods.
 const SLOW_LEFT: f64 = 0.5;
-/// Most such sinusoids, and rounds in which each is fitted together with the straight line of the record; a round takes at
-/// least nine tenths off what the line has of a sinusoid of two periods.
+/// Most such sinusoids, and rounds of a joint fit with the straight line.
 const MOST_SLOW: usize = 2;
-/// Blocks of the record in whose means they are sought, at least.
+/// Fewest blocks of the means in which they are sought.
 const SLOW_BLOCKS: usize = 4096;
-/// Blocks in whose means the first fit is tried before, at least. Of a sinusoid that is all but a thousandth of the slow variation they
-/// lose `(π·8/1024)²/6`, 10⁻⁴, of what is faster than the blocks all but `(8/1024)²` of its power: the first fit leaves a third of
-/// [`SLOW_LEFT`] there too.
+/// Fewest blocks of the first, coarse fit; they lose 10⁻⁴ of a slow sinusoid.
 const COARSE_BLOCKS: usize = 1024;
 const SLOW_ROUNDS: usize = 6;
-/// Ordinates on either side whose median is the noise of one.
+/// Ordinates per side whose median is the noise.
 const NEARBY: usize = 32;
 
 /// The lines of a series with a p-value below 2·10⁻⁵, the strongest first; at most 6 and one at half the sample rate.
 ///
-/// Searches from 8 periods per record up to half the sample rate, or to half the rate at which rounding acts as noise
-/// where that is lower, and at half the sample rate. A record of fewer than some hundred samples has too few ordinates and yields none.
+/// Searches from 8 periods per record to half the rate at which rounding acts as noise, and at half the sample rate. A
+/// record of fewer than some hundred samples has too few ordinates and yields none.
 #[must_use]
 pub fn find_lines(series: &UniformSeries) -> Vec<SpectralLine> {
     find_lines_over(series, |_| 1.0)
 }
 
-/// As [`find_lines`], over a background of white, flicker and random-walk noise times `known`, a function of the frequency
-/// in Hz.
+/// [`find_lines`] over white, flicker and random-walk noise times `known`, by frequency in Hz.
 #[must_use]
 pub(crate) fn find_lines_over(series: &UniformSeries, known: impl Fn(f64) -> f64) -> Vec<SpectralLine> {
     let known: &dyn Fn(f64) -> f64 = &known;
@@ -94,11 +85,9 @@ pub(crate) fn find_lines_over(series: &UniformSeries, known: impl Fn(f64) -> f64
     found
 }
 
-/// The series without sinusoids of fewer periods than are searched, each of which is nearly all of the slow variation beside a
-/// straight line; and these sinusoids. Their leakage would be taken for lines, and they themselves for ramps and steps.
-///
-/// They are sought in block means, which such a sinusoid passes with a loss of `(π·8/4096)²/6`, 6·10⁻⁶, or less, where means of longer
-/// blocks may have one.
+/// Removes sinusoids of fewer periods than are searched, each nearly all of the slow variation beside a straight line;
+/// returns them too. They would leak into lines, and look like ramps and steps. Block means lose at most 6·10⁻⁶ of
+/// them.
 pub(crate) fn without_slow_sines(mut series: UniformSeries) -> (UniformSeries, Vec<SpectralLine>) {
     let block = |blocks: usize| (series.values().len() / blocks).max(1);
     let (coarse, size) = (block(COARSE_BLOCKS), block(SLOW_BLOCKS));
@@ -114,12 +103,10 @@ pub(crate) fn without_slow_sines(mut series: UniformSeries) -> (UniformSeries, V
     (series, found.into_iter().map(|(_, line)| line).collect())
 }
 
-/// The series without the sinusoids that stand out of the means of [`SLOW_BLOCKS`] blocks or more. A regression on the means of fewer
-/// blocks has `sin(πfw)/(πfw)` of one of the frequency f in means over w, which is to it as much noise.
+/// Removes the sinusoids that stand out of means of at least [`SLOW_BLOCKS`] blocks.
 pub(crate) fn without_sines(mut series: UniformSeries) -> UniformSeries {
     let size = (series.values().len() / SLOW_BLOCKS).max(1);
     let width = size as f64 * series.sample_period();
-    // A block's mean belongs to its middle.
     let delay = 0.5 * (size as f64 - 1.0) * series.sample_period();
     let mut means = series.averaged(size).detrended();
     for _ in 0..MOST {
@@ -132,14 +119,12 @@ pub(crate) fn without_sines(mut series: UniformSeries) -> UniformSeries {
     series
 }
 
-/// The sinusoid of the largest ordinate over those around it, if chance gives one as large in fewer than [`SIGNIFICANCE`] of all records:
-/// ordinates of noise over their mean are exponential variables. The noise around it has one density, or one that falls with the square of
-/// the frequency, as that of telegraph noise beyond its corner: a sinusoid stands out of either.
+/// The sinusoid with the largest ordinate over constant or 1/f² noise around, if significant by [`SIGNIFICANCE`].
 fn sine_that_stands_out(series: &UniformSeries) -> Option<Sine> {
     let spectrum = Periodogram::new(series)?;
     let ordinates: Vec<f64> = spectrum.independent().collect();
     let rising: Vec<f64> = ordinates.iter().enumerate().map(|(at, of)| of * (at as f64).powi(2)).collect();
-    // Means hold little of what is faster than half of their rate.
+    // Means hold little above half of their rate.
     let searched = FEWEST_PERIODS..ordinates.len() / 2;
     if searched.len() <= 2 * NEARBY {
         return None;
@@ -154,28 +139,26 @@ fn sine_that_stands_out(series: &UniformSeries) -> Option<Sine> {
     (ratio > limit).then(|| Sine::fit_near(series, at as f64 * spacing, spacing))
 }
 
-/// The ordinates on either side of one.
 fn others(ordinates: &[f64], at: usize) -> impl Iterator<Item = &f64> {
     let around = at.saturating_sub(NEARBY).max(FEWEST_PERIODS)..(at + NEARBY + 1).min(ordinates.len());
     ordinates[around.start..around.start.max(at - 1)].iter().chain(&ordinates[at + 2..around.end])
 }
 
-/// An ordinate over the mean of the others. The median of an exponential variable is ln 2 times its mean.
+/// An ordinate over the mean of the others, by their median over ln 2.
 fn over_others(ordinates: &[f64], at: usize) -> f64 {
     let mut others: Vec<f64> = others(ordinates, at).copied().collect();
     let middle = others.len() / 2;
     ordinates[at] * LN_2 / *others.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Whether an ordinate may be `limit` times the mean of the others: whether more than half of them are so low is counted far faster than
-/// their median is found.
+/// True if an ordinate may be `limit` times the mean of the others, by a fast count.
 fn exceeds_others(ordinates: &[f64], at: usize, limit: f64) -> bool {
     let low = ordinates[at] * LN_2 / limit;
     let (below, all) = others(ordinates, at).fold((0, 0), |(below, all), of| (below + usize::from(*of < low), all + 1));
     below > all / 2
 }
 
-/// The sinusoids of [`without_slow_sines`], with time counted from the first sample of `series`.
+/// The sinusoids of [`without_slow_sines`], time from the first sample.
 fn slow_sines(mut series: UniformSeries) -> Vec<(Sine, SpectralLine)> {
     let mut found = Vec::new();
     while found.len() < MOST_SLOW {
@@ -190,7 +173,7 @@ fn slow_sines(mut series: UniformSeries) -> Vec<(Sine, SpectralLine)> {
         let Some(part) = part_left(&series, &sine, slow).filter(|part| part * SLOW_GAIN <= 1.0) else { break };
         let left = part * slow / FEWEST_PERIODS as f64;
         let ratio = sine.density(&level) / left.max(series.rounding().density(sine.frequency));
-        // What is left has two degrees of freedom an ordinate, less the sinusoid's and the line's.
+        // Two degrees of freedom per ordinate, less sinusoid and line.
         let p_value = part.powi(FEWEST_PERIODS as i32 - 2);
         found.push((sine, sine_line(&sine, series.duration(), ratio, p_value)));
         series = sine.subtracted_from(&series);
@@ -198,19 +181,17 @@ fn slow_sines(mut series: UniformSeries) -> Vec<(Sine, SpectralLine)> {
     found
 }
 
-/// A sinusoid that may be nearly all of the slow variation of a series.
+/// A candidate for nearly all of the slow variation.
 struct SlowSine {
-    /// The series without its straight line.
     level: UniformSeries,
-    /// The sum of the ordinates of its slow variation.
     slow: f64,
-    /// Of the padded ordinates, Hz.
+    /// For padded ordinates, Hz.
     spacing: f64,
     sine: Sine,
 }
 
 impl SlowSine {
-    /// The fit to the series without its straight line; `None` where it leaves too much of the slow variation.
+    /// Fit to the series without its straight line; `None` if too much is left.
     fn first_fit(series: &UniformSeries) -> Option<Self> {
         let level = series.detrended();
         let spectrum = Periodogram::new(&level).filter(|of| of.padded().len() > 2 * PADDING * FEWEST_PERIODS)?;
@@ -224,23 +205,22 @@ impl SlowSine {
     }
 }
 
-/// The sum of the ordinates from one period a record up to those that are searched for lines.
+/// Sum of the ordinates from one period up to those searched for lines.
 fn slow_variation(spectrum: &Periodogram) -> f64 {
     spectrum.independent().skip(1).take(FEWEST_PERIODS).sum()
 }
 
-/// The part of the slow variation `slow` of a series that it has without a sinusoid and the straight line beside it.
+/// Part of the slow variation left by a sinusoid and a straight line.
 fn part_left(series: &UniformSeries, sine: &Sine, slow: f64) -> Option<f64> {
     Some(slow_variation(&Periodogram::new(&sine.subtracted_from(series).detrended())?) / slow)
 }
 
-/// Whether `line` is what the fit of a far stronger resonance has left on its skirts.
+/// True if `line` is a residue on the skirts of a far stronger resonance.
 fn is_residue(line: &SpectralLine, strong: &SpectralLine) -> bool {
     let (own, other) = (line.frequency.value, strong.frequency.value);
     own != other && is_on_skirts(own, strong) && line.statistic < RESIDUE * strong.statistic
 }
 
-/// A record with its spectrum.
 struct Transformed {
     series: UniformSeries,
     spectrum: Spectrum,

@@ -1,10 +1,8 @@
-//! A slow periodic signal that is no sinusoid, by the sum of the harmonics of one frequency.
+//! A slow periodic signal that is no sinusoid, by the sum of its harmonics.
 //!
-//! A thermostat, a pump that comes on every minute, or a radio that draws on the supply every few seconds has harmonics each of
-//! which is too weak for a line of its own, or is one of a few that look like unrelated sinusoids. Together they stand out of the
-//! ordinates between them (the harmonic sum of pulsar searches: J. Taylor and G. Huguenin, "Two new pulsating radio sources",
-//! Nature 221, 1969). The noise is a sum of white and random-walk noise and of Markov processes, fitted to the ordinates between
-//! the harmonics.
+//! Thermostats and pumps have harmonics each too weak for a line; together they stand out (harmonic sum of pulsar
+//! searches: J. Taylor and G. Huguenin, Nature 221, 1969). The noise, white, walking and Markov, is fitted between the
+//! harmonics.
 
 use super::harmonics::Harmonics;
 use super::line_models::{Sine, transform_at};
@@ -17,65 +15,57 @@ use crate::effects::findings::SIGNIFICANCE;
 use crate::samples::uniform_series::UniformSeries;
 use std::ops::Range;
 
-/// Harmonics in the sum, the fundamental among them.
+/// Harmonics in the sum, including the fundamental.
 const HARMONICS: usize = 8;
-/// Fundamentals that are sought together, in periods per record: twice the highest harmonic is half the rate of the blocks in whose means
-/// they are sought. Between the harmonics of a lower one there is no ordinate that none of them reaches.
+/// Fundamentals sought together, periods per record; twice the highest harmonic is half the block rate.
 const RANGES: [Range<usize>; 2] = [4..32, 32..256];
-/// Ordinates to a resolution: the eighth harmonic of a frequency is at most a quarter of a resolution off its ordinate.
+/// Ordinates per resolution; the eighth harmonic is at most a quarter of a resolution off.
 const PADDING: usize = 16;
-/// Steps of the fundamental to a resolution.
+/// Steps of the fundamental per resolution.
 const STEPS: usize = 16;
-/// Distance from a harmonic beyond which an ordinate shows the noise, in resolutions: the first null of the taper's lobe.
+/// Distance from a harmonic, resolutions, of an ordinate of noise: the first null of the taper.
 const LOBE: f64 = 1.2;
-/// Frequencies that are examined, those with the largest sums over the noise that is fitted to all ordinates.
+/// Most frequencies examined, by the sum over the noise of all ordinates.
 const EXAMINED: usize = 8;
-/// Largest probability by chance of the sum of all harmonics over the noise that is fitted to all ordinates, theirs among them, of one that is
-/// examined: without them the noise is lower by a few percent, the probability by a factor of a few.
+/// Largest p-value of an examined sum, by the noise of all ordinates, the harmonics included.
 const PROMISING: f64 = 0.1;
 /// White noise, a random walk and ten Markov processes.
 const TERMS: usize = 12;
-/// Largest probability by chance of the sum of the even harmonics, which a square wave lacks, and of that of the odd ones, which the harmonics of
-/// twice the frequency lack.
+/// Largest p-value of the even harmonics (none in a square wave) and of the odd ones (none at half the frequency).
 const EVEN_BY_CHANCE: f64 = 1e-3;
 const ODD_BY_CHANCE: f64 = 0.05;
-/// Probability by chance of the sum of the harmonics of a fundamental that is clear by itself, at most: it may be a sinusoid, which has none.
-/// The fundamental is known to a resolution, in which there are [`HARMONICS`] frequencies that the highest harmonic tells apart.
+/// Largest p-value of the harmonics of a clear fundamental, which may be a sinusoid.
 const HARMONICS_BY_CHANCE: f64 = 1e-3;
-/// Largest part of one harmonic in the sum: a line of another cause at a multiple would be all of it.
+/// Largest part of one harmonic in the sum; an unrelated line would be all of it.
 const LARGEST_SHARE: f64 = 0.8;
-/// Least power of the fundamental over the noise: the sum of its harmonics alone could be that of a multiple of it. None of them is larger
-/// than it beyond their errors: those of short pulses are all equal.
+/// Least power of the fundamental over the noise; without it, the frequency may be a fraction of the true one.
 const LEAST_FUNDAMENTAL: f64 = 4.0;
 
-/// A periodic signal with harmonics.
 #[derive(Debug, Clone)]
 pub(crate) struct PeriodicSignal {
-    /// Of the fundamental, Hz.
+    /// Fundamental, Hz.
     pub frequency: BoundedEstimate,
-    /// Amplitude of the fundamental, in the unit of the series.
+    /// For the fundamental, in the unit of the series.
     pub amplitude: BoundedEstimate,
-    /// Amplitudes of the second to the last harmonic that shows: 0 of one that has less than the noise.
+    /// From the second to the last significant one; 0 below the noise.
     pub harmonics: Vec<f64>,
-    /// Deviation of these over that of the fundamental, %.
+    /// Their deviation over the fundamental's, %.
     pub harmonics_percent: BoundedEstimate,
-    /// Sum of the ordinates of the second to the eighth harmonic, over the noise.
+    /// Ordinates of the second to the eighth harmonic over the noise.
     pub sum: f64,
     /// Probability of such a sum at any frequency by chance.
     pub p_value: f64,
 }
 
 impl PeriodicSignal {
-    /// The clearest one in a record; `None` if chance explains it.
+    /// The clearest one; `None` if chance explains it.
     pub(crate) fn find(series: &UniformSeries) -> Option<Self> {
-        // Of a channel that never changes nothing is left.
         let series = series.clone().averaged_until_dithered();
         let found = RANGES.iter().filter_map(|range| Self::find_within(range, &series));
         let clearest = found.min_by(|a, b| a.p_value.total_cmp(&b.p_value));
         clearest.filter(|found| found.p_value < SIGNIFICANCE).map(|found| found.with_higher_harmonics(&series))
     }
 
-    /// The clearest one of a range of frequencies.
     fn find_within(periods: &Range<usize>, series: &UniformSeries) -> Option<Self> {
         let size = (series.values().len() / (4 * HARMONICS * periods.end)).max(1);
         let blocks = series.averaged(size).detrended();
@@ -91,7 +81,7 @@ impl PeriodicSignal {
         };
         let mut sums: Vec<(f64, f64, f64)> = (STEPS * periods.start..STEPS * most).map(sum).collect();
         sums.sort_by(|a, b| b.0.total_cmp(&a.0));
-        // Signals are spread evenly over the logarithm of the frequency, and so is the false alarm over the steps.
+        // The false alarm is spread evenly over the logarithm of the frequency.
         let log_range = (RANGES[RANGES.len() - 1].end as f64 / RANGES[0].start as f64).ln();
         let examined = sums.iter().take(EXAMINED).filter_map(|&(_, sum, fundamental)| {
             let trials = STEPS as f64 * fundamental * log_range;
@@ -101,8 +91,7 @@ impl PeriodicSignal {
         examined.min_by(|a, b| a.p_value.total_cmp(&b.p_value))
     }
 
-    /// Examines one fundamental, in resolutions, over the noise up to the `highest` order: the harmonics are those of the record without it,
-    /// into which it would leak.
+    /// Examines a fundamental, in resolutions, over the noise up to `highest`, on the record without the fundamental.
     fn examine(
         blocks: &UniformSeries,
         spectrum: &PaddedSpectrum,
@@ -130,7 +119,7 @@ impl PeriodicSignal {
         let excess = |of: &PaddedSpectrum, number: usize| (over_noise(of, number) - 1.0) * noise_at(number);
         let first = excess(spectrum, 1);
         let powers: Vec<f64> = (2..=HARMONICS).map(|number| excess(&rest, number)).collect();
-        // An ordinate of the power P over noise of the density n has the variance n² + 2nP.
+        // Power P over noise n has the variance n² + 2nP.
         let variance = |power: f64, number: usize| {
             let density = noise_at(number);
             density * (density + 2.0 * power.max(0.0))
@@ -142,14 +131,13 @@ impl PeriodicSignal {
         if !is_fundamental || !has_both || largest > LARGEST_SHARE {
             return None;
         }
-        // Sums of exponential variables, of which those between the harmonics have given the level.
+        // Exponential sums; those between the harmonics gave the level.
         let (above, below) = (ratios.len() as f64, between as f64);
         let by_harmonics = mean_ratio_tail(sum / above, above, below);
         let whole = sum + over_noise(spectrum, 1);
         let with_fundamental = mean_ratio_tail(whole / (above + 1.0), above + 1.0, below);
         let is_periodic = HARMONICS as f64 * by_harmonics < HARMONICS_BY_CHANCE;
         let by_chance = if is_periodic { by_harmonics.min(with_fundamental) } else { by_harmonics };
-        // Either of the two sums.
         let p_value = (2.0 * trials * by_chance).min(1.0);
         let percent = 100.0 * (powers.iter().sum::<f64>().max(0.0) / first).sqrt();
         let relative = NORMAL_975 / (2.0 * sum).sqrt();
@@ -157,7 +145,7 @@ impl PeriodicSignal {
         // Cramér-Rao bound of the fundamental alone.
         let error = NORMAL_975 * 1.5f64.sqrt() * resolution / (std::f64::consts::PI * of_noise.sqrt());
         let amplitude = sine.amplitude();
-        // A sinusoid of this power over the noise, in a resolution, has an amplitude of the relative variance 1/(2·power).
+        // Relative variance 1/(2·power) of the amplitude.
         let half = NORMAL_975 / (2.0 * of_noise).sqrt();
         Some(Self {
             amplitude: BoundedEstimate::new(amplitude, amplitude * (1.0 - half).max(0.0), amplitude * (1.0 + half)),
@@ -173,7 +161,7 @@ impl PeriodicSignal {
         })
     }
 
-    /// The same with the harmonics above the eighth that show, and the frequency by all of them.
+    /// Adds significant harmonics above the eighth, and their information on the frequency.
     fn with_higher_harmonics(mut self, series: &UniformSeries) -> Self {
         let found = Harmonics::measure(series, self.frequency.value, HARMONICS);
         self.harmonics.extend(found.amplitudes().skip(HARMONICS));
@@ -184,7 +172,6 @@ impl PeriodicSignal {
         self
     }
 
-    /// The series without its harmonics, in which it was found.
     pub(crate) fn subtracted_from(&self, series: &UniformSeries) -> UniformSeries {
         let spacing = 0.5 / series.duration();
         let without = |rest: UniformSeries, number: usize| {
@@ -193,43 +180,41 @@ impl PeriodicSignal {
         (1..=self.highest()).fold(series.clone(), without)
     }
 
-    /// Number of the highest harmonic that shows.
+    /// Number of the highest significant harmonic.
     fn highest(&self) -> usize {
         self.harmonics.len() + 1
     }
 
-    /// Whether a frequency, Hz, is a multiple of the signal's within `within` Hz.
+    /// True if a frequency, Hz, is within `within` Hz of a multiple.
     pub(crate) fn has(&self, frequency: f64, within: f64) -> bool {
         let multiple = (frequency / self.frequency.value).round().max(1.0);
         (frequency - multiple * self.frequency.value).abs() < within
     }
 
-    /// Whether a frequency, Hz, is between the fundamental, or half an octave below it, and the highest harmonic that shows.
+    /// True if a frequency, Hz, is between half an octave below the fundamental and the highest harmonic.
     pub(crate) fn reaches(&self, frequency: f64) -> bool {
         (std::f64::consts::FRAC_1_SQRT_2..=self.highest() as f64).contains(&(frequency / self.frequency.value))
     }
 
-    /// Its period, s.
     pub(crate) fn period_s(&self) -> f64 {
         1.0 / self.frequency.value
     }
 }
 
-/// A periodogram whose ordinates are [`PADDING`] to a resolution: all of them, or those that the search for one fundamental needs.
+/// A periodogram with [`PADDING`] ordinates per resolution, all or only those for one fundamental.
 struct PaddedSpectrum {
-    /// Ordinates that are `spacing` of the padded ones apart, from 0 on.
+    /// Ordinates, `spacing` padded ones apart, from 0 on.
     power: Vec<f64>,
     spacing: usize,
-    /// Others, each after its number.
     between: Vec<(usize, f64)>,
 }
 
-/// Number of the padded ordinate that is nearest to an order in periods per record.
+/// Padded ordinate nearest to an order in periods per record.
 fn position(order: f64) -> usize {
     (order * PADDING as f64).round() as usize
 }
 
-/// The samples under the taper, 0 where one is missing, and the sum of the squares of the weights of the others; `None` without any.
+/// Samples under the taper, 0 if missing, and the sum of their squared weights; `None` without any.
 fn tapered(blocks: &UniformSeries) -> Option<(Vec<f64>, f64)> {
     let (length, mut squares) = (blocks.values().len(), 0.0);
     let weighted = |(at, value): (usize, &f64)| {
@@ -244,26 +229,24 @@ fn tapered(blocks: &UniformSeries) -> Option<(Vec<f64>, f64)> {
     (squares > 0.0).then_some((values, squares))
 }
 
-/// `|Σwye^(−iωt)|²/Σw²` of the `values` wy, transformed with zeros up to `length`.
+/// `|Σwye^(−iωt)|²/Σw²` of wy, padded to `length`.
 fn power(values: &[f64], length: usize, squares: f64) -> Option<Vec<f64>> {
     let transform = fourier::forward(length);
     let mut input = transform.make_input_vec();
     input.iter_mut().zip(values).for_each(|(slot, value)| *slot = *value);
     let mut output = transform.make_output_vec();
-    // An error means buffers of the wrong length; these are the planner's own.
     transform.process(&mut input, &mut output).ok()?;
     Some(output.iter().map(|bin| bin.norm_sqr() / squares).collect())
 }
 
 impl PaddedSpectrum {
-    /// All ordinates.
     fn new(blocks: &UniformSeries) -> Option<Self> {
         let (values, squares) = tapered(blocks)?;
         let power = power(&values, PADDING * values.len(), squares)?;
         Some(Self { power, spacing: 1, between: Vec::new() })
     }
 
-    /// The independent ordinates, and those of the harmonics of a fundamental.
+    /// The independent ordinates, and those of a fundamental's harmonics.
     fn at_harmonics(blocks: &UniformSeries, fundamental: f64) -> Option<Self> {
         let (values, squares) = tapered(blocks)?;
         let length = PADDING * values.len();
@@ -275,7 +258,6 @@ impl PaddedSpectrum {
         Some(Self { power: power(&values, values.len(), squares)?, spacing: PADDING, between })
     }
 
-    /// The ordinate nearest to an order in periods per record.
     fn density(&self, order: f64) -> f64 {
         let at = position(order);
         match self.between.iter().find(|(of, _)| *of == at) {
@@ -284,13 +266,12 @@ impl PaddedSpectrum {
         }
     }
 
-    /// The ordinate of a harmonic over the noise.
     fn ratio(&self, noise: &SlowBackground<TERMS>, number: usize, fundamental: f64) -> f64 {
         let order = number as f64 * fundamental;
         self.density(order) / noise.density(order)
     }
 
-    /// Orders of the independent ordinates below `highest`, without those that harmonics of `fundamental` reach.
+    /// Independent orders below `highest` that harmonics of `fundamental` do not reach.
     fn orders(&self, fundamental: Option<f64>, highest: usize) -> impl Iterator<Item = usize> {
         let last = highest.min((self.power.len() - 1) * self.spacing / PADDING);
         (1..last).filter(move |&order| {
@@ -301,13 +282,12 @@ impl PaddedSpectrum {
         })
     }
 
-    /// The noise by the ordinates that the harmonics of `fundamental` do not reach, or by all of them.
+    /// The noise by those ordinates, or by all.
     fn noise(&self, fundamental: Option<f64>, highest: usize) -> Option<SlowBackground<TERMS>> {
         let mut bands: Vec<(usize, f64, f64, f64)> = Vec::new();
         for order in self.orders(fundamental, highest) {
             let density = self.density(order as f64);
             match bands.last_mut() {
-                // A band is an eighth of its frequency wide.
                 Some((first, orders, sum, count)) if order < *first + *first / 8 + 1 => {
                     (*orders, *sum, *count) = (*orders + order as f64, *sum + density, *count + 1.0);
                 }
@@ -325,9 +305,7 @@ impl PaddedSpectrum {
         if bands.len() < TERMS { None } else { SlowBackground::fit(&bands) }
     }
 
-    /// Number of ordinates between the harmonics of `fundamental`, up to twice the highest, and their mean over the noise up to half a period
-    /// above the highest; 1 where it is less. What a filter leaves of noise above them is no sum of such processes, and one that is fitted to it
-    /// is below the noise at the harmonics.
+    /// Number of ordinates between the harmonics of `fundamental`, and their mean over the noise, at least 1.
     fn between(&self, noise: &SlowBackground<TERMS>, fundamental: f64) -> (usize, f64) {
         let highest = |harmonics: f64| (harmonics * fundamental).ceil() as usize;
         let near = self.orders(Some(fundamental), highest(HARMONICS as f64 + 0.5)).map(|order| order as f64);
@@ -347,7 +325,7 @@ mod tests {
 
     const SAMPLES: usize = 16 * 1024;
 
-    /// White noise of deviation 1, a random walk with steps of deviation `step`, and a signal of the phase in turns.
+    /// White noise of deviation 1, a walk with steps `step`, and a signal of the phase in turns.
     fn series(seed: u64, step: f64, signal: impl Fn(f64) -> f64) -> UniformSeries {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut walk = 0.0;
@@ -367,7 +345,7 @@ mod tests {
         let harmonics = (1..=HARMONICS).map(|number| number as f64 * fundamental);
         let largest = all.power.iter().copied().fold(0.0, f64::max);
         for order in orders.chain(harmonics) {
-            // Transforms of a thousand numbers are known to some 10⁻¹⁴ of the largest ordinate.
+            // Rounding of transforms of a thousand numbers.
             assert!((few.density(order) - all.density(order)).abs() < 1e-12 * largest, "{order}");
         }
         assert!(all.orders(None, 512).eq(few.orders(None, 512)));
@@ -376,19 +354,16 @@ mod tests {
     #[test]
     fn a_sawtooth_is_found_among_few_periods() {
         for (seed, periods) in [(1, 5.3), (2, 9.0), (3, 17.7)] {
-            // Amplitudes 0.6/(πk): ordinates of 16·1024/4·0.36/(πk)², 149/k², over the white noise, of which the second to the eighth have 79
-            // together; the walk is as large as the white noise at 5 periods per record.
+            // Ordinates 149/k² over the white noise, 79 in the second to the eighth; the walk equals it at 5 periods.
             let found = PeriodicSignal::find(&series(seed, 0.002, |turn| 0.6 * ((periods * turn).fract() - 0.5)))
                 .expect("some ten times the noise");
             let duration_s = 0.1 * SAMPLES as f64;
-            // Known to less than a tenth of the resolution.
             assert!((found.frequency.value * duration_s - periods).abs() < 0.2, "{periods}: {found:?}");
             assert!(found.has(3.0 * periods / duration_s, 1.0 / duration_s));
         }
     }
 
-    /// Pulses of height A for 8 % of a period have the amplitudes `2A·sin(0.08πk)/(πk)`: ordinates of 13, 12, 11, 9, 7, 6, 4 and 3 times the
-    /// noise, of which any of the first may be the largest.
+    /// Pulses for 8 % of a period: ordinates of 13, 12, 11, 9, 7, 6, 4 and 3 times the noise.
     #[test]
     fn short_pulses_are_found_among_many_periods() {
         for (seed, periods) in [(1, 33.4), (2, 64.2), (3, 121.6), (4, 250.9)] {
@@ -399,7 +374,7 @@ mod tests {
         }
     }
 
-    /// Of a frequency whose noise eight ordinates tell, nine of ten intervals hold the truth: of 40 at least 31 but for one in 100 cases.
+    /// Nine of ten intervals hold: 31 of 40 but for one in 100 cases.
     #[test]
     fn all_harmonics_tell_the_frequency() {
         let of_fundamental = NORMAL_975 * (1.5_f64 / 149.0).sqrt() / std::f64::consts::PI;
@@ -412,27 +387,26 @@ mod tests {
             within += usize::from((low..=high).contains(&(periods / duration_s)));
             half += (high - value) * duration_s / 40.0;
         }
-        // Each of the eight tells as much as the fundamental: 0.35 of its error, less where a harmonic is hardly above the noise.
         assert!(half < 0.6 * of_fundamental, "{half}");
         assert!(within >= 31, "{within}");
     }
 
-    /// A sawtooth of 6: ordinates of 14,900/k² over the noise, 1.6 on the mean from the 65th to the 128th.
+    /// A sawtooth of 6: ordinates of 14,900/k², 1.6 on the mean from the 65th to the 128th.
     #[test]
     fn harmonics_above_the_eighth_are_the_signal_too() {
         let of = series(1, 0.0, |turn| 6.0 * ((7.3 * turn).fract() - 0.5));
         let found = PeriodicSignal::find(&of).expect("a thousand times the noise");
         assert!(found.harmonics.len() >= 127, "{}", found.harmonics.len());
         for (number, amplitude) in (2..=64).map(f64::from).zip(&found.harmonics) {
-            // The amplitude of a sinusoid in noise of deviation 1 has the deviation √(2/n); 0.97 of it is left in means of blocks.
+            // Deviation √(2/n) of an amplitude; means of blocks keep 0.97.
             let (expected, deviation) = (6.0 / (std::f64::consts::PI * number), (2.0 / SAMPLES as f64).sqrt());
             assert!((amplitude - expected).abs() < 4.0 * deviation + 0.03 * expected, "{number}: {amplitude}");
         }
-        // √(π²/6 − 1) of the fundamental, of which the straight line through 7.3 periods takes a hundredth.
+        // √(π²/6 − 1) of the fundamental.
         assert!((found.harmonics_percent.value - 80.3).abs() < 2.0, "{}", found.harmonics_percent.value);
         let left = found.subtracted_from(&of);
         let power = left.values().iter().map(|value| value * value).sum::<f64>() / SAMPLES as f64;
-        // Of the noise 1/2 · 128 ordinates of 8,192 are taken; what is above the 128th has 36/(2π²·128) of power.
+        // 128 of 8,192 ordinates of noise ½ are taken; 36/(2π²·128) remains above the 128th.
         assert!((power - 1.0).abs() < 0.06, "{power}");
     }
 
@@ -443,14 +417,12 @@ mod tests {
             PeriodicSignal::find(&series(seed, 0.0, |turn| 0.3 * ((periods * turn).fract() - 0.5)))
         });
         let found: Vec<PeriodicSignal> = found.collect();
-        // Ordinates of 37/k² over the noise: the harmonics have 20 together, beside 7 of the noise. At one frequency chance has that with 10⁻⁶, at
-        // any frequency in one of 1,000 records: few are clear without the fundamental. Less than half have even and odd ones each.
+        // Ordinates of 37/k²: the harmonics have 20 together, and less than half of the records have even and odd ones.
         let by_harmonics = found.iter().filter(|found| found.sum > 31.0).count();
         assert!(found.len() >= 5 && by_harmonics + 3 <= found.len(), "{} {by_harmonics}", found.len());
     }
 
-    /// A Markov process of 0.8 s and white noise behind two averages over 1.6 s, which leave a fortieth of the density at 0.5 Hz and none at
-    /// 0.6 Hz.
+    /// Two averages over 1.6 s leave a fortieth of the density at 0.5 Hz and none at 0.6 Hz.
     #[test]
     fn noise_behind_a_filter_is_none() {
         for seed in 0..30 {

@@ -1,5 +1,4 @@
-//! Discrete Fourier transforms of a whole record: the tapered periodogram, at the resolution that the record's length
-//! allows, and transforms under sine tapers for its lowest frequencies.
+//! Transforms of a whole record: the tapered periodogram, and sine tapers for the lowest frequencies.
 
 use super::transforms::BufferedTransform;
 use crate::samples::uniform_series::UniformSeries;
@@ -7,26 +6,24 @@ use fourier::Complex;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Ordinates per resolution `1/T`: between two of them a sinusoid loses at most 0.9 dB of its peak.
+/// Ordinates per resolution `1/T`; a sinusoid between two loses at most 0.9 dB.
 pub(super) const PADDING: usize = 2;
 
-/// Fraction of the record over which the taper rises, and again falls. It costs a sinusoid 0.2 dB; without it, the jump
-/// from the record's end to its beginning leaks into the nulls of a digital filter.
+/// Fraction of the record over which the taper rises and falls, against the end's jump in a filter's nulls.
 const RISE: f64 = 0.05;
 
 /// `2·dt/Σw²·|X(f)|²` under the taper `w`, at the multiples of half a resolution.
 #[derive(Clone)]
 pub(super) struct Periodogram {
-    /// Hz between the ordinates of `density`.
+    /// Hz between ordinates.
     spacing: f64,
     density: Vec<f64>,
-    /// Periodograms that each ordinate is the mean of.
+    /// Periodograms averaged in each ordinate.
     looks: u32,
 }
 
 impl Periodogram {
-    /// Transforms samples whose straight line has been removed, with short gaps interpolated. Up to 1 % of them, at the end, are left out so that the
-    /// length has no large prime factor. `None` for a record of fewer than two samples.
+    /// Transforms samples without their straight line, with short gaps interpolated; drops up to 1 % at the end.
     pub(super) fn new(series: &UniformSeries) -> Option<Self> {
         let length = smooth_length(series.values().len());
         let (filled, _) = series.interpolated();
@@ -41,7 +38,7 @@ impl Periodogram {
             if value.is_finite() {
                 *slot = weight * value;
             }
-            // An interpolated sample has hardly any white noise of its own.
+            // An interpolated sample has hardly any white noise.
             if series.values()[at].is_finite() {
                 power += weight * weight;
             }
@@ -54,7 +51,6 @@ impl Periodogram {
         })
     }
 
-    /// Makes this the mean of the periodograms that it is made of and of another of the same length.
     pub(super) fn average_with(&mut self, other: &Self) {
         self.looks += other.looks;
         let weight = f64::from(other.looks) / f64::from(self.looks);
@@ -63,40 +59,38 @@ impl Periodogram {
         }
     }
 
-    /// Independent estimates that each ordinate is the mean of.
+    /// Independent estimates per ordinate.
     pub(super) fn looks(&self) -> f64 {
         f64::from(self.looks)
     }
 
-    /// Sets one of the [`padded`](Self::padded) ordinates.
     pub(super) fn replace(&mut self, at: usize, density: f64) {
         self.density[at] = density;
     }
 
-    /// Resolution `1/T`, Hz.
     pub(super) fn resolution(&self) -> f64 {
         PADDING as f64 * self.spacing
     }
 
-    /// Ordinates at the multiples of the resolution, from 0 Hz; those of white noise are independent of each other.
+    /// Ordinates at multiples of the resolution, from 0 Hz: independent in white noise.
     pub(super) fn independent(&self) -> impl Iterator<Item = f64> {
         self.density.iter().copied().step_by(PADDING)
     }
 
-    /// All ordinates, [`PADDING`] to a resolution, from 0 Hz.
+    /// All ordinates, [`PADDING`] per resolution, from 0 Hz.
     pub(super) fn padded(&self) -> &[f64] {
         &self.density
     }
 }
 
-/// Weight of sample `at` of `length`: 1, with a half cosine at either end (a Tukey window).
+/// Tukey window: weight of sample `at` of `length`.
 pub(super) fn taper(at: usize, length: usize) -> f64 {
     let from_end = at.min(length - 1 - at) as f64 + 0.5;
     let rise = (RISE * length as f64).max(1.0);
     if from_end < rise { (1.0 - (PI * from_end / rise).cos()) / 2.0 } else { 1.0 }
 }
 
-/// The largest length up to `length` without a prime factor above 7.
+/// Largest length up to `length` without a prime factor above 7.
 pub(super) fn smooth_length(length: usize) -> usize {
     (1..=length).rev().find(|&candidate| is_smooth(candidate)).unwrap_or(0)
 }
@@ -110,14 +104,13 @@ fn is_smooth(mut length: usize) -> bool {
     length == 1
 }
 
-/// Number of sine tapers.
 const TAPERS: usize = 3;
-/// Lowest ordinate in use, in resolutions; removing the straight line has removed power below it.
+/// Lowest ordinate in use, resolutions; removing the line took power below.
 const LOWEST: usize = 2;
-/// A band is this fraction of its frequency wide: 1/12.
+/// Relative width of a band: 1/12.
 const BAND: usize = 12;
 
-/// Bands of ordinates from [`LOWEST`] up to `last`, each 1/[`BAND`] of its frequency wide.
+/// Bands from [`LOWEST`] to `last`, 1/[`BAND`] of their frequency wide.
 pub(super) fn low_frequency_bands(last: usize) -> impl Iterator<Item = Range<usize>> {
     let mut from = LOWEST;
     std::iter::from_fn(move || {
@@ -127,12 +120,10 @@ pub(super) fn low_frequency_bands(last: usize) -> impl Iterator<Item = Range<usi
     })
 }
 
-/// Transforms of a record under the sine tapers (K. Riedel and A. Sidorenko, "Minimum bias multiple taper spectral
-/// estimation", IEEE Trans. Signal Process. 43, 1995): little of a random walk leaks to higher frequencies, and the
-/// average over the tapers uses nearly all of the record.
+/// Transforms under sine tapers (K. Riedel and A. Sidorenko, IEEE Trans. Signal Process. 43, 1995).
 pub(super) struct SineTapered {
     pub sample_period: f64,
-    /// Number of samples that were transformed.
+    /// Transformed samples.
     pub length: usize,
     transforms: Vec<Vec<Complex<f64>>>,
 }
@@ -153,7 +144,6 @@ impl SineTapered {
                 }
             }
             let mut output = transform.make_output_vec();
-            // An error means buffers of the wrong length; these are the planner's own.
             transform.process(&mut input, &mut output).ok()?;
             let scale = (2.0 * series.sample_period() / power / TAPERS as f64).sqrt();
             output.iter_mut().for_each(|bin| *bin *= scale);
@@ -163,13 +153,11 @@ impl SineTapered {
         Some(Self { sample_period: series.sample_period(), length, transforms: transforms? })
     }
 
-    /// Hz between ordinates.
     pub(super) fn resolution(&self) -> f64 {
         1.0 / (self.length as f64 * self.sample_period)
     }
 
-    /// Real part of the one-sided cross-spectral density with a record of the same length, at an ordinate, averaged over
-    /// the tapers.
+    /// Real one-sided cross-spectral density at an ordinate, averaged over the tapers.
     pub(super) fn cross_density(&self, other: &Self, at: usize) -> f64 {
         self.transforms.iter().zip(&other.transforms).map(|(a, b)| (a[at] * b[at].conj()).re).sum()
     }

@@ -1,17 +1,17 @@
-//! The smooth density of slow noise in block means: white noise, a random walk, and Markov processes of many time constants.
+//! The smooth density of slow noise in block means: white, a random walk, and Markov processes.
 
 use super::whittle::{Sign, SpectralBand, fit_mixture, mixture_density};
 
-/// Corner of the slowest Markov process, in periods per record; that of each further one is twice the one before.
+/// Corner of the slowest Markov process, periods per record; doubled for each further one.
 const LEAST_CORNER: f64 = 2.0;
 
-/// A sum of `TERMS` densities: of white noise, of a random walk, and of Markov processes.
+/// A sum of `TERMS` densities.
 pub(super) struct SlowBackground<const TERMS: usize> {
     densities: [f64; TERMS],
 }
 
 impl<const TERMS: usize> SlowBackground<TERMS> {
-    /// The likeliest in `bands`, whose frequencies are in periods per record; `None` if all terms are 0.
+    /// Fitted to `bands`, in periods per record; `None` if all terms are 0.
     pub(super) fn fit(bands: &[SpectralBand]) -> Option<Self> {
         let bases: Vec<[f64; TERMS]> = bands.iter().map(|band| Self::basis(band.frequency)).collect();
         let mut densities = [0.0; TERMS];
@@ -19,7 +19,6 @@ impl<const TERMS: usize> SlowBackground<TERMS> {
         (densities.iter().sum::<f64>() > 0.0).then_some(Self { densities })
     }
 
-    /// Density at an order in periods per record.
     pub(super) fn density(&self, order: f64) -> f64 {
         mixture_density(&Self::basis(order), &self.densities)
     }

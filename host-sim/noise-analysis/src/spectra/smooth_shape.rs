@@ -1,7 +1,5 @@
-//! The smooth part of a spectrum, as a sum of known shapes.
-//!
-//! [`SpectralShape`], fitted by Whittle's likelihood, is white, flicker and random-walk noise behind a digital filter; `Background` corrects it by local medians, which
-//! lines hardly move.
+//! The smooth part of a spectrum as a sum of known shapes. [`SpectralShape`], fitted by Whittle's likelihood, is white,
+//! flicker and random-walk noise behind a digital filter; `Background` corrects it by local medians.
 
 use super::whittle::{Sign, SpectralBand, fit_mixture, information, mixture_density};
 use crate::robust::median;
@@ -10,18 +8,17 @@ use nalgebra::DMatrix;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Longest filter that is tried: two cascaded averages of `2^6` samples each, the largest setting of the ADIS16405.
+/// Longest filter: two averages of `2^6` samples, the largest setting of the ADIS16405.
 const LARGEST_TAPS_LOG2: u32 = 6;
 
-/// Most taps of a filter that is read slowly: those of a [`MovingAverageFilter`].
+/// Most taps of a slowly read filter, a [`MovingAverageFilter`].
 const MOST_TAPS: u32 = 128;
 
-/// Which filters a shape may be behind.
+/// Filters that a shape may be behind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Filters {
-    /// None.
     Without,
-    /// Any, of which each sample is one of so many values.
+    /// Any; each sample is one of this many values.
     ReadEvery(u32),
 }
 
@@ -34,16 +31,14 @@ pub struct SpectralShape {
     sample_period: f64,
     /// Taps of each of the filter's two cascaded averages; 1 for no filter.
     pub taps: u32,
-    /// The filter where not every value of it is read.
+    /// The filter, if not every value is read.
     read_slowly: Option<MovingAverageFilter>,
-    /// Densities at 1 Hz of the filtered white, 1/f and 1/f² noise, and of the floor, unit²/Hz.
+    /// At 1 Hz: filtered white, 1/f and 1/f² noise, and the floor, unit²/Hz.
     pub densities: [f64; TERMS],
 }
 
 impl SpectralShape {
-    /// The likeliest shape over all lengths of the filter, without a filter if `bands` is empty. Where each sample is one of several values,
-    /// a filter of which only these are read is a candidate: it resembles one that is as long in samples and of which every value
-    /// is read, but in its nulls.
+    /// The likeliest shape over all filter lengths; slowly read filters if each sample is one of several values.
     #[must_use]
     pub(super) fn fit(bands: &[SpectralBand], sample_period: f64, filters: Filters) -> Self {
         let fit = |taps: u32, decimation: u32| Self::fit_with_filter(bands, sample_period, (taps, decimation));
@@ -67,18 +62,17 @@ impl SpectralShape {
     }
 
     /// N in unit·√s: the root of half the density of the white noise before the filter. Only of a spectrum that is known to
-    /// be behind a filter: in white noise nothing tells the filtered noise from the floor, and
-    /// [`fit_white_noise`](super::fit_white_noise) chooses between them.
+    /// be behind a filter: in white noise nothing tells the filtered noise from the floor.
     #[must_use]
     pub fn angle_random_walk(&self) -> f64 {
         (self.densities[0] / 2.0).sqrt()
     }
 
-    /// Relative standard deviation of [`angle_random_walk`](Self::angle_random_walk) when the other terms are fitted as
-    /// well, by the Fisher information in `bands`; `None` where there is no white noise.
+    /// Relative standard deviation of [`angle_random_walk`](Self::angle_random_walk) beside the other terms (Fisher
+    /// information in `bands`); `None` without white noise.
     #[must_use]
     pub fn angle_random_walk_error(&self, bands: &[SpectralBand]) -> Option<f64> {
-        // Fisher information on the logarithms of the densities that are not 0.
+        // Information on the logarithms of non-zero densities.
         let present: Vec<usize> = (0..TERMS).filter(|&term| self.densities[term] > 0.0).collect();
         if present.first() != Some(&0) {
             return None;
@@ -94,7 +88,7 @@ impl SpectralShape {
         Some(variance.sqrt() / 2.0)
     }
 
-    /// The likeliest shape with a filter of these taps and decimation, and its objective.
+    /// The likeliest shape with these taps and decimation, and its objective.
     fn fit_with_filter(bands: &[SpectralBand], sample_period: f64, (taps, decimation): (u32, u32)) -> (Self, f64) {
         let slow = MovingAverageFilter { decimation: decimation.into(), ..MovingAverageFilter::bartlett(taps as u16) };
         let read_slowly = (decimation > 1).then_some(slow);
@@ -104,7 +98,7 @@ impl SpectralShape {
         (shape, objective)
     }
 
-    /// Values of the terms for a density of 1 at 1 Hz. Without a filter the floor is the same as the white noise, and left out.
+    /// Terms for a density of 1 at 1 Hz. Without a filter the floor is left out: it equals the white noise.
     fn basis(&self, frequency: f64) -> [f64; TERMS] {
         let sine = (PI * frequency * self.sample_period).sin();
         let gain = self.gain(frequency, sine);
@@ -112,8 +106,7 @@ impl SpectralShape {
         [gain, gain / frequency, gain * walk * walk, if self.taps > 1 { 1.0 } else { 0.0 }]
     }
 
-    /// Power gain of the filter at a frequency whose phase in one sample has this `sine`. Of one that is read slowly it has what of white
-    /// noise is folded down.
+    /// Power gain at a frequency with this `sine` of its phase per sample; includes aliases if read slowly.
     fn gain(&self, frequency: f64, sine: f64) -> f64 {
         match &self.read_slowly {
             Some(filter) => filter.density(frequency, self.sample_period),
@@ -122,13 +115,12 @@ impl SpectralShape {
     }
 }
 
-/// Square root of the density of a sampled random walk: 1/f² with its aliases, `(π·dt/sin(πf·dt))²`.
+/// Root of a sampled walk's density: `π·dt/sin(πf·dt)`.
 pub(super) fn walk_amplitude(frequency: f64, sample_period: f64) -> f64 {
     PI * sample_period / (PI * frequency * sample_period).sin()
 }
 
-/// Power gain of two cascaded averages over `taps` samples each (a Bartlett window), at a frequency whose phase in one sample has
-/// this `sine`.
+/// Power gain of two cascaded averages over `taps` samples (Bartlett), with this `sine` of the phase per sample.
 pub(super) fn filter_gain(frequency: f64, sample_period: f64, taps: u32, sine: f64) -> f64 {
     if taps == 1 || sine == 0.0 {
         return 1.0;
@@ -137,18 +129,18 @@ pub(super) fn filter_gain(frequency: f64, sample_period: f64, taps: u32, sine: f
     ((taps * PI * frequency * sample_period).sin() / (taps * sine)).powi(4)
 }
 
-/// Ordinates below this multiple of the resolution are left to the drift of the record.
+/// Lowest ordinate, resolutions; below is drift.
 const LOWEST: usize = 3;
-/// Number of equal bands over the linear part of the spectrum; narrow enough to resolve the nulls of a filter.
+/// Bands over the linear part, narrow enough for a filter's nulls.
 const BANDS: usize = 512;
-/// Ordinates on either side of a local median, at most.
+/// Most ordinates per side of a local median.
 pub(super) const WINDOW: usize = 512;
 /// Variance of the median of exponential variables over that of their mean: 1/ln²2.
 const MEDIAN_LOSS: f64 = 2.08;
-/// Floor of the background, as a fraction of the density of the median band: below it the spectrum is what the taper leaks.
+/// Floor of the background over the median band's density: below is leakage.
 const FLOOR: f64 = 1e-7;
 
-/// A spectrum without its lines: a smooth shape with a local correction.
+/// A spectrum without its lines: smooth shape and local correction.
 pub(super) struct Background<'a> {
     /// Factor on the shape at a frequency in Hz.
     known: &'a dyn Fn(f64) -> f64,
@@ -156,21 +148,19 @@ pub(super) struct Background<'a> {
     floor: f64,
     resolution: f64,
     ordinates: usize,
-    /// Independent estimates that each ordinate is the mean of.
+    /// Independent estimates per ordinate.
     looks: f64,
 }
 
-/// The level of a spectrum around an ordinate.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LocalLevel {
     pub value: f64,
-    /// Number of ordinates whose mean would vary as much as `value`.
+    /// Equivalent number of averaged ordinates.
     pub ordinates: f64,
 }
 
 impl<'a> Background<'a> {
-    /// Fits the background of `density`, given at the multiples of `resolution` Hz from 0 on, each the mean of `looks` independent
-    /// estimates; `None` if that is fewer than 8 bands, or if a band has no power.
+    /// Fits the background of `density` at multiples of `resolution` Hz; `None` below 8 bands, or without power.
     pub(super) fn fit(
         density: &[f64],
         looks: f64,
@@ -200,17 +190,17 @@ impl<'a> Background<'a> {
         })
     }
 
-    /// Density at `bin` resolutions, before the local correction.
+    /// At `bin` resolutions, without the local correction.
     pub(super) fn shape_at(&self, bin: f64) -> f64 {
         let frequency = bin * self.resolution;
         (self.known)(frequency) * (self.shape.density(frequency) + self.floor)
     }
 
-    /// Local correction around `bin`: the median of ordinates that have been divided by [`shape_at`](Self::shape_at).
+    /// Local correction around `bin`: median of ordinates over [`shape_at`](Self::shape_at).
     pub(super) fn level(&self, whitened: &[f64], bin: usize) -> LocalLevel {
         let widest = WINDOW.min(self.ordinates / 16).max(8);
         let low = bin.saturating_sub(widest.min(bin * 2 / 3)).max(LOWEST);
-        // The last ordinate is left out: it has a single degree of freedom.
+        // The last ordinate has a single degree of freedom.
         let high = (bin + widest.min(2 * bin)).min(self.ordinates - 2);
         let mut window = whitened[low..=high].to_vec();
         let value = median(&mut window) / expected_median(window.len(), self.looks);
@@ -218,7 +208,7 @@ impl<'a> Background<'a> {
     }
 }
 
-/// Bands of ordinates up to the end of a spectrum: an eighth of the frequency wide at first, then all of one width.
+/// Bands an eighth of their frequency wide at first, then of one width.
 fn background_bands(ordinates: usize) -> impl Iterator<Item = Range<usize>> {
     let widest = (ordinates / BANDS).max(1);
     let mut start = LOWEST;
@@ -229,9 +219,7 @@ fn background_bands(ordinates: usize) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
-/// Expected median of `count` variables that are each the mean of `looks` exponential ones of mean 1. The expected order statistic
-/// of rank `j` of exponential variables is the sum of `1/i` over the last `j` of `1 … count`; the median of a gamma variable of
-/// shape g, 4 or more, is within 0.3 % `1 − 1/(3g)` of its mean.
+/// Expected median of `count` means of `looks` exponential variables of mean 1.
 fn expected_median(count: usize, looks: f64) -> f64 {
     if looks > 1.0 {
         return 1.0 - 1.0 / (3.0 * looks);

@@ -1,6 +1,4 @@
-//! The lines in the spectrum of a channel, and the terms of a noise model that they are.
-//!
-//! A line whose frequency wanders leaves many peaks in the spectrum, which are merged into one line.
+//! The lines of a channel's spectrum as terms of a noise model. Peaks of a wandering line are merged.
 
 use crate::bounds::MeasuredValue;
 use crate::samples::rounding::Rounding;
@@ -13,82 +11,77 @@ use allan_core::model::FittedTerm;
 use allan_core::term::{NoiseTerm, Resonance, Shape, Sinusoid};
 use std::f64::consts::{PI, SQRT_2};
 
-/// Peaks closer than this part of their frequency are one line if either has a width.
+/// Relative distance of peaks of one line, if either has a width.
 const MERGE_DISTANCE: f64 = 0.03;
-/// Peaks closer than so many of their widths are one line.
+/// Distance of peaks of one line, in widths.
 const MERGE_WIDTHS: f64 = 3.0;
-/// Peaks closer than so many resolutions are one line: a sinusoid and the side lobes of its taper.
+/// Distance of peaks of one line, in resolutions: side lobes.
 const MERGE_RESOLUTIONS: f64 = 8.0;
-/// Distance from a line beyond which a peak is none of the side lobes of its taper, in resolutions, and by how much two peaks at
-/// equal distances from a line may differ in their distances.
+/// Distance, resolutions, beyond the taper's side lobes, and largest difference of sidebands' distances.
 const LOBE_RESOLUTIONS: f64 = 2.5;
 const SIDEBAND_TOLERANCE: f64 = 0.5;
-/// By which part, and by how many standard deviations, equal peaks differ at most: peaks a few resolutions from a line change
-/// with the part of it that was left.
+/// Largest relative difference of equal peaks, and in standard deviations.
 const SIDEBAND_RATIO: f64 = 0.25;
 const SIDEBAND_SIGMAS: f64 = 3.0;
-/// A peak at a lower frequency than so many of its widths is no line but a Markov process.
+/// Least frequency of a line in widths; below is a Markov process.
 const MIN_WIDTHS_FROM_ZERO: f64 = 1.5;
-/// Lower bound of the model's other noise, as a fraction of that of its Markov processes: in the nulls of a filter rounding noise remains.
+/// Least noise of the model over that of its Markov processes: rounding remains in a filter's nulls.
 const MIN_NOISE: f64 = 1e-6;
-/// A line wider than this part of its frequency may be an error of the form of the background.
+/// Relative width above which a line may be an error of the background.
 const BROAD: f64 = 0.1;
-/// A line whose bandwidth times the length of the record is below this is treated as a sinusoid.
+/// Least bandwidth times record length of a resonance; less is a sinusoid.
 const MIN_PHASE_CHANGES: f64 = 30.0;
-/// Least bandwidth of a resonance of few phase changes in the record, in units of its frequency: that of a damping ratio of half a
-/// percent. The speed of the motor in the measured recordings wanders by a third of that.
+/// Least relative bandwidth of a resonance with few phase changes: a damping ratio of half a percent.
 const NARROWEST_BAND: f64 = 0.01;
-/// Periods in a record below which a sinusoid is a ramp to the longest octaves of the curve.
+/// Periods below which a sinusoid is a ramp to the longest octaves.
 pub(crate) const FEW_PERIODS: f64 = 8.0;
 /// Full width at half maximum of a normal curve, in standard deviations.
 const FULL_WIDTH: f64 = 2.35;
-/// One line of a spectrum, merged from one or several peaks.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct MergedLine {
-    /// Mean weighted by power, Hz.
+    /// Weighted by power, Hz.
     pub frequency: MeasuredValue,
     /// Standard deviation of the line's signal, in the channel's unit.
     pub deviation: MeasuredValue,
-    /// Full width at half maximum, Hz; of a line that the record does not resolve 0, or the scatter of its peaks.
+    /// Full width at half maximum, Hz; 0 or the scatter of the peaks if unresolved.
     pub width: MeasuredValue,
-    /// −2 log-likelihood ratio of the strongest peak.
+    /// For the strongest peak: −2 log-likelihood ratio.
     pub statistic: f64,
-    /// Probability that a record without lines shows the strongest peak at any frequency.
+    /// For the strongest peak at any frequency, without lines.
     pub p_value: f64,
-    /// Probability that the strongest peak, were it a resonance, would deviate as far from the spectrum of one.
+    /// p-value of the strongest peak as a resonance.
     pub shape_p_value: f64,
-    /// How the amplitude or the phase of the strongest peak changes to and fro.
+    /// Periodic change of the strongest peak.
     pub modulation: Option<spectra::Modulation>,
-    /// Whether the strongest peak is likelier a resonance than a sinusoid.
+    /// True if the strongest peak is likelier a resonance.
     is_resonance: bool,
     duration_s: f64,
 }
 
-/// The deviation of a line of means of `m` samples over `width` s, before they were taken.
+/// The line before it was averaged over `m` samples, `width` s.
 pub(crate) fn before_averaging(line: &MergedLine, width: f64, m: u64) -> MeasuredValue {
     let gain = gain_of_mean(line.frequency.value, width, m);
     MeasuredValue { value: line.deviation.value / gain, error: line.deviation.error / gain }
 }
 
-/// Part of a sinusoid of `frequency` Hz that is in the means of `m` samples over `width` s: `sin(πfw)/(m·sin(πfw/m))`.
+/// Gain of the mean of `m` samples over `width` s at `frequency`, Hz: `sin(πfw)/(m·sin(πfw/m))`.
 fn gain_of_mean(frequency: f64, width: f64, m: u64) -> f64 {
     let (phase, m) = (PI * frequency * width, m as f64);
     phase.sin() / (m * (phase / m).sin())
 }
 
-/// Whether `line` of a series is what the faster line `of` looks like at its sample period, s: as wide, at the alias of its frequency.
+/// True if `line` is the alias of the faster line `of` at the period, s: at its frequency, as wide.
 pub(crate) fn is_alias(line: &MergedLine, of: &MergedLine, period_s: f64) -> bool {
     let turns = of.frequency.value * period_s;
     let alias = (turns - turns.round()).abs() / period_s;
     let reach =
         MERGE_WIDTHS * (of.width.value + of.frequency.error + line.width.value) + MERGE_RESOLUTIONS / line.duration_s;
-    // Which is narrower is a line of its own.
+    // A narrower one is a line of its own.
     let is_as_wide = MERGE_WIDTHS * line.width.value >= of.width.value || of.is_sinusoid();
     is_as_wide && (line.frequency.value - alias).abs() < reach
 }
 
-/// The lines of a series, the strongest first, over the background of the model `known`, or without a model over any sum
-/// of white, flicker and random-walk noise. Each sample is one of `read_every` values of the sensor.
+/// The lines of a series over the background of `known`, the strongest first; a sample is one of `read_every` values.
 pub(crate) fn find(
     series: &Series,
     rounding: &Rounding,
@@ -105,8 +98,7 @@ pub(crate) fn find(
     merged(peaks, duration_s, duration_s, rate_error)
 }
 
-/// The lines of which `peaks` of a spectrum are parts, in a record of `duration_s`; the spectrum resolves the reciprocal of
-/// `resolved_s`.
+/// Merges `peaks` of a record of `duration_s` whose spectrum resolves 1/`resolved_s`.
 pub(crate) fn merged(
     peaks: Vec<spectra::SpectralLine>,
     resolved_s: f64,
@@ -139,14 +131,12 @@ pub(crate) fn merged(
     lines
 }
 
-/// Full width at half maximum of a peak, Hz; 0 of a sinusoid.
+/// Full width at half maximum, Hz; 0 of a sinusoid.
 fn width(peak: &spectra::SpectralLine) -> f64 {
     peak.width.map_or(0.0, |width| width.value)
 }
 
-/// Density of a model's noise without its lines over what of it is white, flicker and random-walk noise: Markov processes are not, and
-/// white noise behind a filter that is read slowly is not folded as that at the samples' own rate. What remains in its nulls is
-/// `rounding`.
+/// Density of a model's noise without lines over its N, B and K; `rounding` remains in the nulls of filters.
 fn background(model: &Model, frequency: f64, rounding: &Rounding) -> f64 {
     let rounding = 0.5 * rounding.density(frequency);
     let (mut all, mut power_laws) = (0.0, 0.0);
@@ -163,13 +153,11 @@ fn background(model: &Model, frequency: f64, rounding: &Rounding) -> f64 {
     all / power_laws.max(MIN_NOISE * all)
 }
 
-/// Whether a term is noise behind a filter of which not every value is read.
 pub(crate) fn is_read_slowly(kind: &NoiseTerm) -> bool {
     matches!(kind, NoiseTerm::Filtered(filter) if filter.decimation > 1.0)
 }
 
-/// The change of the amplitude of the strongest of `peaks`, if the first two sinusoids beside it are at equal distances on either
-/// side, beyond the side lobes of the taper, and equally strong. All peaks have this `deviation`.
+/// The modulation of the strongest of `peaks`, if the sinusoids on either side are equally far and equally strong.
 fn sidebands(peaks: &[spectra::SpectralLine], deviation: f64, duration_s: f64) -> Option<spectra::Modulation> {
     let [strongest, one, other, ..] = peaks else { return None };
     let distance = |peak: &spectra::SpectralLine| peak.frequency.value - strongest.frequency.value;
@@ -180,7 +168,7 @@ fn sidebands(peaks: &[spectra::SpectralLine], deviation: f64, duration_s: f64) -
     let mean = 0.5 * (one.deviation.value + other.deviation.value);
     let is_equal = difference < SIDEBAND_RATIO * mean + SIDEBAND_SIGMAS * error;
     let are_sinusoids = [strongest, one, other].iter().all(|peak| peak.width.is_none());
-    // Each sideband has half the depth of the amplitude of the line.
+    // A sideband has half the depth.
     let over_line = 2.0 / strongest.deviation.value;
     (is_symmetric && is_beside && is_equal && are_sinusoids).then(|| spectra::Modulation {
         frequency: MeasuredValue {
@@ -196,7 +184,6 @@ fn sidebands(peaks: &[spectra::SpectralLine], deviation: f64, duration_s: f64) -
 }
 
 impl MergedLine {
-    /// One line with the power of all `peaks`, at their mean frequency, as wide as they and their spread.
     fn merge(peaks: &[spectra::SpectralLine], duration_s: f64, rate_error: f64) -> Self {
         let power = |peak: &spectra::SpectralLine| peak.deviation.value * peak.deviation.value;
         let total: f64 = peaks.iter().map(power).sum();
@@ -227,7 +214,7 @@ impl MergedLine {
         }
     }
 
-    /// Whether both have the same frequency, within the wider of them and the resolution.
+    /// Equal within the wider one and the resolution.
     pub(crate) fn is_same(&self, other: &Self) -> bool {
         let reach = self.width.value.max(other.width.value).max(MERGE_RESOLUTIONS / self.duration_s);
         (self.frequency.value - other.frequency.value).abs() < reach
@@ -237,37 +224,32 @@ impl MergedLine {
         matches!(self.kind(), NoiseTerm::Sinusoid(_))
     }
 
-    /// Whether it has a few periods in the record.
     pub(crate) fn is_slow(&self) -> bool {
         self.frequency.value * self.duration_s < FEW_PERIODS
     }
 
-    /// Whether it may be an error of the form of the background.
     pub(crate) fn is_broad(&self) -> bool {
         self.width.value > BROAD * self.frequency.value
     }
 
-    /// Whether the record resolves its width: whether that is at least the reciprocal of the length of the record.
     pub(crate) fn is_wider_than_resolution(&self) -> bool {
         self.width.value * self.duration_s >= 1.0
     }
 
-    /// Whether the spectrum shows a width: the strongest peak is a resonance, and the interval of the width is above the resolution
-    /// and not so narrow as that of a line that wanders.
+    /// True if a resonance is significantly wider than the resolution and a wandering line.
     pub(crate) fn is_band(&self) -> bool {
         let least = self.width.value - NORMAL_975 * self.width.error;
         let is_broad_enough = self.width.value > NARROWEST_BAND * self.frequency.value;
         self.is_resonance && is_broad_enough && least * self.duration_s > 1.0
     }
 
-    /// The term for the line with its size, frequency and width by the spectrum.
     pub(crate) fn fitted_term(&self) -> FittedTerm {
         let kind = self.kind();
         let bounds = |of: MeasuredValue| {
             let half = NORMAL_975 * of.error;
             ((of.value - half).max(0.0), of.value + half)
         };
-        // The coefficient of a sinusoid is its amplitude, that of a resonance its deviation.
+        // Coefficient: amplitude of a sinusoid, deviation of a resonance.
         let scale = if self.is_sinusoid() { SQRT_2 } else { 1.0 };
         let (low, high) = bounds(self.deviation);
         let value = scale * self.deviation.value;
@@ -281,7 +263,7 @@ impl MergedLine {
         term
     }
 
-    /// The model's term for the line: a sinusoid, or a resonance if it is wider than the record resolves.
+    /// A sinusoid, or a resonance if wider than the record resolves.
     pub(crate) fn kind(&self) -> NoiseTerm {
         let (frequency, bandwidth) = (self.frequency.value, self.width.value);
         if bandwidth * self.duration_s < MIN_PHASE_CHANGES {
@@ -302,7 +284,7 @@ mod tests {
     use rand_distr::StandardNormal;
     use std::f64::consts::TAU;
 
-    /// 400 s at 50 Hz: white noise of deviation 1 with a sinusoid at 7.3 Hz that has this amplitude at each part of the record.
+    /// 400 s at 50 Hz: white noise of deviation 1 and a sinusoid at 7.3 Hz, amplitude by the part of the record.
     fn series(amplitude: impl Fn(f64) -> f64) -> Series {
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let slots = 0..20_000_u64;
@@ -323,17 +305,15 @@ mod tests {
                 .map(|line| (line.frequency.value, line.modulation))
         };
         let (frequency, modulation) = of(0.5).expect("100 times the noise at its frequency");
-        // Frequencies are known to a fraction of the resolution of 0.0025 Hz.
         assert!((frequency - 7.3).abs() < 0.0025, "{frequency}");
         let modulation = modulation.expect("two sidebands of a quarter of the amplitude");
         assert!((modulation.frequency.value - 5.0 / 400.0).abs() < 0.0025, "{modulation:?}");
-        // The amplitude of each sideband is known to a fiftieth of that of the line.
+        // Sidebands are known to a fiftieth of the line.
         assert!((modulation.depth.value - 0.5).abs() < 0.1, "{modulation:?}");
         assert_eq!(of(0.0).map(|(_, modulation)| modulation), Some(None));
     }
 
-    /// Five times on and off: the sidebands at the third, the fifth and the seventh multiple have 20,000/4·(2/kπ)² times the power of the noise,
-    /// 225, 81 and 41, and are far enough from the line to be lines of their own.
+    /// Sidebands at the third, fifth and seventh multiple have 225, 81 and 41 times the noise.
     #[test]
     fn a_line_that_is_switched_on_and_off_is_one() {
         let switched = series(|part| if (5.0 * part).fract() < 0.5 { 2.0 } else { 0.0 });
@@ -343,7 +323,7 @@ mod tests {
         assert!((change.frequency.value - 5.0 / 400.0).abs() < 0.0005, "{change:?}");
     }
 
-    /// Means of samples, not of the time between them: the largest frequency in the means is that of two fifths of their rate.
+    /// Up to two fifths of the means' rate.
     #[test]
     fn a_mean_has_the_part_of_a_sinusoid_that_its_samples_have() {
         const MEANS: usize = 10_000;
@@ -352,7 +332,7 @@ mod tests {
                 let sample = |at: usize| (TAU * turns_in_mean * at as f64 / m as f64).sin();
                 let mean = |number: usize| (m * number..m * (number + 1)).map(sample).sum::<f64>() / m as f64;
                 let square = (0..MEANS).map(|number| mean(number).powi(2)).sum::<f64>() / MEANS as f64;
-                // The mean square of whole turns is exactly ½; what is left over of the last one is below 1 in 110 turns.
+                // Whole turns have the mean square ½; the last one adds 1 in 110.
                 let expected = gain_of_mean(turns_in_mean, 1.0, m as u64) / 2f64.sqrt();
                 assert!(
                     (square.sqrt() / expected - 1.0).abs() < 0.005,

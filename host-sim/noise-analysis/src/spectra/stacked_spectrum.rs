@@ -1,9 +1,7 @@
-//! Lines in the mean of the spectra of stretches of a record whose samples are not kept.
+//! Lines in the mean spectrum of stretches of a record whose samples are not kept.
 //!
-//! The ordinates of the mean of `K` spectra are gamma variables of shape `K`, so that it shows a line that is lost in the noise of
-//! each stretch. By the tail of that distribution a sinusoid has to be 1.3 times as large for 16 stretches, and 1.9 times for
-//! 150, as for the spectrum of all of the record at once, which resolves more. A resonance that is wider than a stretch resolves has to
-//! be no larger.
+//! Its ordinates are gamma variables of shape `K`. A sinusoid has to be 1.3 (16 stretches) to 1.9 (150) times as large
+//! as for all of the record; a resonance no larger.
 
 use super::alternation::Alternation;
 use super::lines::MOST;
@@ -12,30 +10,26 @@ use crate::robust::median;
 use crate::samples::rounding::Rounding;
 use crate::samples::uniform_series::UniformSeries;
 
-/// The mean of the spectra of stretches of equal length.
 #[derive(Clone)]
 pub(crate) struct StackedSpectrum {
     sample_period: f64,
     /// Smallest distance of two values, in the channel's unit.
     resolution: f64,
-    /// Values of the sensor for each sample.
     read_every: u32,
-    /// The samples of the stretch of this number that were taken, `NaN` where one is missing.
+    /// Samples of the current stretch, `NaN` if missing.
     stretch: Vec<f64>,
     number: u64,
-    /// Of means of as many samples as the first stretch needs for its rounding to act as noise.
+    /// Over means in which rounding acts as noise, by the first stretch.
     mean: Option<Spectrum>,
-    /// Of all samples: the mean of spectra has no phases.
+    /// Over all samples: the mean of spectra has no phases.
     alternation: Alternation,
-    /// Sample periods up to the latest sample.
     periods: u64,
-    /// Sum of the levels of the stretches, and of the squares of these.
+    /// Sum of the stretches' levels, and of their squares.
     levels: [f64; 2],
 }
 
 impl StackedSpectrum {
-    /// For stretches of `length` samples that are `sample_period` s apart; two values of the channel differ by `resolution` or more,
-    /// and each sample is one of `read_every` values of the sensor.
+    /// For stretches of `length` samples, `sample_period` in s; values differ by `resolution`.
     pub(crate) fn new(sample_period: f64, length: usize, resolution: f64, read_every: u32) -> Self {
         Self {
             sample_period,
@@ -50,7 +44,7 @@ impl StackedSpectrum {
         }
     }
 
-    /// Takes the next sample, which was taken in the sample period `slot`. What is left over at the end is in no stretch.
+    /// Takes the next sample; the remainder at the end is in no stretch.
     pub(crate) fn push(&mut self, slot: u64, value: f64) {
         self.alternation.push(slot, value);
         self.periods = slot + 1;
@@ -66,7 +60,6 @@ impl StackedSpectrum {
         }
     }
 
-    /// Adds the spectrum of the stretch, unless half of its samples or more are missing.
     fn end_stretch(&mut self) {
         let missing = vec![f64::NAN; self.stretch.len()];
         let values = std::mem::replace(&mut self.stretch, missing);
@@ -89,10 +82,10 @@ impl StackedSpectrum {
         }
     }
 
-    /// The lines with a p-value below 2·10⁻⁵, the strongest first; at most 6 and one at half the sample rate.
+    /// P-value below 2·10⁻⁵, the strongest first; at most 6 and one at half the sample rate.
     pub(crate) fn lines(self) -> Vec<SpectralLine> {
         let Some(mut spectrum) = self.mean else { return Vec::new() };
-        // Where the level of the noise changes from stretch to stretch, the loud ones have most of the weight.
+        // Loud stretches have most of the weight.
         let [sum, squares] = self.levels;
         spectrum.independent *= sum * sum / squares / spectrum.periodogram.looks();
         let known = |_: f64| 1.0;
@@ -137,12 +130,12 @@ mod tests {
 
     const STRETCH: usize = 4096;
 
-    /// Lines in 64 stretches of white noise of deviation 1 at 100 Hz with what `signal` adds.
+    /// Lines in 64 stretches of white noise of deviation 1 at 100 Hz and `signal`.
     fn lines(seed: u64, mut signal: impl FnMut(f64) -> f64) -> Vec<SpectralLine> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut stacked = StackedSpectrum::new(0.01, STRETCH, 0.0, 1);
         for slot in 0..64 * STRETCH as u64 {
-            // One sample in a hundred is missing, and half of the stretch before the last.
+            // One sample in a hundred is missing, and half of the second last stretch.
             let is_missing = slot % 100 == 7 || slot * 2 / STRETCH as u64 == 124;
             let value = random.sample::<f64, _>(StandardNormal) + signal(0.01 * slot as f64);
             if !is_missing {
@@ -154,13 +147,13 @@ mod tests {
 
     #[test]
     fn noise_has_no_lines() {
-        // Each of 20 has one with a probability of 2·10⁻⁵.
+        // Each has one with a probability of 2·10⁻⁵.
         for seed in 0..20 {
             assert_eq!(lines(seed, |_| 0.0), []);
         }
     }
 
-    /// A sinusoid whose peak is 2.3 times the noise in each stretch, where noise alone has such an ordinate among ten.
+    /// Its peak is 2.3 times the noise of a stretch.
     #[test]
     fn a_sinusoid_that_no_stretch_shows_is_measured() {
         let amplitude = 0.05;
@@ -173,14 +166,14 @@ mod tests {
             let deviation = (line.deviation.value - amplitude / 2f64.sqrt()) / line.deviation.error;
             frequencies += usize::from(frequency.abs() < 1.96);
             deviations += usize::from(deviation.abs() < 1.96);
-            // A probability of 6·10⁻⁵ each.
+            // 6·10⁻⁵ each.
             assert!(frequency.abs() < 4.0 && deviation.abs() < 4.0, "{seed}: {line:?}");
         }
-        // Of ten, 95 % are inside; 6 or fewer have a probability of one in a thousand.
+        // 6 or fewer of ten have a probability of 10⁻³.
         assert!(frequencies > 6 && deviations > 6, "{frequencies} {deviations}");
     }
 
-    /// White noise through a resonator at 20 Hz, 0.5 Hz wide, which no stretch shows.
+    /// At 20 Hz, 0.5 Hz wide.
     #[test]
     fn a_resonance_is_measured() {
         let mut random = ChaCha8Rng::seed_from_u64(99);

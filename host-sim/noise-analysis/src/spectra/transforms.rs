@@ -1,11 +1,11 @@
-//! Fourier transforms of real numbers in buffers that are used again, and the cosine transform.
+//! Real Fourier transforms with reused buffers, and the cosine transform.
 
 use crate::parallel::threads;
 use fourier::{Complex, RealToComplex, forward};
 use std::f64::consts::PI;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Buffers that no transform uses: new ones of megabytes would have to be cleared by the system.
+/// Spare buffers; the system would have to clear new ones.
 static BUFFERS: Mutex<Vec<Buffers>> = Mutex::new(Vec::new());
 
 #[derive(Default)]
@@ -15,14 +15,13 @@ struct Buffers {
     scratch: Vec<Complex<f64>>,
 }
 
-/// A transform of real numbers with its buffers.
 pub(super) struct BufferedTransform {
     transform: Arc<dyn RealToComplex<f64>>,
     buffers: Buffers,
 }
 
 impl BufferedTransform {
-    /// Of `length` numbers, 2 or more, which are 0 at first.
+    /// `length` is 2 or more; the input is 0 at first.
     pub(super) fn new(length: usize) -> Self {
         let transform = forward(length);
         let mut buffers = BUFFERS.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default();
@@ -33,15 +32,14 @@ impl BufferedTransform {
         Self { transform, buffers }
     }
 
-    /// The numbers to be transformed.
     pub(super) fn input(&mut self) -> &mut [f64] {
         &mut self.buffers.input
     }
 
-    /// Their transform, for which the numbers are overwritten.
+    /// The transform; overwrites the input.
     pub(super) fn output(&mut self) -> Option<&[Complex<f64>]> {
         let Buffers { input, output, scratch } = &mut self.buffers;
-        // An error means buffers of the wrong length; these have the transform's own.
+        // Only buffers of the wrong length are an error.
         self.transform.process_with_scratch(input, output, scratch).ok()?;
         Some(output)
     }
@@ -56,11 +54,7 @@ impl Drop for BufferedTransform {
     }
 }
 
-/// The cosine transform of `values` (DCT-II, not normalised), by order: `Σ x·cos(π·order·(2·at + 1)/2N)`. Their even continuation has no jump,
-/// so that little of a drift leaks.
-///
-/// It is the transform of the even samples, followed by the odd ones in reverse, turned by a quarter of its phase (J. Makhoul, "A fast
-/// cosine transform in one and two dimensions", IEEE Trans. ASSP 28, 1980).
+/// DCT-II of `values`, `Σ x·cos(π·order·(2·at + 1)/2N)` (J. Makhoul, IEEE Trans. ASSP 28, 1980).
 pub(super) fn cosine_transform(values: impl ExactSizeIterator<Item = f64>) -> Vec<f64> {
     let count = values.len();
     let mut transform = BufferedTransform::new(count);

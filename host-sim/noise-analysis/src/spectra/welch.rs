@@ -1,4 +1,4 @@
-//! Welch's estimate of a power spectral density: the average of the periodograms of overlapping windowed segments.
+//! Welch's estimate of a power spectral density.
 
 use super::smooth_shape::{Filters, SpectralShape};
 use super::whittle::SpectralBand;
@@ -8,19 +8,16 @@ use fourier::RealToComplex;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// A segment with more than this fraction of its samples missing is left out.
+/// Largest missing fraction of a segment.
 const MOST_MISSING: f64 = 0.5;
-/// So many points in a row are worth one: neighbouring points under a Hann window correlate by 2/3 at distance 1 and by 1/6
-/// at distance 2, and their squares add.
+/// Points in a row worth one under a Hann window: correlations of 2/3 and 1/6.
 const NEIGHBOURS: f64 = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
 
-/// One-sided power spectral density, averaged over segments of one length that overlap by half, each with its mean removed
-/// and under a Hann window (P. Welch, "The use of fast Fourier transform for the estimation of power spectra", IEEE Trans.
-/// Audio Electroacoust. 15, 1967).
+/// One-sided power spectral density, averaged over half-overlapping segments with their mean removed, under a Hann
+/// window (P. Welch, IEEE Trans. Audio Electroacoust. 15, 1967).
 ///
-/// Samples of short gaps are interpolated ([`UniformSeries::interpolated`]), others replaced by the segment's mean, and all
-/// are left out of the window's power. For white noise that is exact; where noise is predictable from sample to sample, as
-/// behind a filter, the density is too high by the share of the missing samples.
+/// Short gaps are interpolated ([`UniformSeries::interpolated`]), other missing samples are the segment's mean; neither
+/// counts for the window's power. Exact for white noise; too high by the missing share for predictable noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Welch {
     sample_period: f64,
@@ -29,7 +26,6 @@ pub struct Welch {
     density: Vec<f64>,
 }
 
-/// Sums the spectra of segments.
 pub(super) struct WelchSum {
     sample_period: f64,
     window: Vec<f64>,
@@ -41,7 +37,6 @@ pub(super) struct WelchSum {
 }
 
 impl WelchSum {
-    /// For segments of `length` samples.
     pub(super) fn new(sample_period: f64, length: usize) -> Self {
         let transform = fourier::forward(length);
         let (input, output) = (transform.make_input_vec(), transform.make_output_vec());
@@ -56,7 +51,7 @@ impl WelchSum {
         }
     }
 
-    /// Adds a segment, unless more than half of its samples are missing; `filled` are the same samples with short gaps interpolated.
+    /// Adds a segment, unless more than half is missing; `filled` has short gaps interpolated.
     pub(super) fn add(&mut self, segment: &[f64], filled: &[f64]) {
         let present = || segment.iter().zip(&self.window).filter(|(value, _)| value.is_finite());
         let count = present().count();
@@ -68,7 +63,6 @@ impl WelchSum {
         for ((slot, value), weight) in self.input.iter_mut().zip(filled).zip(&self.window) {
             *slot = if value.is_finite() { (value - mean) * weight } else { 0.0 };
         }
-        // An error means buffers of the wrong length; these are the planner's own.
         if self.transform.process(&mut self.input, &mut self.output).is_err() {
             return;
         }
@@ -79,7 +73,7 @@ impl WelchSum {
         self.segments += 1;
     }
 
-    /// The mean over the segments; `None` without any.
+    /// `None` without segments.
     pub(super) fn mean(self) -> Option<Welch> {
         let Self { sample_period, window, mut density, segments, .. } = self;
         density.iter_mut().for_each(|sum| *sum /= segments as f64);
@@ -103,7 +97,7 @@ impl Welch {
         sum.mean()
     }
 
-    /// The mean over the segments of several estimates with segments of one length; `None` of no estimate.
+    /// The mean over estimates with one segment length; `None` without any.
     pub(crate) fn joined<'a>(estimates: impl IntoIterator<Item = &'a Self>) -> Option<Self> {
         estimates.into_iter().cloned().reduce(|mut joined, other| {
             let segments = joined.segments + other.segments;
@@ -125,10 +119,8 @@ impl Welch {
         self.density.iter().enumerate().map(move |(bin, &density)| (bin as f64 * spacing, density))
     }
 
-    /// Number of independent ordinates that each point is worth: half its degrees of freedom.
-    ///
-    /// Segments under a Hann window that overlap by half are correlated with `ρ = 1/6`, so that `n` of them count as
-    /// `n/(1 + 2ρ²)` for large `n`.
+    /// Independent ordinates per point: half its degrees of freedom. `n` half-overlapping segments (`ρ = 1/6`) count as
+    /// `n/(1 + 2ρ²)`.
     #[must_use]
     pub fn ordinates(&self) -> f64 {
         let count = self.segments as f64;
@@ -147,19 +139,15 @@ impl Welch {
         self.sample_period
     }
 
-    /// Averages over bands of up to an eighth of their frequency, without the frequencies in Hz for which `is_line` holds.
-    ///
-    /// The first two points are left out, because the window spreads drift over them, and the last one, which has half
-    /// the degrees of freedom.
+    /// Averages over bands of up to an eighth of their frequency, without the ends and the frequencies (Hz) of lines.
     pub(crate) fn bands(&self, is_line: impl Fn(f64) -> bool) -> Vec<SpectralBand> {
         self.band_points(2, is_line).iter().map(|band| self.average(band)).collect()
     }
 
-    /// The points of the spectrum from `lowest` on, by bands of up to an eighth of their frequency, without those at whose
-    /// frequency in Hz `is_line` holds, and without the last one.
+    /// The points of those bands from `lowest` on.
     pub(crate) fn band_points(&self, lowest: usize, is_line: impl Fn(f64) -> bool) -> Vec<Vec<usize>> {
         let count = self.density.len();
-        // Narrow enough to resolve the nulls of a filter.
+        // Narrow enough for a filter's nulls.
         let widest = (count / 256).max(1);
         let mut bands = Vec::new();
         let mut start = lowest;
@@ -174,7 +162,6 @@ impl Welch {
         bands
     }
 
-    /// The average over neighbouring points.
     pub(crate) fn average(&self, points: &[usize]) -> SpectralBand {
         let count = points.len() as f64;
         let middle = points.first().zip(points.last()).map_or(0.0, |(first, last)| (first + last) as f64 / 2.0);
@@ -185,7 +172,7 @@ impl Welch {
         }
     }
 
-    /// The smooth shape of the spectrum without its lines, and the bands that it was fitted to.
+    /// The smooth shape without lines, and its bands.
     #[must_use]
     pub fn shape(&self, is_line: impl Fn(f64) -> bool) -> (SpectralShape, Vec<SpectralBand>) {
         let bands = self.bands(is_line);

@@ -1,4 +1,4 @@
-//! A spectrum divided by its background, and the peaks that stand out of it.
+//! A spectrum over its background, and its peaks.
 
 use super::line_envelope::Modulation;
 use super::line_models::{Lorentz, Sine};
@@ -13,54 +13,47 @@ use std::cell::OnceCell;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Lowest frequency that is searched, in periods per record: below, lines cannot be distinguished from drift.
+/// Lowest frequency, periods per record; below is drift.
 pub(super) const FEWEST_PERIODS: usize = 8;
-/// Peaks of the periodogram that a sinusoid is fitted to, the highest over the local level.
+/// Highest peaks to which a sinusoid is fitted.
 const FITTED_PEAKS: usize = 3;
-/// Ordinate of a sinusoid between two padded ordinates over the larger of these, at most, by which chance is judged before the fit: the
-/// padding costs 0.9 dB, a factor of 1.23; the rest is for a level that changes over the few ordinates between two of its estimates.
+/// Largest ratio of a sinusoid's ordinate to the nearest padded one: 1.23 by padding, and the change of the level.
 const LARGEST_RISE: f64 = 1.5;
-/// Least width of a resonance, in resolutions.
+/// Least width of a resonance, resolutions.
 pub(super) const NARROWEST: f64 = 1.5;
-/// Least −2 log-likelihood ratio of a sinusoid against a resonance for the latter to be taken.
+/// Least −2 log-likelihood ratio for a resonance over a sinusoid.
 const PREFERENCE: f64 = 10.0;
-/// Least −2 log-likelihood ratio of a resonance against a sinusoid that changes for the latter to be taken: the frequency of the change was
-/// chosen among 256, 2·ln 256, and its size and phase were fitted to some hundred ordinates, ln 100 for each.
+/// Least −2 log-likelihood ratio for a changing sinusoid over a resonance: 2·ln 256 + 2·ln 100.
 const COST_OF_A_CHANGE: f64 = 20.0;
-/// Least relative excess of a broad peak over the density around it; a smaller one may be an error of the background's shape.
+/// Least relative excess of a broad peak over its surroundings.
 const LEAST_EXCESS: f64 = 0.1;
-/// An average is no peak within so many standard deviations of the level around it, which chance exceeds in one of a thousand.
+/// Standard deviations over the level of a peak, one in a thousand.
 const EXAMINED: f64 = 3.0;
-/// Averages on either side that a broad peak is compared with.
+/// Averages per side that a broad peak is compared with.
 const NEIGHBOURS: usize = 16;
-/// An ordinate belongs to a sinusoid where it exceeds the background by so many standard deviations, at most so far from the
-/// sinusoid, in padded ordinates.
+/// Standard deviations of a sinusoid's ordinates over the background, and largest distance, padded ordinates.
 const EXCEEDS: f64 = 3.0;
 const MOST_REACHED: usize = 32 * PADDING;
-/// Error of the frequency of a peak by three padded ordinates, in resolutions.
+/// Frequency error by three padded ordinates, resolutions.
 const INTERPOLATION: f64 = 0.01;
-/// Most rounds of refits.
 const REFITS: usize = 6;
-/// Neighbouring samples over which the level of the noise is estimated, to see whether it changes. The square of such a level
-/// has a relative error of 15 %, and a disturbance of a second or more is several of them.
+/// Samples per noise level; each squared level is known to 15 %.
 const LEVEL_BLOCK: usize = 128;
 
-/// A spectrum to be searched for lines.
 #[derive(Clone)]
 pub(super) struct Spectrum {
     pub periodogram: Periodogram,
-    /// Of the samples, s.
     pub sample_period: f64,
-    /// What its noise may be behind.
+    /// Filters its noise may be behind.
     filters: Filters,
-    /// Independent exponential variables of mean 1 whose mean varies as an ordinate over its density does.
+    /// Independent exponential variables whose mean varies as an ordinate.
     pub independent: f64,
-    /// What is the least density of the background: below it a spectrum shows the rounding to counts itself.
+    /// Least density of the background: the rounding to counts.
     pub(super) floor: Rounding,
 }
 
 impl Spectrum {
-    /// Of a record whose straight line was removed; `None` if it is too short.
+    /// Removes the straight line; `None` for a record that is too short.
     pub(super) fn new(series: &UniformSeries) -> Option<Self> {
         Some(Self {
             periodogram: Periodogram::new(series)?,
@@ -71,7 +64,6 @@ impl Spectrum {
         })
     }
 
-    /// Makes this the mean of the spectra that it is made of and of the `next` record of the same length.
     pub(super) fn average_with(&mut self, next: &Self) {
         self.periodogram.average_with(&next.periodogram);
         self.independent += next.independent;
@@ -83,17 +75,17 @@ impl Spectrum {
 pub struct SpectralLine {
     /// Hz.
     pub frequency: MeasuredValue,
-    /// Standard deviation of the line's signal, in the unit of the series: 1/√2 of a sinusoid's amplitude.
+    /// For the line's signal, in the unit of the series: 1/√2 of a sinusoid's amplitude.
     pub deviation: MeasuredValue,
-    /// Full width at half maximum in Hz; `None` for a sinusoid, which is no wider than the record resolves.
+    /// Full width at half maximum, Hz; `None` for a sinusoid.
     pub width: Option<MeasuredValue>,
-    /// −2 log-likelihood ratio of the background alone against background and line.
+    /// −2 log-likelihood ratio of the background against background and line.
     pub statistic: f64,
-    /// Probability that a record without lines shows such a peak at any frequency.
+    /// Probability of such a peak at any frequency, without lines.
     pub p_value: f64,
-    /// Probability that a line with the spectrum of a resonance deviates as far from it; 1 of a sinusoid.
+    /// p-value as a resonance; 1 of a sinusoid.
     pub shape_p_value: f64,
-    /// How the amplitude or the phase of a line without a width changes over the record; `None` where it may be constant.
+    /// Periodic change of a line without a width; `None` if it may be constant.
     pub modulation: Option<Modulation>,
 }
 
@@ -106,7 +98,6 @@ impl SpectralLine {
     }
 }
 
-/// A line with the model by which it is removed from the record.
 pub(super) enum Candidate {
     Sine(SpectralLine, Sine),
     Resonance(Resonance),
@@ -118,27 +109,25 @@ pub(super) struct Resonance {
     pub lorentz: Lorentz,
 }
 
-/// A record's spectrum divided by its background.
+/// A spectrum over its background.
 pub(super) struct WhitenedSpectrum<'a> {
     periodogram: &'a Periodogram,
     resolution: f64,
     background: Background<'a>,
-    /// Ordinates at the multiples of the resolution, without the resonances that were removed.
+    /// At multiples of the resolution, without removed resonances.
     ordinates: Vec<f64>,
-    /// The same over the background's shape; a resonance that is fitted once more needs a few of them.
+    /// Over the background's shape; a refit needs few of them.
     whitened: OnceCell<Vec<f64>>,
-    /// Ordinates at the multiples of `1/PADDING` of the resolution, which a resonance does not need.
+    /// At multiples of `1/PADDING` of the resolution; not needed for resonances.
     padded: OnceCell<Vec<f64>>,
-    /// The resonances that were removed.
     removed: Vec<Lorentz>,
-    /// As those of the [`Spectrum`].
     independent: f64,
     floor: &'a Rounding,
     looks: f64,
 }
 
 impl<'a> WhitenedSpectrum<'a> {
-    /// Removes the `resonances`, except the one with the index `kept`, from the spectrum.
+    /// Removes the `resonances` except number `kept`.
     pub(super) fn new(
         spectrum: &'a Spectrum,
         known: &'a dyn Fn(f64) -> f64,
@@ -148,7 +137,7 @@ impl<'a> WhitenedSpectrum<'a> {
         Self::behind(spectrum, known, resonances, kept, spectrum.filters)
     }
 
-    /// The same of noise that may be behind these `filters`.
+    /// For noise behind these `filters`.
     fn behind(
         spectrum: &'a Spectrum,
         known: &'a dyn Fn(f64) -> f64,
@@ -183,17 +172,14 @@ impl<'a> WhitenedSpectrum<'a> {
         })
     }
 
-    /// Ordinates at the multiples of the resolution, over the background's shape.
     fn whitened(&self) -> &[f64] {
         self.whitened.get_or_init(|| std::iter::once(0.0).chain(self.over_shape(1..self.ordinates.len())).collect())
     }
 
-    /// Some of these, but for the first of all.
     fn over_shape(&self, bins: Range<usize>) -> impl Iterator<Item = f64> {
         bins.map(|bin| self.ordinates[bin] / self.background.shape_at(bin as f64))
     }
 
-    /// Ordinates at the multiples of `1/PADDING` of the resolution, over the background's shape.
     fn padded(&self) -> &[f64] {
         self.padded.get_or_init(|| {
             let over_shape = |(at, ordinate): (usize, &f64)| {
@@ -207,24 +193,22 @@ impl<'a> WhitenedSpectrum<'a> {
         })
     }
 
-    /// Factor by which resonances were removed from an ordinate of [`padded`](Self::padded).
+    /// Factor of the removed resonances on a [`padded`](Self::padded) ordinate.
     fn deflation_at(&self, at: usize) -> f64 {
         deflation(&self.removed, at as f64 / PADDING as f64)
     }
 
-    /// Least density of the background at a bin.
     fn floor_at(&self, bin: f64) -> f64 {
         self.floor.density(bin * self.resolution)
     }
 
-    /// The most significant line, if one is significant.
     pub(super) fn most_significant(&self, series: &UniformSeries) -> Option<Candidate> {
         let sine = self.strongest_sine(series).filter(|(line, _)| line.p_value < SIGNIFICANCE);
         if let Some((line, sine)) = sine {
             let bin = line.frequency.value / self.resolution;
             let widths =
                 (0..).map(|power| 2f64.powi(2 * power)).take_while(|width| *width < self.ordinates.len() as f64 / 32.0);
-            // A sinusoid that is switched, or swells and fades, is a band of a few lines.
+            // A modulated sinusoid is a band of a few lines.
             let change = || {
                 let density = 2.0 * sine.density(series) / line.statistic;
                 Modulation::find(&sine, &sine.subtracted_from(series), density, |_| false)
@@ -272,7 +256,7 @@ impl<'a> WhitenedSpectrum<'a> {
         Some((sine_line(&sine, series.duration(), ratio, self.sine_p_value(ratio, level)), sine))
     }
 
-    /// Local maxima of the padded ordinates above four times the local level, over that level, with their positions.
+    /// Maxima of the padded ordinates above four times the local level, over it, with positions.
     fn peaks(&self) -> Vec<(f64, usize)> {
         let mut level = 1.0;
         let mut until = 0;
@@ -281,7 +265,7 @@ impl<'a> WhitenedSpectrum<'a> {
         for at in PADDING * FEWEST_PERIODS..padded.len().saturating_sub(2 * PADDING) {
             let bin = at / PADDING;
             if bin >= until {
-                // The level is computed at every few ordinates: it changes little over a fraction of its window.
+                // The level changes little over a fraction of its window.
                 level = self.background.level(self.whitened(), bin).value;
                 until = bin + (bin / 16).clamp(1, WINDOW / 8);
             }
@@ -295,8 +279,7 @@ impl<'a> WhitenedSpectrum<'a> {
         peaks
     }
 
-    /// Probability of a peak of `ratio` times the background at any frequency: Baluev's bound, for a background that is
-    /// estimated from `level.ordinates` ordinates, of which a part is independent.
+    /// p-value of a peak of `ratio` at any frequency: Baluev's bound, with the error of the level.
     fn sine_p_value(&self, ratio: f64, level: LocalLevel) -> f64 {
         let ordinates = self.independent * level.ordinates;
         let one = (1.0 + ratio / ordinates).powf(-ordinates);
@@ -304,7 +287,8 @@ impl<'a> WhitenedSpectrum<'a> {
         (one * (1.0 + frequencies * ratio.sqrt())).min(1.0)
     }
 
-    /// The most significant peak in averages of `4^least_log4` ordinates or more: its position and width in resolutions and its p-value.
+    /// Most significant peak in averages of at least `4^least_log4` ordinates: position and width, resolutions,
+    /// p-value.
     pub(super) fn broad_peak(&self, least_log4: u32) -> Option<(f64, f64, f64)> {
         let ordinates = self.ordinates.len();
         let sizes = || (least_log4..).map(|power| 4_usize.pow(power)).take_while(move |size| *size <= ordinates / 64);
@@ -320,12 +304,12 @@ impl<'a> WhitenedSpectrum<'a> {
             let shifted: Vec<f64> = shifted.map(|chunk| chunk.iter().sum::<f64>() / size as f64).collect();
             let levels = neighbourhoods(&averages, size, self.looks);
             let mut peaks = Vec::new();
-            // An average over one ordinate cannot be shifted by half of it.
+            // An average of one ordinate cannot shift by half.
             for (offset, values) in [(0, &averages), (size / 2, &shifted)].into_iter().take(size) {
                 for (at, (&value, level)) in values.iter().zip(&levels).enumerate() {
                     let [own, others] = [size as f64, level.ordinates].map(|count| self.independent * count);
                     let most = 1.0 + LEAST_EXCESS.max(EXAMINED * (1.0 / own + 1.0 / others).sqrt());
-                    // The floor is not needed where the level alone is too near.
+                    // The floor is computed only if needed.
                     if value / level.value <= most {
                         continue;
                     }
@@ -342,13 +326,13 @@ impl<'a> WhitenedSpectrum<'a> {
         peaks.min_by(|a, b| a.2.total_cmp(&b.2)).filter(|peak| peak.2 < SIGNIFICANCE)
     }
 
-    /// The likeliest resonance near `bin`, by fits that begin with each of `widths`; all in resolutions.
+    /// The likeliest resonance near `bin` from each of `widths`, resolutions.
     pub(super) fn resonance(&self, bin: f64, widths: impl IntoIterator<Item = f64>) -> Option<Lorentz> {
         let fits = self.lorentz_fits(bin, widths);
         fits.filter(|fit| fit.width > NARROWEST).max_by(|a, b| a.statistic.total_cmp(&b.statistic))
     }
 
-    /// The likeliest of such curves, which may be as narrow as a sinusoid.
+    /// May be as narrow as a sinusoid.
     pub(super) fn likeliest_lorentz(&self, bin: f64, widths: impl IntoIterator<Item = f64>) -> Option<Lorentz> {
         self.lorentz_fits(bin, widths).max_by(|a, b| a.statistic.total_cmp(&b.statistic))
     }
@@ -363,8 +347,7 @@ impl<'a> WhitenedSpectrum<'a> {
         widths.into_iter().filter_map(fit)
     }
 
-    /// The sinusoid whose peak is nearest to `bin`, within `width`, both in resolutions; and the padded ordinates that it reaches, with the
-    /// densities that they would have without it.
+    /// The sinusoid nearest to `bin` within `width`, resolutions, and its padded ordinates with their densities.
     pub(super) fn sinusoid_near(&self, bin: f64, width: f64, p_value: f64) -> (SpectralLine, Vec<(usize, f64)>) {
         let padded = self.padded();
         let last = padded.len() - PADDING - 1;
@@ -372,7 +355,7 @@ impl<'a> WhitenedSpectrum<'a> {
         let near = position(bin - width)..=position(bin + width);
         let highest = near.max_by(|&a, &b| padded[a].total_cmp(&padded[b])).unwrap_or(1);
         let level = self.background.level(self.whitened(), highest / PADDING).value;
-        // The logarithm of the main lobe of a taper is a parabola but for a hundredth of the resolution.
+        // ln of a taper's main lobe is nearly a parabola.
         let [left, here, right] = [highest - 1, highest, highest + 1].map(|at| padded[at].ln());
         let curvature = 2.0 * here - left - right;
         let shift = if curvature > 0.0 { (0.5 * (right - left) / curvature).clamp(-0.5, 0.5) } else { 0.0 };
@@ -388,14 +371,14 @@ impl<'a> WhitenedSpectrum<'a> {
             .map(|at| padded[at] * self.background.shape_at((at / PADDING) as f64) - without(at))
             .sum();
         let ordinates = (below + above) as f64 / PADDING as f64;
-        // Energy of the sinusoid over the density of the noise, in all stretches together, and the scatter of both.
+        // Energy over the noise density, in all stretches.
         let ratio = self.independent * over.max(0.0) / without(highest);
         let relative = 0.5 * (self.independent * ordinates + 2.0 * ratio).sqrt() / ratio;
         let deviation = (over.max(0.0) * self.resolution).sqrt();
         let by_noise = relative * 3f64.sqrt() / PI;
         let peak = (padded[highest] / level).max(1.0);
         let line = SpectralLine {
-            // Cramér-Rao bound for a sinusoid in white noise, whose phase is another one in each stretch.
+            // Cramér-Rao bound in white noise, with a phase per stretch.
             frequency: MeasuredValue {
                 value: centre * self.resolution,
                 error: self.resolution * by_noise.hypot(INTERPOLATION),
@@ -411,7 +394,6 @@ impl<'a> WhitenedSpectrum<'a> {
         (line, replaced)
     }
 
-    /// The line of which `lorentz` is the curve.
     pub(super) fn resonance_line(&self, lorentz: &Lorentz, p_value: f64) -> SpectralLine {
         let height = lorentz.height * lorentz.level * self.background.shape_at(lorentz.centre);
         let width = lorentz.width * self.resolution;
@@ -430,14 +412,12 @@ impl<'a> WhitenedSpectrum<'a> {
     }
 }
 
-/// Factor on the ordinate at `bin` resolutions that removes resonances.
 fn deflation(removed: &[Lorentz], bin: f64) -> f64 {
     removed.iter().fold(1.0, |factor, lorentz| factor * lorentz.deflation(bin))
 }
 
-/// Medians of the averages around each of them, each over `size` ordinates.
+/// Medians of the averages over `size` ordinates around each.
 fn neighbourhoods(averages: &[f64], size: usize, looks: f64) -> Vec<LocalLevel> {
-    // In ascending order.
     let mut window: Vec<f64> = Vec::with_capacity(2 * NEIGHBOURS + 2);
     let place = |window: &[f64], value: &f64| window.partition_point(|other| other.total_cmp(value).is_lt());
     let mut next = averages.iter();
@@ -455,19 +435,17 @@ fn neighbourhoods(averages: &[f64], size: usize, looks: f64) -> Vec<LocalLevel> 
         let middle = window.len() / 2;
         let median =
             if window.len().is_multiple_of(2) { (window[middle - 1] + window[middle]) / 2.0 } else { window[middle] };
-        // The median of a gamma variable of shape g is about 1 − 1/(3g) of its mean. The median of many is worth the mean of
-        // 2/π of them.
+        // Gamma median of shape g: 1 − 1/(3g) of the mean, worth 2/π of the values.
         let value = median / (1.0 - 1.0 / (3.0 * size as f64 * looks));
         LocalLevel { value, ordinates: (window.len() * size) as f64 * 2.0 / PI }
     };
     (0..averages.len()).map(&mut level).collect()
 }
 
-/// A sinusoid whose ordinate is `ratio` times the background, in a record of `duration` s.
+/// A sinusoid whose ordinate is `ratio` times the background.
 pub(super) fn sine_line(sine: &Sine, duration: f64, ratio: f64, p_value: f64) -> SpectralLine {
     let amplitude = sine.amplitude();
     SpectralLine {
-        // Cramér-Rao bound for a sinusoid in white noise.
         frequency: MeasuredValue { value: sine.frequency, error: 1.5f64.sqrt() / (PI * duration * ratio.sqrt()) },
         deviation: MeasuredValue { value: amplitude / 2f64.sqrt(), error: amplitude / (2.0 * ratio.sqrt()) },
         width: None,
@@ -478,9 +456,7 @@ pub(super) fn sine_line(sine: &Sine, duration: f64, ratio: f64, p_value: f64) ->
     }
 }
 
-/// The part of the ordinates of a spectrum that are as good as independent. Where samples are missing, or where the level of
-/// the noise changes, neighbouring ordinates are correlated: the mean of many varies as that of `(Σv)²/Σv²` of them, `v` being
-/// the variance of each sample and 0 of a missing one.
+/// Part of the ordinates that count as independent: `(Σv)²/Σv²` with the variance v of each sample, 0 if missing.
 fn independent_part(series: &UniformSeries) -> f64 {
     let present = series.present() as f64 / series.values().len().max(1) as f64;
     let level = |block: &[f64]| {
@@ -495,14 +471,12 @@ fn independent_part(series: &UniformSeries) -> f64 {
         return present;
     }
     let variance = levels.iter().map(|level| (level - mean).powi(2)).sum::<f64>() / count;
-    // Neighbouring levels differ by the scatter of their estimates, in whatever way the noise is correlated.
+    // Half the mean square of first differences is the estimation error alone.
     let scatter = levels.windows(2).map(|pair| 0.5 * (pair[1] - pair[0]).powi(2)).sum::<f64>() / (count - 1.0);
     present / (1.0 + (variance - scatter).max(0.0) / (mean * mean))
 }
 
-/// Refits each resonance over the background without any of them, until that moves it by less than its errors: a strong one biases the
-/// first estimates of it, and those the background. The skirts of the first one, which is the strongest, may be taken for noise behind a
-/// filter, so that neither has its form; it is then refitted to noise that is behind none, and kept if it has its form there.
+/// Refits each resonance over the background without any, until the changes are below its errors.
 pub(super) fn refit(spectrum: &Spectrum, known: &dyn Fn(f64) -> f64, resonances: &mut [Resonance]) {
     let mut first = resonances.to_vec();
     refit_behind(spectrum, known, resonances, spectrum.filters);
@@ -544,8 +518,7 @@ mod tests {
     use rand_distr::StandardNormal;
     use std::f64::consts::TAU;
 
-    /// 450 s of white noise of deviation 2.3 at 204.8 Hz, with a resonance of deviation 3.5 at 5.9 Hz, 0.9 Hz wide: its skirts are as high as
-    /// the noise at 2 and at 12 Hz, and are those of noise behind a filter of 8 taps.
+    /// 450 s of white noise and a resonance at 5.9 Hz, whose skirts look like a filter of 8 taps.
     fn resonant(seed: u64) -> UniformSeries {
         let (rate, width) = (204.8, 0.9);
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -561,7 +534,7 @@ mod tests {
         UniformSeries::new(1.0 / rate, (0..92_160).map(value).collect())
     }
 
-    /// Chance refutes the form of one in 5,000: of 20, two in 60,000 cases.
+    /// Chance refutes one in 5,000: two of 20 in 60,000 cases.
     #[test]
     fn a_wide_resonance_has_its_form_and_no_filter() {
         let found = in_parallel(&(0..20).collect::<Vec<u64>>(), |seed| find_lines(&resonant(*seed)));
@@ -569,7 +542,7 @@ mod tests {
         assert!(found.iter().filter(is_refuted).count() <= 1, "{found:?}");
         for lines in &found {
             let SpectralLine { frequency, width: Some(width), .. } = lines[0] else { panic!("{lines:?}") };
-            // Of 95 %, and of 20 independent records: four deviations are exceeded in one of 800 cases.
+            // Four deviations are exceeded once in 800 cases.
             assert!((frequency.value - 5.9).abs() < 4.0 * frequency.error, "{frequency:?}");
             assert!((width.value - 0.9).abs() < 4.0 * width.error, "{width:?}");
         }

@@ -2,7 +2,7 @@
 
 mod noise;
 mod sample_likelihood;
-mod white_noise;
+mod simulated_noise;
 
 use noise::{Output, PAPER, RATE_HZ, gain, resonance, sine};
 use noise_analysis::samples::uniform_series::UniformSeries;

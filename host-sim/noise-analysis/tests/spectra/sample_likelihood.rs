@@ -1,7 +1,7 @@
 //! N, B and K of all samples of records whose noise is known: how often their 95 % intervals hold it, and the error beside that of an
 //! estimate that uses all that the samples hold.
 
-use super::white_noise::{filtered, white, with_drift};
+use super::simulated_noise::{filtered, white, with_drift};
 use allan_core::model::FittedTerm;
 use allan_core::term::MovingAverageFilter;
 use allan_core::{Model, NoiseTerm};

@@ -1,26 +1,21 @@
-//! Which columns of a file hold the channels, the time and the index, and in which units: as the user says it, else by the
-//! names of the columns.
+//! The columns of channels, time and index with their units, as the user says or by their names.
 
 use crate::columns::unit::{COUNT, SECOND, Unit};
 use measurement::{ChannelProfile, Quantity, SensorProfile};
 
-/// What a column is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(
     clippy::large_enum_variant,
     reason = "a file has few columns, and a profile is copied as the rest of a column is"
 )]
 pub(crate) enum Role {
-    /// Time stamps.
     Time,
-    /// Running number of the sample.
+    /// Running number of a sample.
     Index,
-    /// A channel of the sensor.
     Channel(ChannelProfile),
 }
 
 impl Role {
-    /// As `--columns` takes it.
     fn name(self) -> &'static str {
         match self {
             Self::Time => "time",
@@ -30,16 +25,14 @@ impl Role {
     }
 }
 
-/// A column that a file has.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct AvailableColumn {
-    /// Its name in the file; its number, from 0, where the file names none.
+    /// Its name in the file, or its number, from 0.
     pub(crate) name: String,
-    /// Its unit, where the file says it.
+    /// Its unit, if the file says it.
     pub(crate) unit: Option<Unit>,
 }
 
-/// All `available` columns as they are, to be looked at: as channels without a name, in the unit of the file.
 pub(crate) fn as_they_are(available: &[AvailableColumn]) -> Vec<ChosenColumn> {
     let role = Role::Channel(ChannelProfile::generic("", Quantity::AuxiliaryVoltage));
     let column = |(position, column): (usize, &AvailableColumn)| {
@@ -49,15 +42,13 @@ pub(crate) fn as_they_are(available: &[AvailableColumn]) -> Vec<ChosenColumn> {
     available.iter().enumerate().map(column).collect()
 }
 
-/// A column that is read.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ChosenColumn {
     /// Position among the available columns.
     pub(crate) position: usize,
     pub(crate) role: Role,
-    /// As the file names it.
     pub(crate) label: String,
-    /// Its unit; `None` for times that are stated without one.
+    /// `None` for times without a stated unit.
     pub(crate) unit: Option<Unit>,
     /// Size of 1 in the unit of the channel.
     pub(crate) factor: f64,
@@ -66,76 +57,58 @@ pub(crate) struct ChosenColumn {
 /// Why columns cannot be chosen.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SelectionError {
-    /// An argument that is no assignment.
     #[error("--columns {0}: expected CHANNEL=COLUMN, such as gyro_x=wx")]
     NoAssignment(String),
-    /// A channel that the sensor does not have.
     #[error("--columns {name}=…: no such channel; {sensor} has {known}, and there are time and sample")]
     UnknownChannel {
         /// As given.
         name: String,
-        /// Name of the sensor.
         sensor: String,
-        /// Its channels.
         known: String,
     },
-    /// A channel that is assigned twice, or two columns that look like it.
     #[error("{channel} is both {one} and {other}: say which with --columns")]
     Ambiguous {
         /// The channel.
         channel: String,
-        /// A column.
         one: String,
-        /// Another column.
         other: String,
     },
-    /// A column that the file does not have.
     #[error("no column {wanted}; the file has {available}")]
     NoColumn {
         /// As given.
         wanted: String,
-        /// Names of the columns.
         available: String,
     },
-    /// No column looks like a channel.
     #[error("no column is named like a channel; say which is which, as in --columns gyro_x=NAME; the file has {0}")]
     NoChannel(String),
-    /// A unit that is not known.
     #[error("--units {unit}: not a known unit; known are {known}")]
     UnknownUnit {
         /// As given.
         unit: String,
-        /// The known ones.
         known: String,
     },
-    /// Two units for one quantity.
     #[error("--units {0} and {1} are of one quantity")]
     TwoUnits(&'static str, &'static str),
-    /// A column without a stated unit.
     #[error("column {column}: no unit of {channel}; give one, as in --units {example}")]
     NoUnit {
-        /// The column.
         column: String,
-        /// Its channel.
         channel: String,
         /// A unit of the channel.
         example: &'static str,
     },
-    /// Counts of a sensor whose scale is not known.
     #[error("column {0}: counts of which sensor? give its profile with --sensor")]
     CountsOfAny(String),
 }
 
-/// What the user says of the columns.
+/// The columns as the user states them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ColumnSelection {
-    /// Channel and column.
     assignments: Vec<(String, String)>,
     units: Vec<Unit>,
 }
 
 impl ColumnSelection {
-    /// From assignments such as `gyro_x=wx` and names of units, each of which is that of all columns of its quantity.
+    /// From assignments such as `gyro_x=wx`, and a unit for each quantity.
     ///
     /// # Errors
     /// A text that is no assignment, or an unknown or a second unit of a quantity.
@@ -161,40 +134,38 @@ impl ColumnSelection {
         Ok(Self { assignments, units: known })
     }
 
-    /// Whether the user says nothing.
+    /// True if nothing is stated.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.assignments.is_empty() && self.units.is_empty()
     }
 
-    /// The channels, `time` and `sample` that the user assigns, each with the position of its column in `available`.
+    /// Assigned channels, `time` and `sample`, each with its column's position in `available`.
     pub(crate) fn assignments(&self, available: &[AvailableColumn]) -> Vec<(&'static str, usize)> {
         let sensor = SensorProfile::generic();
         let assigned = self.assigned(available, &sensor).unwrap_or_default();
         assigned.into_iter().map(|(role, position)| (role.name(), position)).collect()
     }
 
-    /// The unit that the user states for the quantity with this base.
+    /// Stated unit of the quantity with this base.
     pub(crate) fn stated_unit(&self, base: &str) -> Option<Unit> {
         self.units.iter().copied().find(|unit| unit.base == base)
     }
 
-    /// Whether the user assigns columns.
     pub(crate) fn has_columns(&self) -> bool {
         !self.assignments.is_empty()
     }
 
-    /// Whether the user states units.
     pub(crate) fn has_units(&self) -> bool {
         !self.units.is_empty()
     }
 
-    /// Whether every column that the user names is one of `available`.
+    /// True if every named column is in `available`.
     pub(crate) fn is_covered(&self, available: &[AvailableColumn]) -> bool {
         self.assignments.iter().all(|(_, wanted)| available.iter().any(|column| column.name == *wanted))
     }
 
-    /// The columns to read of `available`: time, index, and the channels in the order of `sensor`.
+    /// Time, index, and the channels in the order of `sensor`.
     pub(crate) fn choose(
         &self,
         available: &[AvailableColumn],
@@ -205,7 +176,7 @@ impl ColumnSelection {
         } else {
             let mut assigned = self.assigned(available, sensor)?;
             if !assigned.iter().any(|(role, _)| *role == Role::Time) {
-                // The time is seldom named, and a file has rarely two.
+                // Time is seldom named, and seldom ambiguous.
                 assigned.extend(by_name(available, sensor).ok().and_then(|named| {
                     named.into_iter().find(|(role, column)| {
                         *role == Role::Time && !assigned.iter().any(|(_, other)| other == column)
@@ -231,8 +202,7 @@ impl ColumnSelection {
         chosen.into_iter().map(|(role, position)| self.with_unit(role, position, &available[position])).collect()
     }
 
-    /// The columns of other quantities than rate and force, by their positions, that have no unit, beside those of an inertial sensor: a
-    /// magnetometer or a thermometer is no reason to ask for one.
+    /// Unitless columns of other quantities, by positions: a magnetometer or thermometer is no reason to ask.
     fn unitless_companions(&self, chosen: &[(Role, usize)], available: &[AvailableColumn]) -> Vec<usize> {
         let quantity = |role: &Role| match role {
             Role::Channel(profile) => Some(profile.quantity),
@@ -253,7 +223,7 @@ impl ColumnSelection {
         chosen.iter().copied().filter(is_unitless).map(|(_, position)| position).collect()
     }
 
-    /// Which of the columns are not among the `chosen` ones, and why, and which units their names tell: a sentence each.
+    /// Sentences on the columns that are not `chosen`, and on units by name.
     pub(crate) fn notes(
         &self,
         available: &[AvailableColumn],
@@ -301,7 +271,6 @@ impl ColumnSelection {
         notes
     }
 
-    /// The unit that the name of a column alone tells.
     fn unit_of_interface(&self, column: &ChosenColumn) -> Option<Unit> {
         let Role::Channel(profile) = column.role else { return None };
         let is_stated = self.stated_unit(profile.quantity.unit()).is_some();
@@ -324,7 +293,6 @@ impl ColumnSelection {
                     known: sensor.channels.iter().map(|channel| channel.name).collect::<Vec<_>>().join(", "),
                 })?,
             };
-            // By its name, or by its heading with the unit.
             let by_name = available.iter().position(|column| column.name == *wanted);
             let heading = AvailableColumn::from_heading(wanted);
             let position = by_name
@@ -365,8 +333,7 @@ impl ColumnSelection {
 }
 
 impl AvailableColumn {
-    /// From a heading that may end in a unit: `ax [m/s^2]`, `wx (rad/s)`, `gyro x, deg/s`, `gyro_x_deg_s`, `time_us`, `gyro_x_counts`. The
-    /// output registers of the ADIS164xx, `XGYRO_OUT`, have counts.
+    /// From a heading that may end in a unit: `ax [m/s^2]`, `wx (rad/s)`, `gyro x, deg/s`, `gyro_x_deg_s`, `time_us`.
     pub(crate) fn from_heading(heading: &str) -> Self {
         let heading = heading.trim().trim_start_matches(['#', '%']).trim();
         if let Some((name, unit)) = heading.rsplit_once(',')
@@ -398,14 +365,14 @@ impl AvailableColumn {
             .unwrap_or_else(|| Self { name: heading.to_owned(), unit: None })
     }
 
-    /// What stands before the usual name of a channel, and the channel, `time` or `sample` that it names.
+    /// A prefix and the channel, `time` or `sample` in the name.
     pub(crate) fn prefix_and_channel(&self) -> Option<(&str, &'static str)> {
         let channel = match role_of(&self.name)? {
             NamedRole::Time => return Some(("", "time")),
             NamedRole::Index => return Some(("", "sample")),
             NamedRole::Channel(name) => name,
         };
-        // The shortest ending that is a name by itself has the longest beginning before it.
+        // The shortest ending has the longest beginning before it.
         let starts = self.name.char_indices().map(|(at, _)| at).rev();
         let short = starts.filter(|at| *at > 0 && !self.name[..*at].ends_with(|letter: char| letter.is_alphanumeric()));
         let is_name =
@@ -413,7 +380,7 @@ impl AvailableColumn {
         Some((&self.name[..short.clone().find(is_name).unwrap_or(0)], channel))
     }
 
-    /// The channel of `sensor` that its name tells.
+    /// The channel of `sensor` by name.
     fn channel(&self, sensor: &SensorProfile) -> Option<ChannelProfile> {
         match role_of(&self.name)? {
             NamedRole::Channel(name) => sensor.channel(name),
@@ -421,23 +388,22 @@ impl AvailableColumn {
         }
     }
 
-    /// Whether its unit may be that of a channel.
+    /// True if its unit suits the channel.
     fn may_measure(&self, profile: &ChannelProfile) -> bool {
         self.unit.is_none_or(|unit| unit.measures(profile.quantity) || unit.base == COUNT)
     }
 
-    /// Whether its name is that of a time.
+    /// True for the name of a time.
     pub(crate) fn is_time(&self) -> bool {
         matches!(role_of(&self.name), Some(NamedRole::Time))
     }
 
-    /// A column of a format that says what it is.
+    /// A column whose format states it.
     pub(crate) fn known(name: &str, unit: &str) -> Self {
         Self { name: name.to_owned(), unit: Unit::parse(unit) }
     }
 }
 
-/// The names of columns in a message; of many the first.
 fn names(available: &[AvailableColumn]) -> String {
     const SHOWN: usize = 24;
     let shown: Vec<&str> = available.iter().take(SHOWN).map(|column| column.name.as_str()).collect();
@@ -445,7 +411,7 @@ fn names(available: &[AvailableColumn]) -> String {
     format!("{}{more}", shown.join(", "))
 }
 
-/// Names of columns in a note: `a[0…8]` are nine elements of an array.
+/// `a[0…8]` are nine elements of an array.
 fn listed(names: &[&str]) -> String {
     let element = |name: &str| {
         let (array, number) = name.strip_suffix(']')?.rsplit_once('[')?;
@@ -467,20 +433,20 @@ fn listed(names: &[&str]) -> String {
     all.join(", ")
 }
 
-/// The unit of a magnetic field in `G`, which is gauss and not gravity.
+/// `G` of a magnetic field is gauss.
 fn gauss_of_field(name: &str, unit: &str) -> Option<Unit> {
     let is_field = matches!(role_of(name), Some(NamedRole::Channel(channel)) if channel.starts_with("magn"));
     Unit::parse("gauss").filter(|_| is_field && unit.trim() == "G")
 }
 
-/// Whether a heading is the name of an output register in the data sheets of the ADIS164xx.
+/// True for an output register of the ADIS164xx data sheets.
 pub fn is_output_register(heading: &str) -> bool {
     const OF_PART: [&str; 3] = ["SUPPLY_OUT", "TEMP_OUT", "AUX_ADC"];
     let of_axis = heading.strip_suffix("_OUT").and_then(|name| name.strip_prefix(['X', 'Y', 'Z']));
     OF_PART.contains(&heading) || of_axis.is_some_and(|name| ["GYRO", "ACCL", "MAGN"].contains(&name))
 }
 
-/// The unit of a quantity in the industrial I/O interface of Linux, by a name of it that is not that of raw counts: `in_anglvel_x`.
+/// Unit in the industrial I/O interface of Linux, such as `in_anglvel_x`, without raw counts.
 fn unit_by_interface(name: &str, quantity: Quantity) -> Option<Unit> {
     let plain = name.to_lowercase();
     let unit = match quantity.unit() {
@@ -492,14 +458,12 @@ fn unit_by_interface(name: &str, quantity: Quantity) -> Option<Unit> {
     if plain.ends_with("_raw") { None } else { Unit::parse(unit) }
 }
 
-/// The columns whose names say what they are: the name of a channel of any sensor, `time` or `sample`, and the position. `None` where
-/// two columns look like one channel.
+/// Columns named as a channel of any sensor, `time` or `sample`, with positions; `None` if ambiguous.
 pub(crate) fn known_by_name(available: &[AvailableColumn]) -> Option<Vec<(&'static str, usize)>> {
     let named = by_name(available, &SensorProfile::generic()).ok()?;
     Some(named.into_iter().map(|(role, position)| (role.name(), position)).collect())
 }
 
-/// The columns whose names say what they are.
 fn by_name(available: &[AvailableColumn], sensor: &SensorProfile) -> Result<Vec<(Role, usize)>, SelectionError> {
     let mut named: Vec<(Role, usize)> = Vec::new();
     for (position, column) in available.iter().enumerate() {
@@ -511,14 +475,13 @@ fn by_name(available: &[AvailableColumn], sensor: &SensorProfile) -> Result<Vec<
             NamedRole::Channel(name) => sensor.channel(name).map(Role::Channel),
         };
         let role = own.or_else(by_name).or_else(of_body).filter(|role| match role {
-            // A magnetic field is no rate, whatever it is called.
             Role::Channel(profile) => column.may_measure(profile),
             Role::Time | Role::Index => true,
         });
         let Some(role) = role else { continue };
         if let Some((_, other)) = named.iter().find(|(known, _)| *known == role) {
             if role == Role::Time {
-                // When the sample was taken, rather than when it was published or written.
+                // The time of sampling, not of publishing or writing.
                 if is_time_of_sample(&column.name) {
                     named.retain(|(known, _)| *known != Role::Time);
                     named.push((role, position));
@@ -536,7 +499,7 @@ fn by_name(available: &[AvailableColumn], sensor: &SensorProfile) -> Result<Vec<
     Ok(named)
 }
 
-/// The rate that a column is by the names of aviation: p, q and r, where there are all three.
+/// p, q and r of aviation, if all three are there.
 fn rate_of_body(available: &[AvailableColumn], position: usize) -> Option<&'static str> {
     let is_named = |column: &AvailableColumn, letter: &str| column.name.trim().eq_ignore_ascii_case(letter);
     let letters = ["p", "q", "r"];
@@ -545,14 +508,13 @@ fn rate_of_body(available: &[AvailableColumn], position: usize) -> Option<&'stat
     Some(AXES[0].1[axis])
 }
 
-/// What the name of a column says.
 enum NamedRole {
     Time,
     Index,
     Channel(&'static str),
 }
 
-/// The usual names, in small letters with `_` for other signs and without the axis.
+/// Usual names in small letters, `_` for other signs, without axis.
 const GYROSCOPE: [&str; 32] = [
     "gyro",
     "gy",
@@ -631,7 +593,7 @@ const AXES: [(&str, [&str; 3]); 3] = [
     ("magn", ["magn_x", "magn_y", "magn_z"]),
 ];
 
-/// Whether a time column has the times of the samples by its name, where a file has several.
+/// True for the times of samples in a file with several.
 fn is_time_of_sample(name: &str) -> bool {
     let name = name.to_lowercase();
     name.ends_with("stamp_sample") || name.ends_with("header.stamp") || name.starts_with("sensor")
@@ -641,7 +603,7 @@ fn role_of(name: &str) -> Option<NamedRole> {
     let plain: String =
         name.to_lowercase().chars().map(|letter| if letter.is_ascii_alphanumeric() { letter } else { '_' }).collect();
     let plain = plain.trim_matches('_');
-    // As the industrial I/O interface of Linux and data sheets call them: `in_anglvel_x_raw`, `XGYRO_OUT`.
+    // `in_anglvel_x_raw`, `XGYRO_OUT`.
     let plain = plain.strip_prefix("in_").unwrap_or(plain);
     let plain =
         ["_raw", "_out", "_input", "_lsb"].iter().find_map(|ending| plain.strip_suffix(ending)).unwrap_or(plain);
@@ -650,7 +612,7 @@ fn role_of(name: &str) -> Option<NamedRole> {
         | "timeus" | "elapsed" | "elapsed_time" | "x_value" => {
             return Some(NamedRole::Time);
         }
-        // A column that is called by its unit.
+        // Named by its unit.
         _ if plain.len() > 1 && Unit::parse(plain).is_some_and(|unit| unit.base == SECOND) => {
             return Some(NamedRole::Time);
         }
@@ -665,7 +627,7 @@ fn role_of(name: &str) -> Option<NamedRole> {
         _ => {}
     }
     let groups = [&GYROSCOPE[..], &ACCELEROMETER[..], &MAGNETOMETER[..]];
-    // The axis before the name: `xgyro`, `x_accel`. Single letters behind it are no name.
+    // An axis before the name: `xgyro`, `x_accel`.
     let before = plain.chars().next().and_then(|axis| "xyz".find(axis)).and_then(|axis| {
         let base = plain[1..].trim_start_matches('_');
         let group = groups.iter().position(|group| base.len() > 2 && group.contains(&base))?;
@@ -676,7 +638,7 @@ fn role_of(name: &str) -> Option<NamedRole> {
     }
     let axis = plain.chars().last().and_then(|axis| "xyz".find(axis).or_else(|| "012".find(axis)))?;
     let base = plain[..plain.len() - 1].trim_end_matches('_');
-    // A longer name may stand before the usual one: `imu0_gyro`, `field_angular_velocity`. Single letters stand alone.
+    // A prefix: `imu0_gyro`, `field_angular_velocity`; not before single letters.
     let matches = |known: &str| base == known || known.len() > 2 && base.ends_with(&format!("_{known}"));
     let group = groups.iter().position(|group| group.iter().any(|known| matches(known)))?;
     Some(NamedRole::Channel(AXES[group].1[axis]))
@@ -687,7 +649,6 @@ mod tests {
     use super::{AvailableColumn, ColumnSelection, Role, SelectionError};
     use measurement::SensorProfile;
 
-    /// The roles, factors and units of a header.
     fn chosen(headings: &[&str], columns: &[&str], units: &[&str]) -> Result<Vec<(String, f64)>, SelectionError> {
         let owned = |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>();
         let available: Vec<AvailableColumn> = headings.iter().map(|text| AvailableColumn::from_heading(text)).collect();
@@ -752,7 +713,6 @@ mod tests {
         assert_eq!(plain[1], ("gyro_z=2".to_owned(), 1.0));
     }
 
-    /// Spellings of programs, drivers and data sheets, each beside a time.
     #[test]
     fn the_names_of_all_trades_are_known() {
         for (name, channel) in [
@@ -784,13 +744,12 @@ mod tests {
         let expected = ["time s=0", "gyro_x=1", "gyro_y=2", "gyro_z=3"];
         let found = chosen(&body, &[], &[]).expect("columns");
         assert_eq!(found.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), expected);
-        // Pressure and rain, and a field that is called as a rate.
+        // Pressure and rain, and a field named as a rate.
         for headings in [&["t_s", "p", "r"][..], &["t_s", "w_x [uT]"], &["latitude", "quality"]] {
             assert!(matches!(chosen(headings, &[], &["deg/s"]), Err(SelectionError::NoChannel(_))), "{headings:?}");
         }
     }
 
-    /// No column disappears without a word.
     #[test]
     fn every_column_is_used_or_named_as_left_out() {
         let headings = ["time_s", "gx [deg/s]", "gy [deg/s]", "gz [deg/s]", "temp", "my_rate_q", "m_x [V]", "note"];
@@ -811,7 +770,6 @@ mod tests {
 
     #[test]
     fn of_several_times_that_of_the_sample_is_taken() {
-        // As `rostopic echo -p` and ulog2csv write them.
         let ros =
             ["%time", "field.header.seq", "field.header.stamp", "field.header.frame_id", "field.angular_velocity.x"];
         let expected = vec![("time ?=2".to_owned(), 1.0), ("gyro_x=4".to_owned(), 1.0)];

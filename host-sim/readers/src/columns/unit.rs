@@ -1,4 +1,4 @@
-//! Units of the columns of recordings, as people write them, and their factors to the units of the analysis.
+//! Units of columns and their factors to the units of the analysis.
 
 use measurement::Quantity;
 
@@ -7,23 +7,19 @@ const GRAVITY: f64 = 9.806_65;
 /// deg/s per rad/s.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
-/// What a number in a column counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Unit {
-    /// As it is written in messages.
     pub(crate) name: &'static str,
-    /// The unit of the analysis that measures the same; `s` for times, `count` for register counts.
+    /// Unit of the analysis; `s` for times, `count` for register counts.
     pub(crate) base: &'static str,
     /// Size of this unit, in `base`.
     pub(crate) factor: f64,
 }
 
-/// Base of times.
 pub(crate) const SECOND: &str = "s";
-/// Base of register counts.
 pub(crate) const COUNT: &str = "count";
 
-/// The first spelling is the name; all but it are as [`normalized`] leaves them.
+/// The name, and other spellings, [normalized](normalized).
 const UNITS: &[(&[&str], &str, f64)] = &[
     (&["deg/s", "degs", "degs-1", "deg/sec", "dps", "degps"], "deg/s", 1.0),
     (&["rpm", "r/min", "rev/min"], "deg/s", 6.0),
@@ -44,7 +40,7 @@ const UNITS: &[(&[&str], &str, f64)] = &[
     (&["mT", "mt"], "gauss", 10.0),
     (&["uT", "ut"], "gauss", 1e-2),
     (&["nT", "nt"], "gauss", 1e-5),
-    // The origin of the scale does not matter to noise.
+    // The origin does not matter to noise.
     (&["degC", "degc", "celsius", "c"], "degC", 1.0),
     (&["K", "kelvin", "k"], "degC", 1.0),
     (&["V", "v", "volt"], "V", 1.0),
@@ -57,8 +53,7 @@ const UNITS: &[(&[&str], &str, f64)] = &[
 ];
 
 impl Unit {
-    /// The unit that `text` names, such as `rad/s`, `m s^-2`, `°/s` or `mg`, or a multiple or a part of one, such as `0.07*deg/s` or
-    /// `deg/s/131`; `None` for other texts.
+    /// Such as `rad/s`, `m s^-2`, `°/s` or `mg`, also with a factor: `0.07*deg/s`, `deg/s/131`; `None` for other texts.
     #[must_use]
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let number = |text: &str| text.trim().parse::<f64>().ok().filter(|number| number.is_normal() && *number > 0.0);
@@ -79,25 +74,22 @@ impl Unit {
         })
     }
 
-    /// Names of all units.
     pub(crate) fn names() -> impl Iterator<Item = &'static str> {
         UNITS.iter().map(|(spellings, ..)| spellings[0])
     }
 
-    /// Whether it is a unit of times.
     #[must_use]
     pub(crate) fn is_time(&self) -> bool {
         self.base == SECOND
     }
 
-    /// Whether it is a unit of `quantity`.
     #[must_use]
     pub(crate) fn measures(&self, quantity: Quantity) -> bool {
         self.base == quantity.unit()
     }
 }
 
-/// Small letters, `deg` for °, `u` for µ, `/` for "per", and without blanks, underscores, powers and multiplication signs.
+/// Small letters; `deg` for °, `u` for µ, `/` for "per"; no blanks, underscores, powers, multiplication signs.
 fn normalized(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     for letter in text.to_lowercase().chars() {

@@ -1,6 +1,5 @@
-//! DataFlash logs of ArduPilot (`.bin`): IMU messages, and batches of raw samples (ISBH, ISBD) with gaps between them.
-//!
-//! The crate `ardupilot-binlog` 0.2 is not used because a format message that states a length below 3 bytes makes it panic.
+//! DataFlash logs of ArduPilot (`.bin`): IMU messages, and batches of raw samples (ISBH, ISBD). The crate
+//! `ardupilot-binlog` 0.2 panics at a stated length below 3.
 
 use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::AvailableColumn;
@@ -14,32 +13,29 @@ use std::io::{self, BufReader, ErrorKind, Read};
 
 const FORMAT: &str = "ArduPilot log";
 
-/// First two bytes of every message; its type follows.
+/// First two bytes of a message, before its type.
 const START: [u8; 2] = [0xA3, 0x95];
-/// Type of the message that describes another type, and its length.
+/// Description of a type, and its length.
 const FMT: u8 = 0x80;
 const FMT_BYTES: usize = 89;
-/// First bytes of every log.
 pub(crate) const MAGIC: [u8; 3] = [START[0], START[1], FMT];
 
-/// Samples in an ISBD message.
 const BATCH_SAMPLES: usize = 32;
 
-/// Labels of an inertial sensor in whatever message, with their channels and units.
+/// Vectors of an inertial sensor with channels and units.
 const VECTORS: [([&str; 3], [&str; 3], &str); 2] =
     [(["GyrX", "GyrY", "GyrZ"], GYROSCOPE, "rad/s"), (["AccX", "AccY", "AccZ"], ACCELEROMETER, "m/s^2")];
-/// Label of a sensor's temperature beside them, degC.
 const TEMPERATURE: &str = "T";
-/// Labels of times, with their units; the first that a message has is that of its samples.
+/// Times with units; the first one present is that of the samples.
 const TIMES: [(&str, &str); 4] = [("SampleUS", "us"), ("TimeUS", "us"), ("TimeMS", "ms"), ("TimeS", "s")];
-/// Label of the number of a sensor among several.
+/// Number of a sensor among several.
 const INSTANCE: &str = "I";
 
-/// What the rows of a topic are made of. Of topics whose sensor is known the least is read where the user names none.
+/// The rows of a topic; the least of known sensors is the default.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 enum Rows {
     GyroscopeBatches(i64),
-    /// Messages by their name, and the number of the sensor where they have one.
+    /// By name, and number of the sensor.
     Messages(String, Option<i64>),
     AccelerometerBatches(i64),
 }
@@ -54,7 +50,7 @@ impl Rows {
         }
     }
 
-    /// The topic of a batch, of samples with a time and three axes, or of messages of this format.
+    /// The topic of a batch or of messages.
     fn topic(&self, format: Option<&MessageFormat>, rows: u64) -> Topic {
         let topic = Topic { name: self.name(), rows: Some(rows), ..Topic::default() };
         let mut sensor = TopicSensor::default();
@@ -91,7 +87,6 @@ impl Rows {
     }
 }
 
-/// An open log.
 pub(crate) struct ArduPilotSource<'a> {
     file: &'a FileBytes,
     offer: Offer,
@@ -141,7 +136,6 @@ impl Source for ArduPilotSource<'_> {
     }
 }
 
-/// The header of a batch: what its samples are and when they were taken.
 struct Batch {
     number: i64,
     rows: Rows,
@@ -153,7 +147,7 @@ struct Batch {
 }
 
 impl Batch {
-    /// From an ISBH message; `None` if it is of no known sensor or has no scale or rate.
+    /// From ISBH; `None` for unknown sensors, or without scale or rate.
     fn from_header(header: &LogMessage) -> Option<Self> {
         let instance = header.integer("instance")?;
         let rows = match header.integer("type")? {
@@ -168,30 +162,28 @@ impl Batch {
     }
 }
 
-/// What a way through a log leaves.
 struct Log {
     formats: BTreeMap<u8, MessageFormat>,
-    /// Bytes that are no message.
+    /// Bytes outside of messages.
     skipped: u64,
 }
 
-/// Takes what a row belongs to, and gives its numbers by the positions of their columns.
+/// Gets the row's topic and its numbers by position.
 type EachSample<'a> = dyn FnMut(&Rows, &dyn Fn(usize) -> Number) -> Result<(), InputError> + 'a;
 
-/// Gives every sample to `each`.
 fn for_each_sample(file: &FileBytes, budget: Budget, each: &mut EachSample) -> Result<Log, InputError> {
     let fail = |error| file.error(Reason::from_io(error));
     let input = BufReader::new(file.open().map_err(fail)?);
     let mut messages = Messages::new(Metered::new(input, budget.meter()));
     let mut batch: Option<Batch> = None;
-    // Of each type of message: its name with the instance that was seen last.
+    // By type: name and last instance.
     let mut known: BTreeMap<u8, Rows> = BTreeMap::new();
     while let Some(message) = messages.next().map_err(fail)? {
         match message.format.name.as_str() {
             "FMT" => {}
             "ISBH" => batch = Batch::from_header(&message),
             "ISBD" => {
-                // A message is lost where the sequence number is not the next one: its samples are a gap.
+                // A missing sequence number makes its samples a gap.
                 let (Some(batch), Some(sequence)) = (batch.as_mut(), message.integer("seqno")) else { continue };
                 if message.integer("N") != Some(batch.number) || sequence < 0 {
                     continue;
@@ -204,7 +196,7 @@ fn for_each_sample(file: &FileBytes, budget: Budget, each: &mut EachSample) -> R
                         message.element(label, at).map_or(f64::NAN, |count| f64::from(count) / batch.multiplier)
                     };
                     each(&batch.rows, &|column| match column {
-                        // Integers keep every digit of a time since the start; the fraction of a microsecond is below its tick.
+                        // Integers keep every digit; a fraction of a microsecond is below the tick.
                         0 => Number::Real(batch.start_us as f64 + after_us),
                         column => Number::Real(axis(["x", "y", "z"][(column - 1).min(2)])),
                     })?;
@@ -224,17 +216,13 @@ fn for_each_sample(file: &FileBytes, budget: Budget, each: &mut EachSample) -> R
     Ok(Log { formats: messages.formats, skipped: messages.skipped })
 }
 
-/// A type of message as the log describes it.
 #[derive(Debug, Clone, PartialEq)]
 struct MessageFormat {
     name: String,
-    /// Bytes of the message, with its start and type.
     length: usize,
-    /// Label, type and place of each field.
     fields: Vec<(String, char, usize)>,
 }
 
-/// A message.
 struct LogMessage<'a> {
     format: &'a MessageFormat,
     bytes: &'a [u8],
@@ -282,7 +270,7 @@ impl LogMessage<'_> {
         }
     }
 
-    /// Element `at` of an array of 32 numbers of 16 bits.
+    /// Element `at` of 32 numbers of 16 bits.
     fn element(&self, label: &str, at: usize) -> Option<i16> {
         let (kind, bytes) = self.field(label)?;
         let own = bytes.get(2 * at..)?.first_chunk().filter(|_| kind == 'a')?;
@@ -290,7 +278,7 @@ impl LogMessage<'_> {
     }
 }
 
-/// Bytes of a field; `None` for a type that is not known.
+/// `None` for an unknown type.
 fn field_bytes(kind: char) -> Option<usize> {
     Some(match kind {
         'b' | 'B' | 'M' => 1,
@@ -303,12 +291,9 @@ fn field_bytes(kind: char) -> Option<usize> {
     })
 }
 
-/// Reads messages one after the other; what is none is skipped and counted.
 struct Messages<R> {
     input: R,
-    /// Bytes that were read and not consumed.
     pending: Vec<u8>,
-    /// The message that was returned last.
     current: Vec<u8>,
     formats: BTreeMap<u8, MessageFormat>,
     skipped: u64,
@@ -321,7 +306,7 @@ impl<R: Read> Messages<R> {
         Self { input, pending: Vec::new(), current: Vec::new(), formats, skipped: 0 }
     }
 
-    /// Whether `count` bytes are pending; reads more if not.
+    /// Reads until `count` bytes are pending; false at the end.
     fn has(&mut self, count: usize) -> io::Result<bool> {
         while self.pending.len() < count {
             let start = self.pending.len();
@@ -340,7 +325,6 @@ impl<R: Read> Messages<R> {
         Ok(true)
     }
 
-    /// The next message; `None` at the end, where a message may be cut off.
     fn next(&mut self) -> io::Result<Option<LogMessage<'_>>> {
         let kind = loop {
             if !self.has(MAGIC.len())? {
@@ -377,7 +361,7 @@ impl<R: Read> Messages<R> {
     }
 }
 
-/// The type that a format message describes; `None` if it contradicts itself.
+/// `None` for a contradictory description.
 fn described_format(message: &[u8]) -> Option<(u8, MessageFormat)> {
     let text = |from: usize, bytes: usize| {
         let field = message.get(from..from + bytes)?;

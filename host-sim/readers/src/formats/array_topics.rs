@@ -1,4 +1,4 @@
-//! Arrays of numbers with names, as NumPy, MATLAB and HDF5 keep them: which of them are columns of one table.
+//! Named arrays of NumPy, MATLAB and HDF5, and the tables that they form.
 
 use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::{AvailableColumn, known_by_name};
@@ -10,10 +10,10 @@ use crate::rows::batch::Number;
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 
-/// Names of vectors whose unit is a matter of course, as in NaveGo and in textbooks on strapdown navigation.
+/// Vectors without a stated unit, as in NaveGo and textbooks.
 const UNITS_BY_NAME: [(&str, &str); 2] = [("wb", "rad/s"), ("fb", "m/s^2")];
 
-/// Names of a sample rate, Hz, in small letters: of attributes, or of arrays of one number beside the others.
+/// Names of a sample rate, Hz: attributes, or arrays of one number.
 const RATES: [&str; 13] = [
     "sampling_rate",
     "sample_rate",
@@ -40,25 +40,23 @@ pub(crate) fn stated_rate(name: &str, number: f64) -> Option<f64> {
     (is_known && rate.is_finite() && rate > 0.0).then_some(rate)
 }
 
-/// An array of a file: a vector, or a matrix whose longer side is the time.
+/// A vector, or a matrix whose longer side is time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct NamedArray {
-    /// Where it lies, with the sign that comes before its own name: `imu1.` or `/run/`; empty for the outermost.
+    /// Path with its final sign, `imu1.` or `/run/`; empty at the top.
     pub(crate) group: String,
-    /// Its name; empty where the file has one array without a name.
+    /// Empty for the only array.
     pub(crate) name: String,
-    /// Length of the longer side.
     pub(crate) rows: usize,
-    /// Names of the columns, or their numbers, from 0.
+    /// Or numbers, from 0.
     pub(crate) columns: Vec<String>,
-    /// Unit of the numbers, where the file says it.
     pub(crate) unit: Option<Unit>,
-    /// Sample rate, Hz, where the file says it, and what says it.
+    /// Hz, and its source, if the file says it.
     pub(crate) rate: Option<(f64, String)>,
 }
 
 impl NamedArray {
-    /// A matrix of `rows` by `columns` whose columns have numbers.
+    /// A matrix with numbered columns.
     pub(crate) fn matrix(group: &str, name: &str, rows: usize, columns: usize) -> Self {
         let columns = (0..columns).map(|number| number.to_string()).collect();
         Self { group: group.to_owned(), name: name.to_owned(), rows, columns, ..Self::default() }
@@ -72,7 +70,7 @@ impl NamedArray {
         format!("{}{}", self.group, self.name)
     }
 
-    /// The name of a column: `gyro.0` of the matrix `gyro`, the name alone of a vector, the number alone where the array has no name.
+    /// `gyro.0` of a matrix; the name of a vector; the number without a name.
     fn column_name(&self, path: &str, column: usize) -> String {
         match (path, self.columns.len()) {
             ("", _) => self.columns[column].clone(),
@@ -81,7 +79,6 @@ impl NamedArray {
         }
     }
 
-    /// A column of the table under this name.
     fn available(&self, path: &str, column: usize) -> AvailableColumn {
         let name = self.column_name(path, column);
         let heading = AvailableColumn::from_heading(&name);
@@ -92,15 +89,12 @@ impl NamedArray {
     }
 }
 
-/// Takes the numbers of a row, or the reason why there are no more.
 pub(crate) type EachArrayRow<'a> = dyn FnMut(Result<&[Number], Reason>) -> Result<(), InputError> + 'a;
 
-/// The numbers in the arrays of a file.
 pub(crate) trait ArrayReader: Send {
-    /// Name of the format.
     const FORMAT: &'static str;
 
-    /// The columns, by their numbers, of the array at `array`. `add` is called with how many numbers are about to be held.
+    /// Columns of an array; `add` gets the count of numbers to be held.
     fn read(
         &mut self,
         array: usize,
@@ -108,27 +102,25 @@ pub(crate) trait ArrayReader: Send {
         add: &mut dyn FnMut(u64) -> Result<(), Reason>,
     ) -> Result<Vec<Vec<Number>>, Reason>;
 
-    /// Gives the rows of these columns, each by its array and its number, or the reason why there are no more, without holding them;
-    /// `None` where the format has to hold them.
+    /// Streams the rows of columns (array, number); `None` if the format has to hold them.
     fn for_each_row(&mut self, _places: &[(usize, usize)], _each: &mut EachArrayRow) -> Option<Result<(), InputError>> {
         None
     }
 }
 
-/// A file with named arrays.
 pub(crate) struct ArraySource<'a, R> {
     file: &'a Path,
     reader: R,
     arrays: Vec<NamedArray>,
     offer: Offer,
-    /// Array and column of each column of the whole file, and those columns of each topic.
+    /// Array and column of each column, overall and per topic.
     places: Vec<(usize, usize)>,
     members: Vec<Vec<usize>>,
     budget: Budget,
 }
 
 impl<'a, R: ArrayReader> ArraySource<'a, R> {
-    /// The first topic has all arrays; each group and each array is one of its own.
+    /// The first topic has all arrays; groups and arrays follow.
     pub(crate) fn new(file: &'a Path, mut reader: R, mut arrays: Vec<NamedArray>, budget: Budget) -> Self {
         set_stated_rates(&mut reader, &mut arrays);
         let places: Vec<(usize, usize)> = arrays
@@ -153,7 +145,7 @@ impl<'a, R: ArrayReader> ArraySource<'a, R> {
         source
     }
 
-    /// Adds a topic of the arrays whose numbers are members.
+    /// Members are numbers of arrays.
     fn add_topic(&mut self, name: String, is_member: impl Fn(usize) -> bool) -> usize {
         let members: Vec<usize> = (0..self.places.len()).filter(|&at| is_member(self.places[at].0)).collect();
         let available = |&at: &usize| {
@@ -167,14 +159,14 @@ impl<'a, R: ArrayReader> ArraySource<'a, R> {
         self.offer.topics.len() - 1
     }
 
-    /// The rate that the file states for some columns of a topic, Hz, and what states it.
+    /// The stated rate of columns, Hz, with its source.
     fn stated_rate(&self, topic: usize, columns: &[usize]) -> Option<&(f64, String)> {
         let mut arrays: Vec<usize> = columns.iter().map(|&column| self.places[self.members[topic][column]].0).collect();
         arrays.sort_unstable();
         arrays.into_iter().find_map(|array| self.arrays[array].rate.as_ref())
     }
 
-    /// The sensor that the arrays directly in `group` are, by their names.
+    /// The sensor by names of the arrays in `group`.
     fn sensor(&self, group: &str, topic: usize) -> Option<TopicSensor> {
         let own: Vec<usize> = (0..self.members[topic].len())
             .filter(|&at| self.arrays[self.places[self.members[topic][at]].0].group == group)
@@ -185,7 +177,7 @@ impl<'a, R: ArrayReader> ArraySource<'a, R> {
             .map(|&at| {
                 let (array, column) = place(at);
                 let array = &self.arrays[array];
-                // The names of the numbers in a record say enough.
+                // A record's numbers have names.
                 let path = if array.has_named_columns() { "" } else { array.name.as_str() };
                 array.available(path, column)
             })
@@ -203,7 +195,7 @@ impl<'a, R: ArrayReader> ArraySource<'a, R> {
                 || GYROSCOPE.contains(&channel)
                 || ACCELEROMETER.contains(&channel);
             if !is_needed && available[at].unit.is_none() {
-                // A magnetometer or a thermometer is no reason to ask for a unit.
+                // A magnetometer or thermometer is no reason to ask.
                 continue;
             }
             let position = own[at];
@@ -226,11 +218,10 @@ impl<'a, R: ArrayReader> ArraySource<'a, R> {
     }
 }
 
-/// Sets the rate of the arrays beside and below an array of one number that states one.
 fn set_stated_rates(reader: &mut impl ArrayReader, arrays: &mut [NamedArray]) {
     for at in 0..arrays.len() {
         let NamedArray { group, name, rows: 1, columns, .. } = &arrays[at] else { continue };
-        // The value 1 stands for any.
+        // 1 stands for any.
         if columns.len() != 1 || stated_rate(name, 1.0).is_none() {
             continue;
         }
@@ -249,7 +240,7 @@ impl<R: ArrayReader> Source for ArraySource<'_, R> {
         &self.offer
     }
 
-    /// Arrays of one length: all of them where their names are those of one sensor, else those of a group and the groups in it.
+    /// Arrays of one length: all if they name one sensor, else by group.
     fn tables(&self, topic: usize) -> Vec<Vec<usize>> {
         let mut by_rows: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         for (at, member) in self.members[topic].iter().enumerate() {
@@ -257,7 +248,6 @@ impl<R: ArrayReader> Source for ArraySource<'_, R> {
         }
         let columns = &self.offer.topics[topic].columns;
         let mut tables = Vec::new();
-        // Arrays of one number come last.
         for all in by_rows.into_values().rev() {
             let available: Vec<AvailableColumn> = all.iter().map(|&at| columns[at].clone()).collect();
             if known_by_name(&available).is_some_and(|known| !known.is_empty()) {

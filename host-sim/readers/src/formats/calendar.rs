@@ -1,23 +1,20 @@
-//! Calendar times, as people's loggers write them: dates, times of day, both in one text, and the parts of a time in several columns.
+//! Calendar times of loggers: dates, times of day, both in one text, or parts in several columns.
 
 use crate::columns::column_selection::AvailableColumn;
 use crate::formats::fields::number;
 use crate::rows::batch::Number;
 use jiff::civil::Date;
 
-/// Nanoseconds of a second, a day and half a day.
 const SECOND_NS: i64 = 1_000_000_000;
 pub(crate) const DAY_NS: i64 = 86_400 * SECOND_NS;
 
 const MONTHS: [&str; 12] = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"];
 
-/// Nanoseconds from 1970 to a date and a time of day in one text: ISO 8601, or any [`date`] and [`time_of_day`] with a blank or a T
-/// between them; or of a duration as `0 days 00:00:01.5`.
+/// ns since 1970 by ISO 8601 or any [`date`] and [`time_of_day`]; or a duration, `0 days 00:00:01.5`.
 pub(crate) fn date_time(text: &str) -> Option<i64> {
     date_time_with(text, date)
 }
 
-/// The same, whose date is read by `date`.
 fn date_time_with(text: &str, date: impl FnOnce(&str) -> Option<i64>) -> Option<i64> {
     let at = text.find(|c: char| c == 'T' || c == 't' || c.is_ascii_whitespace())?;
     let (first, rest) = (&text[..at], text[at + 1..].trim_start());
@@ -28,27 +25,27 @@ fn date_time_with(text: &str, date: impl FnOnce(&str) -> Option<i64>) -> Option<
     date(first)?.checked_mul(DAY_NS)?.checked_add(time_of_day(rest)?)
 }
 
-/// Days from 1970 to a date: 2018-04-25, 2018/04/25, 25.04.2018, 25-Apr-2018, 04/25/2018 and 25/04/2018. Where day and month cannot be told
-/// apart, the month is first between strokes and the day elsewhere.
+/// Days since 1970: 2018-04-25, 2018/04/25, 25.04.2018, 25-Apr-2018, 04/25/2018 or 25/04/2018. Ambiguous: month first
+/// between strokes, else day first.
 pub(crate) fn date(text: &str) -> Option<i64> {
     let date = WrittenDate::parse(text)?;
     date.days(Order::MonthFirst).filter(|_| date.is_stroked).or_else(|| date.days(Order::DayFirst))
 }
 
-/// Which of day and month comes first in dates whose year is last.
+/// First of day and month, if the year is last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Order {
     DayFirst,
     MonthFirst,
 }
 
-/// A date whose order may not be known.
+/// A date of perhaps unknown order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct WrittenDate {
     year: i64,
-    /// Month and day; where the year is last, as they are written.
+    /// As written if the year is last.
     parts: [i64; 2],
-    /// Whether the order is that of the file.
+    /// In the file's order.
     is_open: bool,
     is_stroked: bool,
 }
@@ -81,7 +78,7 @@ impl WrittenDate {
         }
     }
 
-    /// Days from 1970; `None` where there is no such day.
+    /// `None` if there is no such day.
     fn days(self, order: Order) -> Option<i64> {
         let [month, day] = match (self.is_open, order) {
             (true, Order::DayFirst) => [self.parts[1], self.parts[0]],
@@ -92,12 +89,11 @@ impl WrittenDate {
     }
 }
 
-/// The order of day and month of a file, which its dates tell in the end: by a day that is no month, else by the first change of the date, which
-/// is a day and no month later. Until then it does not matter, as times are differences.
+/// Order of day and month in a file, by a day above 12 or the first change of date.
 #[derive(Debug, Clone, Default)]
 struct DateOrder {
     known: Option<Order>,
-    /// The date before, and days that were added since to go on from it.
+    /// Last date, and days added since.
     before: Option<WrittenDate>,
     shift: i64,
 }
@@ -127,8 +123,7 @@ impl DateOrder {
     }
 }
 
-/// Nanoseconds from midnight to a time of day, in UTC where it says its offset: 10:00, 10:00:13, 10:00:13.25, 10:00:13Z,
-/// 10:00:13+02:00, 10:00:13 PM, 10:00:13:250 (ms).
+/// ns from midnight, UTC with an offset: 10:00, 10:00:13.25, 10:00:13+02:00, 10:00:13 PM, 10:00:13:250 (ms).
 pub(crate) fn time_of_day(text: &str) -> Option<i64> {
     let text = text.trim();
     let upper = text.to_uppercase();
@@ -142,7 +137,7 @@ pub(crate) fn time_of_day(text: &str) -> Option<i64> {
         Some(at) => (&clock[..at], offset(&clock[at..])?),
         None => (clock, 0),
     };
-    // Minutes and seconds with a fraction, as of an elapsed time.
+    // Minutes and seconds of an elapsed time.
     let is_without_hour = clock.matches(':').count() == 1 && clock.contains('.');
     let with_hour = format!("0:{clock}");
     let clock = if is_without_hour { with_hour.as_str() } else { clock };
@@ -166,7 +161,7 @@ pub(crate) fn time_of_day(text: &str) -> Option<i64> {
             }
             let digits = &fraction[..fraction.len().min(9)];
             let scale = 10i64.pow(9 - digits.len() as u32);
-            // The 61st second of a minute is a leap second.
+            // Leap second.
             (two_digits(second, 61)?, digits.parse::<i64>().ok()? * scale)
         }
         None => (0, 0),
@@ -175,7 +170,7 @@ pub(crate) fn time_of_day(text: &str) -> Option<i64> {
     parts.next().is_none().then_some(((hour * 60 + minute - offset) * 60 + second) * SECOND_NS + fraction)
 }
 
-/// Minutes that a clock is ahead of UTC, of `+02:00`, `+0200` or `+02`.
+/// Minutes ahead of UTC: `+02:00`, `+0200` or `+02`.
 fn offset(text: &str) -> Option<i64> {
     let digits = text[1..].replace(':', "");
     let is_offset = [2, 4].contains(&digits.len()) && digits.bytes().all(|b| b.is_ascii_digit());
@@ -183,25 +178,19 @@ fn offset(text: &str) -> Option<i64> {
     minutes.map(|(hours, minutes): (i64, i64)| (60 * hours + minutes) * if text.starts_with('-') { -1 } else { 1 })
 }
 
-/// Where the calendar times of a row are.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum CalendarColumns {
-    /// Date and time of day in one field.
     One(usize),
-    /// A date, and the time of day in the next field.
     Two(usize),
-    /// A time of day without a date.
     TimeOfDay(usize),
-    /// Whole numbers that are one time together, with the nanoseconds of each unit: seconds and nanoseconds, or hours, minutes and seconds.
+    /// Whole numbers with their ns: seconds and nanoseconds, or hours, minutes, seconds.
     Parts(Vec<(usize, i64)>),
 }
 
-/// A part of a time that may have a column of its own.
 struct TimePart {
-    /// Endings of the name of the column, in small letters.
     names: &'static [&'static str],
     unit_ns: i64,
-    /// Its numbers are below this.
+    /// Exclusive bound.
     below: i64,
 }
 
@@ -226,20 +215,15 @@ const PARTS: [TimePart; 7] = [
     },
     TimePart { names: &["centisecond", "centiseconds"], unit_ns: 10_000_000, below: 100 },
 ];
-/// The place of the seconds among them.
 const SECONDS: usize = 2;
 
-/// A column whose name is that of a part of a time.
 struct NamedPart {
-    /// What comes before it in the name.
     prefix: String,
-    /// Its place among the [`PARTS`].
     part: usize,
     position: usize,
 }
 
 impl CalendarColumns {
-    /// The first of `fields` with a calendar time.
     pub(crate) fn find(fields: &[&str]) -> Option<Self> {
         fields.iter().enumerate().find_map(|(at, field)| {
             let next_is_time = || fields.get(at + 1).is_some_and(|next| time_of_day(next).is_some());
@@ -253,8 +237,7 @@ impl CalendarColumns {
         })
     }
 
-    /// The columns whose names are those of the parts of a time, as `secs` and `nsecs`, with whole numbers in `rows` that fit them. The seconds
-    /// are one of them.
+    /// Columns named as parts of a time, as `secs` and `nsecs`, with whole numbers in `rows`; seconds are required.
     pub(crate) fn parts(available: &[AvailableColumn], rows: &[Vec<&str>]) -> Option<Self> {
         let mut named: Vec<NamedPart> = Vec::new();
         for (position, column) in available.iter().enumerate() {
@@ -278,14 +261,13 @@ impl CalendarColumns {
         let prefix = named.iter().find(|of| of.part == SECONDS).map(|of| of.prefix.clone())?;
         named.retain(|of| of.prefix == prefix);
         let has = |part: usize| named.iter().any(|of| of.part == part);
-        // Hours without minutes are no time of day; of several fractions one is a part.
+        // Hours need minutes; one fraction at most.
         let is_time = named.len() > 1 && has(0) <= has(1) && !rows.is_empty();
         let mut parts: Vec<(usize, i64)> = named.iter().map(|of| (of.position, PARTS[of.part].unit_ns)).collect();
         parts.sort_unstable();
         is_time.then_some(Self::Parts(parts))
     }
 
-    /// Number of the field in which it begins.
     pub(crate) fn position(&self) -> usize {
         match self {
             Self::One(at) | Self::Two(at) | Self::TimeOfDay(at) => *at,
@@ -294,12 +276,12 @@ impl CalendarColumns {
     }
 }
 
-/// Reads the calendar times of consecutive rows.
+/// Calendar times of consecutive rows.
 #[derive(Debug, Clone)]
 pub(crate) struct CalendarClock {
     pub(crate) columns: CalendarColumns,
     order: DateOrder,
-    /// Time of day of the row before, and midnights since the first row, for times without a date.
+    /// Last time of day, and midnights since the first row.
     before_ns: Option<i64>,
     midnights: i64,
 }
@@ -309,14 +291,14 @@ impl CalendarClock {
         Self { columns, order: DateOrder::default(), before_ns: None, midnights: 0 }
     }
 
-    /// The time of a row, ns; `field` is the one at the position of the columns, and `next` the one after it.
+    /// ns; `next` is the field behind `field`.
     pub(crate) fn time_ns(&mut self, field: &str, next: &str) -> Option<i64> {
         match self.columns {
             CalendarColumns::One(_) => date_time_with(field, |date| self.order.days(date)),
             CalendarColumns::Two(_) => self.order.days(field)?.checked_mul(DAY_NS)?.checked_add(time_of_day(next)?),
             CalendarColumns::TimeOfDay(_) => {
                 let now = time_of_day(field)?;
-                // A time that goes back by more than half a day is that of the next one.
+                // Back by more than half a day: the next day.
                 self.midnights += i64::from(self.before_ns.is_some_and(|before| now < before - DAY_NS / 2));
                 self.before_ns = Some(now);
                 Some(now + self.midnights * DAY_NS)
@@ -325,17 +307,16 @@ impl CalendarClock {
         }
     }
 
-    /// Whether the time, or its date, is in the field at `position`.
+    /// True for the field of the time or its date.
     pub(crate) fn is_at(&self, position: usize) -> bool {
         !matches!(self.columns, CalendarColumns::Parts(_)) && self.columns.position() == position
     }
 
-    /// The position of the first part of a time.
     pub(crate) fn start_of_parts(&self) -> Option<usize> {
         matches!(self.columns, CalendarColumns::Parts(_)).then(|| self.columns.position())
     }
 
-    /// The time that the sum of the parts of a row is, ns, after as many midnights, or full hours without hours, as were passed.
+    /// ns of a sum of parts, plus passed midnights or hours.
     pub(crate) fn sum_ns(&mut self, sum: i64) -> Option<i64> {
         let CalendarColumns::Parts(parts) = &self.columns else { return None };
         let has = |part: usize| parts.iter().any(|(_, unit)| *unit == PARTS[part].unit_ns);
@@ -347,7 +328,7 @@ impl CalendarClock {
         sum.checked_add(self.midnights.checked_mul(modulus)?)
     }
 
-    /// The nanoseconds of the part of a time in the field at `position`; `None` where that is none.
+    /// `None` if it is no part.
     pub(crate) fn part_ns(&self, position: usize, field: &str) -> Option<Option<i64>> {
         let CalendarColumns::Parts(parts) = &self.columns else { return None };
         let (_, unit) = parts.iter().find(|(at, _)| *at == position)?;
@@ -362,7 +343,7 @@ impl CalendarClock {
 mod tests {
     use super::{CalendarClock, CalendarColumns, DAY_NS, date, date_time, time_of_day};
 
-    /// By `date -u -d ... +%s`: 2018-04-25 10:00:13 is 1524650413; 2000-02-29 is day 11016.
+    /// By `date -u`: 1524650413; 2000-02-29 is day 11016.
     #[test]
     fn calendar_times_of_many_loggers_are_the_same_second() {
         const NS: i64 = 1_524_650_413_000_000_000;
@@ -398,7 +379,7 @@ mod tests {
         }
     }
 
-    /// The evenings before and the nights after a change of the date, in either order of day and month.
+    /// Evenings and nights around a change of date.
     #[test]
     fn one_order_of_day_and_month_is_that_of_the_whole_file() {
         for (month, day) in [(5, 11), (11, 5), (12, 12), (1, 31), (2, 28), (9, 30), (12, 31)] {

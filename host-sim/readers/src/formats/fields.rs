@@ -1,25 +1,24 @@
-//! The fields of a row of text, and the numbers in them.
+//! Fields of a text row and their numbers.
 
 use crate::input::delimited_text;
 use crate::rows::batch::Number;
 
-/// Separators of columns, the first that occurs; blanks where none does.
+/// The first that occurs; else blanks.
 const SEPARATORS: [char; 3] = [';', '\t', ','];
 
-/// Fields that stand for a missing value, in small letters.
 const MISSING: [&str; 22] = [
     "", "nan", "na", "n/a", "null", "none", "nil", "-", "--", "---", "*", "?", "#n/a", "#na", "#value!", "#num!",
     "#div/0!", "1.#qnan", "-1.#ind", "1.#inf", "ovf", "missing",
 ];
 
-/// What the serial monitor of the Arduino IDE writes between the time of a line and the line.
+/// Between time and line in the Arduino serial monitor.
 pub(crate) const ARROW: &str = " -> ";
 
-/// The sign between the fields of a row, without the time that a serial monitor writes before it.
+/// Behind a serial monitor's time.
 pub(crate) fn separator_of(text: &str) -> Option<char> {
     let fields = text.split_once(ARROW).map_or(text, |(_, rest)| rest);
     if fields.contains('"') {
-        // Every second part is between quotation marks.
+        // Every second part is quoted.
         let is_outside = |separator: &char| fields.split('"').step_by(2).any(|part| part.contains(*separator));
         return SEPARATORS.into_iter().find(is_outside);
     }
@@ -31,7 +30,7 @@ pub(crate) fn split(text: &str, separator: Option<char>) -> Fields<'_> {
     Fields { rest: Some(text), separator, has_arrow: text.contains(ARROW), list: None }
 }
 
-/// How many numbers each cell of a row has: one, or those of a list in brackets.
+/// One, or the length of a list in brackets.
 pub(crate) fn list_lengths(text: &str, separator: Option<char>) -> Vec<usize> {
     let mut fields = split(text, separator);
     let mut lengths = Vec::new();
@@ -44,26 +43,22 @@ pub(crate) fn list_lengths(text: &str, separator: Option<char>) -> Vec<usize> {
     lengths
 }
 
-/// The fields of a row, of which some may stand between quotation marks, in which a separator is none (RFC 4180). The numbers of a list in
-/// brackets are fields of their own.
+/// Fields, also quoted (RFC 4180). List elements are fields.
 pub(crate) struct Fields<'a> {
     rest: Option<&'a str>,
-    /// An ASCII character; blanks where there is none.
+    /// ASCII; blanks if `None`.
     separator: Option<u8>,
-    /// Whether there may be a time of a serial monitor before the row.
+    /// A serial monitor's time may come first.
     has_arrow: bool,
-    /// What follows in a list.
     list: Option<&'a str>,
 }
 
 impl<'a> Fields<'a> {
-    /// The text before the next separator, and what follows it.
     fn cut(text: &'a str, separator: u8) -> (&'a str, Option<&'a str>) {
         let at = text.bytes().position(|byte| byte == separator);
         at.map_or((text, None), |at| (&text[..at], Some(&text[at + 1..])))
     }
 
-    /// The field, or the first number of the list that it is.
     fn first_of_list(&mut self, field: &'a str) -> &'a str {
         if field.as_bytes().first() != Some(&b'[') {
             return field;
@@ -83,13 +78,12 @@ impl<'a> Fields<'a> {
         element
     }
 
-    /// The next field, if it stands between quotation marks, and what follows them.
     fn quoted(text: &'a str) -> Option<(&'a str, &'a str)> {
         if text.bytes().next().is_none_or(|first| first.is_ascii_graphic() && first != b'"') {
             return None;
         }
         let inner = text.trim_start().strip_prefix('"')?;
-        // Two marks are one in the text.
+        // Two marks are one.
         let mut marks = inner.match_indices('"').map(|(at, _)| at).peekable();
         while let Some(at) = marks.next() {
             if marks.next_if_eq(&(at + 1)).is_none() {
@@ -131,7 +125,7 @@ impl<'a> Iterator for Fields<'a> {
     }
 }
 
-/// A number, with a decimal comma too; NaN for a missing one; `None` for other texts.
+/// Also with decimal comma; NaN if missing; `None` for other texts.
 pub(crate) fn number(field: &str) -> Option<Number> {
     if let Some(number) = short_number(field.as_bytes()) {
         return Some(number);
@@ -146,15 +140,15 @@ pub(crate) fn number(field: &str) -> Option<Number> {
     real.or_else(missing).map(Number::Real)
 }
 
-/// Digits of a number with decimals whose quotient by their power of ten is the nearest float: both are exact.
+/// Both numerator and power of ten are exact.
 const EXACT_DIGITS: usize = 15;
 
-/// Most numbers: at most 18 digits without decimals, or 15 of which some are decimals; `None` for other texts.
+/// Up to 18 digits, or 15 with decimals; `None` for other texts.
 fn short_number(field: &[u8]) -> Option<Number> {
     leading_number(field).filter(|(_, rest)| rest.is_empty()).map(|(number, _)| number)
 }
 
-/// Such a number at the start of `text`, and what follows it.
+/// At the start of `text`, and the rest.
 #[inline]
 pub(crate) fn leading_number(text: &[u8]) -> Option<(Number, &[u8])> {
     const POWERS: [f64; EXACT_DIGITS + 1] =

@@ -1,4 +1,4 @@
-//! Which format a file has, by its content; and the reading of any of them.
+//! Recognition of a format by content, and reading.
 
 use crate::columns::column_selection::ColumnSelection;
 use crate::formats::ardupilot_log::{self, ArduPilotSource};
@@ -41,38 +41,29 @@ use std::thread;
 use std::time::Duration;
 use tempfile::NamedTempFile;
 
-/// Bytes that tell a format: several messages of the raw stream.
+/// Several messages of the raw stream.
 pub const HEAD_BYTES: u64 = 1 << 14;
 
 /// The format of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileFormat {
-    /// Lines of text: a table of numbers.
     TextTable,
-    /// One array of NumPy.
     Npy,
-    /// An archive of arrays of NumPy.
     Npz,
-    /// MATLAB, level 5.
     Mat,
-    /// A bag of ROS 1.
     RosBag,
     /// MCAP, of ROS 2 or Foxglove.
     Mcap,
-    /// A bag of ROS 2 in SQLite.
     Sqlite,
-    /// A log of PX4.
     Ulog,
-    /// A DataFlash log of ArduPilot.
     ArduPilot,
     /// HDF5, which is also MATLAB 7.3.
     Hdf5,
-    /// Arrays in memory.
     Arrays,
 }
 
 impl FileFormat {
-    /// What it is called in a sentence.
+    /// Name for messages.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -103,35 +94,28 @@ const MAGICS: [(&[u8], FileFormat); 8] = [
     (&ardupilot_log::MAGIC, FileFormat::ArduPilot),
 ];
 
-/// An input that can be read more than once: a file, a copy of what came through a pipe or was compressed, bytes in memory, or the files of
-/// a bag that was split.
+/// An input that can be read again: a file, a copy (pipe, compressed), memory, or a bag's files.
 #[derive(Debug)]
 pub struct InputFile {
-    /// As the user named it.
     name: PathBuf,
-    /// At least one, which is empty where there are arrays; of a bag of ROS 2 in a folder all of its files, in their order.
+    /// Empty for arrays; the files of a ROS 2 bag in order.
     parts: Vec<InputPart>,
-    /// Arrays in memory in the place of files.
     arrays: Option<Arc<MemoryTable>>,
     format: FileFormat,
     monitor: ReadMonitor,
     budget: Budget,
 }
 
-/// A file of an input.
 #[derive(Debug)]
 struct InputPart {
-    /// As it was given.
     origin: FileBytes,
-    /// As it is read.
     bytes: FileBytes,
     budget: Budget,
 }
 
 impl InputFile {
-    /// Opens `name`, `-` for standard input, and recognises its format. A pipe is copied to a temporary file, and so is a
-    /// compressed file of a binary format. Of a folder the bag of ROS 2 in it is opened. `monitor` counts the bytes that are read of the
-    /// recording, and may stop the reading of a pipe, of text and of an array.
+    /// Opens `name`, `-` for standard input, and recognises its format. Pipes and compressed binary files are copied; a
+    /// folder is a ROS 2 bag. `monitor` counts bytes and may stop pipes, text and arrays.
     ///
     /// # Errors
     /// The file cannot be read or copied, or it has none of the formats.
@@ -139,7 +123,7 @@ impl InputFile {
         Self::recognised(name, Self::files(name, monitor)?, monitor)
     }
 
-    /// The files of `name`, as [`open`](Self::open) reads them: one, or those of a bag in a folder.
+    /// One file, or those of a bag.
     ///
     /// # Errors
     /// There is none, or a pipe cannot be copied.
@@ -165,7 +149,7 @@ impl InputFile {
     /// Opens bytes in memory that are called `name`.
     ///
     /// # Errors
-    /// They have none of the formats, or are too many once they are decompressed.
+    /// Unknown format, or too large when decompressed.
     pub fn in_memory(name: &Path, bytes: impl Into<Arc<[u8]>>) -> Result<Self, InputError> {
         Self::recognised(name, vec![FileBytes::in_memory(name, bytes)], &ReadMonitor::default())
     }
@@ -185,7 +169,7 @@ impl InputFile {
         }
     }
 
-    /// Recognises the format of files that are one recording called `name`.
+    /// Recognises the files of one recording.
     ///
     /// # Errors
     /// As [`open`](Self::open).
@@ -203,12 +187,12 @@ impl InputFile {
         Ok(Self { name: name.to_owned(), parts, arrays: None, format, monitor: monitor.clone(), budget })
     }
 
-    /// What was recognised.
+    /// The recognised format.
     pub fn format(&self) -> FileFormat {
         self.format
     }
 
-    /// Begins to make the hash of the bytes, as they were given.
+    /// Begins the hash of the given bytes.
     ///
     /// # Errors
     /// The file cannot be opened; or there is none, but arrays.
@@ -219,7 +203,7 @@ impl InputFile {
         FileHash::begin(&self.parts.iter().map(|part| part.origin.clone()).collect::<Vec<_>>())
     }
 
-    /// How many rows there are, by the bytes that were read for the first `rows` of them; `None` where they are not counted.
+    /// Estimated rows, by the bytes of the first `rows`; `None` if not counted.
     pub fn expected_rows(&self, rows: u64) -> Option<u64> {
         let [part] = self.parts.as_slice() else { return None };
         let (length, read) = (part.bytes.length().ok()??, self.monitor.bytes());
@@ -231,12 +215,12 @@ impl InputFile {
         &self.name
     }
 
-    /// Who watches the reading.
+    /// The monitor of the reading.
     pub fn monitor(&self) -> &ReadMonitor {
         &self.monitor
     }
 
-    /// The bytes as they are read; of a bag that was split, those of its first file.
+    /// The first file of a split bag.
     pub fn bytes(&self) -> &FileBytes {
         &self.parts[0].bytes
     }
@@ -250,7 +234,7 @@ impl InputFile {
         lines.header()?.map(str::to_owned).ok_or_else(|| self.bytes().error(Reason::Empty))
     }
 
-    /// The rows of a table, or of a topic; `register` tells the channels, by their names, whose numbers are words of a register.
+    /// Rows of a table or topic; `register` gives the register of a channel of words, by name.
     ///
     /// # Errors
     /// The file is damaged, or its topic or columns cannot be chosen.
@@ -267,8 +251,8 @@ impl InputFile {
         Ok(FileRows::new(name, rows, &self.monitor, register))
     }
 
-    /// What is in the file without an analysis, of the topic that is named or of all that have an inertial sensor; `selection` is what the
-    /// user says of the columns, and `sensor` tells, by the names of the columns of a table, how large its counts are.
+    /// Content without an analysis, of the named topic or of all inertial sensors; `selection` is the user's, `sensor`
+    /// gives the size of counts.
     ///
     /// # Errors
     /// The file is damaged, or has no rows of numbers.
@@ -300,8 +284,7 @@ impl InputFile {
         Ok(whole?.into_iter().map(inspect).collect())
     }
 
-    /// Names of the sensors of one kind that the file has, each to be read with [`ReadOptions::topic`]; none of a file with one sensor,
-    /// without a known one, or of text.
+    /// Sensors of one kind for [`ReadOptions::topic`]; empty for one sensor, unknown ones, or text.
     ///
     /// # Errors
     /// The file is damaged.
@@ -313,7 +296,7 @@ impl InputFile {
         Ok(topics::names_of_several(source.as_ref()))
     }
 
-    /// What is in the file: topics of messages, groups of arrays or the only array, with their columns; nothing of text.
+    /// Topics, groups or the array, with columns; empty for text.
     ///
     /// # Errors
     /// The file is damaged.
@@ -325,7 +308,6 @@ impl InputFile {
         Ok(source.topics().iter().map(TopicDescription::from).collect())
     }
 
-    /// The topics of a binary format.
     fn source(&self) -> Result<Box<dyn Source + '_>, InputError> {
         if let Some(arrays) = &self.arrays {
             return Ok(Box::new(arrays.source(&self.name, self.budget)?));
@@ -361,7 +343,6 @@ impl InputFile {
 }
 
 impl InputPart {
-    /// A file of a recording, decompressed where its format needs that, and its format.
     fn recognised(origin: FileBytes) -> Result<(Self, FileFormat), InputError> {
         let fail = |error| origin.error(Reason::Io(error));
         let refuse = |reason| Err(origin.error(reason));
@@ -371,13 +352,13 @@ impl InputPart {
                 .map_err(|error| origin.error(Reason::from_io(error)))
         };
         let mut bytes = origin.clone();
-        // Of compressed text, what is in it.
+        // Content of compressed text.
         let mut text = None;
         let mut head = bytes.head(HEAD_BYTES).map_err(fail)?;
         if head.starts_with(&GZIP_MAGIC) {
             let mut inner = GzipMembers::new(BufReader::new(bytes.open().map_err(fail)?));
             let mut start = Vec::new();
-            // Damage is reported with its line where the whole is read.
+            // Reported with its line later.
             let _ = inner.by_ref().take(HEAD_BYTES).read_to_end(&mut start);
             if binary_format(&start).is_some() {
                 bytes = expanded(&mut start.as_slice().chain(inner))?;
@@ -405,16 +386,12 @@ impl InputPart {
     }
 }
 
-/// How often a pipe that sends nothing is left for a request to stop.
+/// Interval of looking for a stop.
 const STOP_INTERVAL: Duration = Duration::from_millis(50);
-/// Parts of a pipe that wait to be written.
 const PARTS: usize = 4;
-/// Bytes of a part.
 const PART_BYTES: usize = 1 << 16;
 
-/// A temporary file with all that comes through a pipe, until it ends or `monitor` stops the reading.
-///
-/// A thread reads the pipe, because a read waits until something comes. After a stop it waits for the end of the process.
+/// A temporary copy of a pipe, until its end or a stop. A thread reads; after a stop it blocks until the process ends.
 fn copied_pipe(input: impl Read + Send + 'static, monitor: &ReadMonitor) -> io::Result<NamedTempFile> {
     monitor.begin();
     let (sender, parts) = mpsc::sync_channel::<io::Result<Vec<u8>>>(PARTS);
@@ -454,7 +431,7 @@ fn copied_pipe(input: impl Read + Send + 'static, monitor: &ReadMonitor) -> io::
     Ok(copy)
 }
 
-/// Whether the first bytes are those of HDF5, whose signature may come behind 512 bytes, or 1024, and so on.
+/// The signature may follow 512 bytes, 1024, and so on.
 fn is_hdf5(head: &[u8]) -> bool {
     let mut starts =
         std::iter::once(0).chain((9..).map(|power| 1usize << power).take_while(|start| *start < head.len()));

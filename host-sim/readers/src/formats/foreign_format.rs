@@ -1,9 +1,8 @@
-//! Binary files that are not read: what they look like, and how to convert them.
+//! Foreign binary files, and how to convert them.
 
 use crate::input::input_error::Reason;
 use std::fmt::Write;
 
-/// First bytes, what they begin, and how to convert it.
 const FOREIGN: &[(&[u8], &str, &str)] = &[
     (b"RDX2\n", R_WORKSPACE, IN_R),
     (b"RDX3\n", R_WORKSPACE, IN_R),
@@ -43,12 +42,10 @@ const IN_PANDAS: &str =
 const R_WORKSPACE: &str = "an R workspace";
 const IN_R: &str = "in R: load(\"FILE\"); ls(); write.csv(NAME, \"NAME.csv\", row.names = FALSE)";
 
-/// A part of the letters of a text that may be control characters: 1 in 64 and more are none.
+/// Text has fewer than one control character in 64.
 const MOST_CONTROLS: usize = 64;
-/// Bytes that an error shows.
 const SHOWN: usize = 16;
 
-/// Whether the first bytes of a file are no text.
 pub(crate) fn is_binary(head: &[u8]) -> bool {
     let is_foreign = FOREIGN.iter().any(|(magic, ..)| head.starts_with(magic));
     let is_control = |byte: &&u8| byte.is_ascii_control() && !byte.is_ascii_whitespace() && **byte != 0x1B;
@@ -56,26 +53,26 @@ pub(crate) fn is_binary(head: &[u8]) -> bool {
     is_foreign || head.contains(&0) || controls * MOST_CONTROLS > head.len()
 }
 
-/// What is said of [a JSON document](is_json_document).
+/// For [a JSON document](is_json_document).
 pub(crate) const JSON_DOCUMENT: Reason = Reason::Foreign {
     what: "a JSON document",
     how: "objects are read that stand one in each line; in Python, of a list of them: \
           pandas.read_json(\"FILE\").to_json(\"FILE.jsonl\", orient=\"records\", lines=True)",
 };
 
-/// What is said of [a report](is_report).
+/// For [a report](is_report).
 pub(crate) const REPORT: Reason = Reason::Foreign {
     what: "a report of this program",
     how: "`compare` and `export` take it; `analyze` takes the recording that it was made of",
 };
 
-/// Whether a text begins as the JSON of a report does.
+/// True for the JSON of a report.
 pub(crate) fn is_report(head: &[u8]) -> bool {
     let mut signs = head.iter().filter(|byte| !byte.is_ascii_whitespace());
     br#"{"schema":"#.iter().all(|sign| signs.next() == Some(sign))
 }
 
-/// Whether a text begins a JSON object of several lines, or of one that is longer than `head`, or a list of objects or lists.
+/// A JSON object over several lines or longer than `head`, or a list of objects or lists.
 pub(crate) fn is_json_document(head: &[u8]) -> bool {
     let text = head.trim_ascii_start();
     let mut signs = text.iter().filter(|byte| !byte.is_ascii_whitespace());
@@ -87,7 +84,6 @@ pub(crate) fn is_json_document(head: &[u8]) -> bool {
     }
 }
 
-/// What a binary file looks like, and how to convert it.
 pub(crate) fn refusal(head: &[u8]) -> Reason {
     match FOREIGN.iter().find(|(magic, ..)| head.starts_with(magic)) {
         Some((_, what, how)) => Reason::Foreign { what, how },
@@ -99,12 +95,12 @@ pub(crate) fn refusal(head: &[u8]) -> Reason {
     }
 }
 
-/// Whether each message comes after a time of 8 bytes, in µs since 1970: two of version 1 or 2, one after the other.
+/// Two messages of version 1 or 2, each behind 8 bytes of µs since 1970.
 fn is_mavlink(head: &[u8]) -> bool {
     const TIME: usize = 8;
     let length = |at: usize| {
         let header = head.get(at + TIME..at + TIME + 3)?;
-        // Header and checksum around the payload, and a signature.
+        // Header, checksum, signature.
         match header[0] {
             0xFE => Some(TIME + 8 + usize::from(header[1])),
             0xFD => Some(TIME + 12 + usize::from(header[1]) + if header[2] & 1 == 1 { 13 } else { 0 }),
@@ -114,12 +110,10 @@ fn is_mavlink(head: &[u8]) -> bool {
     length(0).is_some_and(|first| length(first).is_some())
 }
 
-/// The first bytes as hexadecimal digits and as text.
 fn shown(head: &[u8]) -> String {
     let head = &head[..head.len().min(SHOWN)];
     let mut text = String::new();
     for byte in head {
-        // Writing to a string cannot fail.
         let _ = write!(text, "{byte:02X} ");
     }
     let letter = |byte: &u8| if byte.is_ascii_graphic() { char::from(*byte) } else { '.' };

@@ -1,7 +1,4 @@
-//! Datasets of HDF5, which is also what MATLAB 7.3 and `h5py` write: matrices of numbers and tables of records, by their paths.
-//!
-//! Of the crates without a C library `hdf5-pure` reads windows of rows, all of the files that the tests write with `h5py`, and says how
-//! large a dataset is before it is read.
+//! Datasets of HDF5 (MATLAB 7.3, `h5py`): matrices and tables of records, by path, in windows of rows.
 
 use crate::columns::unit::Unit;
 use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray, stated_rate};
@@ -17,23 +14,18 @@ use std::io::Read;
 
 const FORMAT: &str = "HDF5";
 
-/// Columns of a matrix beyond which it is no recording.
 const MAX_COLUMNS: usize = 1024;
-/// Groups and datasets of a file.
 const MAX_OBJECTS: usize = 1 << 14;
-/// Rows that are read at once, where the chunks of the file are smaller.
 const ROWS_AT_ONCE: u64 = 4096;
 
-/// Names of attributes that state a unit, in small letters.
 const UNITS: [&str; 2] = ["unit", "units"];
-/// Those of a factor of the numbers, and of what is added to the products (NetCDF Climate and Forecast Conventions, 8.1).
+/// Factor and offset (NetCDF Climate and Forecast Conventions, 8.1).
 const SCALES: [&str; 2] = ["scale_factor", "scale"];
 const OFFSET: &str = "add_offset";
-/// The attribute by which MATLAB says what an array was, and what of it are no numbers.
+/// Class of an array in MATLAB.
 const MATLAB_CLASS: &str = "MATLAB_class";
 const NO_NUMBERS: [&str; 4] = ["char", "cell", "string", "function_handle"];
 
-/// A number in a record or an element.
 #[derive(Debug, Clone, Copy)]
 struct Encoded {
     offset: usize,
@@ -41,28 +33,24 @@ struct Encoded {
     is_big_endian: bool,
 }
 
-/// How a dataset lies in the file.
 struct Layout {
     path: String,
     rows: usize,
-    /// Of each column; all at the start of an element where each column is a row of the file.
+    /// All at the element's start if columns are rows of the file.
     columns: Vec<Encoded>,
-    /// Bytes of a row of the file.
     stride: usize,
-    /// Whether each column is a row of the file.
+    /// Columns are rows of the file.
     is_by_column: bool,
-    /// What the numbers are multiplied by, and what is added.
     scale: Option<[f64; 2]>,
 }
 
-/// An open file.
 pub(crate) struct Hdf5Reader {
     file: File,
     layouts: Vec<Layout>,
     meter: Meter,
 }
 
-/// What the groups around a dataset state.
+/// Statements of enclosing groups.
 #[derive(Clone, Default)]
 struct Stated {
     rate: Option<(f64, String)>,
@@ -93,7 +81,6 @@ fn damaged(error: impl ToString) -> Reason {
     Reason::Format { format: FORMAT, error: error.to_string().into() }
 }
 
-/// The datasets of numbers of a file.
 struct Found {
     layouts: Vec<Layout>,
     arrays: Vec<NamedArray>,
@@ -106,13 +93,13 @@ impl Found {
         let stated = around.with(&group.attrs().unwrap_or_default(), path);
         for name in group.datasets().map_err(damaged)? {
             self.count()?;
-            // A dataset of a kind that is not read leaves the others to be read.
+            // An unreadable dataset leaves the others.
             let Ok(dataset) = group.dataset(&name) else { continue };
             self.add(&dataset, path, &name, &stated);
         }
         for name in group.groups().map_err(damaged)? {
             self.count()?;
-            // MATLAB keeps what cells refer to in a group of its own.
+            // MATLAB's group for references.
             if name.starts_with('#') {
                 continue;
             }
@@ -153,7 +140,7 @@ impl Found {
 }
 
 impl Stated {
-    /// With what these attributes of `path` say.
+    /// Adds attributes of `path`.
     fn with(&self, attributes: &HashMap<String, AttrValue>, path: &str) -> Self {
         let mut stated = self.clone();
         for (name, value) in attributes {
@@ -170,7 +157,6 @@ impl Stated {
     }
 }
 
-/// The number of an attribute that has one.
 fn number(value: &AttrValue) -> Option<f64> {
     match value {
         AttrValue::F32(value) => Some(f64::from(*value)),
@@ -191,7 +177,6 @@ fn number(value: &AttrValue) -> Option<f64> {
     }
 }
 
-/// The text of an attribute that has one.
 fn text(value: &AttrValue) -> Option<String> {
     match value {
         AttrValue::String(text)
@@ -211,7 +196,7 @@ fn text(value: &AttrValue) -> Option<String> {
     }
 }
 
-/// How a dataset lies, and the names of its columns; `None` for what is no vector, matrix or table of numbers.
+/// `None` unless vector, matrix or table of numbers.
 fn layout(path: &str, kind: &Datatype, shape: &[u64]) -> Option<(Layout, Vec<String>)> {
     let sides: Vec<usize> = shape.iter().map(|side| usize::try_from(*side).ok()).collect::<Option<_>>()?;
     let (first, second) = match *sides.as_slice() {
@@ -250,7 +235,7 @@ fn layout(path: &str, kind: &Datatype, shape: &[u64]) -> Option<(Layout, Vec<Str
     Some((layout, (0..columns).map(|column| column.to_string()).collect()))
 }
 
-/// Adds the numbers of a record at `offset`, also in records and arrays within it: `gyro.x`, `gyro.0`.
+/// Numbers of a record at `offset`, nested: `gyro.x`, `gyro.0`.
 fn add_numbers(path: &str, kind: &Datatype, offset: usize, level: usize, found: &mut Vec<(Encoded, String)>) {
     if found.len() > MAX_COLUMNS || Budget::check_depth(level).is_err() {
         return;
@@ -275,7 +260,6 @@ fn add_numbers(path: &str, kind: &Datatype, offset: usize, level: usize, found: 
     }
 }
 
-/// A number of this type at `offset`; `None` for other types.
 fn encoded(kind: &Datatype, offset: usize) -> Option<Encoded> {
     let bytes = u8::try_from(kind.type_size()).ok()?;
     let (scalar, order) = match kind {
@@ -295,7 +279,7 @@ fn encoded(kind: &Datatype, offset: usize) -> Option<Encoded> {
 }
 
 impl Encoded {
-    /// The number in a row of the file; NaN beyond its end.
+    /// NaN beyond the end.
     fn number(self, row: &[u8]) -> Number {
         let size = self.scalar.bytes();
         let Some(own) = row.get(self.offset..self.offset + size) else { return Number::Real(f64::NAN) };

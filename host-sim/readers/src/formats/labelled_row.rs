@@ -1,11 +1,9 @@
-//! Lines that name each of their numbers: `gx: 0.01, gy: 0.02` or `t=5 gx=0.01`, as sketches print them, and JSON objects, one a line.
+//! Lines that name their numbers: `gx: 0.01, gy: 0.02`, `t=5 gx=0.01`, or JSON objects.
 
 use serde_json::Value;
 
-/// What comes between a number and the next name.
 const SEPARATORS: [char; 4] = [',', ';', '\t', '|'];
 
-/// The names and the texts of the numbers of a line; `None` for another line.
 pub(crate) fn parse(line: &str) -> Option<Vec<(String, String)>> {
     let line = line.trim();
     if line.starts_with('{') {
@@ -30,7 +28,7 @@ pub(crate) fn parse(line: &str) -> Option<Vec<(String, String)>> {
     (found.len() > 1).then_some(found)
 }
 
-/// Adds what is in a value of JSON under its path: `gyro.x` of an object, `gyro.0` of an array.
+/// JSON by path: `gyro.x`, `gyro.0`.
 fn add(value: &Value, path: &str, found: &mut Vec<(String, String)>) {
     let inner = |name: &str| if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };
     match value {

@@ -1,5 +1,4 @@
-//! Arrays of MATLAB: `.mat` files of level 5, which `save` writes without `-v7.3`, with those in structures and cells (MAT-File Format,
-//! chapter 1). Of the crates that read them, `matfile` knows no structure, and prints to the terminal.
+//! MATLAB `.mat` files of level 5, with structures and cells (MAT-File Format, chapter 1). `matfile` has no structures.
 
 use crate::formats::array_topics::{ArrayReader, ArraySource, NamedArray};
 use crate::formats::message_layout::Scalar;
@@ -13,34 +12,29 @@ use std::io::{self, BufReader, Read};
 
 const FORMAT: &str = "MATLAB";
 
-/// Columns of a matrix beyond which it is no recording.
 const MAX_COLUMNS: usize = 1024;
-/// Elements of an array of cells or of structures with arrays, and fields of a structure, beyond which it is no recording.
+/// Children of a cell array or structure.
 const MAX_CHILDREN: usize = 1024;
-/// Numbers of a field of a structure that are a sample, and not an array of samples.
+/// Longest sample in a structure's field.
 const MAX_IN_SAMPLE: usize = 16;
-/// Arrays of a file; and those with every sample of an array of structures.
+/// Limits per file, without and with structures of samples.
 const MAX_ARRAYS: usize = 1 << 12;
 const MAX_PARTS: usize = 1 << 20;
-/// Bytes of a name.
 const MAX_NAME: u64 = 256;
-/// Bytes that are decoded at once; a multiple of every number's.
 const BUFFER_BYTES: usize = 1 << 13;
 
-/// Bytes before the first data element, and of the tag of an element: type and length.
+/// Header, and tag (type, length).
 const HEADER_BYTES: usize = 128;
 const TAG_BYTES: usize = 8;
-/// Types of data elements.
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
-/// Classes of arrays: cells, structures, and numbers from double to uint64.
 const CELL: u32 = 1;
 const STRUCTURE: u32 = 2;
-/// Class of an object of MATLAB, whose numbers are in a nameless array of bytes that has no public description.
+/// Object: its numbers lie in undocumented bytes.
 const OBJECT: u32 = 17;
 const NUMERIC: std::ops::RangeInclusive<u32> = 6..=15;
 
-/// A matrix of a file, or a field of an array of structures that have a sample each.
+/// A matrix, or a field of structures with a sample each.
 #[derive(Debug, Clone)]
 struct ListedArray {
     group: String,
@@ -49,12 +43,12 @@ struct ListedArray {
     parts: Parts,
 }
 
-/// The matrices, by their numbers in the file, of which an array is made: one, or one of each structure.
+/// Numbers of the matrices in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Parts {
     first: usize,
     stride: usize,
-    /// `None` of a matrix.
+    /// `None` for a matrix.
     structures: Option<usize>,
 }
 
@@ -70,7 +64,7 @@ impl Parts {
 }
 
 impl ListedArray {
-    /// Samples, and numbers in each.
+    /// Samples and numbers per sample.
     fn shape(&self) -> [usize; 2] {
         let [rows, columns] = self.sides;
         match self.parts.structures {
@@ -80,16 +74,15 @@ impl ListedArray {
     }
 }
 
-/// What writes the columns of an object that is no table as plain arrays.
+/// For objects other than tables.
 const OTHER_COMMANDS: &str = "copy its numbers into matrices and save these";
 
-/// What writes a table of MATLAB as text.
 fn table_commands(name: &str, class: &str) -> String {
     let table = if class == "timetable" { format!("timetable2table({name})") } else { name.to_owned() };
     format!("writetable({table}, \"{name}.csv\")")
 }
 
-/// An open `.mat` file, which is read from its beginning for each array.
+/// Read from the start for each array.
 pub(crate) struct MatReader {
     file: FileBytes,
     arrays: Vec<ListedArray>,
@@ -143,14 +136,12 @@ impl ArrayReader for MatReader {
     }
 }
 
-/// A way through all data elements of a file: to list its arrays, or to read one of them.
+/// A pass over the data elements, to list or to read.
 struct Walk<'a> {
-    /// What is read, and its columns.
     wanted: Option<(Parts, &'a [usize])>,
     arrays: Vec<ListedArray>,
-    /// Names and classes of objects.
     objects: Vec<(String, String)>,
-    /// Matrices until now, and those of them that were read.
+    /// Matrices so far, and those read.
     walked: usize,
     taken: usize,
     values: Vec<Vec<Number>>,
@@ -173,12 +164,10 @@ impl Walk<'_> {
         }
     }
 
-    /// Whether all that is wanted has been read.
     fn is_done(&self) -> bool {
         self.wanted.is_some_and(|(parts, _)| self.taken == parts.count())
     }
 
-    /// Whether the matrix that comes is to be read.
     fn takes_next(&self) -> bool {
         self.wanted.is_some_and(|(parts, _)| parts.contain(self.walked))
     }
@@ -202,7 +191,7 @@ impl Walk<'_> {
                 walked?;
             } else if tag.held.is_none() {
                 self.element(&mut bytes.as_slice().chain(&mut element))?;
-                // Elements that are not compressed begin at multiples of 8 bytes.
+                // Uncompressed elements are aligned to 8 bytes.
                 padding = tag.rest() - u64::from(tag.length);
             } else {
                 element.set_limit(0);
@@ -227,8 +216,7 @@ impl Walk<'_> {
         if self.walked > most { Err(Reason::Array(format!("more than {most} arrays"))) } else { Ok(()) }
     }
 
-    /// Joins the arrays from `start` on, those of `count` structures `group`, where each structure has the same fields with a sample each;
-    /// else leaves out those of so many structures that they are no recording.
+    /// Joins the arrays of `count` structures with a sample each; drops those of too many structures.
     fn join(&mut self, start: usize, count: usize, group: &str) {
         let all = &self.arrays[start..];
         let fields = all.len() / count;
@@ -252,14 +240,14 @@ impl Walk<'_> {
         }
     }
 
-    /// A data element of the outermost level, which is an array or is left out.
+    /// Top level: an array, or skipped.
     fn element(&mut self, input: &mut dyn Read) -> Result<(), Reason> {
         let mut input = Counted { input, at: 0 };
         let tag = Tag::read(&mut input, self.is_big_endian)?;
         if tag.kind == MATRIX { self.matrix(&mut input, tag, "", None, 0) } else { Ok(()) }
     }
 
-    /// An array after its tag, with all in it. `name` is that of a field, which has none of its own.
+    /// After its tag; `name` is that of a field.
     fn matrix(
         &mut self,
         input: &mut Counted,
@@ -333,7 +321,6 @@ impl Walk<'_> {
         if tag.kind == MATRIX { self.matrix(input, tag, group, Some(name), level + 1) } else { input.skip(tag.rest()) }
     }
 
-    /// Names of the fields of a structure.
     fn fields(&mut self, input: &mut Counted) -> Result<Vec<String>, Reason> {
         let length = self.small(input, 4)?.first().map_or(0, |length| *length as usize);
         let tag = Tag::read(input, self.is_big_endian)?;
@@ -348,7 +335,7 @@ impl Walk<'_> {
         Ok(names.chunks(length).map(name).collect())
     }
 
-    /// An element of words of 32 bits, of which there are `most` bytes at most.
+    /// 32-bit words, at most `most` bytes.
     fn small(&mut self, input: &mut Counted, most: u64) -> Result<Vec<u32>, Reason> {
         let tag = Tag::read(input, self.is_big_endian)?;
         if u64::from(tag.length) > most {
@@ -366,7 +353,6 @@ impl Walk<'_> {
         Ok(String::from_utf8_lossy(&self.content(input, tag)?).into_owned())
     }
 
-    /// The bytes of an element whose length was checked.
     fn content(&self, input: &mut Counted, tag: Tag) -> Result<Vec<u8>, Reason> {
         let mut bytes = tag.held.map_or_else(Vec::new, |held| held[..tag.length as usize].to_vec());
         if tag.held.is_none() {
@@ -377,7 +363,6 @@ impl Walk<'_> {
         Ok(bytes)
     }
 
-    /// Takes the wanted columns of the element of the real parts.
     fn numbers(&mut self, input: &mut Counted, [rows, columns]: [usize; 2]) -> Result<(), Reason> {
         let tag = Tag::read(input, self.is_big_endian)?;
         let unknown = || Reason::Format { format: FORMAT, error: "an array has numbers of an unknown type".into() };
@@ -402,7 +387,6 @@ impl Walk<'_> {
         }
     }
 
-    /// Takes the wanted columns of the numbers of a matrix, which have so many bytes.
     fn columns(
         &mut self,
         input: &mut dyn Read,
@@ -441,12 +425,10 @@ impl Walk<'_> {
     }
 }
 
-/// The group of the fields of a structure in an array of them.
 fn inner_group(group: &str, element: usize) -> String {
     format!("{group}.{element}.")
 }
 
-/// A number of up to 8 bytes.
 fn number(bytes: &[u8], is_big_endian: bool) -> u64 {
     let join = |word: u64, byte: &u8| word << 8 | u64::from(*byte);
     if is_big_endian { bytes.iter().fold(0, join) } else { bytes.iter().rev().fold(0, join) }
@@ -462,7 +444,7 @@ fn ended(error: io::Error) -> Reason {
     }
 }
 
-/// Type and length of a data element. Of up to 4 bytes the content may lie in the tag.
+/// Type and length; up to 4 bytes lie in the tag.
 #[derive(Clone, Copy)]
 struct Tag {
     kind: u32,
@@ -486,13 +468,13 @@ impl Tag {
         }
     }
 
-    /// Bytes of the content after the tag, with those that fill it up to a multiple of 8.
+    /// With padding to 8.
     fn rest(self) -> u64 {
         if self.held.is_some() { 0 } else { u64::from(self.length).next_multiple_of(TAG_BYTES as u64) }
     }
 }
 
-/// An input that knows how much was read of it.
+/// Counts bytes.
 struct Counted<'a> {
     input: &'a mut dyn Read,
     at: u64,

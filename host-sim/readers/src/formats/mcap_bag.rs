@@ -1,4 +1,4 @@
-//! MCAP of ROS 2 and Foxglove: the definition of each type of message is in the schema of its channel.
+//! MCAP (ROS 2, Foxglove) with definitions in its schemas.
 
 use crate::formats::mcap_file::{self, McapRecord};
 use crate::formats::message_layout::{Encoding, MessageLayout};
@@ -10,17 +10,15 @@ use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::InputError;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// An MCAP file.
 pub(crate) struct McapSource<'a> {
     file: &'a FileBytes,
     offer: Offer,
-    /// Of each topic; `None` where its messages cannot be decoded.
+    /// `None` if not decodable.
     layouts: Vec<Option<(MessageLayout, Encoding)>>,
     channels: Vec<BTreeSet<u16>>,
     budget: Budget,
 }
 
-/// A channel as its record says it.
 struct Channel {
     topic: String,
     schema: u16,
@@ -28,10 +26,9 @@ struct Channel {
     messages: u64,
 }
 
-/// A schema: name, encoding, definition.
+/// Name, encoding, definition.
 type Schema = (String, String, Vec<u8>);
 
-/// What a file has.
 #[derive(Default)]
 struct Contents {
     schemas: BTreeMap<u16, Schema>,
@@ -58,7 +55,7 @@ impl Contents {
         }
     }
 
-    /// By the summary; `None` where it does not tell all channels that have messages.
+    /// `None` if the summary is incomplete.
     fn of_summary(file: &FileBytes) -> Option<Self> {
         let (mut contents, mut has_all) = (Self::default(), true);
         let has_summary = mcap_file::for_each_of_summary(file, |record| match record {
@@ -82,7 +79,7 @@ impl<'a> McapSource<'a> {
         let contents = match Contents::of_summary(file) {
             Some(contents) => contents,
             None => {
-                // Channels may be declared anywhere: the topics are known after a first pass.
+                // Topics need a first pass.
                 let mut contents = Contents::default();
                 damage = mcap_file::for_each_record(file, budget, |record| {
                     contents.add(record);
@@ -126,7 +123,7 @@ impl<'a> McapSource<'a> {
     }
 }
 
-/// The layout of messages in `encoding`, by a definition in `language`; that of ROS itself where there is no definition.
+/// By a definition in `language`, else ROS's own.
 fn layout(kind: &str, language: &str, definition: &[u8], encoding: &str) -> Option<(MessageLayout, Encoding)> {
     let (version, encoding) = match encoding {
         "ros1" => (RosVersion::Ros1, Encoding::Packed),
@@ -179,7 +176,7 @@ mod tests {
         [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat()
     }
 
-    /// A file with three messages of one channel, whose summary says that the channel `counted` has `count`, and begins so many bytes late.
+    /// Three messages; the summary states `count` for channel `counted`, and begins `late` bytes late.
     fn file(counted: u16, count: u64, late: u64) -> FileBytes {
         let schema = record(3, &[&1u16.to_le_bytes(), &text("test/Rate"), &text("ros2msg"), &text("float64 x\n")]);
         let channel =
@@ -194,7 +191,6 @@ mod tests {
         FileBytes::in_memory(Path::new("x.mcap"), [&data[..], &described, &statistics, &footer, MAGIC].concat())
     }
 
-    /// The number in the summary is believed for the list of topics, and the messages are read whatever it says.
     #[test]
     fn a_summary_stands_for_a_first_reading_where_it_tells_all_channels() {
         for (counted, count, late, listed) in

@@ -1,6 +1,4 @@
-//! Records of an MCAP file, those in chunks included, in the memory of one chunk.
-//!
-//! The crate `mcap` is not used: its decompression needs a compiler of C.
+//! Records of MCAP in the memory of one chunk. The crate `mcap` needs a C compiler.
 
 use crate::input::budget::{Budget, Meter, Metered};
 use crate::input::file_bytes::FileBytes;
@@ -12,23 +10,19 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
 pub(crate) const FORMAT: &str = "MCAP";
 
-/// Largest record or chunk, compressed or not, bytes: images are larger than a message of an IMU, but not so large.
 const MAX_RECORD: usize = 1 << 28;
-/// Largest summary that is read, bytes: it has the index of each chunk.
+/// Has the index of each chunk.
 const MAX_SUMMARY: u64 = 1 << 26;
-/// First and last bytes of a file.
+/// First and last bytes.
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-/// Type and length before each record.
 const HEADER_BYTES: usize = 1 + 8;
-/// The footer, whose first field is the position of the summary, and the last bytes of a file.
 const END_BYTES: usize = HEADER_BYTES + 8 + 8 + 4 + MAGIC.len();
-/// Position of the messages of each channel in the statistics, and length of one entry.
+/// Offset of the counts, and size of an entry.
 const COUNTS_AT: usize = 8 + 2 + 4 * 4 + 2 * 8;
 const COUNT_BYTES: usize = 2 + 8;
-/// Position of the CRC of a chunk, and after it the name of its compression: after its times and its uncompressed size.
+/// Behind times and uncompressed size.
 const CRC_AT: usize = 8 + 8 + 8;
 
-/// Types of records.
 mod op {
     pub(super) const FOOTER: u8 = 2;
     pub(super) const SCHEMA: u8 = 3;
@@ -38,7 +32,6 @@ mod op {
     pub(super) const STATISTICS: u8 = 11;
 }
 
-/// The records that tell what messages there are, and the messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum McapRecord<'a> {
     Schema {
@@ -53,22 +46,19 @@ pub(crate) enum McapRecord<'a> {
         topic: &'a str,
         encoding: &'a str,
     },
-    /// `log_ns` is when it was recorded.
+    /// `log_ns` is the time of recording.
     Message {
         channel: u16,
         log_ns: u64,
         data: &'a [u8],
     },
-    /// How many messages each channel has, in a summary.
     Counts(MessageCounts<'a>),
 }
 
-/// Messages of each channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct MessageCounts<'a>(&'a [u8]);
 
 impl MessageCounts<'_> {
-    /// Each channel with its number of messages.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (u16, u64)> {
         self.0.chunks_exact(COUNT_BYTES).filter_map(|entry| {
             let (channel, count) = entry.split_first_chunk()?;
@@ -78,7 +68,7 @@ impl MessageCounts<'_> {
 }
 
 impl<'a> McapRecord<'a> {
-    /// From the bytes of a record; `None` for other types. An error if it is cut off.
+    /// `None` for other types; an error if cut off.
     fn decode(opcode: u8, bytes: &'a [u8]) -> Result<Option<Self>, Reason> {
         let mut fields = Fields(bytes);
         let record = match opcode {
@@ -101,7 +91,6 @@ impl<'a> McapRecord<'a> {
     }
 }
 
-/// Fields of a record, one after the other.
 struct Fields<'a>(&'a [u8]);
 
 impl<'a> Fields<'a> {
@@ -145,14 +134,13 @@ fn cut_off() -> Reason {
     damaged("a chunk is cut off")
 }
 
-/// Type and length of the record that begins with `header`.
 fn type_and_length(header: [u8; HEADER_BYTES]) -> Result<(u8, usize), Reason> {
     let [opcode, length @ ..] = header;
     let length = usize::try_from(u64::from_le_bytes(length)).ok().filter(|length| *length <= MAX_RECORD);
     Ok((opcode, length.ok_or_else(|| damaged("a record is longer than 268435456 bytes"))?))
 }
 
-/// Why reading ends: the file is damaged here, or `each` refused a record.
+/// Damage, or a refusal by `each`.
 enum Stop {
     Damage(Reason),
     Refusal(InputError),
@@ -164,10 +152,9 @@ impl From<Reason> for Stop {
     }
 }
 
-/// Takes the records of a file.
 type EachRecord<'a> = dyn FnMut(McapRecord) -> Result<(), InputError> + 'a;
 
-/// Gives every record to `each`; and why there are no more where the file is damaged or ends early.
+/// With the reason of an early end.
 pub(crate) fn for_each_record(
     file: &FileBytes,
     budget: Budget,
@@ -180,8 +167,7 @@ pub(crate) fn for_each_record(
     }
 }
 
-/// Gives the records of the summary at the end of a file to `each`: all schemas and channels, and how many messages there are. False where
-/// the file has no such summary, as after a recording that was interrupted.
+/// Records of the final summary; false without one, as after an interruption.
 pub(crate) fn for_each_of_summary(file: &FileBytes, mut each: impl FnMut(McapRecord)) -> bool {
     let summary = || -> io::Result<Vec<u8>> {
         let mut input = file.open()?;
@@ -241,12 +227,12 @@ fn give(opcode: u8, data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
     McapRecord::decode(opcode, data)?.map_or(Ok(()), |record| each(record).map_err(Stop::Refusal))
 }
 
-/// The records of a chunk, which may be cut off; `unpacked` is where they are decompressed.
+/// `unpacked` is a buffer.
 fn chunk(data: &[u8], unpacked: &mut Vec<u8>, meter: &mut Meter, each: &mut EachRecord) -> Result<(), Stop> {
     let mut fields = Fields(data.get(CRC_AT..).ok_or_else(cut_off)?);
     let crc = fields.take(4).and_then(|bytes| bytes.first_chunk().copied()).map(u32::from_le_bytes);
     let (crc, compression) = crc.zip(fields.text()).ok_or_else(cut_off)?;
-    // The length of the records, which follow.
+    // Length of the records.
     fields.take(8).ok_or_else(cut_off)?;
     let packed = fields.0;
     let decoder: Box<dyn Read + '_> = match compression {
@@ -258,7 +244,7 @@ fn chunk(data: &[u8], unpacked: &mut Vec<u8>, meter: &mut Meter, each: &mut Each
     unpacked.clear();
     let failure = Metered::new(decoder, meter).take(MAX_RECORD as u64).read_to_end(unpacked).err();
     let content = if compression.is_empty() { packed } else { unpacked.as_slice() };
-    // Those before the damage can be used.
+    // Usable before the damage.
     let read = records(content, each);
     if let Some(error) = failure {
         return Err(match Reason::from_io(error) {
@@ -272,7 +258,6 @@ fn chunk(data: &[u8], unpacked: &mut Vec<u8>, meter: &mut Meter, each: &mut Each
     if crc == 0 || crc == sum.sum() { Ok(()) } else { Err(damaged("the checksum of a chunk is wrong").into()) }
 }
 
-/// The records in `bytes`, one after the other.
 fn records(mut bytes: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
     while let Some((header, rest)) = bytes.split_first_chunk() {
         let (opcode, length) = type_and_length(*header)?;
@@ -299,7 +284,6 @@ mod tests {
         [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat()
     }
 
-    /// What is read of a file of these records, and whether it is called damaged.
     fn read(records: &[Vec<u8>]) -> (Vec<String>, Option<String>) {
         let file = FileBytes::in_memory(Path::new("x.mcap"), [b"\x89MCAP0\r\n".to_vec(), records.concat()].concat());
         let mut found = Vec::new();
@@ -310,7 +294,7 @@ mod tests {
         (found, damage.expect("a file that can be read").map(|reason| reason.to_string()))
     }
 
-    /// Lengths that lie: of a text (4 GiB), of a record (beyond its chunk, beyond the file, 16 EiB).
+    /// For a text (4 GiB), of a record (beyond chunk or file, 16 EiB).
     #[test]
     fn lengths_that_lie_are_damage_after_what_came_before() {
         let schema = record(3, &[&1u16.to_le_bytes(), &text("a/msg/B"), &text("ros2msg"), &text("bool x")]);
@@ -345,7 +329,7 @@ mod tests {
             assert_eq!(found, whole, "{name}");
             assert!(damage.is_some(), "{name}");
         }
-        // A chunk that is cut off has its records up to there.
+        // A cut chunk has records up to there.
         let two = chunk(&[message.clone(), message.clone()].concat());
         let (found, damage) = read(&[schema, two[..two.len() - 3].to_vec()]);
         assert_eq!((found.as_slice(), damage.is_some()), (whole.map(str::to_owned).as_slice(), true));

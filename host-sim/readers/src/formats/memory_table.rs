@@ -1,4 +1,4 @@
-//! Arrays that a program holds in memory, such as those of NumPy or the columns of an Arrow table.
+//! Arrays in memory, as of NumPy or Arrow.
 
 use crate::columns::unit::Unit;
 use crate::formats::array_topics::{ArrayReader, ArraySource, EachArrayRow, NamedArray};
@@ -9,44 +9,39 @@ use std::fmt::Debug;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Rows that are read at once.
 const ROWS_AT_ONCE: usize = 4096;
 
 /// The numbers of one column.
 pub trait MemoryColumn: Debug + Send + Sync {
-    /// How many there are.
     fn rows(&self) -> usize;
 
-    /// Puts the numbers from row `first` on into all of `numbers`; one that is missing is NaN.
+    /// From `first` on; NaN if missing.
     fn read(&self, first: usize, numbers: &mut [Number]);
 }
 
 /// An array: a vector, or a matrix as its columns.
 #[derive(Debug, Clone)]
 pub struct MemoryArray {
-    /// Its name; empty where it is the only one.
+    /// Empty if it is the only one.
     pub name: String,
-    /// Unit of its numbers, such as `ns`, where it has one.
+    /// Such as `ns`.
     pub unit: Option<String>,
-    /// At least one, all of one length.
+    /// At least one, of equal length.
     pub columns: Vec<Arc<dyn MemoryColumn>>,
 }
 
 /// Arrays that are one recording.
 #[derive(Debug, Clone, Default)]
 pub struct MemoryTable {
-    /// The arrays, in their order.
     pub arrays: Vec<MemoryArray>,
 }
 
 impl MemoryTable {
-    /// Bytes of as many doubles.
     pub(crate) fn bytes(&self) -> u64 {
         let numbers = self.arrays.iter().flat_map(|array| &array.columns).map(|column| column.rows() as u64 * 8);
         numbers.sum()
     }
 
-    /// The arrays as those of a file.
     pub(crate) fn source<'a>(
         &'a self,
         name: &'a Path,

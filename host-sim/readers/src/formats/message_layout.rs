@@ -1,29 +1,25 @@
-//! Messages of which a definition says the fields: names, types, arrays and nesting, as ROS and PX4 write them.
-//!
-//! A [`MessageLayout`] lists every number of a message as a column, such as `imu.angular_velocity.x` or `gyro[2]`, and decodes messages
-//! to a number for each column. Of a sequence of floats, whose length a message says,
-//! the first 16 are columns; other numbers in sequences, and in arrays of more than 64 elements, are none and are skipped.
+//! Messages with defined fields, as in ROS and PX4: a column per number, such as `imu.angular_velocity.x` or `gyro[2]`.
+//! The first 16 floats of a sequence are columns; longer arrays than 64 are skipped.
 
 use crate::input::budget::Budget;
 use crate::input::input_error::Reason;
 use crate::rows::batch::Number;
 use std::collections::HashMap;
 
-/// Elements of an array that are columns of their own.
+/// Longest array with columns.
 const MOST_ELEMENTS: usize = 64;
-/// The same of a sequence of floats, of which the definition does not say how many there are.
+/// Columns of a sequence of floats.
 const MOST_OF_SEQUENCE: usize = 16;
-/// Steps of a layout, of which there are some for every column: definitions that use each other can ask for any number.
+/// Definitions that use each other can ask for any number.
 const MOST_STEPS: usize = 1 << 14;
 
-/// A number as it is encoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Scalar {
-    /// Signed, of so many bytes.
+    /// Bytes.
     Signed(u8),
-    /// Unsigned, of so many bytes.
+    /// Bytes.
     Unsigned(u8),
-    /// A float of 2, 4 or 8 bytes.
+    /// 2, 4 or 8 bytes.
     Float(u8),
 }
 
@@ -33,7 +29,7 @@ impl Scalar {
         usize::from(bytes)
     }
 
-    /// The number in `word`, of which [`bytes`](Self::bytes) are used.
+    /// Uses [`bytes`](Self::bytes) of `word`.
     pub(crate) fn number(self, word: u64) -> Number {
         let unused = 64 - 8 * self.bytes() as u32;
         match self {
@@ -46,7 +42,7 @@ impl Scalar {
     }
 }
 
-/// A float of 16 bits (IEEE 754, binary16).
+/// IEEE 754 binary16.
 fn half(bits: u16) -> f64 {
     let (exponent, fraction) = (i32::from(bits >> 10 & 0x1F), f64::from(bits & 0x3FF));
     let magnitude = match exponent {
@@ -58,30 +54,26 @@ fn half(bits: u16) -> f64 {
     if bits >> 15 == 1 { -magnitude } else { magnitude }
 }
 
-/// What a field holds.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum FieldType {
     Scalar(Scalar),
-    /// Seconds and nanoseconds of 32 bits each; a column in ns.
+    /// Seconds and ns of 32 bits; a column in ns.
     Time,
-    /// A length of 32 bits and as many bytes.
+    /// 32-bit length and bytes.
     Text,
-    /// Fields of another definition, by its name.
     Nested(String),
-    /// What is not decoded, by its name: the message cannot be read beyond it.
+    /// Not decoded: ends the reading of a message.
     Unknown(String),
 }
 
-/// How many of a field there are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Repeat {
     Once,
     Times(usize),
-    /// A length of 32 bits comes before them.
+    /// 32-bit length first.
     Any,
 }
 
-/// A field of a definition.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Field {
     pub(crate) name: String,
@@ -89,44 +81,36 @@ pub(crate) struct Field {
     pub(crate) repeat: Repeat,
 }
 
-/// Definitions by their names.
 pub(crate) type Definitions = HashMap<String, Vec<Field>>;
 
-/// How fields follow each other in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Encoding {
-    /// Little endian, without padding: ROS 1 and PX4.
+    /// Little endian, unpadded: ROS 1 and PX4.
     Packed,
-    /// CDR with its own header of 4 bytes, of either byte order: ROS 2. A number is aligned to its size, counted from the header on.
+    /// CDR with a header of 4 bytes: ROS 2. Aligned to its size behind the header.
     Cdr,
 }
 
-/// A step of decoding.
 #[derive(Debug, Clone)]
 enum Step {
-    /// A number, which is a column where one is given.
     Number(Scalar, Option<usize>),
     Time(Option<usize>),
     Text,
-    /// A length of 32 bits and as many numbers: the first column, and how many columns there are.
+    /// 32-bit length; first column, number of columns.
     Sequence(Scalar, usize, usize),
-    /// The same steps again and again; none of their numbers is a column.
     Repeat(Repeat, Vec<Step>),
-    /// The end of what can be decoded.
     Unknown,
 }
 
-/// A column of a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct MessageColumn {
-    /// Names of the fields from the outermost on, with `.` between them.
+    /// Path with `.`.
     pub(crate) name: String,
-    /// Whether it is a time in ns.
+    /// ns.
     pub(crate) is_time: bool,
     pub(crate) is_float: bool,
 }
 
-/// The columns of a type of message, and how it is decoded.
 #[derive(Debug, Clone)]
 pub(crate) struct MessageLayout {
     columns: Vec<MessageColumn>,
@@ -134,17 +118,14 @@ pub(crate) struct MessageLayout {
 }
 
 impl MessageLayout {
-    /// The layout of the definition `root`.
-    ///
-    /// # Errors
-    /// A definition that is missing, that contains itself or is nested too deeply, or too many fields.
+    /// Layout of the definition `root`; an error if one is missing, contains itself or is nested too deeply.
     pub(crate) fn new(root: &str, definitions: &Definitions) -> Result<Self, Reason> {
         let mut builder = Builder { definitions, columns: Vec::new(), steps: 0 };
         let steps = builder.steps_of(root, "", true, 0)?;
         Ok(Self { columns: builder.columns, steps })
     }
 
-    /// The same columns, of which only the wanted ones are decoded; nothing after the last of them is read.
+    /// Decodes wanted columns only, up to the last one.
     pub(crate) fn only(&self, is_wanted: impl Fn(usize) -> bool) -> Self {
         let mut steps: Vec<Step> = Vec::new();
         let mut end = 0;
@@ -155,7 +136,7 @@ impl MessageLayout {
                 Step::Text | Step::Repeat(..) | Step::Unknown => false,
             };
             match (step, steps.last_mut()) {
-                // Numbers of one size one after the other are skipped as one.
+                // Numbers of one size are skipped as one.
                 (Step::Number(scalar, _), Some(Step::Repeat(Repeat::Times(count), each)))
                     if !has_wanted && matches!(each[..], [Step::Number(of, _)] if of.bytes() == scalar.bytes()) =>
                 {
@@ -174,13 +155,12 @@ impl MessageLayout {
         Self { columns: self.columns.clone(), steps }
     }
 
-    /// The columns, in the order of the message.
+    /// In the order of the message.
     pub(crate) fn columns(&self) -> &[MessageColumn] {
         &self.columns
     }
 
-    /// Decodes a message to one number for each column. `None` if it is too short or its header says another encoding; what was
-    /// decoded until then is in `row`, and NaN in the rest.
+    /// One number per column; `None` if too short or of another encoding, with NaN for the rest of `row`.
     pub(crate) fn decode(&self, bytes: &[u8], encoding: Encoding, row: &mut Vec<Number>) -> Option<()> {
         row.clear();
         row.resize(self.columns.len(), Number::Real(f64::NAN));
@@ -196,7 +176,7 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    /// The steps of a definition whose fields are named after `prefix`; they are columns if `named`.
+    /// Fields after `prefix`; columns if `named`.
     fn steps_of(&mut self, name: &str, prefix: &str, named: bool, level: usize) -> Result<Vec<Step>, Reason> {
         Budget::check_depth(level)?;
         let definitions = self.definitions;
@@ -281,7 +261,7 @@ fn run(steps: &[Step], cursor: &mut Cursor, row: &mut [Number]) -> Option<()> {
             }
             Step::Time(column) => {
                 let (seconds, nanoseconds) = (cursor.word(4)?, cursor.word(4)?);
-                // Seconds are signed in ROS 2 and unsigned in ROS 1.
+                // Signed in ROS 2, unsigned in ROS 1.
                 let seconds = seconds as u32;
                 let seconds = if cursor.is_packed { i64::from(seconds) } else { i64::from(seconds.cast_signed()) };
                 if let Some(column) = column {
@@ -318,7 +298,7 @@ fn run(steps: &[Step], cursor: &mut Cursor, row: &mut [Number]) -> Option<()> {
                     let before = cursor.at;
                     run(each, cursor, row)?;
                     if cursor.at == before {
-                        // Definitions without a field take no bytes, however many there are.
+                        // Takes no bytes.
                         break;
                     }
                 }
@@ -329,11 +309,10 @@ fn run(steps: &[Step], cursor: &mut Cursor, row: &mut [Number]) -> Option<()> {
     Some(())
 }
 
-/// Reads fields one after the other.
 struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// Where alignment counts from, and its largest step.
+    /// Origin of alignment, and its largest step.
     origin: usize,
     most: usize,
     is_big: bool,
@@ -345,7 +324,7 @@ impl<'a> Cursor<'a> {
         const ENCAPSULATION: usize = 4;
         let (most, is_big) = match encoding {
             Encoding::Packed => return Some(Self { bytes, at: 0, origin: 0, most: 1, is_big: false, is_packed: true }),
-            // Plain CDR of version 1 and 2 (DDS-XTypes 1.3, table 60), which differ in the alignment of 8 bytes.
+            // Plain CDR 1 and 2 (DDS-XTypes 1.3, table 60) differ in 8 bytes.
             Encoding::Cdr => match bytes.get(..2)? {
                 [0, 0] => (8, true),
                 [0, 1] => (8, false),
@@ -367,7 +346,6 @@ impl<'a> Cursor<'a> {
         Some(())
     }
 
-    /// The next `size` bytes as a number.
     fn word(&mut self, size: usize) -> Option<u64> {
         self.align(size);
         let own = self.bytes.get(self.at..self.at.checked_add(size)?)?;
@@ -388,7 +366,7 @@ mod tests {
     use crate::formats::ros_definition::{RosVersion, layout};
     use crate::rows::batch::Number;
 
-    /// 2065 in ROS 1, whose seconds are unsigned; before 1970 in ROS 2, whose seconds are signed.
+    /// 2065 in ROS 1; before 1970 in ROS 2.
     #[test]
     fn seconds_beyond_31_bits_are_those_of_the_version() {
         let stamp = [3_000_000_000u32.to_le_bytes(), 500u32.to_le_bytes()].concat();

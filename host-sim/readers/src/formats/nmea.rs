@@ -1,21 +1,17 @@
-//! Sentences as of NMEA 0183: `$NAME,field,field,…*68`, where the last two digits are the exclusive or of all characters between `$` and
-//! `*`. Inertial sensors send their samples so.
+//! Sentences of NMEA 0183, `$NAME,field,…*68`, with the exclusive or between `$` and `*`.
 
 use crate::columns::column_selection::AvailableColumn;
 
-/// A line that is a sentence.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sentence<'a> {
-    /// Such as `VNYMR`.
     pub(crate) name: &'a str,
-    /// What comes after the name, and before the checksum.
     pub(crate) fields: Vec<&'a str>,
-    /// Whether its checksum is right; a sentence without one is taken as it is.
+    /// True for a right or absent checksum.
     pub(crate) is_intact: bool,
 }
 
 impl<'a> Sentence<'a> {
-    /// `None` for a line that is none.
+    /// `None` for another line.
     pub(crate) fn parse(line: &'a str) -> Option<Self> {
         let content = line.strip_prefix(['$', '!'])?;
         let (content, is_intact) = match content.rsplit_once('*') {
@@ -31,14 +27,14 @@ impl<'a> Sentence<'a> {
     }
 }
 
-/// The columns of a sentence of `width` fields: by the names that its sender's manual gives them, else by their numbers, from 1.
+/// Names by the manual, else numbers from 1.
 pub(crate) fn columns(name: &str, width: usize) -> Vec<AvailableColumn> {
     const ATTITUDE: &[(&str, &str)] = &[("yaw", ""), ("pitch", ""), ("roll", "")];
     const QUATERNION: &[(&str, &str)] = &[("q0", ""), ("q1", ""), ("q2", ""), ("q3", "")];
     const MAGNETIC: &[(&str, &str)] = &[("magn_x", "gauss"), ("magn_y", "gauss"), ("magn_z", "gauss")];
     const ACCELERATION: &[(&str, &str)] = &[("accl_x", "m/s^2"), ("accl_y", "m/s^2"), ("accl_z", "m/s^2")];
     const RATE: &[(&str, &str)] = &[("gyro_x", "rad/s"), ("gyro_y", "rad/s"), ("gyro_z", "rad/s")];
-    // VectorNav, VN-100 User Manual (UM001), "System Module" and "Attitude Subsystem": ASCII measurement messages.
+    // VectorNav VN-100 (UM001), ASCII measurement messages.
     let parts: &[&[(&str, &str)]] = match name {
         "VNYMR" => &[ATTITUDE, MAGNETIC, ACCELERATION, RATE],
         "VNQMR" => &[QUATERNION, MAGNETIC, ACCELERATION, RATE],
@@ -61,7 +57,7 @@ pub(crate) fn columns(name: &str, width: usize) -> Vec<AvailableColumn> {
 mod tests {
     use super::{Sentence, columns};
 
-    /// `$GPGLL` with the checksum 1D is a well-known example of NMEA 0183.
+    /// `$GPGLL` with 1D is a well-known example.
     #[test]
     fn a_sentence_has_a_name_fields_and_a_checksum() {
         let content = "VNYMR,+006.380,+000.023,-001.953,+1.0640,-0.2531,+3.0614,+00.005,+00.344,-09.758,-0.001222,-0.000450,-0.001218";

@@ -13,25 +13,20 @@ use crate::rows::whole_table::MAX_SAMPLES;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use zip::ZipArchive;
 
-/// Columns of a matrix beyond which it is no recording.
 const MAX_COLUMNS: u64 = 1024;
-/// What is said of an array of Python objects.
 const OBJECTS: &str = "holds Python objects, which are not read; of a dict of arrays, in Python: \
                        numpy.savez(\"FILE.npz\", **numpy.load(\"FILE\", allow_pickle=True).item())";
 
-/// Rows of an array that are read at once.
 const ROWS_AT_ONCE: usize = 4096;
 
-/// An open `.npy` file.
 pub(crate) struct NpyReader {
     input: BufReader<Counted<OpenBytes>>,
     layout: ArrayLayout,
-    /// Where the numbers begin, bytes.
+    /// Offset, bytes.
     start: u64,
 }
 
 impl NpyReader {
-    /// Opens a file.
     pub(crate) fn open<'a>(
         file: &'a FileBytes,
         budget: Budget,
@@ -46,7 +41,7 @@ impl NpyReader {
         Ok(ArraySource::new(file.name(), Self { input, layout, start }, arrays, budget))
     }
 
-    /// The bytes of some rows from `first` on: of each of `columns`, or of whole rows.
+    /// Rows from `first` on, of `columns` or whole.
     fn fill(&mut self, first: usize, columns: &[usize], buffers: &mut [Vec<u8>]) -> Result<usize, Reason> {
         let Self { layout, input, start } = self;
         let rows = ROWS_AT_ONCE.min(layout.rows - first);
@@ -79,7 +74,7 @@ impl ArrayReader for NpyReader {
     fn for_each_row(&mut self, places: &[(usize, usize)], each: &mut EachArrayRow) -> Option<Result<(), InputError>> {
         let columns: Vec<usize> = places.iter().map(|(_, column)| *column).collect();
         let mut buffers = vec![Vec::new(); if self.layout.by_column { columns.len() } else { 1 }];
-        // Of each column: the buffer with its numbers, where they begin in it, and how they are encoded.
+        // Buffer, offset, encoding per column.
         let place = |(number, &column): (usize, &usize)| {
             let FieldLayout { offset, encoding, .. } = &self.layout.fields[column];
             if self.layout.by_column { (number, 0, encoding.clone()) } else { (0, *offset, encoding.clone()) }
@@ -108,10 +103,8 @@ impl ArrayReader for NpyReader {
     }
 }
 
-/// An open `.npz` file.
 pub(crate) struct NpzReader {
     archive: ZipArchive<BufReader<OpenBytes>>,
-    /// Number of the entry and layout of each array.
     layouts: Vec<(usize, ArrayLayout)>,
     meter: Meter,
 }
@@ -138,7 +131,7 @@ impl NpzReader {
             return Err(fail(Reason::Foreign { what, how }));
         }
         let mut arrays: Vec<NamedArray> = layouts.iter().map(|(_, layout)| layout.array()).collect();
-        // An only array needs no name.
+        // A single array needs no name.
         if let [array] = arrays.as_mut_slice() {
             array.name.clear();
         }
@@ -162,7 +155,7 @@ impl ArrayReader for NpzReader {
     }
 }
 
-/// The layout of an entry of an archive; `None` for what is no array of numbers: text and objects are left out.
+/// `None` for text and objects.
 fn entry_layout<R: Read + Seek>(archive: &mut ZipArchive<R>, number: usize) -> Result<Option<ArrayLayout>, Reason> {
     let mut entry = archive.by_index(number).map_err(damaged)?;
     let path = entry.name().map_err(damaged)?.into_owned();
@@ -178,7 +171,6 @@ fn damaged(error: zip::result::ZipError) -> Reason {
     Reason::Format { format: "NumPy .npz", error: error.to_string().into() }
 }
 
-/// A field of a row: where it lies and how it is encoded.
 #[derive(Debug, Clone, PartialEq)]
 struct FieldLayout {
     name: String,
@@ -186,21 +178,18 @@ struct FieldLayout {
     encoding: Encoding,
 }
 
-/// How an array lies in its file.
 #[derive(Debug, Clone, PartialEq)]
 struct ArrayLayout {
     name: String,
     rows: usize,
     fields: Vec<FieldLayout>,
-    /// Bytes of a row; of an element where columns are contiguous.
+    /// Per row, or per element if contiguous.
     stride: usize,
-    /// Whether each column lies in one piece.
     by_column: bool,
     unit: Option<Unit>,
 }
 
 impl ArrayLayout {
-    /// Reads the header; the numbers follow in `input`.
     fn read(input: &mut impl Read, name: &str) -> Result<Self, Reason> {
         let unusable = |what: String| Reason::Array(format!("array {name:?} {what}"));
         let Header { element, is_fortran_order, shape } = Header::read(input)?;
@@ -256,7 +245,6 @@ impl ArrayLayout {
         NamedArray { name: self.name.clone(), rows: self.rows, columns, unit: self.unit, ..NamedArray::default() }
     }
 
-    /// The numbers of `columns`, from the end of the header on.
     fn columns(
         &self,
         input: &mut impl Read,
@@ -298,7 +286,7 @@ impl ArrayLayout {
     }
 }
 
-/// Adds the numbers in a field of a record: `gyro.0` of an array in it, `imu.gx` of a record in it.
+/// `gyro.0` of an array, `imu.gx` of a record.
 fn flatten<'a>(name: &str, element: &'a ElementType, plain: &mut Vec<(String, &'a Encoding)>) -> Result<(), String> {
     match element {
         ElementType::Plain(encoding) => plain.push((name.to_owned(), encoding)),
@@ -307,7 +295,7 @@ fn flatten<'a>(name: &str, element: &'a ElementType, plain: &mut Vec<(String, &'
                 let before = plain.len();
                 flatten(&format!("{name}.{number}"), inner, plain)?;
                 if plain.len() == before {
-                    // Arrays without a number, however many there are.
+                    // Arrays without a number.
                     break;
                 }
             }
@@ -322,7 +310,7 @@ fn flatten<'a>(name: &str, element: &'a ElementType, plain: &mut Vec<(String, &'
     if plain.len() as u64 > most { Err(format!("has more than {most} columns")) } else { Ok(()) }
 }
 
-/// The number at the start of `bytes`; NaN where they are too few.
+/// NaN if too short.
 fn decode(encoding: &Encoding, bytes: &[u8]) -> Number {
     let size = encoding.bytes;
     let Some(own) = bytes.get(..size).filter(|own| own.len() <= 8) else { return Number::Real(f64::NAN) };

@@ -1,29 +1,22 @@
-//! The header of an array of NumPy (format 1.0 to 3.0): a literal of Python with the type of its elements, their order, and its shape.
+//! The header of a NumPy array (format 1.0 to 3.0), a literal of Python.
 
 use crate::input::input_error::Reason;
 use std::io::{self, ErrorKind, Read};
 
 const FORMAT: &str = "NumPy array";
-/// Brackets within brackets: fields within fields, which are not read, have five.
 const MOST_BRACKETS: usize = 8;
-/// Bytes of the header of an array of a thousand named fields, with room.
 const MOST_BYTES: u64 = 1 << 20;
 
-/// The type of an element.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum ElementType {
-    /// A number, or another single value.
     Plain(Encoding),
-    /// So many of another type.
     Array(u64, Box<ElementType>),
-    /// Fields with names.
     Record(Vec<(String, ElementType)>),
 }
 
-/// How a single value is encoded, as in `<f8` or `<M8[ns]`.
+/// Such as `<f8` or `<M8[ns]`.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Encoding {
-    /// As it stands in the header.
     pub(crate) text: String,
     pub(crate) is_big_endian: bool,
     /// `f`, `i`, `u`, `b`, `M`, `m`, `O` and others.
@@ -31,24 +24,22 @@ pub(crate) struct Encoding {
     pub(crate) bytes: usize,
 }
 
-/// What the header says.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Header {
     pub(crate) element: ElementType,
-    /// Whether the first index changes fastest.
+    /// The first index changes fastest.
     pub(crate) is_fortran_order: bool,
     pub(crate) shape: Vec<u64>,
 }
 
 impl Header {
-    /// Reads a header; the numbers follow in `input`.
     pub(crate) fn read(input: &mut impl Read) -> Result<Self, Reason> {
         let mut start = [0; 8];
         fill(input, &mut start)?;
         if !start.starts_with(b"\x93NUMPY") {
             return Err(damaged("it does not begin as an array"));
         }
-        // The length has two bytes in version 1.
+        // Two bytes in version 1.
         let mut length = [0; 8];
         fill(input, &mut length[..if start[6] == 1 { 2 } else { 4 }])?;
         let length = u64::from_le_bytes(length);
@@ -57,7 +48,7 @@ impl Header {
         }
         let mut text = vec![0; length as usize];
         fill(input, &mut text)?;
-        // Latin-1 before version 3, in which names have other letters.
+        // Latin-1 before version 3.
         let text =
             String::from_utf8(text).unwrap_or_else(|error| error.into_bytes().into_iter().map(char::from).collect());
         let literal = Parser { rest: text.trim_start(), depth: 0 }.literal()?;
@@ -88,7 +79,6 @@ fn fill(input: &mut impl Read, bytes: &mut [u8]) -> Result<(), Reason> {
     })
 }
 
-/// The type that a `descr` says.
 fn element(descr: &Literal) -> Result<ElementType, Reason> {
     match descr {
         Literal::Text(text) => encoding(text).map(ElementType::Plain),
@@ -100,7 +90,7 @@ fn element(descr: &Literal) -> Result<ElementType, Reason> {
                     [name, inner, Literal::List(shape)] => (name, inner, shape.as_slice()),
                     _ => return Err(damaged("a field is none")),
                 };
-                // A title may stand before the name.
+                // A title may come first.
                 let name = match name {
                     Literal::Text(name) => name,
                     Literal::List(names) => match names.as_slice() {
@@ -136,12 +126,12 @@ fn encoding(text: &str) -> Result<Encoding, Reason> {
 }
 
 impl Encoding {
-    /// The unit of a time, as in `<M8[ns]`.
+    /// As in `<M8[ns]`.
     pub(crate) fn time_unit(&self) -> Option<&str> {
         self.text.split_once('[').and_then(|(_, unit)| unit.strip_suffix(']'))
     }
 
-    /// Whether it is a number, or a time, of a size that is read.
+    /// A number or time of a readable size.
     pub(crate) fn is_number(&self) -> bool {
         match self.kind {
             'i' | 'u' | 'b' => matches!(self.bytes, 1 | 2 | 4 | 8),
@@ -152,13 +142,11 @@ impl Encoding {
     }
 }
 
-/// A literal of Python, as far as a header has it.
 #[derive(Debug, Clone, PartialEq)]
 enum Literal {
     Text(String),
     Number(u64),
     Bool(bool),
-    /// A list or a tuple.
     List(Vec<Literal>),
     Dict(Vec<(String, Literal)>),
 }
@@ -197,14 +185,12 @@ impl Parser<'_> {
         }
     }
 
-    /// Goes into a bracket.
     fn enter(&mut self) -> Result<(), Reason> {
         self.depth += 1;
         self.rest = &self.rest[1..];
         if self.depth > MOST_BRACKETS { Err(Reason::TooDeep { most: MOST_BRACKETS }) } else { Ok(()) }
     }
 
-    /// Whether the bracket ends here; goes out of it.
     fn leave(&mut self, end: char) -> bool {
         self.rest = self.rest.trim_start();
         let Some(rest) = self.rest.strip_prefix(end) else { return false };
@@ -213,7 +199,7 @@ impl Parser<'_> {
         true
     }
 
-    /// Takes a comma, which the last item need not have.
+    /// The last comma is optional.
     fn take(&mut self, sign: char) -> bool {
         self.rest = self.rest.trim_start();
         let rest = self.rest.strip_prefix(sign);
@@ -260,7 +246,6 @@ mod tests {
         Header::read(&mut [&b"\x93NUMPY\x01\x00"[..], &length, text.as_bytes()].concat().as_slice())
     }
 
-    /// Headers as numpy.save writes them.
     #[test]
     fn headers_of_numpy_are_understood() {
         let matrix =

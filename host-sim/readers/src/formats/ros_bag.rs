@@ -1,8 +1,5 @@
-//! Bags of ROS 1 (`.bag`, format 2.0): the definition of each type of message is in the connection of its topic.
-//!
-//! A bag is a row of records, each a header of named fields and its data; messages lie in chunks, which may be compressed. What a record says of
-//! its own length is believed as far as the bytes come. The index at the end is used where there is one: a bag of a recording that was
-//! interrupted has none, and is read from its start.
+//! Bags of ROS 1 (`.bag`, 2.0) with definitions in their connections; messages lie in chunks. Interrupted recordings
+//! lack the index and are read from the start.
 
 use crate::formats::message_layout::{Encoding, MessageLayout};
 use crate::formats::ros_definition::{self, RosVersion};
@@ -17,30 +14,25 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom};
 
 const FORMAT: &str = "ROS 1 bag";
-/// First line of every bag.
 const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
-/// Bytes of the header of a record, of which the definition of a message is none.
+/// Without message definitions.
 const MOST_HEADER_BYTES: u32 = 1 << 20;
-/// Bytes of a message, or of the definition of one: images have some of ten million.
 const MOST_DATA_BYTES: u32 = 1 << 28;
 
-/// Size of each buffer: many messages of a sensor.
 const BUFFER_BYTES: usize = 1 << 16;
 
-/// Kinds of records.
 const MESSAGE: u8 = 2;
 const BAG_HEADER: u8 = 3;
 const CHUNK: u8 = 5;
 const CHUNK_INFO: u8 = 6;
 const CONNECTION: u8 = 7;
 
-/// A record that is used.
 enum Record<'a> {
-    /// What is published on a topic, and by which definition.
+    /// The topic and the definition of a connection.
     Connection(Connection),
-    /// Of how many messages of each connection a chunk is.
+    /// Messages of each connection in a chunk.
     ChunkInfo(&'a [u8]),
-    /// A message of a connection, and when it was recorded, ns.
+    /// A message of a connection.
     Message { connection: u32, recorded_ns: i64, data: &'a [u8] },
 }
 
@@ -51,11 +43,8 @@ struct Connection {
     definition: String,
 }
 
-/// What ends the reading.
 enum Stop {
-    /// The consumer's refusal.
     Refusal(InputError),
-    /// Damage, a limit, or the disk.
     Reason(Reason),
 }
 
@@ -65,20 +54,16 @@ impl From<Reason> for Stop {
     }
 }
 
-/// Takes the records of a bag.
 type EachRecord<'a> = dyn FnMut(Record) -> Result<(), InputError> + 'a;
 
-/// An open bag.
 pub(crate) struct RosBagSource<'a> {
     file: &'a FileBytes,
     offer: Offer,
-    /// Of each topic.
     layouts: Vec<MessageLayout>,
     connections: Vec<BTreeSet<u32>>,
     budget: Budget,
 }
 
-/// A topic that is found, with the identities of its connections.
 struct FoundTopic {
     kind: String,
     definition: String,
@@ -97,7 +82,7 @@ impl<'a> RosBagSource<'a> {
                 Record::Connection(Connection { id, topic, kind, definition }) => {
                     let new = || FoundTopic { kind: kind.clone(), definition, connections: BTreeSet::new() };
                     let known = found.entry(topic).or_insert_with(new);
-                    // A topic has one type; of another only the first is read.
+                    // Only the first type of a topic is read.
                     if known.kind == kind {
                         known.connections.insert(id);
                     }
@@ -118,7 +103,7 @@ impl<'a> RosBagSource<'a> {
         }
         let (mut topics, mut layouts, mut connections) = (Vec::new(), Vec::new(), Vec::new());
         for (name, FoundTopic { kind, definition, connections: ids }) in found {
-            // A definition that cannot be understood leaves its topic out.
+            // Unintelligible definitions are left out.
             let Ok(layout) = ros_definition::layout(&kind, &definition, RosVersion::Ros1) else { continue };
             let rows = ids.iter().filter_map(|id| counts.get(id)).sum();
             topics.push(ros_message::topic(&name, &kind, &layout, Some(rows)));
@@ -148,7 +133,6 @@ impl Source for RosBagSource<'_> {
     }
 }
 
-/// The bytes of a bag behind its first line.
 struct BagBytes {
     input: BufReader<OpenBytes>,
 }
@@ -160,7 +144,6 @@ impl BagBytes {
         Ok(Self { input })
     }
 
-    /// Goes to the index, if there is one.
     fn seek_index(&mut self) -> Result<bool, Reason> {
         let start = MAGIC.len() as u64;
         let length = self.input.seek(SeekFrom::End(0)).map_err(Reason::Io)?;
@@ -175,7 +158,7 @@ impl BagBytes {
     }
 }
 
-/// Calls `each` with the records from here on; why there are no more, where the bag is damaged or ends early.
+/// From here on, with the reason of an early end.
 fn for_each_record(
     file: &FileBytes,
     input: &mut BagBytes,
@@ -199,7 +182,7 @@ fn read_records(
 ) -> Result<(), Stop> {
     let (mut header, mut data) = (Vec::new(), Vec::new());
     loop {
-        // Most records lie in the buffer as a whole.
+        // Mostly within the buffer.
         if let Some((header, data)) = whole_record(input.fill_buf().map_err(refused)?)
             && (kind(header) != Some(CHUNK) || !has_chunks)
         {
@@ -222,7 +205,6 @@ fn read_records(
     }
 }
 
-/// Header and data of the record that begins with these bytes, where they have all of it.
 fn whole_record(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     let part = |bytes| -> Option<(&[u8], &[u8])> {
         let (length, rest) = <[u8]>::split_first_chunk::<4>(bytes)?;
@@ -232,7 +214,6 @@ fn whole_record(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     Some((header, part(rest)?.0))
 }
 
-/// Gives a record, if it is used.
 fn give(header: &[u8], data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
     let id = field(header, b"conn").map(|value| number(value) as u32);
     let record = match (kind(header), id) {
@@ -253,7 +234,6 @@ fn give(header: &[u8], data: &[u8], each: &mut EachRecord) -> Result<(), Stop> {
     each(record).map_err(Stop::Refusal)
 }
 
-/// Reads the records of a chunk, of which `input` has the bytes.
 fn read_chunk(input: &mut dyn BufRead, header: &[u8], meter: &mut Meter, each: &mut EachRecord) -> Result<(), Stop> {
     let read = match field(header, b"compression") {
         Some(b"none") => read_records(input, meter, false, each),
@@ -271,18 +251,17 @@ fn read_chunk(input: &mut dyn BufRead, header: &[u8], meter: &mut Meter, each: &
         }
     };
     read?;
-    // Padding behind the compressed data.
+    // Padding.
     io::copy(input, &mut io::sink()).map_err(|error| Stop::Reason(Reason::Io(error)))?;
     Ok(())
 }
 
-/// The records of decompressed data, which are counted as they come.
+/// Counts bytes as they come.
 fn read_expanded(expanded: impl Read, each: &mut EachRecord) -> Result<(), Stop> {
     let mut none = Budget::new(0).meter();
     read_records(&mut BufReader::with_capacity(BUFFER_BYTES, expanded), &mut none, false, each)
 }
 
-/// Reads the header of the next record; false at the end.
 fn next_record(input: &mut dyn BufRead, header: &mut Vec<u8>) -> Result<bool, Reason> {
     let mut length = [0; 4];
     let read = Read::take(&mut *input, 1).read(&mut length).map_err(refused)?;
@@ -298,7 +277,6 @@ fn next_record(input: &mut dyn BufRead, header: &mut Vec<u8>) -> Result<bool, Re
     Ok(true)
 }
 
-/// Reads the data of a record.
 fn read_data(input: &mut dyn BufRead, data: &mut Vec<u8>) -> Result<(), Reason> {
     let mut length = [0; 4];
     fill(input, &mut length)?;
@@ -309,7 +287,7 @@ fn read_data(input: &mut dyn BufRead, data: &mut Vec<u8>) -> Result<(), Reason> 
     read_exactly(input, length, data)
 }
 
-/// Reads so many bytes, of which memory is taken as they come.
+/// Allocates as bytes come.
 fn read_exactly(input: &mut dyn BufRead, count: u32, bytes: &mut Vec<u8>) -> Result<(), Reason> {
     bytes.clear();
     let read = Read::take(&mut *input, u64::from(count)).read_to_end(bytes).map_err(refused)?;
@@ -320,7 +298,6 @@ fn fill(input: &mut dyn BufRead, bytes: &mut [u8]) -> Result<(), Reason> {
     input.read_exact(bytes).map_err(refused)
 }
 
-/// What a decompressor or the budget refuses.
 fn refused(error: io::Error) -> Reason {
     match error.kind() {
         ErrorKind::UnexpectedEof => Reason::Truncated { format: FORMAT },
@@ -336,7 +313,7 @@ fn damaged(error: String) -> Reason {
     Reason::Format { format: FORMAT, error: error.into() }
 }
 
-/// The value of a field of a header: each has a length, a name, `=` and the value.
+/// Length, name, `=`, value.
 fn field<'a>(mut header: &'a [u8], name: &[u8]) -> Option<&'a [u8]> {
     while let Some((length, rest)) = header.split_first_chunk::<4>() {
         let (own, rest) = rest.split_at_checked(u32::from_le_bytes(*length) as usize)?;
@@ -352,7 +329,6 @@ fn kind(header: &[u8]) -> Option<u8> {
     field(header, b"op").and_then(|op| op.first()).copied()
 }
 
-/// A number, the least byte first.
 fn number(bytes: &[u8]) -> u64 {
     bytes.iter().take(8).rev().fold(0, |number, byte| number << 8 | u64::from(*byte))
 }
@@ -389,7 +365,6 @@ mod tests {
         record(&[("op", &[CHUNK]), ("compression", compression.as_bytes()), ("size", &size)], data)
     }
 
-    /// A connection and messages of one float each.
     fn records(rows: u32) -> Vec<u8> {
         let definition = fields(&[("type", b"test/Rate"), ("message_definition", b"float64 x\n")]);
         let id = 0u32.to_le_bytes();
@@ -422,7 +397,7 @@ mod tests {
         }
     }
 
-    /// The numbers of the messages, and why there are no more.
+    /// Numbers, and reason of the end.
     fn read(source: &mut RosBagSource) -> (Vec<f64>, Option<String>) {
         let column = source.topics()[0].columns.iter().position(|column| column.name == "x").expect("a column");
         let mut rows = Vec::new();
@@ -433,7 +408,7 @@ mod tests {
         (rows, ending.expect("rows").damage.map(|damage| damage.to_string()))
     }
 
-    /// As after a recording that was interrupted; every compression.
+    /// Interrupted; every compression.
     #[test]
     fn a_bag_without_an_index_is_read_as_far_as_it_goes() {
         let expected: Vec<f64> = (0..50).map(f64::from).collect();
@@ -452,7 +427,6 @@ mod tests {
         }
     }
 
-    /// Constants that become a hundred megabytes.
     #[test]
     fn a_chunk_that_expands_without_end_is_refused() {
         let zeros = vec![0; 100 << 20];
@@ -462,7 +436,6 @@ mod tests {
             let refused = RosBagSource::open(&file, Budget::new(0)).err().expect("refused").reason;
             assert!(matches!(refused, Reason::Expands { .. }), "{compression}: {refused}");
         }
-        // A record that says it has four gigabytes.
         let file = bag(&[[&8u32.to_le_bytes()[..], &fields(&[("op", &[2])]), &[0xFF; 4]].concat()]);
         assert!(RosBagSource::open(&file, Budget::new(0)).is_err());
     }

@@ -1,17 +1,16 @@
-//! Definitions of ROS messages as text: those of ROS 1 in the connections of a bag, and those of ROS 2 in the schemas of MCAP.
+//! Definitions of ROS 1 (bags) and ROS 2 (MCAP) as text.
 
 use crate::formats::message_layout::{Definitions, Field, FieldType, MessageLayout, Repeat, Scalar};
 use crate::input::input_error::Reason;
 
-/// The generation of ROS, which have different headers, times and types of one byte.
+/// With different headers, times, and types of one byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RosVersion {
     Ros1,
     Ros2,
 }
 
-/// The layout of the message `kind`, such as `sensor_msgs/Imu` or `sensor_msgs/msg/Imu`, by its definition: its own fields first, then
-/// those of the types that it uses, each after a line of `=` and a line `MSG: TYPE`.
+/// Layout of `kind`, such as `sensor_msgs/Imu`, by its definition and those behind lines of `=` and `MSG: TYPE`.
 pub(crate) fn layout(kind: &str, definition: &str, version: RosVersion) -> Result<MessageLayout, Reason> {
     let root = short(kind);
     let mut definitions = known(version);
@@ -31,7 +30,7 @@ pub(crate) fn layout(kind: &str, definition: &str, version: RosVersion) -> Resul
     MessageLayout::new(&root, &definitions)
 }
 
-/// The layout of a type that is part of ROS itself, where the file has no definition; `None` for all others.
+/// Types of ROS itself; `None` for others.
 pub(crate) fn known_layout(kind: &str, version: RosVersion) -> Option<MessageLayout> {
     let definitions = known(version);
     let root = short(kind);
@@ -43,7 +42,7 @@ fn short(kind: &str) -> String {
     kind.replace("/msg/", "/")
 }
 
-/// The common types of an inertial sensor (`std_msgs`, `geometry_msgs` and `sensor_msgs`).
+/// `std_msgs`, `geometry_msgs`, `sensor_msgs`.
 fn known(version: RosVersion) -> Definitions {
     let header = match version {
         RosVersion::Ros1 => "uint32 seq\ntime stamp\nstring frame_id",
@@ -62,7 +61,7 @@ fn known(version: RosVersion) -> Definitions {
     types.into_iter().map(|(name, text)| (name.to_owned(), fields(name, text))).collect()
 }
 
-/// The field of a line in the definition of `owner`; `None` for a comment or a constant.
+/// `None` for comments and constants.
 fn field(line: &str, owner: &str, version: RosVersion) -> Option<Field> {
     let line = line.split('#').next()?.trim();
     let (kind, rest) = line.split_once(char::is_whitespace)?;
@@ -76,7 +75,7 @@ fn field(line: &str, owner: &str, version: RosVersion) -> Option<Field> {
         None => (kind, Repeat::Once),
         Some((kind, count)) => match count.trim_end_matches(']').parse() {
             Ok(count) => (kind, Repeat::Times(count)),
-            // Without a number, or with a largest one: `[]`, `[<=3]`.
+            // `[]`, `[<=3]`.
             Err(_) => (kind, Repeat::Any),
         },
     };
@@ -84,7 +83,7 @@ fn field(line: &str, owner: &str, version: RosVersion) -> Option<Field> {
 }
 
 fn field_type(kind: &str, owner: &str, version: RosVersion) -> FieldType {
-    // Texts may have a largest length: `string<=8`.
+    // `string<=8`.
     let plain = kind.split("<=").next().unwrap_or(kind);
     let scalar = match (plain, version) {
         ("bool" | "uint8" | "char", _) | ("byte", RosVersion::Ros2) => Scalar::Unsigned(1),
@@ -99,7 +98,7 @@ fn field_type(kind: &str, owner: &str, version: RosVersion) -> FieldType {
         ("float64", _) => Scalar::Float(8),
         ("time" | "duration", RosVersion::Ros1) => return FieldType::Time,
         ("string", _) => return FieldType::Text,
-        // How many bytes a letter has depends on the program that wrote it.
+        // Letter size depends on the writer.
         ("wstring" | "wchar", _) => return FieldType::Unknown(plain.to_owned()),
         (other, _) => {
             let other = short(other);
@@ -126,7 +125,7 @@ mod tests {
     use crate::formats::message_layout::{Encoding, MessageLayout};
     use crate::rows::batch::Number;
 
-    /// The doubles of `sensor_msgs/Imu`: orientation and its covariance, rate and its covariance, force and its covariance.
+    /// Orientation, rate, force, each with covariance.
     fn doubles(big: bool) -> Vec<u8> {
         let mut values = vec![0.0f64; 13];
         values.extend([0.25, -0.5, 0.75]);
@@ -136,7 +135,6 @@ mod tests {
         values.iter().flat_map(|value| if big { value.to_be_bytes() } else { value.to_le_bytes() }).collect()
     }
 
-    /// The time and the six axes, where the message has them all.
     fn measured(layout: &MessageLayout, message: &[u8], encoding: Encoding) -> Option<Vec<Number>> {
         let mut row = Vec::new();
         layout.decode(message, encoding, &mut row)?;
@@ -181,12 +179,11 @@ mod tests {
         let text = "# a comment\nuint8 MOST=3\nstring NAME=a # b\nint32 count 5\nstring<=4 name \"x\"\nfloat32[<=3] some\nfloat32[2] two\n";
         let layout = layout("a/msg/B", text, RosVersion::Ros2).expect("a layout");
         let names: Vec<&str> = layout.columns().iter().map(|column| column.name.as_str()).collect();
-        // The definition does not say how long a sequence is.
         let some = (0..16).map(|at| format!("some[{at}]"));
         let expected: Vec<String> =
             ["count".to_owned()].into_iter().chain(some).chain(["two[0]", "two[1]"].map(str::to_owned)).collect();
         assert_eq!(names, expected);
-        // The number, a name of one letter and its end, one number of the sequence, and the two, each aligned to 4 bytes.
+        // Each aligned to 4 bytes.
         let words = [7u32, 2, u32::from_le_bytes(*b"x\0\0\0"), 1, 1.5f32.to_bits(), 2.5f32.to_bits(), 3.5f32.to_bits()];
         let message: Vec<u8> = [0, 1, 0, 0].into_iter().chain(words.into_iter().flat_map(u32::to_le_bytes)).collect();
         let mut row = Vec::new();

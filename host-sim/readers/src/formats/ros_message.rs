@@ -1,4 +1,4 @@
-//! Messages of ROS as rows: which of their columns are an inertial sensor's, and when they were taken.
+//! Rows of ROS messages: inertial columns and times.
 
 use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::AvailableColumn;
@@ -6,16 +6,14 @@ use crate::formats::message_layout::{Encoding, MessageColumn, MessageLayout};
 use crate::formats::topics::{Topic, TopicSensor};
 use crate::rows::batch::Number;
 
-/// Names of the fields of an inertial sensor (`sensor_msgs/Imu`), in whatever message, with their channels and units (REP 103).
+/// Fields of `sensor_msgs/Imu` in any message, with channels and units (REP 103).
 const VECTORS: [(&str, [&str; 3], &str); 2] =
     [("angular_velocity", GYROSCOPE, "rad/s"), ("linear_acceleration", ACCELEROMETER, "m/s^2")];
-/// The first element of a covariance is -1 where the quantity is not measured (`sensor_msgs/Imu`).
+/// -1 if not measured (`sensor_msgs/Imu`).
 const COVARIANCE: &str = "_covariance[0]";
 const NOT_MEASURED: f64 = -1.0;
-/// Column of the time at which a message was recorded.
 const RECORD_TIME: &str = "record_time";
 
-/// The topic `name` of messages of the type `kind`.
 pub(crate) fn topic(name: &str, kind: &str, layout: &MessageLayout, rows: Option<u64>) -> Topic {
     let columns = layout.columns();
     let available = |column: &MessageColumn| {
@@ -35,7 +33,6 @@ pub(crate) fn topic(name: &str, kind: &str, layout: &MessageLayout, rows: Option
     }
 }
 
-/// Every part of a message with an angular velocity or a linear acceleration.
 fn sensors(kind: &str, columns: &[MessageColumn]) -> Vec<TopicSensor> {
     let at = |name: &str| columns.iter().position(|column| column.name == name);
     let axes = |path: &str| -> Option<[usize; 3]> {
@@ -65,7 +62,7 @@ fn sensors(kind: &str, columns: &[MessageColumn]) -> Vec<TopicSensor> {
                 sensor.add_axes(channels, axes, unit);
             }
         }
-        // `sensor_msgs/Imu` says its units; other types follow it by convention.
+        // Units of `sensor_msgs/Imu`; others follow by convention.
         let is_imu = VECTORS.iter().any(|(name, ..)| at(&format!("{prefix}{name}{COVARIANCE}")).is_some());
         if !is_imu {
             sensor.note = Some(format!(
@@ -78,8 +75,7 @@ fn sensors(kind: &str, columns: &[MessageColumn]) -> Vec<TopicSensor> {
     prefixes.iter().map(sensor).collect()
 }
 
-/// When a sample was taken: the stamp of the innermost header around `prefix`, else a stamp beside it, else when the message was
-/// recorded.
+/// The innermost header's stamp around `prefix`, else one beside it, else the time of recording.
 fn time_column(columns: &[MessageColumn], prefix: &str) -> usize {
     let of = |endings: &[&str]| {
         let mut scope = prefix;
@@ -98,15 +94,14 @@ fn time_column(columns: &[MessageColumn], prefix: &str) -> usize {
     of(&["header.stamp"]).or_else(|| of(&["stamp", "time", "timestamp"])).unwrap_or(columns.len())
 }
 
-/// Makes rows of the columns that are read of the messages of one topic.
 pub(crate) struct RosRows<'a> {
     layout: MessageLayout,
     encoding: Encoding,
-    /// Positions of the columns; one after the last of the layout is the time of recording.
+    /// One beyond the last is the time of recording.
     columns: &'a [usize],
-    /// For each of them the covariance that says whether it is measured.
+    /// Covariance that marks an absent quantity.
     guards: Vec<Option<usize>>,
-    /// Whether the first stamp is zero: it was never set, and the time of recording stands for it.
+    /// A zero first stamp is replaced by the time of recording.
     is_unset: Option<bool>,
     decoded: Vec<Number>,
     row: Vec<Number>,
@@ -126,10 +121,10 @@ impl<'a> RosRows<'a> {
         Self { layout, encoding, columns, guards, is_unset: None, decoded: Vec::new(), row: Vec::new() }
     }
 
-    /// The row of a message that was recorded at `record_ns`. What it does not have is NaN.
+    /// NaN for what is missing.
     pub(crate) fn row(&mut self, message: &[u8], record_ns: Option<i64>) -> &[Number] {
         let Self { layout, encoding, columns, guards, is_unset, decoded, row } = self;
-        // The columns before a damage are used; a time that is missing ends the reading with an error that names the row.
+        // Columns before damage are used; a missing time ends the reading.
         let _ = layout.decode(message, *encoding, decoded);
         let record = record_ns.map_or(Number::Real(f64::NAN), Number::Integer);
         row.clear();
@@ -147,7 +142,6 @@ impl<'a> RosRows<'a> {
         row
     }
 
-    /// What the user should know of the rows.
     pub(crate) fn notes(&self) -> Vec<String> {
         let unset = "the stamps of the messages are not set; the times at which they were recorded stand for them";
         self.is_unset.filter(|unset| *unset).map(|_| unset.to_owned()).into_iter().collect()

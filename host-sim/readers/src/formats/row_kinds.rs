@@ -1,15 +1,13 @@
-//! Rows of several kinds in one text, such as `ACC,…` and `GYR,…` in turn: a field says which kind a row is, or the blanks in the others.
+//! Rows of several kinds, such as `ACC,…` and `GYR,…`, told by a field or by blanks.
 
 use crate::columns::column_selection::AvailableColumn;
 use crate::formats::calendar;
 use crate::formats::fields::number;
 use crate::input::input_error::Reason;
 
-/// Most kinds; names of frames or states may be many.
 const MOST_KINDS: usize = 8;
-/// How often each kind has to be among the first rows.
 const LEAST_ROWS: usize = 2;
-/// Names of columns whose numbers tell devices from each other.
+/// Columns that number devices.
 const NUMBERED: [&str; 12] = [
     "id",
     "device",
@@ -24,15 +22,13 @@ const NUMBERED: [&str; 12] = [
     "imu_id",
     "instance",
 ];
-/// Fewest numbers in a row of a sensor.
 const LEAST_NUMBERS: usize = 2;
 
-/// A kind of rows.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum RowKind {
-    /// With this name in the field at `at`.
+    /// Name in the field `at`.
     Labelled { at: usize, name: String },
-    /// With numbers in these fields, where the rows of the other kinds have none.
+    /// Numbers in these fields, which the other kinds lack.
     Filled { own: Vec<usize>, others: Vec<usize>, name: String },
 }
 
@@ -43,7 +39,6 @@ impl RowKind {
         }
     }
 
-    /// Whether these are the fields of a row of this kind.
     pub(crate) fn has(&self, row: &[&str]) -> bool {
         match self {
             Self::Labelled { at, name } => row.get(*at) == Some(&name.as_str()),
@@ -52,40 +47,38 @@ impl RowKind {
     }
 }
 
-/// Fields that have numbers in some rows, and in how many.
+/// Fields with numbers, and rows.
 struct Part {
     fields: Vec<usize>,
     rows: usize,
 }
 
-/// A name in a field, and how many rows have it.
 struct Label<'a> {
     name: &'a str,
     rows: usize,
 }
 
-/// The kinds of rows of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct RowKinds(
-    /// Those whose rows have numbers, in the order in which they come.
+    /// With numbers, in their order.
     Vec<RowKind>,
 );
 
 impl RowKinds {
-    /// Of the first rows of a file; `None` where all are of one kind.
+    /// `None` for one kind.
     pub(crate) fn find(rows: &[Vec<&str>]) -> Option<Self> {
         let width = rows.iter().map(Vec::len).min()?;
         (0..width).find_map(|at| Self::of_labels(rows, at, is_label))
     }
 
-    /// Of the first rows of a file below a heading, in which a column of whole numbers is called as one that tells devices from each other.
+    /// By a column that numbers devices.
     pub(crate) fn find_by_number(rows: &[Vec<&str>], heading: &[&str]) -> Option<Self> {
         let is_named = |name: &&str| NUMBERED.contains(&name.to_lowercase().trim_start_matches(['#', '%', ' ']));
         let at = heading.iter().position(is_named).filter(|at| rows.iter().all(|row| row.len() > *at))?;
         Self::of_labels(rows, at, |field| field.parse::<u32>().is_ok())
     }
 
-    /// Of the first rows of a table that was merged of several: each row has the numbers of one of them, and blanks for the others.
+    /// Merged tables: blanks for the others.
     pub(crate) fn find_by_blanks(rows: &[Vec<&str>], columns: &[AvailableColumn]) -> Option<Self> {
         let has_number = |row: &[&str], at: usize| {
             row.get(at).is_some_and(|field| !field.is_empty() && number(field).is_some_and(|it| !it.value().is_nan()))
@@ -97,7 +90,7 @@ impl RowKinds {
             let fields: Vec<usize> = parted.iter().copied().filter(|at| has_number(row, *at)).collect();
             match parts.iter_mut().find(|part| part.fields == fields) {
                 Some(part) => part.rows += 1,
-                // A row without any number is of no kind.
+                // No kind.
                 None if fields.is_empty() => {}
                 None => parts.push(Part { fields, rows: 1 }),
             }
@@ -146,7 +139,7 @@ impl RowKinds {
         (is_several && !kinds.is_empty()).then_some(Self(kinds))
     }
 
-    /// The kind whose rows have numbers in all of these fields.
+    /// With numbers in all of these fields.
     pub(crate) fn filled_at(&self, positions: &[usize]) -> Option<&RowKind> {
         self.0.iter().find(|kind| match kind {
             RowKind::Filled { own, .. } => !positions.is_empty() && positions.iter().all(|at| own.contains(at)),
@@ -154,7 +147,7 @@ impl RowKinds {
         })
     }
 
-    /// The kind that is read: that which is named, or the only one.
+    /// The named one, or the only one.
     pub(crate) fn choose(&self, wanted: Option<&str>) -> Result<RowKind, Reason> {
         let all = || self.0.iter().map(RowKind::name).collect::<Vec<_>>().join(", ");
         let kind = match (wanted, self.0.as_slice()) {
@@ -167,7 +160,7 @@ impl RowKinds {
     }
 }
 
-/// Whether a field is a name, and no number, time or missing value.
+/// No number, time or missing value.
 fn is_label(field: &str) -> bool {
     let starts = field.chars().next().is_some_and(char::is_alphabetic);
     let is_time = || calendar::date_time(field).or_else(|| calendar::date(field)).is_some();
@@ -191,7 +184,7 @@ mod tests {
     fn kinds_are_told_from_other_texts() {
         let two = kinds(&["ACC,1,2,3", "GYR,1,2,3", "ACC,1,2,3", "GPS,lost,0", "GYR,1,2,3", "GPS,lost,0"]);
         assert_eq!(two, Some(vec!["ACC".to_owned(), "GYR".to_owned()]));
-        // One name for all rows is that of a frame; names that come once are anything.
+        // A name in all rows is a frame's.
         assert_eq!(kinds(&["0,1,imu_link", "1,2,imu_link", "2,3,imu_link"]), None);
         assert_eq!(kinds(&["a,1,2", "b,2,3", "c,3,4"]), None);
         assert_eq!(kinds(&["nan,1,2", "nan,2,3", "2.5,3,4"]), None);

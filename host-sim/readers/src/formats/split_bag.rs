@@ -1,16 +1,16 @@
-//! A bag of ROS 2 in a folder, which `ros2 bag record` may split into several files: their topics are one.
+//! A ROS 2 bag in a folder, perhaps split.
 
 use crate::formats::topics::{EachRow, Ending, Offer, Source, Topic};
 use crate::input::input_error::InputError;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Endings of the files of a bag, and that of a file which is compressed as a whole.
+/// Endings, plain and compressed.
 const ENDINGS: [&str; 2] = [".mcap", ".db3"];
 const COMPRESSED: &str = ".zstd";
 
-/// The files of the bag in `folder` in their order, which is that of the numbers in their names (`run_0.mcap`, `run_1.mcap`); none where it
-/// has none, or those of several bags. Its `metadata.yaml` is not needed: a recorder that is killed writes none.
+/// Files of the bag in the order of their numbers (`run_0.mcap`, `run_1.mcap`); none without a bag, or with several.
+/// Without `metadata.yaml`, which a killed recorder lacks.
 ///
 /// # Errors
 /// It is no folder that can be read.
@@ -31,15 +31,12 @@ pub fn files_of_bag(folder: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(found.into_iter().filter(|_| is_one_bag).map(|(.., file)| file).collect())
 }
 
-/// The files of a bag, one after the other.
 pub(crate) struct SplitBag<'a> {
     files: Vec<Box<dyn Source + 'a>>,
-    /// Of all files.
     offer: Offer,
 }
 
 impl<'a> SplitBag<'a> {
-    /// Of at least one file.
     pub(crate) fn new(files: Vec<Box<dyn Source + 'a>>) -> Self {
         let mut topics: Vec<Topic> = Vec::new();
         for topic in files.iter().flat_map(|file| file.topics()) {
@@ -52,7 +49,7 @@ impl<'a> SplitBag<'a> {
     }
 }
 
-/// Whether the rows of one topic go on in the other.
+/// True if one continues the other.
 fn is_same(one: &Topic, other: &Topic) -> bool {
     one.name == other.name && one.kind == other.kind && one.columns == other.columns
 }

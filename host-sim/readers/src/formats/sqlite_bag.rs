@@ -1,5 +1,4 @@
-//! Bags of ROS 2 in SQLite (`.db3`): the definition of each type of message is in the table `message_definitions`, which bags before
-//! ROS 2 Iron do not have; of those the types of ROS itself are read.
+//! Bags of ROS 2 in SQLite (`.db3`) by `message_definitions`; bags before Iron have ROS's own types only.
 
 use crate::formats::message_layout::{Encoding, MessageLayout};
 use crate::formats::ros_definition::{self, RosVersion};
@@ -15,17 +14,16 @@ use std::io::{self, Read};
 
 const FORMAT: &str = "ROS 2 SQLite bag";
 
-/// Instructions of the database between two looks at the clock.
+/// Between two checks of the clock.
 const INSTRUCTIONS: i32 = 100_000;
 
-/// An open bag.
 pub(crate) struct SqliteSource<'a> {
     file: &'a FileBytes,
-    /// The file of the database, where the bytes are in memory.
+    /// For bytes in memory.
     _copy: Option<FileBytes>,
     database: Connection,
     offer: Offer,
-    /// Of each topic: its number in the database, and its layout where that is known.
+    /// Number in the database, and layout if known.
     layouts: Vec<(i64, Option<MessageLayout>)>,
     budget: Budget,
 }
@@ -41,7 +39,7 @@ impl<'a> SqliteSource<'a> {
         let copy = copy.transpose().map_err(|error| file.error(Reason::Io(error)))?;
         let path = copy.as_ref().and_then(FileBytes::file).or(file.file()).unwrap_or(file.name());
         let mut database = Connection::open_with_flags(path, flags).map_err(fail)?;
-        // A query over tables that the file defines may never end.
+        // Queries over the file's tables may never end.
         database.progress_handler(INSTRUCTIONS, Some(move || budget.check_time().is_err())).map_err(fail)?;
         if !has_table(&database, "topics").map_err(fail)? || !has_table(&database, "messages").map_err(fail)? {
             let topics = tables(&database).map_err(fail)?;
@@ -67,21 +65,19 @@ impl<'a> SqliteSource<'a> {
     }
 }
 
-/// Whether the database has this table. A view is none, nor is a table with columns that are computed: the file could make them of any size.
+/// Not a view or computed columns, which could have any size.
 fn has_table(database: &Connection, name: &str) -> rusqlite::Result<bool> {
     let computed = "SELECT 1 FROM pragma_table_xinfo(sqlite_master.name) WHERE hidden <> 0";
     let text = format!("SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ? AND NOT EXISTS ({computed})");
     database.prepare(&text)?.exists((name,))
 }
 
-/// Names of the tables and views; of many the first.
 fn tables(database: &Connection) -> rusqlite::Result<String> {
     let mut query = database.prepare("SELECT name FROM sqlite_master WHERE type IN ('table', 'view') LIMIT 24")?;
     let names: Vec<String> = query.query_map((), |row| row.get(0))?.collect::<Result<_, _>>()?;
     Ok(if names.is_empty() { "no table".to_owned() } else { format!("the tables {}", names.join(", ")) })
 }
 
-/// Definitions in the language of ROS, by type.
 fn definitions(database: &Connection) -> rusqlite::Result<HashMap<String, String>> {
     if !has_table(database, "message_definitions")? {
         return Ok(HashMap::new());
@@ -128,7 +124,6 @@ impl Source for SqliteSource<'_> {
                         each(rows.row(data, recorded_ns))?;
                         continue;
                     }
-                    // `ros2 bag record --compression-mode message`.
                     let mut expanded = Vec::new();
                     let read = Metered::new(ZstdFrames::new(data), &mut meter).read_to_end(&mut expanded);
                     match read {
@@ -170,7 +165,6 @@ mod tests {
 
     #[test]
     fn a_query_that_takes_longer_than_the_budget_is_stopped() {
-        // Enough topics that the database looks at the clock while it sorts them.
         let rows = "WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c LIMIT 20000)
             INSERT INTO topics SELECT x, 'a', 'b' FROM c;";
         let (_dir, file) = database(&[TOPICS, MESSAGES, rows]);

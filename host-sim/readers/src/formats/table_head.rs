@@ -1,4 +1,4 @@
-//! The head of a table in text: where its rows begin, what the lines before them say, and which columns the rows have.
+//! The head of a text table: start of the rows, preamble, columns.
 
 use crate::columns::column_selection::AvailableColumn;
 use crate::columns::unit::Unit;
@@ -8,16 +8,14 @@ use crate::formats::row_kinds::RowKind;
 use crate::input::delimited_text;
 use std::collections::{BTreeMap, VecDeque};
 
-/// Lines at the start of a file in which its table is found.
+/// Lines in which the table is sought.
 pub(crate) const HEAD_LINES: usize = 256;
 
-/// Lines between two rows of one table that may be damaged.
+/// Damaged lines within a table.
 const MOST_BETWEEN: usize = 2;
 
-/// A line and its number.
 pub(crate) type Line = (u64, String);
 
-/// The lines before the rows of a table, and the first rows.
 #[derive(Debug, Default)]
 pub(crate) struct TableHead {
     preamble: Vec<Line>,
@@ -25,19 +23,16 @@ pub(crate) struct TableHead {
     pub(crate) separator: Option<char>,
 }
 
-/// The columns of the rows of a table, or of one kind of them.
 #[derive(Debug)]
 pub(crate) struct TableColumns {
     pub(crate) available: Vec<AvailableColumn>,
-    /// Fields of a row.
     pub(crate) width: usize,
     pub(crate) calendar: Option<CalendarColumns>,
-    /// The line with their names.
     pub(crate) heading_line: Option<u64>,
 }
 
 impl TableHead {
-    /// Divides the first lines of a file at the first row; `None` where there is none.
+    /// `None` without a row.
     pub(crate) fn at_first_row(lines: Vec<Line>) -> Option<Self> {
         let first = lines.iter().position(|(_, text)| is_row(text))?;
         let separator = separator_of(&lines[first].1);
@@ -46,7 +41,7 @@ impl TableHead {
         Some(Self { preamble, rows, separator })
     }
 
-    /// Moves the lines before the longest run of rows of one width to the preamble. Single damaged lines do not end the table.
+    /// Moves lines before the longest run of one width to the preamble; single damaged lines do not end it.
     pub(crate) fn leave_preamble(&mut self) {
         let shapes: Vec<Option<(Option<char>, usize)>> = self.rows.iter().map(|(_, text)| shape(text)).collect();
         let mut longest = 0..0;
@@ -73,23 +68,20 @@ impl TableHead {
         self.separator = self.rows.front().and_then(|(_, text)| separator_of(text));
     }
 
-    /// The fields of the first rows.
     pub(crate) fn fields(&self) -> Vec<Vec<&str>> {
         self.rows.iter().map(|(_, text)| split(text, self.separator).collect()).collect()
     }
 
-    /// The names above the rows, as they are.
     pub(crate) fn last_names(&self) -> Vec<&str> {
         self.preamble.last().map(|(_, text)| split(text, self.separator).collect()).unwrap_or_default()
     }
 
-    /// The sample rate that a line before the rows states, Hz.
+    /// Stated rate, Hz.
     pub(crate) fn rate_hz(&self) -> Option<f64> {
         let keyed = || self.value_of(&["rate", "sample_rate", "samplerate", "sampling_rate", "frequency", "fs", "odr"]);
         self.preamble.iter().find_map(|(_, text)| stated_rate(text)).or_else(keyed).filter(|hz| *hz > 0.0)
     }
 
-    /// The number of a line that is one of these keys and a number.
     fn value_of(&self, keys: &[&str]) -> Option<f64> {
         self.preamble.iter().find_map(|(_, text)| {
             let fields: Vec<&str> =
@@ -100,7 +92,7 @@ impl TableHead {
         })
     }
 
-    /// The columns of the rows, or of one `kind` of them.
+    /// For one `kind`, or all.
     pub(crate) fn columns(&self, kind: Option<&RowKind>) -> TableColumns {
         let fields = self.fields();
         let own: Vec<Vec<&str>> = fields.iter().filter(|row| kind.is_none_or(|kind| kind.has(row))).cloned().collect();
@@ -110,7 +102,7 @@ impl TableHead {
         let lists = Lists(lengths);
         let width = self.width_of(&row, &lists);
         let mut calendar = CalendarColumns::find(&row);
-        // As `write.table` of R numbers the rows, without a name in the heading.
+        // R's `write.table` numbers rows without a name.
         let is_numbered = matches!(own.as_slice(), [first, second, ..] if first.first() == Some(&"1") && second.first() == Some(&"2"));
         let is_short = |names: usize| names + 1 == width && matches!(calendar, Some(CalendarColumns::Two(_)));
         let is_unnumbered = |names: usize| names + 1 == width && is_numbered;
@@ -120,7 +112,7 @@ impl TableHead {
         let is_heading = |names: usize| names == width || is_short(names) || is_unnumbered(names);
         let is_last = |line: u64| self.preamble.last().is_some_and(|(last, _)| *last == line);
         let plain = || {
-            // The last line before a table is its heading, where it may be.
+            // The last line before a table is its heading.
             let is_own = |(line, text): &&Line| {
                 let names = names_of(text);
                 is_heading(names.len()) || is_last(*line) && is_part_of_heading(&names, width)
@@ -130,7 +122,7 @@ impl TableHead {
         };
         let heading = match (kind, of_kind) {
             (_, Some(heading)) => Some(heading),
-            // Rows of several kinds have a common heading where it fits.
+            // A common heading if it fits.
             (Some(RowKind::Labelled { .. }), None) => {
                 plain().filter(|(line, names)| names.len() == width && !is_comment(&self.preamble, *line))
             }
@@ -165,7 +157,7 @@ impl TableHead {
         TableColumns { available, width, calendar, heading_line }
     }
 
-    /// Fields of the rows of a table: those of `row`, but for empty ones at the end that no heading has a name for.
+    /// Without final empty fields that have no name.
     fn width_of(&self, row: &[&str], lists: &Lists) -> usize {
         let least = trimmed_width(row);
         let width = |text: &str| trimmed_width(&lists.names(&split(text, self.separator).collect::<Vec<_>>()));
@@ -173,7 +165,7 @@ impl TableHead {
         headings.filter(|names| (least..row.len()).contains(names)).max().unwrap_or(row.len())
     }
 
-    /// The names in the line that names the columns of this kind of row, in a comment: `'ACCE;time(s);x(m/s^2)'`.
+    /// From a comment: `'ACCE;time(s);x(m/s^2)'`.
     fn heading_of(&self, kind: &RowKind, width: usize) -> Option<(u64, Vec<String>)> {
         let RowKind::Labelled { at: 0, name } = kind else { return None };
         let separator = self.separator?;
@@ -186,7 +178,7 @@ impl TableHead {
         })
     }
 
-    /// Gives the columns the units that lines before the rows state as scales: `gscale,0.001` of a log for video stabilisation.
+    /// Scales as `gscale,0.001`.
     fn set_scales(&self, available: &mut [AvailableColumn]) {
         const SCALES: [(&str, &str, &str); 4] = [
             ("tscale", "time", "s"),
@@ -206,11 +198,10 @@ impl TableHead {
     }
 }
 
-/// How many numbers each cell of a row has.
 struct Lists(Vec<usize>);
 
 impl Lists {
-    /// The names of the numbers of each cell: `gyro.0`, `gyro.1` of a list.
+    /// `gyro.0`, `gyro.1` of a list.
     fn names(&self, cells: &[&str]) -> Vec<String> {
         let mut names = Vec::with_capacity(cells.len());
         for (at, cell) in cells.iter().enumerate() {
@@ -226,13 +217,12 @@ impl Lists {
         names
     }
 
-    /// Cells of rows of `width` numbers.
     fn cells(&self, width: usize) -> usize {
         width - self.0.iter().map(|length| length - 1).sum::<usize>().min(width)
     }
 }
 
-/// The name and the unit in the heading of a list, as in `gyro [deg/s]` or `gyro_dps`.
+/// `gyro [deg/s]` or `gyro_dps`.
 fn name_of_list(heading: &str) -> (String, Option<Unit>) {
     let ends = heading.match_indices('_').map(|(at, _)| at);
     let by_ending = ends
@@ -247,7 +237,6 @@ fn name_of_list(heading: &str) -> (String, Option<Unit>) {
     }
 }
 
-/// What a field holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum FieldKind {
     Number,
@@ -256,7 +245,6 @@ enum FieldKind {
 }
 
 impl FieldKind {
-    /// Whether both may be in one column.
     fn is_like(self, other: Self) -> bool {
         self == other || self == Self::Missing || other == Self::Missing
     }
@@ -271,14 +259,13 @@ fn kinds_of_fields(text: &str) -> Vec<FieldKind> {
     split(text, separator_of(text)).map(kind).collect()
 }
 
-/// Separator and fields of a row. Between tabs the empty cells at the end are cut with the blanks.
+/// Separator and fields; final tabs are cut as blanks.
 fn shape(text: &str) -> Option<(Option<char>, usize)> {
     let separator = separator_of(text);
     let width = if separator == Some('\t') { 0 } else { split(text, separator).count() };
     is_row(text).then_some((separator, width))
 }
 
-/// Fields up to the last one that is not empty.
 fn trimmed_width<T: AsRef<str>>(fields: &[T]) -> usize {
     fields.iter().rposition(|field| !field.as_ref().is_empty()).map_or(0, |at| at + 1)
 }
@@ -287,7 +274,7 @@ fn is_comment(preamble: &[Line], line: u64) -> bool {
     preamble.iter().any(|(own, text)| *own == line && text.starts_with(['#', '%']) && text.contains(['\'', ':']))
 }
 
-/// Whether these are names of the first of `width` columns, or of more, of which the last have no rows: names of channels are among them.
+/// Names of the first of `width` columns, or more; channels among them.
 fn is_part_of_heading(names: &[String], width: usize) -> bool {
     let is_known = |name: &String| {
         let column = AvailableColumn::from_heading(name);
@@ -297,7 +284,7 @@ fn is_part_of_heading(names: &[String], width: usize) -> bool {
     names.len() > 1 && 2 * names.len() >= width && names.len() < 2 * width && are_names && names.iter().any(is_known)
 }
 
-/// The names of a heading in two lines, of which the upper one names groups of columns: `Gyroscope,,` over `X,Y,Z`. `None` for one in a line.
+/// Two lines: `Gyroscope,,` over `X,Y,Z`; `None` for one.
 fn joined_names(above: &[String], own: &[String]) -> Option<Vec<String>> {
     let is_of_groups = above.len() == own.len()
         && above.iter().any(|name| name.is_empty())
@@ -314,7 +301,7 @@ fn joined_names(above: &[String], own: &[String]) -> Option<Vec<String>> {
     Some(joined.collect())
 }
 
-/// The sample rate that a line before the rows states, as in `// Update Rate: 100.0Hz`, Hz.
+/// `// Update Rate: 100.0Hz`.
 fn stated_rate(line: &str) -> Option<f64> {
     const NAMES: [&str; 4] = ["rate", "frequency", "freq", "fs"];
     let plain = line.to_lowercase();
@@ -326,13 +313,12 @@ fn stated_rate(line: &str) -> Option<f64> {
     number[start..].parse().ok().filter(|hz: &f64| is_named && *hz > 0.0)
 }
 
-/// Marks the column of calendar times.
 pub(crate) fn set_calendar(available: &mut [AvailableColumn], calendar: &CalendarColumns) {
     let at = calendar.position();
     let is_part = matches!(calendar, CalendarColumns::Parts(_));
     let name = if available[at].is_time() && !is_part { available[at].name.clone() } else { "time".to_owned() };
     if let CalendarColumns::Parts(parts) = calendar {
-        // The other parts are no times of their own.
+        // Other parts are no times.
         for (part, _) in &parts[1..] {
             available[*part] =
                 AvailableColumn { name: format!("{} (part of the time)", available[*part].name), unit: None };
@@ -341,8 +327,7 @@ pub(crate) fn set_calendar(available: &mut [AvailableColumn], calendar: &Calenda
     available[at] = AvailableColumn::known(&name, "ns");
 }
 
-/// The names in a heading above rows of `width` fields. Between blanks, a unit in brackets belongs to the name before it, and quotation
-/// marks hold a name together.
+/// Names above `width` fields; units in brackets and quotation marks keep blanks.
 fn names(text: &str, separator: Option<char>, width: usize) -> Vec<&str> {
     let mut plain: Vec<&str> = split(text, separator).collect();
     while plain.len() > width && plain.last() == Some(&"") {
@@ -378,7 +363,7 @@ fn names(text: &str, separator: Option<char>, width: usize) -> Vec<&str> {
     names.filter(|name| !matches!(*name, "#" | "%")).collect()
 }
 
-/// The units of a row of them, where it is one.
+/// `None` unless a row of units.
 fn units_of(fields: &[String]) -> Option<Vec<Option<Unit>>> {
     let unit = |field: &String| Unit::parse(field.trim_matches(['[', ']', '(', ')']));
     let units: Vec<Option<Unit>> = fields.iter().map(unit).collect();
@@ -386,7 +371,7 @@ fn units_of(fields: &[String]) -> Option<Vec<Option<Unit>>> {
     (2 * known > trimmed_width(fields)).then_some(units)
 }
 
-/// The columns of a heading. Of several with the same name each is known by its number, from 0.
+/// Equal names are numbered from 0.
 pub(crate) fn named_columns(names: &[String], units: Option<&[Option<Unit>]>) -> Vec<AvailableColumn> {
     let mut columns: Vec<AvailableColumn> = names.iter().map(|name| AvailableColumn::from_heading(name)).collect();
     for (column, unit) in columns.iter_mut().zip(units.unwrap_or_default()) {
@@ -402,8 +387,7 @@ pub(crate) fn named_columns(names: &[String], units: Option<&[Option<Unit>]>) ->
     columns
 }
 
-/// Whether a line is a row and no heading or comment: at least half of its fields are numbers or calendar times, or all are missing. The
-/// others may be texts, such as the name of a frame.
+/// At least half numbers or calendar times, or all missing; other texts may be frames.
 pub(crate) fn is_row(text: &str) -> bool {
     let separator = separator_of(text);
     let (mut numbers, mut missing, mut fields, mut named) = (0, 0, 0, 0);

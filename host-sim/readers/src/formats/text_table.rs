@@ -1,5 +1,4 @@
-//! Tables of numbers in any units: CSV with commas, semicolons, tabs or blanks, with or without a heading, sentences as of NMEA 0183, and
-//! lines that name each number.
+//! Tables of numbers in text: CSV, sentences, named numbers.
 
 use crate::columns::column_selection::{AvailableColumn, ChosenColumn, Role, SelectionError, as_they_are};
 use crate::formats::calendar::{CalendarClock, CalendarColumns};
@@ -20,23 +19,21 @@ use crate::rows::whole_table::WholeTable;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 
-/// Part of the rows that may be damaged: a file with more is another one than it is taken for. So many are damaged before that is asked.
+/// Largest share of damaged rows, and number before it counts.
 const MOST_DAMAGED: f64 = 0.1;
 const FIRST_DAMAGED: u64 = 64;
 
-/// The rows of a table, which can be read again; a monitor counts the bytes and may stop the reading.
+/// Re-readable; a monitor counts bytes and may stop.
 pub(crate) struct TextRows<'a> {
     file: &'a FileBytes,
     options: ReadOptions,
     monitor: ReadMonitor,
     chosen: Vec<ChosenColumn>,
     rate_hz: Option<f64>,
-    /// The table before its first reading.
     opened: Option<TextTable>,
 }
 
 impl<'a> TextRows<'a> {
-    /// Opens a table and chooses its columns.
     pub(crate) fn open(file: &'a FileBytes, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
         let table = TextTable::open(file, options, monitor)?;
         let (chosen, rate_hz) = (table.chosen.clone(), table.rate_hz);
@@ -67,7 +64,6 @@ impl RowSource for TextRows<'_> {
     }
 }
 
-/// Reads all columns of a table; fields that are no numbers are missing.
 pub(crate) fn read_whole(
     file: &FileBytes,
     topic: Option<&str>,
@@ -78,27 +74,24 @@ pub(crate) fn read_whole(
     whole.read(&mut TextTable { is_lenient: true, ..table })
 }
 
-/// Chooses the columns to read of those that there are.
 type Choose<'a> = dyn Fn(&[AvailableColumn]) -> Result<Vec<ChosenColumn>, SelectionError> + 'a;
 
-/// How the fields of a row are told from each other.
 enum Layout {
-    /// By a separator; blanks where there is none.
+    /// Fields between separators; between blanks without one.
     Columns {
         separator: Option<char>,
         calendar: Option<CalendarClock>,
-        /// That which is read, of rows of several kinds.
+        /// The kind that is read, if there are several.
         kind: Option<RowKind>,
         /// Rows of the other kinds.
         others: u64,
     },
-    /// Those of one kind of sentence.
+    /// Sentences of one kind.
     Sentences { name: String, damaged: u64, others: u64 },
-    /// Each with its name; `others` are lines without these names.
+    /// Lines that name each number; `others` lack these names.
     Labelled { names: Vec<String>, calendar: Option<CalendarClock>, others: u64 },
 }
 
-/// Rows that are left out because they cannot be read.
 #[derive(Debug, Default)]
 struct DamagedRows {
     rows: u64,
@@ -108,10 +101,7 @@ struct DamagedRows {
 }
 
 impl DamagedRows {
-    /// Leaves out a row.
-    ///
-    /// # Errors
-    /// Too many rows are damaged.
+    /// Leaves out a row; an error if these are too many.
     fn add(&mut self, error: InputError) -> Result<(), InputError> {
         self.damaged += 1;
         if self.first.is_none() {
@@ -133,28 +123,23 @@ impl DamagedRows {
     }
 }
 
-/// An open table, read row by row.
 pub(crate) struct TextTable {
     file: PathBuf,
     lines: Lines,
     available: Vec<AvailableColumn>,
     chosen: Vec<ChosenColumn>,
     layout: Layout,
-    /// The rate that a line before the rows states, Hz.
+    /// Stated before the rows, Hz.
     rate_hz: Option<f64>,
-    /// What the user should know of the columns.
     columns_notes: Vec<String>,
     damaged: DamagedRows,
-    /// Whether a field that is no number is a missing one.
     is_lenient: bool,
     fields: RowFields,
-    /// The first rows, which were read to tell the columns.
     first: VecDeque<(u64, String)>,
     row: Vec<Number>,
 }
 
 impl TextTable {
-    /// Opens a table and chooses its columns.
     pub(crate) fn open(file: &FileBytes, options: &ReadOptions, monitor: &ReadMonitor) -> Result<Self, InputError> {
         let choose = |available: &[AvailableColumn]| options.choose(available);
         let table = Self::open_with(file, options.topic.as_deref(), monitor, &choose)?;
@@ -201,7 +186,6 @@ impl TextTable {
     }
 }
 
-/// A file whose first lines were read.
 struct Opened<'a> {
     file: &'a FileBytes,
     choose: &'a Choose<'a>,
@@ -209,7 +193,6 @@ struct Opened<'a> {
 }
 
 impl Opened<'_> {
-    /// Of rows of columns.
     fn columns(self, topic: Option<&str>, mut head: TableHead) -> Result<TextTable, InputError> {
         let fail = |reason| self.file.error(reason);
         let kinds = RowKinds::find(&head.fields());
@@ -226,7 +209,7 @@ impl Opened<'_> {
                 return Err(fail(Reason::UnknownTopic(names)));
             }
             (Some(kinds), topic) => {
-                // The columns that are read may be those of one kind alone.
+                // Perhaps of one kind alone.
                 let by_columns = || {
                     let chosen = (self.choose)(&head.columns(None).available).ok()?;
                     let channels = chosen.iter().filter(|column| matches!(column.role, Role::Channel(_)));
@@ -239,7 +222,7 @@ impl Opened<'_> {
             }
         };
         let TableColumns { available, width, calendar, heading_line } = head.columns(kind.as_ref());
-        // The columns of the other kinds are none of this one.
+        // Other kinds' columns.
         let others: &[usize] = if let Some(RowKind::Filled { others, .. }) = &kind { others } else { &[] };
         let positions: Vec<usize> = (0..available.len()).filter(|at| !others.contains(at)).collect();
         let available: Vec<AvailableColumn> = positions.iter().map(|at| available[*at].clone()).collect();
@@ -249,7 +232,7 @@ impl Opened<'_> {
         })?;
         chosen.iter_mut().for_each(|column| column.position = positions[column.position]);
         drop(rows);
-        // The tabs at the end of a line are blanks too.
+        // Final tabs are blanks.
         let fields = RowFields::new(width, head.separator == Some('\t'), &chosen);
         let rate_hz = head.rate_hz();
         let calendar = calendar.map(CalendarClock::new);
@@ -285,10 +268,10 @@ impl Opened<'_> {
         (self.choose)(available).map_err(|error| self.file.error(Reason::Selection(Box::new(error))))
     }
 
-    /// Of sentences of one kind, that which the options name, else the most frequent one with numbers among the first.
+    /// The named kind, else the most frequent with numbers.
     fn sentences(self, topic: Option<&str>, first: VecDeque<Line>) -> Result<TextTable, InputError> {
         let file = self.file;
-        // Name and number of fields of each kind, and how many there are.
+        // Name, fields, count.
         let mut kinds: Vec<(String, usize, usize)> = Vec::new();
         for sentence in first.iter().filter_map(|(_, text)| Sentence::parse(text)).filter(|of| of.is_intact) {
             match kinds.iter_mut().find(|(name, ..)| name == sentence.name) {
@@ -323,7 +306,7 @@ impl Opened<'_> {
         Ok(self.table(available, chosen, Layout::Sentences { name, damaged: 0, others: 0 }, fields, first))
     }
 
-    /// Of lines that name each of their numbers; `first` are the lines that were read.
+    /// `first` are lines already read.
     fn labelled(self, names: Vec<String>, first: Vec<Line>) -> Result<TextTable, InputError> {
         let rows = first.iter().filter_map(|(_, text)| labelled_row::parse(text));
         let row = rows.map(|row| values_of(&names, row)).next().unwrap_or_default();
@@ -352,7 +335,6 @@ impl RowSource for TextTable {
         None
     }
 
-    /// The rows that were not read yet.
     fn read(&mut self, each: &mut EachRow) -> Result<Ending, InputError> {
         while let Some(line) = self.next_row()? {
             match each(&self.row) {
@@ -370,7 +352,6 @@ impl RowSource for TextTable {
 }
 
 impl TextTable {
-    /// What the user should know of the rows that were read, one sentence each.
     fn notes(&self) -> Vec<String> {
         let of_rate = self.rate_hz.map(|hz| format!("the file states a rate of {hz} Hz before its rows"));
         let zeros = self.lines.zero_bytes();
@@ -397,7 +378,6 @@ impl TextTable {
         notes
     }
 
-    /// An error of a row of a line.
     fn fault(&self, line: u64, RowFault { column, reason }: RowFault) -> InputError {
         match column {
             Some(at) => InputError::field(&self.file, line, &self.chosen[at].label, reason),
@@ -405,7 +385,7 @@ impl TextTable {
         }
     }
 
-    /// Reads the next row into `row`; its line, or `None` at the end.
+    /// Into `row`; `None` at the end.
     fn next_row(&mut self) -> Result<Option<u64>, InputError> {
         let Self { file, lines, chosen, layout, is_lenient, fields: of_row, first, row, damaged, .. } = self;
         let plain = match layout {
@@ -467,7 +447,7 @@ impl TextTable {
                         *damaged += 1;
                         row.clear();
                         row.resize(chosen.len(), Number::Real(f64::NAN));
-                        // A sample came, and its values are not known; nor is its time, if it has one.
+                        // A sample without values; its time must be known.
                         Ok(chosen.iter().all(|column| matches!(column.role, Role::Channel(_))))
                     }
                     Some(Sentence { name: own, fields, .. }) if own == *name => {
@@ -480,7 +460,7 @@ impl TextTable {
                 },
             };
             let of_layout = of_layout.or_else(|fault| match fault {
-                // The row has the missing ones as NaN.
+                // Missing ones are NaN.
                 (Some(_), Reason::NotNumber(_) | Reason::NotTime(_)) if *is_lenient => Ok(true),
                 fault => Err(fault),
             });
@@ -494,7 +474,6 @@ impl TextTable {
     }
 }
 
-/// The names in most of the first lines of a file, where each names its numbers.
 fn labelled_names(lines: &[(u64, String)]) -> Option<Vec<String>> {
     let mut kinds: Vec<(Vec<String>, usize)> = Vec::new();
     for row in lines.iter().filter_map(|(_, text)| labelled_row::parse(text)) {
@@ -510,11 +489,11 @@ fn labelled_names(lines: &[(u64, String)]) -> Option<Vec<String>> {
     (2 * count > lines.len()).then_some(names)
 }
 
-/// The values of a row in the order of `names`; empty where it has none.
+/// In the order of `names`; empty if missing.
 fn values_of(names: &[String], row: Vec<(String, String)>) -> Vec<String> {
     let mut values = vec![String::new(); names.len()];
     for (at, (name, value)) in row.into_iter().enumerate() {
-        // Most rows have the same order.
+        // Mostly in one order.
         let is_same = names.get(at) == Some(&name);
         if let Some(at) = Some(at).filter(|_| is_same).or_else(|| names.iter().position(|known| *known == name)) {
             values[at] = value;
@@ -523,15 +502,14 @@ fn values_of(names: &[String], row: Vec<(String, String)>) -> Vec<String> {
     values
 }
 
-/// The fields of a row, and which of them are read.
 #[derive(Debug)]
 struct RowFields {
     width: usize,
-    /// Whether empty fields at the end may be absent.
+    /// Final empty fields may be absent.
     may_be_short: bool,
-    /// Position of each field that is read, in ascending order, and which of the chosen columns it is.
+    /// Fields in ascending order, and their columns.
     read: Vec<(usize, usize)>,
-    /// Which of the chosen columns each field is; empty where a field is two of them.
+    /// Column of each field; empty if a field has two.
     plain: Vec<Option<usize>>,
 }
 
@@ -546,8 +524,7 @@ impl RowFields {
         Self { width, may_be_short, read, plain }
     }
 
-    /// The same as [`numbers`](Self::numbers) of the line that `text` begins with, and the bytes of the line with its end, where it is as
-    /// nearly all are: numbers without an exponent, and letters and digits in the fields that are not read. `None` for any other line.
+    /// Fast path of [`numbers`](Self::numbers) for plain lines, and the bytes of the line; `None` for any other.
     fn plain_numbers(&self, text: &[u8], separator: char, row: &mut Vec<Number>) -> Option<usize> {
         row.resize(self.read.len(), Number::Real(f64::NAN));
         let (mut rest, last) = (text, self.plain.len().checked_sub(1)?);
@@ -571,7 +548,6 @@ impl RowFields {
         Some(text.len() - rest.len())
     }
 
-    /// The numbers of the chosen columns of a row.
     fn numbers<'a>(
         &self,
         mut fields: impl Iterator<Item = &'a str>,
@@ -582,11 +558,10 @@ impl RowFields {
         row.resize(self.read.len(), Number::Real(f64::NAN));
         let mut read = self.read.as_slice();
         let mut found = 0;
-        // Fields up to the last one that is not empty.
         let mut filled = 0;
         let mut fault: Option<(usize, Reason)> = None;
         let mut after_date = None;
-        // The sum of the parts of a time.
+        // Sum of the parts of a time.
         let mut parts_ns = Some(0_i64);
         while let Some(field) = after_date.take().or_else(|| fields.next()) {
             let position = found;
@@ -634,7 +609,7 @@ impl RowFields {
     }
 }
 
-/// Whether a row has a number, but none of the `chosen` columns of its sensor: it is of another one.
+/// A number, but none of the `chosen` columns.
 fn is_of_other_sensor<'a>(
     fields: impl Iterator<Item = &'a str>,
     chosen: &[ChosenColumn],

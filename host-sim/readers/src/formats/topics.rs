@@ -1,7 +1,4 @@
-//! What a file of several sources offers, and the table of one of them: topics of messages, groups of arrays, a log's sensors.
-//!
-//! A format implements [`Source`]: it lists its topics with all their columns, marks those that it knows to be of an inertial sensor, and
-//! gives the rows of a topic one after the other. Which topic and which columns are read is decided here, for every format alike.
+//! Files of several sources (topics, groups of arrays, sensors), and the choice of a table for all formats.
 
 use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ColumnSelection, as_they_are};
 use crate::columns::unit::Unit;
@@ -14,59 +11,52 @@ use crate::rows::whole_table::{WholeSensor, WholeTable};
 use measurement::SensorProfile;
 use std::path::Path;
 
-/// A source of rows in a file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Topic {
-    /// As `--topic` takes it.
+    /// For `--topic`.
     pub(crate) name: String,
-    /// Its type in the file; empty where there is none.
+    /// Empty without one.
     pub(crate) kind: String,
-    /// How its messages are encoded, where that is not decoded.
     pub(crate) encoding: Option<String>,
-    /// Rows, where the format says how many without reading them.
     pub(crate) rows: Option<u64>,
-    /// All that can be read of it.
     pub(crate) columns: Vec<AvailableColumn>,
-    /// What is known to be an inertial sensor in it.
     pub(crate) sensors: Vec<TopicSensor>,
 }
 
-/// An inertial sensor whose columns are known without the user.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct TopicSensor {
-    /// What tells it from the others of its topic; empty where there is one.
+    /// Empty for a single one.
     pub(crate) name: String,
-    /// Channel of the sensor, or `time` or `sample`; position of the column; and the unit, where the column does not say it.
+    /// Channel, `time` or `sample`; position; unit if the column lacks it.
     pub(crate) columns: Vec<(&'static str, usize, Option<Unit>)>,
-    /// Why the units are those, where the file does not say them.
+    /// Reason of unstated units.
     pub(crate) note: Option<String>,
 }
 
 impl TopicSensor {
-    /// Whether it has such a channel.
+    /// True if it has the channel.
     pub(crate) fn has(&self, channel: &str) -> bool {
         self.columns.iter().any(|(name, ..)| *name == channel)
     }
 
-    /// Adds the three axes, which are in `unit`.
+    /// In `unit`.
     pub(crate) fn add_axes(&mut self, channels: [&'static str; 3], positions: [usize; 3], unit: &str) {
         let unit = Unit::parse(unit);
         self.columns.extend(channels.into_iter().zip(positions).map(|(channel, at)| (channel, at, unit)));
     }
 }
 
-/// A source of rows in a file: a topic of messages, a group of arrays, or an array.
+/// A source of rows: topic, group or array.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TopicDescription {
-    /// As [`ReadOptions::topic`] takes it; empty for all arrays of a file.
+    /// For [`ReadOptions::topic`]; empty for all arrays.
     pub name: String,
-    /// Its type in the file, such as `sensor_msgs/Imu`; empty where there is none.
+    /// Such as `sensor_msgs/Imu`; may be empty.
     pub kind: String,
-    /// Rows, where the format says how many without reading them.
     pub rows: Option<u64>,
-    /// Names of the columns, each with its unit where the file says it. Without a column the messages cannot be decoded.
+    /// With units, if stated; empty if not decodable.
     pub columns: Vec<(String, Option<&'static str>)>,
-    /// Names of the sensors in it that are read without options, each for [`ReadOptions::topic`].
+    /// Read without options, for [`ReadOptions::topic`].
     pub sensors: Vec<String>,
 }
 
@@ -83,70 +73,57 @@ impl From<&Topic> for TopicDescription {
     }
 }
 
-/// What a file has to be read.
 #[derive(Debug, Default)]
 pub(crate) struct Offer {
-    /// Name of the format.
     pub(crate) format: &'static str,
-    /// All that there is.
     pub(crate) topics: Vec<Topic>,
-    /// The name of the sensor that is read where the user says nothing; `None` where the user has to say.
+    /// Default sensor; `None` if the user has to say.
     pub(crate) preferred: Option<String>,
-    /// The topic that has the columns of all others.
     pub(crate) whole: Option<usize>,
 }
 
 impl Offer {
-    /// Of topics of which the user chooses one.
     pub(crate) fn new(format: &'static str, topics: Vec<Topic>) -> Self {
         Self { format, topics, ..Self::default() }
     }
 }
 
-/// How the reading of a topic ended.
 #[derive(Debug, Default)]
 pub(crate) struct Ending {
-    /// Why there are no more rows, where the file is damaged or ends early.
     pub(crate) damage: Option<Reason>,
-    /// What the user should know, one sentence each.
     pub(crate) notes: Vec<String>,
 }
 
-/// Takes the numbers of a row, one for each of the columns that were asked for.
 pub(crate) type EachRow<'a> = dyn FnMut(&[Number]) -> Result<(), InputError> + 'a;
 
-/// A file with several sources of rows.
 pub(crate) trait Source: Send {
-    /// What there is.
     fn offer(&self) -> &Offer;
 
-    /// All topics.
     fn topics(&self) -> &[Topic] {
         &self.offer().topics
     }
 
-    /// The rate that the file states for these columns of a topic, Hz.
+    /// Stated, Hz.
     fn rate_hz(&self, _topic: usize, _columns: &[usize]) -> Option<f64> {
         None
     }
 
-    /// The columns of a topic whose rows belong together, by their positions.
+    /// Columns whose rows belong together.
     fn tables(&self, topic: usize) -> Vec<Vec<usize>> {
         vec![(0..self.topics()[topic].columns.len()).collect()]
     }
 
-    /// Gives every row of the topic at `topic`, with the `columns` at these positions.
+    /// Rows of `topic` with these columns.
     fn read(&mut self, topic: usize, columns: &[usize], each: &mut EachRow) -> Result<Ending, InputError>;
 }
 
-/// A topic, and a sensor of it where one is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Choice {
     topic: usize,
     sensor: Option<usize>,
 }
 
-/// The name of a sensor for `--topic`: that of its topic, and its own where a topic has several.
+/// For `--topic`.
 fn sensor_name(topic: &Topic, sensor: &TopicSensor) -> String {
     match (topic.name.as_str(), sensor.name.as_str()) {
         (name, "") | ("", name) => name.to_owned(),
@@ -154,7 +131,6 @@ fn sensor_name(topic: &Topic, sensor: &TopicSensor) -> String {
     }
 }
 
-/// Every known sensor with its name.
 fn sensors(topics: &[Topic]) -> Vec<(String, Choice)> {
     let of_topic = |(number, topic)| {
         let topic: &Topic = topic;
@@ -164,8 +140,7 @@ fn sensors(topics: &[Topic]) -> Vec<(String, Choice)> {
     topics.iter().enumerate().flat_map(of_topic).collect()
 }
 
-/// Names of the sensors of a file that are of one kind with the one that is read first, for `--topic`; none of a file with one sensor or
-/// without a known one.
+/// Sensors of the default's kind, for `--topic`; none if there is one or none known.
 pub(crate) fn names_of_several(source: &dyn Source) -> Vec<String> {
     let topics = source.topics();
     let all = sensors(topics);
@@ -173,18 +148,16 @@ pub(crate) fn names_of_several(source: &dyn Source) -> Vec<String> {
     let first =
         all.iter().find(|(name, _)| source.offer().preferred.as_deref().is_none_or(|preferred| preferred == name));
     let Some(first) = first.map(|(_, choice)| kind(choice)) else { return Vec::new() };
-    // Where the user would have to choose, all are offered; where one is preferred, those of its kind.
+    // All without a default, else its kind.
     let is_offered = |choice: &Choice| source.offer().preferred.as_deref().is_none() || kind(choice) == first;
     let names: Vec<String> = all.into_iter().filter(|(_, choice)| is_offered(choice)).map(|(name, _)| name).collect();
     if names.len() > 1 { names } else { Vec::new() }
 }
 
-/// The channels that a sensor has.
 fn shape(topic: &Topic, sensor: Option<usize>) -> Vec<&'static str> {
     sensor.map_or_else(Vec::new, |at| topic.sensors[at].columns.iter().map(|(channel, ..)| *channel).collect())
 }
 
-/// The topic that the options name, or the only one that they can mean.
 fn choose(source: &dyn Source, options: &ReadOptions) -> Result<Choice, Reason> {
     let (topics, format) = (source.topics(), source.offer().format);
     let known = sensors(topics);
@@ -205,14 +178,14 @@ fn choose(source: &dyn Source, options: &ReadOptions) -> Result<Choice, Reason> 
         if let Some(topic) = source.offer().whole {
             return Ok(Choice { topic, sensor: None });
         }
-        // Those that have the columns that are named.
+        // With the named columns.
         let has = |topic: &Topic| options.selection.is_covered(&topic.columns);
         let able: Vec<usize> = (0..topics.len()).filter(|&at| has(&topics[at])).collect();
         let preferred = known.iter().find(|(name, _)| Some(name.as_str()) == source.offer().preferred.as_deref());
         return match (able.as_slice(), preferred) {
             ([topic], _) => Ok(Choice { topic: *topic, sensor: None }),
             ([], _) if topics.len() == 1 => Ok(Choice { topic: 0, sensor: None }),
-            // The columns of the only sensor are those that the user looks for.
+            // The only sensor has the user's columns.
             ([], None) if known.len() == 1 => Ok(Choice { sensor: None, ..known[0].1 }),
             (able, Some((_, choice))) if able.contains(&choice.topic) => Ok(Choice { sensor: None, ..*choice }),
             ([], _) => Err(Reason::NoSensor { format, topics: describe(topics) }),
@@ -237,7 +210,6 @@ fn choose(source: &dyn Source, options: &ReadOptions) -> Result<Choice, Reason> 
     }
 }
 
-/// Topics with their types, in a message; of many the first.
 fn describe(topics: &[Topic]) -> String {
     const SHOWN: usize = 24;
     let one = |topic: &Topic| match (topic.kind.as_str(), topic.columns.is_empty()) {
@@ -250,7 +222,6 @@ fn describe(topics: &[Topic]) -> String {
     format!("{}{more}", shown.join(", "))
 }
 
-/// The columns to read, with their positions in the topic.
 fn choose_columns(
     topic: &Topic,
     sensor: Option<&TopicSensor>,
@@ -273,7 +244,6 @@ fn choose_columns(
     Ok(chosen)
 }
 
-/// The rows of the topic that the options choose.
 pub(crate) struct TopicRows<'a> {
     file: &'a Path,
     source: Box<dyn Source + 'a>,
@@ -284,7 +254,6 @@ pub(crate) struct TopicRows<'a> {
 }
 
 impl<'a> TopicRows<'a> {
-    /// Chooses topic and columns of a file.
     pub(crate) fn open(
         file: &'a Path,
         source: Box<dyn Source + 'a>,
@@ -364,10 +333,10 @@ impl RowSource for TopicRows<'_> {
     }
 }
 
-/// Topics without a known sensor that are read to be looked at.
+/// Topics read without a known sensor.
 const MOST_TOPICS: usize = 8;
 
-/// All columns of the topic that is named; else of those with a known sensor; else of the first ones.
+/// Named topic, else known sensors, else the first ones.
 pub(crate) fn read_whole<'a>(
     file: &'a Path,
     mut source: Box<dyn Source + 'a>,
@@ -411,7 +380,7 @@ pub(crate) fn read_whole<'a>(
     if let Some(error) = refused.filter(|error| tables.is_empty() || error.reason.is_limit()) {
         return Err(error);
     }
-    // A name of one of several sensors of a topic.
+    // One of several sensors.
     for table in &mut tables {
         if table.sensors.iter().any(|sensor| Some(sensor.name.as_str()) == topic) {
             table.sensors.retain(|sensor| Some(sensor.name.as_str()) == topic);
@@ -420,12 +389,11 @@ pub(crate) fn read_whole<'a>(
     Ok(tables)
 }
 
-/// What is known of these columns of a topic before they are read.
 fn described(source: &dyn Source, topic: usize, chosen: &[AvailableColumn]) -> WholeTable {
     let Topic { name, kind, .. } = &source.topics()[topic];
     let is_of_arrays = source.offer().whole.is_some();
     let mut whole = WholeTable { name: name.clone(), kind: kind.clone(), is_of_arrays, ..WholeTable::default() };
-    // The same column may be in several topics, under one name.
+    // Columns may be in several topics.
     let position = |name: &str| chosen.iter().position(|column| column.name == name);
     for of in source.topics().iter().filter(|of| is_of_arrays || of.name == *name) {
         for sensor in &of.sensors {

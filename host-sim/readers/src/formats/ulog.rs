@@ -1,7 +1,4 @@
-//! ULog of PX4: gyroscopes and accelerometers, one sample a message or a FIFO of samples a message, and any other message by its columns.
-//!
-//! The crate `px4-ulog` is not used: it follows formats within formats to any depth, in time that grows with the square of it until the
-//! stack ends.
+//! ULog of PX4: sensors by message or FIFO, and any message. The crate `px4-ulog` follows nested formats without limit.
 
 use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::AvailableColumn;
@@ -17,16 +14,12 @@ use std::rc::Rc;
 
 const FORMAT: &str = "PX4 ULog";
 
-/// Bytes before the first message.
 const HEADER_BYTES: u64 = 16;
-/// Samples of a FIFO message.
 const FIFO_SAMPLES: usize = 32;
-/// Unit of the times, which are those of the samples.
 const TIME_UNIT: &str = "us";
 const GYROSCOPE_UNIT: &str = "rad/s";
 const ACCELEROMETER_UNIT: &str = "m/s^2";
 
-/// Messages of sensors: name, and the fields of its axes.
 type Axes = ([&'static str; 3], Vector);
 const XYZ: [&str; 3] = ["x", "y", "z"];
 const SENSORS: [(&str, &[Axes]); 3] = [
@@ -40,17 +33,15 @@ const SENSORS: [(&str, &[Axes]); 3] = [
     ),
     ("sensor_accel", &[(XYZ, Vector::Force)]),
 ];
-/// Messages with the samples of a FIFO.
 const FIFOS: [(&str, Vector); 2] = [("sensor_gyro_fifo", Vector::Rate), ("sensor_accel_fifo", Vector::Force)];
-/// Messages of gyroscope and accelerometer, which drivers of one part publish with the same times.
+/// Published with the same times.
 const PAIRS: [[&str; 2]; 2] = [["sensor_gyro_fifo", "sensor_accel_fifo"], ["sensor_gyro", "sensor_accel"]];
 
-/// Samples that wait for that of the other sensor at most.
+/// Waiting for the other sensor.
 const MOST_WAITING: usize = 1024;
-/// Share of the samples that must have the time of one of the other sensor if both are to be read as one.
+/// Least share of common times.
 const MIN_PAIRED: f64 = 0.9;
 
-/// What a vector measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Vector {
     Rate,
@@ -66,17 +57,13 @@ impl Vector {
     }
 }
 
-/// A message and the number of its publisher.
 type Key = (String, u8);
 
-/// What the rows of a topic are made of.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Rows {
-    /// Messages, with all their columns.
     Messages(Key),
-    /// Samples of a FIFO.
     Fifo(Key),
-    /// Samples of a gyroscope, each with that of the accelerometer at the same time.
+    /// Gyroscope with accelerometer at the same time.
     Pair([&'static str; 2], u8),
 }
 
@@ -84,19 +71,17 @@ fn name_of(name: &str, instance: u8) -> String {
     if instance == 0 { name.to_owned() } else { format!("{name}:{instance}") }
 }
 
-/// Samples of a gyroscope and an accelerometer that wait for one of the other sensor at the same time.
+/// Samples waiting for their pair.
 #[derive(Debug, Default)]
 struct Pairing {
-    /// By the bits of the time in µs, which sort like the time.
+    /// By the bits of µs, which sort like times.
     waiting: BTreeMap<u64, (usize, [Number; 4])>,
     paired: u64,
-    /// Samples of which there is no other.
     alone: u64,
 }
 
 impl Pairing {
-    /// Adds a sample of sensor 0, the gyroscope, or 1, the accelerometer; and gives it with that of the other sensor, once there
-    /// are both.
+    /// Gyroscope 0, accelerometer 1; returns a complete pair.
     fn add(&mut self, sensor: usize, sample: [Number; 4]) -> Option<[Number; 7]> {
         let key = sample[0].value().max(0.0).to_bits();
         match self.waiting.remove(&key) {
@@ -119,10 +104,9 @@ impl Pairing {
     }
 }
 
-/// An open log.
 pub(crate) struct UlogSource<'a> {
     file: &'a FileBytes,
-    /// Preferred is the gyroscope with the most samples, with its accelerometer; without a gyroscope the accelerometer with the most.
+    /// Default: the gyroscope with most samples and its accelerometer, or that accelerometer.
     offer: Offer,
     rows: Vec<Rows>,
     budget: Budget,
@@ -160,7 +144,7 @@ impl<'a> UlogSource<'a> {
         for (pair, instance) in &pairs {
             source.add_pair(*pair, *instance, pairings[&(*pair, *instance)].paired);
         }
-        // The message that both sensors share before others with as many samples, and the first instance.
+        // Shared messages, then the first instance.
         let rank = |(at, topic): &(usize, &Topic)| {
             let sensor = topic.sensors.first();
             let has = |axes: [&str; 3]| sensor.is_some_and(|sensor| sensor.has(axes[0]));
@@ -183,7 +167,6 @@ impl<'a> UlogSource<'a> {
         }
     }
 
-    /// A message of its own, and the samples of a FIFO.
     fn add(&mut self, key: &Key, layout: &MessageLayout, rows: u64) {
         let (name, instance) = key;
         let topic = Topic { name: name_of(name, *instance), kind: name.clone(), rows: Some(rows), ..Topic::default() };
@@ -232,13 +215,11 @@ fn pair_name(pair: [&str; 2], instance: u8) -> String {
     name_of(&pair.join("+"), instance)
 }
 
-/// The time, and then these columns.
 fn sample_columns(names: &[&str]) -> Vec<AvailableColumn> {
     let values = names.iter().map(|name| AvailableColumn { name: (*name).to_owned(), unit: None });
     std::iter::once(AvailableColumn::known("time", TIME_UNIT)).chain(values).collect()
 }
 
-/// The pair that a message belongs to, and whether it is its first or second.
 fn pair_of(message: &str) -> Option<([&'static str; 2], usize)> {
     PAIRS.iter().find_map(|pair| Some((*pair, pair.iter().position(|of| *of == message)?)))
 }
@@ -283,7 +264,6 @@ impl Source for UlogSource<'_> {
     }
 }
 
-/// A message of data.
 struct Message<'a> {
     name: &'a str,
     instance: u8,
@@ -291,9 +271,9 @@ struct Message<'a> {
     data: &'a [u8],
 }
 
-/// Decodes the columns of a message into `row`; and its time, which is that of the sample where the log has it.
+/// Into `row`; returns its time.
 fn decode(message: &Message, row: &mut Vec<Number>) -> Number {
-    // Padding at the end is not logged: a message may be shorter than its format.
+    // Final padding is not logged.
     let _ = message.layout.decode(message.data, Encoding::Packed, row);
     let columns = message.layout.columns();
     let number = |name: &str| columns.iter().position(|column| column.name == name).map(|at| row[at]);
@@ -301,7 +281,6 @@ fn decode(message: &Message, row: &mut Vec<Number>) -> Number {
     sampled.or_else(|| number("timestamp")).unwrap_or(Number::Real(f64::NAN))
 }
 
-/// Gives the samples of a message of one vector to `each`: the time and three axes.
 fn for_each_sample(
     message: &Message,
     row: &mut Vec<Number>,
@@ -315,14 +294,14 @@ fn for_each_sample(
         return each([time, Number::Real(value("x")), Number::Real(value("y")), Number::Real(value("z"))]);
     }
     let (interval_us, scale, samples) = (value("dt"), value("scale"), value("samples"));
-    // Also false for NaN.
+    // Also for NaN.
     if !(samples >= 0.0 && samples <= FIFO_SAMPLES as f64) {
         return each([Number::Real(f64::NAN); 4]);
     }
     let first = ["x[0]", "y[0]", "z[0]"].map(|name| columns.iter().position(|column| column.name == name));
     let samples = samples as usize;
     for at in 0..samples {
-        // The time of the message is that of its last sample.
+        // The last sample's time.
         let before_us = (samples - 1 - at) as f64 * interval_us;
         let axis = |axis: usize| {
             let count = first[axis].and_then(|first| row.get(first + at)).map_or(f64::NAN, |count| count.value());
@@ -333,7 +312,7 @@ fn for_each_sample(
     Ok(())
 }
 
-/// `time`, in µs, less `before_us`.
+/// In µs.
 fn earlier(time: Number, before_us: f64) -> Number {
     match time {
         Number::Integer(time) if before_us.fract() == 0.0 => Number::Integer(time.saturating_sub(before_us as i64)),
@@ -341,7 +320,6 @@ fn earlier(time: Number, before_us: f64) -> Number {
     }
 }
 
-/// Gives each message of data to `each`; and why there are no more where the file is damaged.
 fn for_each_message(
     file: &FileBytes,
     budget: Budget,
@@ -349,13 +327,13 @@ fn for_each_message(
 ) -> Result<Option<Reason>, InputError> {
     let fail = |error| file.error(Reason::Io(error));
     let mut input = MessageBytes { input: BufReader::new(file.open().map_err(fail)?), at: 0 };
-    // Where data were appended, as after a crash: the message before it may have no end.
+    // Appended data follow a cut message.
     let mut appended: Vec<u64> = Vec::new();
     let mut meter = budget.meter();
     let mut formats: Definitions = HashMap::new();
     let mut layouts: HashMap<String, Rc<MessageLayout>> = HashMap::new();
     let mut subscriptions: HashMap<u16, (String, u8, Rc<MessageLayout>)> = HashMap::new();
-    // A format that cannot be understood leaves its messages out.
+    // Formats that are not understood are left out.
     let mut refused = None;
     let mut bytes = Vec::new();
     input.next(HEADER_BYTES, &mut bytes).map_err(fail)?;
@@ -419,14 +397,12 @@ fn for_each_message(
     }
 }
 
-/// The bytes of a log.
 struct MessageBytes {
     input: BufReader<OpenBytes>,
     at: u64,
 }
 
 impl MessageBytes {
-    /// The next `count` bytes; false where there are fewer.
     fn next(&mut self, count: u64, bytes: &mut Vec<u8>) -> io::Result<bool> {
         bytes.clear();
         let read = self.input.by_ref().take(count).read_to_end(bytes)? as u64;
@@ -440,11 +416,7 @@ impl MessageBytes {
     }
 }
 
-/// Where data were appended to a log, by its message of flag bits: 8 compatible ones, 8 incompatible ones, of which the first bit says that data
-/// were appended, and three offsets.
-///
-/// # Errors
-/// It has incompatible flags that are not known.
+/// Offsets of appended data, by the flag bits; an error for unknown incompatible flags.
 fn flag_bits(message: &[u8]) -> Result<Vec<u64>, Reason> {
     const DATA_APPENDED: u8 = 1;
     let incompatible = message.get(8..16).unwrap_or_default();
@@ -459,7 +431,7 @@ fn flag_bits(message: &[u8]) -> Result<Vec<u64>, Reason> {
     Ok(offsets.filter(|offset| *offset > 0).collect())
 }
 
-/// Name and fields of a format such as `sensor_gyro:uint64_t timestamp;float[3] xyz;`; `None` for other texts.
+/// `sensor_gyro:uint64_t timestamp;float[3] xyz;`.
 fn format(text: &[u8]) -> Option<(String, Vec<Field>)> {
     let (name, fields) = std::str::from_utf8(text).ok()?.split_once(':')?;
     let field = |text: &str| {

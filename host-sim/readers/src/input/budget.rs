@@ -1,8 +1,4 @@
-//! What the reading of one file may cost: bytes once they are decompressed, numbers, and levels of nesting.
-//!
-//! A file of a few kilobytes can ask for gigabytes (compressed constants) or for a stack of any depth (definitions within definitions).
-//! Every reader draws from one budget, whose amounts grow with the size of the file, so that no recording that a sensor made meets it: the
-//! noise of a converter does not compress to a fiftieth. They bound the time as well, but for a query of a database, which has a deadline.
+//! Limits on the reading of a file, which grow with its size: bytes, numbers, nesting, time.
 
 use crate::input::file_bytes::FileBytes;
 use crate::input::input_error::Reason;
@@ -10,36 +6,31 @@ use std::borrow::BorrowMut;
 use std::io::{self, Read};
 use std::time::{Duration, Instant};
 
-/// Bytes that a byte of the file may become when it is decompressed, and bytes that every file has beside.
 const BYTES_PER_BYTE: u64 = 50;
 const BYTES_OF_ANY: u64 = 1 << 24;
-/// Numbers that a byte of the file may become, and numbers that every file has beside.
 const VALUES_PER_BYTE: u64 = 8;
 const VALUES_OF_ANY: u64 = 1 << 20;
-/// Time of a query for a byte of the file, and for every file.
 const NANOSECONDS_PER_BYTE: u64 = 1_000;
 const TIME_OF_ANY: Duration = Duration::from_secs(10);
-/// Definitions within definitions, structures within structures, groups within groups.
 const MOST_LEVELS: usize = 32;
 
-/// The end of a query that may take so long; a browser has neither queries nor a clock.
+/// `None` in a browser, which has no clock.
 fn deadline(time: Duration) -> Option<Instant> {
     if cfg!(target_family = "wasm") { None } else { Instant::now().checked_add(time) }
 }
 
-/// The amounts for one file. A reader that goes through the file twice takes a [`Meter`] for each time.
+/// For one file; a [`Meter`] per pass.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Budget {
     bytes: u64,
     values: u64,
     time: Duration,
-    /// `None` without a limit.
+    /// `None` is no limit.
     #[cfg_attr(not(feature = "sqlite"), expect(dead_code, reason = "a query alone may never end"))]
     end: Option<Instant>,
 }
 
 impl Budget {
-    /// For a file of `bytes`, from now on.
     pub(crate) fn new(bytes: u64) -> Self {
         let time = TIME_OF_ANY + Duration::from_nanos(bytes.saturating_mul(NANOSECONDS_PER_BYTE));
         Self {
@@ -50,12 +41,10 @@ impl Budget {
         }
     }
 
-    /// For this file, from now on; of a pipe without a limit.
     pub(crate) fn of_file(file: &FileBytes) -> io::Result<Self> {
         Ok(Self::new(file.length()?.unwrap_or(u64::MAX)))
     }
 
-    /// For files that are one recording, from now on.
     pub(crate) fn joined(budgets: impl IntoIterator<Item = Self>) -> Self {
         budgets.into_iter().fold(Self::new(0), |all, of| Self {
             bytes: all.bytes.saturating_add(of.bytes),
@@ -65,29 +54,24 @@ impl Budget {
         })
     }
 
-    /// Without any time left.
     #[cfg(test)]
     pub(crate) fn spent() -> Self {
         let budget = Self::new(0);
         Self { end: budget.end.and_then(|end| end.checked_sub(budget.time)), ..budget }
     }
 
-    /// The same for another reading, from now on.
     pub(crate) fn again(self) -> Self {
         Self { end: deadline(self.time), ..self }
     }
 
-    /// Counts from nothing.
     pub(crate) fn meter(self) -> Meter {
         Meter { budget: self, bytes: 0, values: 0 }
     }
 
-    /// Refuses what lies deeper than any recording.
     pub(crate) fn check_depth(levels: usize) -> Result<(), Reason> {
         if levels > MOST_LEVELS { Err(Reason::TooDeep { most: MOST_LEVELS }) } else { Ok(()) }
     }
 
-    /// Refuses to go on with a query after the time has passed.
     #[cfg(any(feature = "sqlite", test))]
     pub(crate) fn check_time(self) -> Result<(), Reason> {
         let is_late = self.end.is_some_and(|end| Instant::now() > end);
@@ -95,7 +79,6 @@ impl Budget {
     }
 }
 
-/// What one reading has cost.
 #[derive(Debug)]
 pub(crate) struct Meter {
     budget: Budget,
@@ -108,7 +91,6 @@ impl Meter {
         self.budget
     }
 
-    /// Adds bytes that were decompressed.
     pub(crate) fn add_bytes(&mut self, bytes: u64) -> Result<(), Reason> {
         self.bytes = self.bytes.saturating_add(bytes);
         if self.bytes > self.budget.bytes {
@@ -117,7 +99,6 @@ impl Meter {
         Ok(())
     }
 
-    /// Adds numbers that are held.
     pub(crate) fn add_values(&mut self, values: u64) -> Result<(), Reason> {
         self.values = self.values.saturating_add(values);
         if self.values > self.budget.values {
@@ -127,7 +108,7 @@ impl Meter {
     }
 }
 
-/// Counts what comes out of a decompressor. What the budget refuses is an error that [`Reason::from_io`] gives back.
+/// Counts decompressed bytes; refusals come back by [`Reason::from_io`].
 pub(crate) struct Metered<R, M = Meter> {
     input: R,
     meter: M,
@@ -138,7 +119,6 @@ impl<R, M> Metered<R, M> {
         Self { input, meter }
     }
 
-    /// What the reading has cost until now.
     pub(crate) fn into_meter(self) -> M {
         self.meter
     }

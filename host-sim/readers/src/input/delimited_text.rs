@@ -1,7 +1,4 @@
-//! Comma-separated text from a plain or gzip file, line by line, with the number of every line as an editor shows it.
-//!
-//! The crate `csv` is not used because the line number that it reports is wrong after a blank line and in files with CR LF
-//! line ends.
+//! Lines of a plain or gzip file with an editor's line numbers. The crate `csv` counts blank lines and CR LF wrongly.
 
 use crate::input::budget::{Budget, Metered};
 use crate::input::file_bytes::FileBytes;
@@ -14,10 +11,8 @@ use crate::input::utf16_reader::Utf16Reader;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::PathBuf;
 
-/// Longest line that is read, bytes.
 const MAX_LINE_BYTES: u64 = 1 << 16;
 
-/// Size of each read buffer, bytes.
 const BUFFER_BYTES: usize = 1 << 16;
 
 /// An open file, read one line at a time.
@@ -26,18 +21,18 @@ pub struct Lines {
     input: BufReader<Box<dyn Read + Send>>,
     line: u64,
     bytes: Vec<u8>,
-    /// The line, where it is no UTF-8.
+    /// If not UTF-8.
     latin: String,
     is_latin: bool,
-    /// Whether the line in `bytes` is read once more.
+    /// The line in `bytes` comes again.
     again: bool,
-    /// Bytes that are zero, as where a disk was full or a device lost its power.
+    /// As of a full disk or lost power.
     zero_bytes: u64,
     monitor: ReadMonitor,
 }
 
 impl Lines {
-    /// Opens `file`. Whether it is compressed is told by its first bytes, not by its name.
+    /// Opens `file`; its first bytes tell compression.
     ///
     /// # Errors
     /// The file is missing, unreadable, a directory or empty.
@@ -45,11 +40,10 @@ impl Lines {
         Self::open_monitored(file, &ReadMonitor::default())
     }
 
-    /// As [`open`](Self::open); `monitor` counts the bytes.
     pub(crate) fn open_monitored(file: &FileBytes, monitor: &ReadMonitor) -> Result<Self, InputError> {
         let fail = |reason| file.error(reason);
         let mut raw = file.open().map_err(|e| fail(Reason::Io(e)))?;
-        // The first bytes are chained in front again instead of seeking: the file may be a pipe.
+        // Without seeking: it may be a pipe.
         let mut start = Vec::with_capacity(2);
         raw.by_ref().take(2).read_to_end(&mut start).map_err(|e| fail(Reason::Io(e)))?;
         if start.is_empty() {
@@ -69,7 +63,7 @@ impl Lines {
                 Box::new(members)
             }
         } else if is_utf16 {
-            // As programs for Windows write it.
+            // In Windows programs.
             Box::new(Utf16Reader::new(whole).map_err(|e| fail(Reason::Io(e)))?)
         } else {
             Box::new(whole)
@@ -88,8 +82,7 @@ impl Lines {
         })
     }
 
-    /// The next line that is not blank, without the blanks around it, and its number from 1; `None` at the end of the file. A line that
-    /// is no UTF-8 is Latin-1, as programs for Windows write a degree sign.
+    /// The next non-blank line, trimmed, with its number from 1; Latin-1 unless UTF-8. `None` at the end.
     ///
     /// # Errors
     /// The file cannot be read or decompressed, or the line is longer than 65536 bytes or has control characters.
@@ -103,7 +96,7 @@ impl Lines {
                 Err(Reason::TruncatedGzip) if self.monitor.is_cut() => 0,
                 Err(reason) => return Err(InputError::line(&self.file, self.line, reason)),
             };
-            // The copy of a pipe that was stopped may end within a line.
+            // A stopped pipe may end within a line.
             if read == 0 || (self.monitor.is_cut() && self.bytes.last() != Some(&b'\n')) {
                 self.monitor.end();
                 return Ok(None);
@@ -125,7 +118,7 @@ impl Lines {
         if let Ok(text) = text(&self.bytes) {
             return Ok(Some((self.line, text)));
         }
-        // Characters that no text has tell other bytes from letters.
+        // Control characters are no text.
         let latin = self.bytes.trim_ascii().iter().map(|byte| char::from(*byte));
         if latin.clone().any(|letter| letter.is_control() && letter != '\t') {
             return Err(InputError::line(&self.file, self.line, Reason::NotText));
@@ -136,25 +129,24 @@ impl Lines {
         Ok(Some((self.line, &self.latin)))
     }
 
-    /// The bytes of the next lines, as far as they are in memory; none where they cannot be read.
+    /// In memory; empty if not readable.
     pub(crate) fn buffer(&mut self) -> &[u8] {
         if self.again { &[] } else { self.input.fill_buf().unwrap_or_default() }
     }
 
-    /// Consumes the next line, which has so many bytes with its end, and returns its number.
+    /// With its end; returns its number.
     pub(crate) fn consume_line(&mut self, bytes: usize) -> u64 {
         self.input.consume(bytes);
         self.line += 1;
         self.line
     }
 
-    /// Bytes that are zero, which were left out.
+    /// Bytes left out.
     pub(crate) fn zero_bytes(&self) -> u64 {
         self.zero_bytes
     }
 
-    /// The header without consuming it: what [`next_line`](Self::next_line) returns now, and will return once more. `None` for a file of
-    /// blank lines.
+    /// The next line without consuming it; `None` for blank lines only.
     ///
     /// # Errors
     /// As [`next_line`](Self::next_line).
@@ -165,7 +157,6 @@ impl Lines {
     }
 }
 
-/// Whether a file begins as text in UTF-16, in either order of the bytes.
 pub(crate) fn is_utf16(start: &[u8]) -> bool {
     start.starts_with(b"\xFF\xFE") || start.starts_with(b"\xFE\xFF")
 }
@@ -176,7 +167,6 @@ impl Drop for Lines {
     }
 }
 
-/// The text of a line without the blanks around it.
 fn text(bytes: &[u8]) -> Result<&str, std::str::Utf8Error> {
     let plain = bytes.trim_ascii();
     if let [first, .., last] = plain
@@ -188,7 +178,6 @@ fn text(bytes: &[u8]) -> Result<&str, std::str::Utf8Error> {
     std::str::from_utf8(bytes).map(|text| text.trim_start_matches('\u{feff}').trim())
 }
 
-/// Tells damaged compression from a failing disk.
 fn read_failure(error: io::Error) -> Reason {
     match error.kind() {
         io::ErrorKind::UnexpectedEof => Reason::TruncatedGzip,
@@ -198,9 +187,9 @@ fn read_failure(error: io::Error) -> Reason {
     }
 }
 
-/// A field without the blanks and the quotation marks around it.
+/// Without blanks and quotation marks.
 pub fn field(raw: &str) -> &str {
-    // Most have neither.
+    // Mostly neither.
     let is_bare = |byte: Option<&u8>| byte.is_none_or(|byte| byte.is_ascii_graphic() && *byte != b'"');
     if is_bare(raw.as_bytes().first()) && is_bare(raw.as_bytes().last()) {
         return raw;
@@ -209,7 +198,7 @@ pub fn field(raw: &str) -> &str {
     trimmed.strip_prefix('"').and_then(|t| t.strip_suffix('"')).unwrap_or(trimmed)
 }
 
-/// The first 32 characters of a field, for an error message.
+/// For messages.
 pub fn quote(text: &str) -> String {
     text.chars().take(32).collect()
 }

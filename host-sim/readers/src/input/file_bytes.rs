@@ -1,5 +1,4 @@
-//! The bytes of a recording, which can be read more than once: of a file, of a copy of what came through a pipe or was compressed, or in
-//! memory.
+//! Re-readable bytes: file, copy or memory.
 
 use crate::input::input_error::{InputError, Reason};
 use std::fs::{self, File};
@@ -8,11 +7,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::NamedTempFile;
 
-/// The bytes, under the name by which the user knows them. All clones are of the same bytes.
+/// Bytes under the user's name, shared by clones.
 #[derive(Debug, Clone)]
 pub struct FileBytes {
     name: PathBuf,
-    /// `None` where they are in the file of this name.
+    /// `None` for the file itself.
     copy: Option<BytesCopy>,
 }
 
@@ -23,7 +22,6 @@ enum BytesCopy {
 }
 
 impl<P: AsRef<Path> + ?Sized> From<&P> for FileBytes {
-    /// The bytes of a file.
     fn from(file: &P) -> Self {
         Self { name: file.as_ref().to_owned(), copy: None }
     }
@@ -41,12 +39,12 @@ impl FileBytes {
         Self { name: name.to_owned(), copy: Some(BytesCopy::Memory(bytes.into())) }
     }
 
-    /// What is in a temporary file.
+    /// The bytes of a temporary file.
     pub fn in_temporary_file(name: &Path, file: NamedTempFile) -> Self {
         Self { name: name.to_owned(), copy: Some(BytesCopy::File(Arc::new(file))) }
     }
 
-    /// A copy of all that `input` has, in a temporary file where the system has files.
+    /// In a temporary file if possible.
     pub(crate) fn copied(name: &Path, mut input: impl Read) -> io::Result<Self> {
         if cfg!(target_family = "wasm") {
             let mut bytes = Vec::new();
@@ -65,7 +63,7 @@ impl FileBytes {
         &self.name
     }
 
-    /// The file that has them; `None` in memory.
+    /// `None` in memory.
     pub(crate) fn file(&self) -> Option<&Path> {
         match &self.copy {
             None => Some(&self.name),
@@ -82,17 +80,14 @@ impl FileBytes {
         }
     }
 
-    /// The first ones.
-    ///
-    /// # Errors
-    /// They cannot be read.
+    /// The first bytes.
     pub fn head(&self, most: u64) -> io::Result<Vec<u8>> {
         let mut head = Vec::new();
         self.open()?.take(most).read_to_end(&mut head)?;
         Ok(head)
     }
 
-    /// How many there are; `None` of a pipe.
+    /// `None` of a pipe.
     pub(crate) fn length(&self) -> io::Result<Option<u64>> {
         match (&self.copy, self.file()) {
             (Some(BytesCopy::Memory(bytes)), _) => Ok(Some(bytes.len() as u64)),

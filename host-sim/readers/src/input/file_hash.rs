@@ -1,4 +1,4 @@
-//! The SHA-256 of a file, which tells recordings of one name from each other.
+//! SHA-256 of a file.
 
 use crate::input::file_bytes::{FileBytes, OpenBytes};
 use crate::input::threads::may_begin_threads;
@@ -7,10 +7,9 @@ use std::fmt::Write as _;
 use std::io::{self, ErrorKind, Read};
 use std::thread::{self, JoinHandle};
 
-/// Bytes that are read at once.
 const PART_BYTES: usize = 1 << 18;
 
-/// A hash that another thread makes, where there may be one, while the file is read for its samples.
+/// Made on another thread if allowed.
 #[derive(Debug)]
 pub struct FileHash(HashState);
 
@@ -21,10 +20,7 @@ enum HashState {
 }
 
 impl FileHash {
-    /// Begins to read `files`, one after the other.
-    ///
-    /// # Errors
-    /// One cannot be opened.
+    /// Begins to read `files` in order.
     pub fn begin(files: &[FileBytes]) -> io::Result<Self> {
         let inputs: Vec<OpenBytes> = files.iter().map(FileBytes::open).collect::<Result<_, _>>()?;
         Ok(Self(if may_begin_threads() {
@@ -34,10 +30,7 @@ impl FileHash {
         }))
     }
 
-    /// The hash in hexadecimal digits, when the file was read.
-    ///
-    /// # Errors
-    /// The file cannot be read.
+    /// In hexadecimal digits.
     pub fn finish(self) -> io::Result<String> {
         match self.0 {
             HashState::Running(thread) => {
@@ -63,7 +56,6 @@ fn sha256(inputs: impl IntoIterator<Item = impl Read>) -> io::Result<String> {
     }
     let mut text = String::new();
     for byte in hash.finalize() {
-        // Writing into a string cannot fail.
         let _ = write!(text, "{byte:02x}");
     }
     Ok(text)
@@ -73,7 +65,7 @@ fn sha256(inputs: impl IntoIterator<Item = impl Read>) -> io::Result<String> {
 mod tests {
     use super::sha256;
 
-    /// The examples of FIPS 180-2, appendix B.
+    /// FIPS 180-2, appendix B.
     #[test]
     fn the_published_examples_have_their_hashes() {
         for (message, expected) in [

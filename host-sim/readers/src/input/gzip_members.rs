@@ -1,19 +1,17 @@
-//! The members of a gzip file one after the other (RFC 1952, section 2.2).
+//! Members of a gzip file (RFC 1952, section 2.2).
 
 use flate2::bufread::GzDecoder;
 use std::io::{self, BufRead, ErrorKind, Read};
 
-/// First two bytes of every member.
 pub(crate) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
-/// Decompresses all members. Blanks, line ends and zeros after a member, which copying and padding leave, are skipped.
+/// All members; blanks, line ends and zeros behind them are skipped.
 pub(crate) struct GzipMembers<R> {
-    /// `None` after the last member.
+    /// `None` after the last.
     member: Option<GzDecoder<R>>,
 }
 
 impl<R: BufRead> GzipMembers<R> {
-    /// Over a file that begins with a member.
     pub(crate) fn new(input: R) -> Self {
         Self { member: Some(GzDecoder::new(input)) }
     }
@@ -40,7 +38,7 @@ impl<R: BufRead> Read for GzipMembers<R> {
     }
 }
 
-/// The first byte that is no padding, not consumed; `None` at the end.
+/// Not consumed; `None` at the end.
 fn skip_padding(input: &mut impl BufRead) -> io::Result<Option<u8>> {
     loop {
         let bytes = input.fill_buf()?;

@@ -1,11 +1,11 @@
-//! Errors of an input file: which file, line and column, and the reason.
+//! Errors of an input file: place and reason.
 
 use crate::columns::column_selection::SelectionError;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A file that cannot be used. Its `Display` is one line: file, line, column, reason.
+/// A file that cannot be used; `Display` is one line.
 #[derive(Debug)]
 pub struct InputError {
     /// As the user named it.
@@ -24,31 +24,22 @@ pub struct InputError {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Reason {
-    /// The file cannot be read.
     #[error("{0}")]
     Io(io::Error),
-    /// A folder where a file is expected.
     #[error("is a directory, not a file, and not that of one bag of ROS 2 in .mcap or .db3 files")]
     Directory,
-    /// No byte, or only blank lines.
     #[error("the file is empty")]
     Empty,
-    /// A header without a row after it.
     #[error("no data after the header")]
     NoData,
-    /// The gzip stream ends before its trailer.
     #[error("truncated gzip: the compressed data end early")]
     TruncatedGzip,
-    /// The gzip stream is damaged.
     #[error("damaged gzip: {0}")]
     DamagedGzip(io::Error),
-    /// Bytes after a gzip stream that are none.
     #[error("bytes after the end of the gzip data that are no gzip data")]
     TrailingBytes,
-    /// More samples than are held in memory.
     #[error("more than 33554432 samples: give the recording in parts")]
     TooManySamples,
-    /// Compressed data that are far larger than noise can be compressed from.
     #[error(
         "its data are more than {bytes} bytes, far more than a recording of this size has; decompress it or save it uncompressed"
     )]
@@ -56,36 +47,29 @@ pub enum Reason {
         /// Bytes that are read at most.
         bytes: u64,
     },
-    /// Far more numbers than a file of its size has of a sensor.
     #[error("more than {values} numbers, far more than a recording of this size has; save it uncompressed")]
     TooManyValues {
         /// Numbers that are read at most.
         values: u64,
     },
-    /// Definitions, structures or groups within others.
     #[error("nested more than {most} levels deep")]
     TooDeep {
         /// Levels that are read.
         most: usize,
     },
-    /// A reading without an end.
     #[error("not read within {seconds} s, far longer than a recording of this size takes")]
     TooSlow {
         /// Time for a file of this size, s.
         seconds: u64,
     },
-    /// A format whose reader this program was built without.
     #[error("{0}, which this program was built without; build it with the features hdf5 and sqlite")]
     NotBuilt(&'static str),
-    /// A binary format that is known and not read.
     #[error("{what}, which is not read; {how}")]
     Foreign {
-        /// What it is.
+        /// Description of the format.
         what: &'static str,
-        /// How to convert it.
         how: &'static str,
     },
-    /// A binary format that is not known.
     #[error(
         "of no known format: it begins with {begins}; known are tables in text, NumPy, MATLAB, HDF5, bags of ROS, MCAP, ULog and \
          DataFlash logs; write its numbers as text or, in Python, with numpy.save(\"FILE.npy\", array)"
@@ -94,36 +78,26 @@ pub enum Reason {
         /// The first bytes.
         begins: String,
     },
-    /// Bytes that are neither UTF-8 nor Latin-1.
     #[error("not text in UTF-8 or Latin-1")]
     NotText,
-    /// More than 65536 bytes without a line end.
     #[error("the line is longer than 65536 bytes")]
     LongLine,
-    /// The header names no channel of the part.
     #[error("no known column; expected names such as gyro_x_counts")]
     NoChannel,
-    /// A frame log where a table of counts is expected.
     #[error("this is an SPI frame log; read it with `replay`")]
     FrameLog,
-    /// More or fewer fields than the header has.
     #[error("{found} fields, the header has {expected}")]
     FieldCount {
         /// Fields of this line.
         found: usize,
-        /// Fields of the header.
         expected: usize,
     },
-    /// Text, or a fraction, where an integer belongs.
     #[error("{0:?} is not a whole number")]
     NotInteger(String),
-    /// Text where a number belongs.
     #[error("{0:?} is not a number")]
     NotNumber(String),
-    /// Infinity or NaN.
     #[error("{0:?} is not a finite time")]
     NotFinite(String),
-    /// Text where a date or a time of day belongs.
     #[error("{0:?} is no date or time as in the rows above")]
     NotTime(String),
     /// A count that the register's field cannot hold.
@@ -136,60 +110,46 @@ pub enum Reason {
         /// Largest count of the field.
         high: i16,
     },
-    /// A time that decreases.
     #[error("time {now} s is before {before} s of the row above")]
     TimeBackwards {
-        /// Of the row above, s.
+        /// Time of the row above, s.
         before: f64,
-        /// Of this row, s.
+        /// Time of this row, s.
         now: f64,
     },
-    /// An index that repeats or decreases.
     #[error("sample {now} does not follow {before}")]
     IndexBackwards {
-        /// Of the row above.
+        /// Index of the row above.
         before: u64,
-        /// Of this row.
         now: u64,
     },
-    /// A byte that is not written as two hexadecimal digits.
     #[error("{0:?} is not a row of hexadecimal bytes")]
     NotHex(String),
-    /// Bytes that do not form 16-bit words.
     #[error("{0} bytes are no whole number of 16-bit words")]
     OddBytes(usize),
-    /// The two lines of a full-duplex bus always carry the same number of bytes.
     #[error("{mosi} bytes out but {miso} bytes in")]
     UnequalLengths {
         /// Bytes from the host.
         mosi: usize,
-        /// Bytes from the part.
         miso: usize,
     },
-    /// A first line that is not that of a frame log.
     #[error("not an SPI frame log: the first line must be `time_s,mosi,miso`")]
     NotFrameLog,
-    /// A frame log without one burst in it.
     #[error("no burst transaction (26 bytes that start with 3E00)")]
     NoBurst,
-    /// A burst that was taken in another range of the gyroscopes than those before it.
     #[error("the gyro range changes from {before} to {now} deg/s between bursts; give each range its own log")]
     MixedRange {
-        /// Of the bursts above, deg/s.
+        /// Range of the bursts above, deg/s.
         before: u16,
-        /// Of this burst, deg/s.
+        /// Range of this burst, deg/s.
         now: u16,
     },
-    /// No row of numbers near the beginning.
     #[error("no row of numbers: neither a table nor another known format")]
     NoNumbers,
-    /// Columns, units or channels that cannot be chosen.
     #[error("{0}")]
     Selection(Box<SelectionError>),
-    /// A time column without a stated unit, whose values show none.
     #[error("column {0}: no unit of the time; give one, as in --units us")]
     NoTimeUnit(String),
-    /// A clock that was set back so that many rows are out of order.
     #[error(
         "the time goes back before row {row} by {by} of its units, and {rows} rows are earlier than one before them"
     )]
@@ -201,69 +161,56 @@ pub enum Reason {
         /// Such rows.
         rows: u64,
     },
-    /// A log without a message, or an archive without an array.
     #[error("there is nothing to read in this {format}")]
     NoTopic {
         /// Name of the format.
         format: &'static str,
     },
-    /// A log or an archive in which no inertial sensor is known.
     #[error(
         "no inertial sensor is known in this {format}; say which columns with --topic and --columns: it has {topics}"
     )]
     NoSensor {
         /// Name of the format.
         format: &'static str,
-        /// Names and types of its topics.
         topics: String,
     },
-    /// A topic, with its type, of which the file has no definition.
     #[error(
         "the messages of {} cannot be decoded: the file has no definition of {}; where that package is installed, `ros2 bag convert` to MCAP \
          writes it along",
         .0.0, .0.1
     )]
     NoDefinition(Box<(String, String)>),
-    /// A topic whose messages are not encoded as those of ROS, and how they are.
     #[error(
         "the messages of {} are encoded in {}; those of ROS 1 and ROS 2 (ros1, cdr) are decoded; in Python, mcap.reader gives the messages, of \
          which a table is made by csv.writer",
         .0.0, .0.1
     )]
     Encoding(Box<(String, String)>),
-    /// A topic that the log does not have: as given, and the names of the topics.
     #[error("--topic {}: not in the file; it has {}", .0.0, .0.1)]
     UnknownTopic(Box<(String, String)>),
-    /// Several topics of which the user names none.
     #[error("several topics: choose one with --topic: {0}")]
     SeveralTopics(String),
-    /// Arrays that cannot be columns of one table: what each has.
     #[error("{0}; columns of one table have as many rows")]
     UnequalRows(String),
-    /// An array that is no column or matrix of numbers.
     #[error("{0}")]
     Array(String),
-    /// A file that its format's reader refuses.
     #[error("damaged {format} file: {error}")]
     Format {
         /// Name of the format.
         format: &'static str,
-        /// What its reader says.
         error: Box<str>,
     },
-    /// A file that ends early.
     #[error("truncated {format}: the data end early")]
     Truncated {
         /// Name of the format.
         format: &'static str,
     },
-    /// The driver refused the replayed transaction.
     #[error("replay over the bus: {0}")]
     Bus(String),
 }
 
 impl Reason {
-    /// Whether a limit of this program was met: the file need not be damaged.
+    /// A limit of this program: the file may be intact.
     pub(crate) fn is_limit(&self) -> bool {
         matches!(
             self,
@@ -275,7 +222,7 @@ impl Reason {
         )
     }
 
-    /// Why reading failed: what a [`Metered`](crate::input::budget::Metered) input refused, or the error itself.
+    /// A [`Metered`](crate::input::budget::Metered) refusal, or the error itself.
     pub(crate) fn from_io(error: io::Error) -> Self {
         match error.downcast::<Self>() {
             Ok(reason) => reason,
@@ -320,7 +267,7 @@ impl fmt::Display for InputError {
         if let Some(column) = &self.column {
             write!(f, ": column {}", Printable(column))?;
         }
-        // Some readers of formats describe a fault in several lines.
+        // Some describe a fault in several lines.
         let reason = self.reason.to_string();
         let lines: Vec<&str> = reason.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
         write!(f, ": {}", lines.join(" "))
@@ -329,11 +276,11 @@ impl fmt::Display for InputError {
 
 impl std::error::Error for InputError {}
 
-/// Text from outside, with the characters escaped that a terminal obeys or that reorder or hide others.
+/// Escapes characters that a terminal obeys or that hide others.
 #[derive(Debug, Clone, Copy)]
 pub struct Printable<'a>(pub &'a str);
 
-/// Whether a character is invisible and changes the direction or the joining of others (Unicode, general category Cf), or ends a line.
+/// Invisible characters (Unicode Cf), and line ends.
 fn is_format(c: char) -> bool {
     matches!(c,
         '\u{ad}' | '\u{600}'..='\u{605}' | '\u{61c}' | '\u{6dd}' | '\u{70f}' | '\u{180e}' | '\u{200b}'..='\u{200f}'

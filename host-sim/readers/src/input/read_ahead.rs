@@ -1,30 +1,23 @@
-//! The next part of a file is made ready on another thread while the caller works on this one.
+//! The next part of a file on another thread.
 
 use std::io::{self, ErrorKind, Read};
 use std::panic::resume_unwind;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::{self, JoinHandle};
 
-/// Bytes of a part.
 const PART_BYTES: usize = 1 << 16;
-/// Parts that wait for the caller.
 const PARTS_AHEAD: usize = 4;
 
-/// Bytes that another thread reads ahead, such as those of a decoder.
 pub(crate) struct ReadAhead {
     parts: Receiver<io::Result<Vec<u8>>>,
     /// `None` after the end.
     thread: Option<JoinHandle<()>>,
     part: Vec<u8>,
-    /// Bytes of the part that were read.
     read: usize,
 }
 
 impl ReadAhead {
-    /// Begins to read `input`, until its end, an error, or the end of this reader.
-    ///
-    /// # Errors
-    /// The system has no thread left.
+    /// Reads `input` until its end, an error, or a drop; an error if the system has no thread left.
     pub(crate) fn new(mut input: impl Read + Send + 'static) -> io::Result<Self> {
         let (send, parts) = sync_channel(PARTS_AHEAD);
         let read_all = move || {
@@ -34,7 +27,7 @@ impl ReadAhead {
                 part.truncate(count);
                 let is_wanted = send.send(Ok(part)).is_ok();
                 if let Some(error) = error {
-                    // There is nothing to do for a caller that is gone.
+                    // The caller is gone.
                     let _ = send.send(Err(error));
                 }
                 if count < PART_BYTES || !is_wanted {
@@ -47,7 +40,7 @@ impl ReadAhead {
     }
 }
 
-/// Reads until `buffer` is full, the input ends or fails: how many bytes, and the error.
+/// Bytes read, and the error.
 fn fill(input: &mut impl Read, buffer: &mut [u8]) -> (usize, Option<io::Error>) {
     let mut filled = 0;
     while filled < buffer.len() {
@@ -67,7 +60,7 @@ impl Read for ReadAhead {
             match self.parts.recv() {
                 Ok(part) => (self.part, self.read) = (part?, 0),
                 Err(_) => {
-                    // The input has ended. A panic of its reader is passed on to the caller.
+                    // A panic of the reader is passed on.
                     self.thread.take().map_or(Ok(()), JoinHandle::join).unwrap_or_else(|panic| resume_unwind(panic));
                     return Ok(0);
                 }
@@ -83,7 +76,7 @@ impl Read for ReadAhead {
 mod tests {
     use super::*;
 
-    /// Gives `count` bytes, a few at a time, and then an error.
+    /// Some bytes, then an error.
     struct Damaged {
         given: usize,
         count: usize,
@@ -123,7 +116,6 @@ mod tests {
         let mut reader = ReadAhead::new(Endless(ended)).unwrap();
         reader.read_exact(&mut [0; 10]).unwrap();
         drop(reader);
-        // The sender is dropped with the thread's input.
         assert!(wait.recv().is_err());
     }
 }

@@ -1,26 +1,25 @@
-//! How far the reading of a file is, and the request to end it before the end of the file.
+//! Progress of a reading, and the request to end it.
 
 use std::fmt;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering::Relaxed};
 
-/// What a recording is read for.
+/// Purpose of a reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReadPass {
-    /// The first rows, which tell the clock of the time stamps: all of a recording that is held in memory.
+    /// Tells the clock; all of a recording in memory.
     FirstRows,
-    /// The first reading of a recording that is read in blocks: its rate, its length, and the size of its counts.
+    /// Rate, length and counts of a streamed recording.
     Survey,
-    /// The second reading of such a recording: its samples.
+    /// Samples of a streamed recording.
     Samples,
 }
 
-/// Shared by the reader of a file and by those who watch it. All clones are one monitor.
+/// Shared between reader and watchers.
 #[derive(Debug, Clone, Default)]
 pub struct ReadMonitor(Arc<State>);
 
-/// Says whether the reading shall end.
 type Question = dyn Fn() -> bool + Send + Sync;
 
 #[derive(Default)]
@@ -42,13 +41,13 @@ impl fmt::Debug for State {
 }
 
 impl ReadMonitor {
-    /// Calls `watch` with [`bytes`](Self::bytes) whenever it grows, on the thread that reads.
+    /// On the reading thread, as [`bytes`](Self::bytes) grow.
     #[must_use]
     pub fn watched(watch: fn(u64)) -> Self {
         Self(Arc::new(State { watch: Some(watch), ..State::default() }))
     }
 
-    /// Asks `question` with each batch of rows, on the thread that takes them; the reading [stops](Self::stop) where it says so.
+    /// With each batch, on its thread; true [stops](Self::stop).
     #[must_use]
     pub fn asking(question: impl Fn() -> bool + Send + Sync + 'static) -> Self {
         Self(Arc::new(State { question: Some(Box::new(question)), ..State::default() }))
@@ -61,13 +60,13 @@ impl ReadMonitor {
         }
     }
 
-    /// Bytes that were read from the file since it was opened last; compressed ones, where the file is compressed.
+    /// Since the last opening; compressed ones if compressed.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.0.bytes.load(Relaxed)
     }
 
-    /// What the file is read for.
+    /// Purpose of the current reading.
     #[must_use]
     pub fn pass(&self) -> ReadPass {
         let passes = [ReadPass::FirstRows, ReadPass::Survey, ReadPass::Samples];
@@ -75,40 +74,37 @@ impl ReadMonitor {
         passes.into_iter().find(|of| *of as u8 == pass).unwrap_or(ReadPass::FirstRows)
     }
 
-    /// Begins a reading.
+    /// Begins a pass.
     pub fn begin_pass(&self, pass: ReadPass) {
         self.0.pass.store(pass as u8, Relaxed);
     }
 
-    /// Whether a file is being read that can be stopped.
+    /// True if a stoppable file is being read.
     #[must_use]
     pub fn is_reading(&self) -> bool {
         self.0.is_reading.load(Relaxed)
     }
 
-    /// Ends the reading after the row that is read now, as if the file ended there.
+    /// As if the file ended behind this row.
     pub fn stop(&self) {
         self.0.stop.store(true, Relaxed);
     }
 
-    /// Whether the reading was ended by [`stop`](Self::stop).
+    /// By [`stop`](Self::stop).
     #[must_use]
     pub fn is_interrupted(&self) -> bool {
         self.0.is_interrupted.load(Relaxed)
     }
 
-    /// Begins a file.
     pub(crate) fn begin(&self) {
         self.0.bytes.store(0, Relaxed);
         self.0.is_reading.store(true, Relaxed);
     }
 
-    /// Ends a file.
     pub(crate) fn end(&self) {
         self.0.is_reading.store(false, Relaxed);
     }
 
-    /// Whether the reading has to end here. The request is served by this: the next file is read to its end.
     pub(crate) fn take_stop(&self) -> bool {
         let is_stopped = self.0.stop.load(Relaxed) && self.0.stop.swap(false, Relaxed);
         if is_stopped {
@@ -117,7 +113,7 @@ impl ReadMonitor {
         is_stopped
     }
 
-    /// Notes that the file is a copy of a pipe whose reading was stopped: it may end within a line or within compressed data.
+    /// A stopped pipe: may end within a line or compressed data.
     pub(crate) fn cut(&self) {
         self.0.is_cut.store(true, Relaxed);
     }
@@ -126,7 +122,6 @@ impl ReadMonitor {
         self.0.is_cut.load(Relaxed)
     }
 
-    /// Counts bytes that were read.
     pub(crate) fn count(&self, bytes: usize) {
         let before = self.0.bytes.fetch_add(bytes as u64, Relaxed);
         if let Some(watch) = self.0.watch {
@@ -135,7 +130,6 @@ impl ReadMonitor {
     }
 }
 
-/// Counts what is read through it.
 pub(crate) struct Counted<R> {
     input: R,
     monitor: ReadMonitor,

@@ -1,4 +1,4 @@
-//! Why the samples of a recording cannot be read.
+//! Reasons against streaming.
 
 use crate::input::input_error::InputError;
 use time_base::TimeBaseError;
@@ -9,7 +9,6 @@ pub enum StreamError {
     /// The file is damaged, or its columns cannot be chosen.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// It has no time base.
     #[error(transparent)]
     TimeBase(#[from] TimeBaseError),
 }

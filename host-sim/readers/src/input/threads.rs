@@ -1,4 +1,4 @@
-//! Whether readers may begin threads: not in a browser, and not where the caller works on one alone.
+//! Permission for threads: not in a browser.
 
 use std::cell::Cell;
 
@@ -6,9 +6,8 @@ thread_local! {
     static IS_ALONE: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs `task`; all that it reads, it reads on the thread of the caller.
+/// Reads on the caller's thread.
 pub fn read_on_one_thread<R>(task: impl FnOnce() -> R) -> R {
-    /// Takes the restriction away again, also where the task panics.
     struct Restore(bool);
     impl Drop for Restore {
         fn drop(&mut self) {
@@ -19,7 +18,7 @@ pub fn read_on_one_thread<R>(task: impl FnOnce() -> R) -> R {
     task()
 }
 
-/// Whether a reader may begin a thread.
+/// True if allowed.
 #[must_use]
 pub fn may_begin_threads() -> bool {
     !cfg!(target_family = "wasm") && !IS_ALONE.get()

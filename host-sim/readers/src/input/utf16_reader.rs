@@ -9,7 +9,7 @@ const CHUNK_BYTES: u64 = 1 << 15;
 pub(crate) struct Utf16Reader<R> {
     input: R,
     unit: fn([u8; 2]) -> u16,
-    /// What was read and is not a whole character yet.
+    /// Bytes of a character that is not whole yet.
     bytes: Vec<u8>,
     text: Cursor<String>,
 }

@@ -1,15 +1,14 @@
-//! Zstandard, frame by frame: what was compressed in parts, one after the other, is one text.
+//! Zstandard, all frames.
 
 use ruzstd::decoding::{FrameDecoder, StreamingDecoder};
 use std::io::{self, BufRead, Read};
 
-/// First bytes of a frame (RFC 8878, 3.1.1).
+/// RFC 8878, 3.1.1.
 pub(crate) const ZSTD_MAGIC: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
-/// First bytes of a frame that is skipped, less four bits, and bytes of its header.
+/// Less four bits, and header size.
 const SKIPPABLE: [u8; 3] = [0x2A, 0x4D, 0x18];
 const SKIPPABLE_HEADER: usize = 8;
 
-/// What the frames of `R` hold.
 pub(crate) struct ZstdFrames<R: BufRead> {
     frame: Option<StreamingDecoder<R, FrameDecoder>>,
     input: Option<R>,
@@ -20,7 +19,6 @@ impl<R: BufRead> ZstdFrames<R> {
         Self { frame: None, input: Some(input) }
     }
 
-    /// Begins the next frame; whether there is one.
     fn begin(&mut self) -> io::Result<bool> {
         while let Some(mut input) = self.input.take() {
             let start = input.fill_buf()?;
@@ -72,7 +70,7 @@ mod tests {
     fn frames_one_after_the_other_are_one_text() {
         let parts = ["t,gx\n".repeat(3000), "0.01,2\n".repeat(9000)];
         let [one, other] = parts.each_ref().map(|part| compress_to_vec(part.as_bytes(), CompressionLevel::Fastest));
-        // A frame of three bytes that is skipped.
+        // Skipped.
         let skipped = [&[0x53, 0x2A, 0x4D, 0x18, 3, 0, 0, 0][..], b"abc"].concat();
         let all = [&skipped[..], &one, &skipped, &other].concat();
         let read = |bytes: &[u8]| {

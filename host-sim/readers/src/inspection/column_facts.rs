@@ -1,4 +1,4 @@
-//! What the numbers of a column show.
+//! Facts of a column's numbers.
 
 use crate::columns::column_selection::AvailableColumn;
 use crate::columns::unit::Unit;
@@ -6,35 +6,26 @@ use crate::inspection::time_unit::time_unit;
 use crate::rows::quantizer::{difference_noise, step};
 use crate::rows::whole_table::WholeColumn;
 
-/// Part of the rows that may be before the row above in a column of times.
 const MOST_BACKWARDS: f64 = 0.01;
-/// How many times as fast a clock may be in one half of a recording as in the other: gaps are in one of them.
+/// Ratio of the halves' rates: gaps.
 const MOST_UNEVEN: f64 = 8.0;
 
-/// Rows of a block, in which a sensor is at rest or is not; of short tables fewer.
 const BLOCK: usize = 128;
 const LEAST_BLOCKS: usize = 8;
-/// Least part of the rows in which a counter grows by one.
 const COUNTS_BY_ONE: f64 = 0.9;
 
-/// A column and what its numbers show.
 pub(crate) struct ColumnFacts<'a> {
     pub(crate) column: &'a AvailableColumn,
     pub(crate) values: &'a [f64],
-    /// Of the finite values.
     pub(crate) mean: f64,
-    /// The means of blocks of rows.
     pub(crate) blocks: Vec<f64>,
-    /// Standard deviation of the noise, by the differences of neighbours.
+    /// By neighbours' differences.
     pub(crate) noise: f64,
     pub(crate) step: Option<f64>,
 }
 
-/// Times of rows that do not go back.
 pub(crate) struct RowTimes {
-    /// From the first.
     pub(crate) seconds: Vec<f64>,
-    /// Rows that are left out because their time is before that of a row above.
     pub(crate) backwards: usize,
 }
 
@@ -44,7 +35,6 @@ impl RowTimes {
     }
 }
 
-/// The mean of the finite values.
 fn mean(values: &[f64]) -> f64 {
     let finite = || values.iter().filter(|value| value.is_finite());
     finite().sum::<f64>() / finite().count() as f64
@@ -63,12 +53,11 @@ impl<'a> ColumnFacts<'a> {
         }
     }
 
-    /// Whether all values are whole numbers, and not all the same.
     pub(crate) fn is_whole(&self) -> bool {
         self.noise > 0.0 && self.values.iter().all(|value| value.is_nan() || value.fract() == 0.0)
     }
 
-    /// Whether the values are a running number: whole, and nearly each is larger than the one before by one.
+    /// Whole, mostly growing by one.
     pub(crate) fn is_counter(&self) -> bool {
         let by_one = self.values.windows(2).filter(|pair| pair[1] - pair[0] == 1.0).count();
         let is_most = by_one as f64 >= COUNTS_BY_ONE * (self.values.len().max(1) - 1) as f64;
@@ -76,7 +65,6 @@ impl<'a> ColumnFacts<'a> {
         self.values.len() > 2 && is_most && is_growing && self.values.iter().all(|value| value.fract() == 0.0)
     }
 
-    /// Whether the values may be times: they grow evenly, and hardly one is smaller than the one before.
     pub(crate) fn is_clock(&self) -> bool {
         let rows = self.values.len();
         let back = self.values.windows(2).filter(|pair| pair[1] < pair[0] || pair[1].is_nan()).count();
@@ -88,7 +76,7 @@ impl<'a> ColumnFacts<'a> {
         one > 0.0 && other > 0.0 && one.max(other) < MOST_UNEVEN * one.min(other)
     }
 
-    /// The times of the rows that have one; `None` where their unit cannot be told or there are fewer than two.
+    /// `None` without a unit, or fewer than two.
     pub(crate) fn times_s(&self) -> Option<RowTimes> {
         let own = self.column.unit.filter(Unit::is_time).map(|unit| unit.factor);
         let factor = own.or_else(|| time_unit(self.values).map(|(unit, _)| unit.factor))?;
@@ -105,7 +93,7 @@ impl<'a> ColumnFacts<'a> {
         (times.seconds.len() > 1).then_some(times)
     }
 
-    /// The running numbers of the rows; `None` where one is none, or does not follow the one above.
+    /// `None` unless increasing.
     pub(crate) fn indices(&self) -> Option<Vec<u64>> {
         let is_index = |value: &f64| value.fract() == 0.0 && (0.0..9e15).contains(value);
         let is_increasing = self.values.windows(2).all(|pair| pair[0] < pair[1]);

@@ -1,4 +1,4 @@
-//! Which columns are an inertial sensor: as the format says it, by their names, or by their numbers.
+//! Inertial columns by format, names or numbers.
 
 use crate::columns::axes::{ACCELEROMETER, GYROSCOPE};
 use crate::columns::column_selection::{AvailableColumn, ColumnSelection, known_by_name};
@@ -12,93 +12,77 @@ use measurement::SensorProfile;
 use std::collections::BTreeMap;
 use time_base::TimeRange;
 
-/// What a column is taken for.
+/// The guessed role of a column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColumnGuess {
-    /// Name of the channel, or `time` or `sample`.
+    /// Or `time` or `sample`.
     pub channel: &'static str,
-    /// Unit that the file does not say.
     pub unit: Option<&'static str>,
-    /// Why, where neither the format nor the name of the column says it.
     pub reason: String,
 }
 
-/// The options with which a sensor of a file is analysed.
+/// Options for a sensor of a file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Proposal {
-    /// `--topic`, where it is needed.
     pub topic: Option<String>,
-    /// `--columns`: channel and column; empty where the file tells the columns.
+    /// Empty if the file tells.
     pub columns: Vec<String>,
-    /// `--units`; empty where the file tells them.
+    /// Empty if the file tells.
     pub units: Vec<String>,
-    /// `--from` and `--to`: the part at rest, where the sensor was moved before or after it.
+    /// Part at rest of a moved sensor.
     pub part: Option<TimeRange>,
-    /// Whether `--rate` is needed.
+    /// True if `--rate` is needed.
     pub lacks_rate: bool,
-    /// Whether the sensor is found without its topic, if it is the only one.
     pub is_found: bool,
-    /// Whether a column or a unit is guessed.
+    /// True if a column or a unit is guessed.
     pub is_guessed: bool,
-    /// `--sensor`, where the names of the columns are those of its registers.
     pub sensor: Option<&'static str>,
-    /// Guesses that are not safe, one sentence each.
     pub doubts: Vec<String>,
 }
 
 impl Proposal {
-    /// Whether nothing is guessed: the file or the user says it.
+    /// Nothing guessed.
     #[must_use]
     pub fn is_complete(&self) -> bool {
         !self.is_guessed && !self.lacks_rate
     }
 
-    /// Whether nothing is missing in it, and no guess is in doubt.
+    /// Nothing missing or doubtful.
     #[must_use]
     pub fn is_safe(&self) -> bool {
         !self.lacks_rate && self.doubts.is_empty()
     }
 }
 
-/// How the columns of a sensor are known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Evidence {
-    /// The user says it.
     User,
-    /// The format knows them.
     Format,
-    /// By their names.
     Names,
-    /// By their names, but the names of several sensors.
     Prefix,
-    /// By their numbers.
     Numbers,
 }
 
-/// Channel, `time` or `sample`; position of the column; its unit, where the file says it; and why it is taken for that.
+/// Channel, `time` or `sample`; position; stated unit; reason.
 type Columns = Vec<(&'static str, usize, Option<Unit>, &'static str)>;
 
-/// A sensor in a table.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SensorGuess {
-    /// For `--topic`; empty where there is one.
+    /// May be empty.
     name: String,
     evidence: Evidence,
     columns: Columns,
-    /// Units that the file does not say.
     force: Option<UnitGuess>,
     rate: Option<UnitGuess>,
     time: Option<(Unit, String)>,
-    /// Whether a temperature without a unit is taken to be in °C.
     is_celsius: bool,
 }
 
-/// The unit that a temperature without one is taken to have, and the temperatures of sensors.
 const CELSIUS: &str = "degC";
 const TEMPERATURES: std::ops::RangeInclusive<f64> = -40.0..=125.0;
 
 impl SensorGuess {
-    /// The sensors of a table; none where no column is one of a gyroscope or an accelerometer.
+    /// None without gyroscope or accelerometer.
     pub(crate) fn all(
         table: &WholeTable,
         facts: &[ColumnFacts],
@@ -109,7 +93,7 @@ impl SensorGuess {
         if found.is_empty() {
             let by_format: Vec<Self> = table.sensors.iter().map(|sensor| Self::of_format(sensor, facts)).collect();
             let by_names = Self::by_names(facts);
-            // What lies in several groups of arrays is not seen as a whole by the format.
+            // Several groups of arrays.
             let channels = |of: &[Self]| of.iter().map(|sensor| sensor.inertial().count()).max().unwrap_or(0);
             let is_more = table.is_of_arrays && channels(&by_names) > channels(&by_format);
             found = if by_format.is_empty() || is_more { by_names } else { by_format };
@@ -126,7 +110,7 @@ impl SensorGuess {
         Self { name: name.to_owned(), evidence, columns, force: None, rate: None, time: None, is_celsius: false }
     }
 
-    /// What the user says, and the time, which is seldom named.
+    /// And the time, seldom named.
     fn by_user(facts: &[ColumnFacts], selection: &ColumnSelection) -> Option<Self> {
         let available: Vec<AvailableColumn> = facts.iter().map(|of| of.column.clone()).collect();
         let mut assigned = selection.assignments(&available);
@@ -144,7 +128,6 @@ impl SensorGuess {
         Self::new(&sensor.name, Evidence::Format, sensor.columns.iter().map(column).collect())
     }
 
-    /// By the names of the columns: one sensor, or one for each beginning of the names where they are those of several.
     fn by_names(facts: &[ColumnFacts]) -> Vec<Self> {
         let available: Vec<AvailableColumn> = facts.iter().map(|of| of.column.clone()).collect();
         let unit = |at: usize| facts[at].column.unit;
@@ -161,7 +144,7 @@ impl SensorGuess {
                 }
             }
         }
-        // Times stand beside all of them.
+        // Times belong to all.
         let common = groups.remove("").unwrap_or_default();
         let of_group = |(_, own): (&str, Vec<(&'static str, usize)>)| {
             let is_new = |(channel, _): &&(&'static str, usize)| !own.iter().any(|(known, _)| known == channel);
@@ -175,14 +158,13 @@ impl SensorGuess {
         of_common.into_iter().chain(groups.clone().into_iter().filter_map(of_group)).collect()
     }
 
-    /// The column with the times of the rows: by its name, or because it grows evenly.
+    /// By name, or growing evenly.
     fn clock(facts: &[ColumnFacts]) -> Option<(usize, &'static str)> {
         let named = facts.iter().position(|of| of.column.is_time()).map(|at| (at, ""));
         let is_clock = |at: &usize| facts[*at].is_clock() && !facts[*at].is_counter();
         named.or_else(|| (0..facts.len()).find(is_clock).map(|at| (at, "it grows evenly")))
     }
 
-    /// Adds the times, where the names do not say them.
     fn add_clock(&mut self, facts: &[ColumnFacts]) {
         let is_known = ["time", "sample"].iter().any(|channel| self.position(channel).is_some());
         if matches!(self.evidence, Evidence::Names | Evidence::Prefix)
@@ -194,8 +176,7 @@ impl SensorGuess {
         }
     }
 
-    /// By the numbers: a column that grows is the time, three neighbours that are as long as gravity are the accelerometer, and of the others
-    /// those three whose mean is smallest against their noise are the gyroscope. Rows that are called as one of these have no other.
+    /// By numbers: time grows, gravity is the accelerometer, the smallest mean over noise the gyroscope.
     fn by_numbers(facts: &[ColumnFacts], topic: &str) -> Option<Self> {
         let mut columns: Columns = Vec::new();
         let unit = |at: usize| facts[at].column.unit;
@@ -226,7 +207,6 @@ impl SensorGuess {
         let reason = "the three are not gravity";
         for (channels, first, reason) in [(GYROSCOPE, rate, reason), (ACCELEROMETER, force, "")] {
             let Some(first) = first else { continue };
-            // The names may say the order of the axes.
             let axis =
                 |at: usize| facts[at].column.name.to_lowercase().chars().last().and_then(|axis| "xyz".find(axis));
             let named: Vec<usize> = (first..first + 3).filter_map(axis).collect();
@@ -236,20 +216,19 @@ impl SensorGuess {
                 columns.push((channel, at, unit(at), reason));
             }
         }
-        // The order of the axes, whatever that of the columns.
         columns.sort_by_key(|(channel, ..)| {
             ["time", "sample"].iter().chain(&GYROSCOPE).chain(&ACCELEROMETER).position(|known| known == channel)
         });
         Some(Self::new("", Evidence::Numbers, columns)).filter(Self::is_inertial)
     }
 
-    /// The same with the units that the file does not say.
+    /// Adds units that the file lacks.
     fn with_units(mut self, facts: &[ColumnFacts], profile: &SensorProfile, selection: &ColumnSelection) -> Self {
         let any = SensorProfile::generic();
         for (channel, _, unit, _) in &mut self.columns {
             let base = any.channel(channel).map_or(SECOND, |of| of.quantity.unit());
             *unit = selection.stated_unit(base).or(*unit);
-            // Counts have the size that the sensor's profile says.
+            // By the profile.
             if unit.is_some_and(|unit| unit.base == COUNT) {
                 *unit = profile
                     .channel(channel)
@@ -273,7 +252,7 @@ impl SensorGuess {
         let own_force = own_force.and_then(|(_, _, unit, _)| unit.map(|unit| unit.name));
         let known_force = force_guess.as_ref().filter(|of| of.is_safe).map(|of| of.unit).or(own_force);
         let rate_guess = lacks_unit(GYROSCOPE).then(|| unit_guess::rate_unit(&rate, known_force));
-        // What the analysis takes without being told is no guess.
+        // Defaults are no guess.
         let time_guess = self.columns.iter().find(|(channel, ..)| *channel == "time").and_then(|&(_, at, unit, _)| {
             let values = facts[at].values;
             let origin = values.first().copied().unwrap_or(0.0);
@@ -287,23 +266,20 @@ impl SensorGuess {
         Self { force: force_guess, rate: rate_guess, time: time_guess, is_celsius, ..self }
     }
 
-    /// Whether it has a channel of an inertial sensor, or of a magnetometer.
     fn is_inertial(&self) -> bool {
         let is_axis = |channel: &str| GYROSCOPE.contains(&channel) || ACCELEROMETER.contains(&channel);
         self.columns.iter().any(|(channel, ..)| is_axis(channel) || channel.starts_with("magn_"))
     }
 
-    /// The position of the column of a channel.
     pub(crate) fn position(&self, channel: &str) -> Option<usize> {
         self.columns.iter().find(|(own, ..)| *own == channel).map(|(_, at, ..)| *at)
     }
 
-    /// Whether the column at `at` is one of the accelerometer.
     pub(crate) fn is_force(&self, at: usize) -> bool {
         self.columns.iter().any(|(channel, own, ..)| *own == at && ACCELEROMETER.contains(channel))
     }
 
-    /// Columns of gyroscope and accelerometer: positions, and the size of 1 in deg/s or g, where it is known.
+    /// Positions, and size of 1 in deg/s or g if known.
     pub(crate) fn inertial(&self) -> impl Iterator<Item = (usize, Option<f64>)> {
         self.columns.iter().filter_map(|&(channel, at, unit, _)| {
             let guess = self.unit_guess(channel)?;
@@ -312,7 +288,7 @@ impl SensorGuess {
         })
     }
 
-    /// The guess of the unit of a channel of gyroscope or accelerometer, if there is one; `None` of other channels.
+    /// `None` for other channels.
     fn unit_guess(&self, channel: &str) -> Option<Option<&UnitGuess>> {
         if GYROSCOPE.contains(&channel) {
             return Some(self.rate.as_ref());
@@ -320,7 +296,6 @@ impl SensorGuess {
         ACCELEROMETER.contains(&channel).then_some(self.force.as_ref())
     }
 
-    /// What the column at `at` is taken for.
     pub(crate) fn guess(&self, at: usize) -> Option<ColumnGuess> {
         let &(channel, _, unit, why) = self.columns.iter().find(|(_, own, ..)| *own == at)?;
         let (guessed, reason) = match (self.unit_guess(channel).flatten(), &self.time) {
@@ -333,7 +308,6 @@ impl SensorGuess {
         Some(ColumnGuess { channel, unit: guessed, reason })
     }
 
-    /// The options with which this sensor of `table` is analysed.
     pub(crate) fn proposal(&self, table: &WholeTable, facts: &[ColumnFacts], has_rate: bool) -> Proposal {
         let is_needed = |(channel, _, unit, _): &(&str, usize, Option<Unit>, &str)| {
             let is_axis = GYROSCOPE.contains(channel) || ACCELEROMETER.contains(channel);
@@ -372,7 +346,7 @@ impl SensorGuess {
     }
 }
 
-/// What the name of a kind of rows says of their numbers.
+/// For a row's label.
 enum RowLabel {
     Force,
     Rate,
@@ -392,7 +366,6 @@ impl RowLabel {
     }
 }
 
-/// Parts of names that are none of a rate or a specific force.
 const OTHER_NAMES: [&str; 22] = [
     "lat",
     "lon",
@@ -418,21 +391,19 @@ const OTHER_NAMES: [&str; 22] = [
     "temp",
 ];
 
-/// Whether the name and the unit of a column leave it to be a rate or a specific force.
+/// By name and unit.
 fn may_be_inertial(column: &AvailableColumn) -> bool {
     let name = column.name.to_lowercase();
     let unit = column.unit.is_none_or(|unit| ["deg/s", "g", COUNT].contains(&unit.base));
     unit && !OTHER_NAMES.iter().any(|other| name.contains(other))
 }
 
-/// Least length of threes that may be the accelerometer, in that of the longest.
+/// Over the longest.
 const LONGEST: f64 = 0.9;
-/// Largest ratio of the noises of three axes of one sensor.
+/// For one sensor's axes.
 const MOST_UNLIKE: f64 = 10.0;
 
-/// First positions of threes of neighbours that may be the axes of a sensor.
 struct Triples {
-    /// Those that are as long as gravity.
     force: Option<usize>,
     others: Vec<usize>,
 }
@@ -459,9 +430,9 @@ impl Triples {
         let length = |at: usize| unit_guess::usual_length(&axes(at));
         let is_gravity = |at: &usize| unit_guess::force_unit(&axes(*at)).is_some();
         let gravity: Vec<usize> = runs.iter().flat_map(all).filter(is_gravity).collect();
-        // The longest of several: 9.8 is no bias, 1 may be.
+        // 9.8 is no bias, 1 may be.
         let longest = gravity.iter().map(|at| length(*at)).fold(0.0, f64::max);
-        // Of those that share a column the one that leaves the most threes of axes beside it, and those the most alike.
+        // Most others left, then most alike.
         let division = |at: usize| {
             let run = runs.iter().find(|run| run.contains(&at)).cloned().unwrap_or_default();
             let threes: Vec<usize> =
@@ -480,7 +451,7 @@ impl Triples {
                 None => vec![run],
             };
             for part in parts.into_iter().filter(|part| part.len() >= 3) {
-                // From where the axes are most alike.
+                // Most alike.
                 let of_offset = |offset: usize| (part.start + offset..part.end - 2).step_by(3).collect::<Vec<_>>();
                 let cost = |triples: &Vec<usize>| triples.iter().map(|at| unlike(*at).ln()).sum::<f64>();
                 let offsets = (0..=part.len() % 3).map(of_offset);

@@ -1,34 +1,31 @@
-//! Where a sensor was steady: the longest run of blocks of rows whose noise is that of the quietest ones.
+//! Steady part: longest run of blocks as quiet as the quietest.
 
 use crate::inspection::column_facts::ColumnFacts;
 use crate::inspection::sensor_guess::SensorGuess;
 use crate::rows::quantizer::{MEDIAN_OF_NORMAL, noise_at_lag};
 use std::ops::Range;
 
-/// Rows of a block whose noise is independent, and most times as many where a filter makes neighbours alike.
+/// Rows of a block, and most correlation lengths.
 const BLOCK: usize = 128;
 const MOST_ALIKE: usize = 16;
-/// How many times the noise at half of a lag that at the lag is where the noise is still alike.
+/// Ratio of noise at half a lag where it is still correlated.
 const GROWS: f64 = 1.1;
-/// How many times the standard deviation of the quietest eighth of the blocks a steady block has at most. That of 128 independent samples
-/// scatters by 10 %.
+/// Over the quietest eighth; 128 samples scatter by 10 %.
 const MOST_NOISE: f64 = 3.0;
-/// How far deviation and mean of a block may differ from those of a sensor at rest, deg/s and g: noise and vibration of a table are below,
-/// a hand is above.
+/// Deviation and change at rest, deg/s and g: above a table, below a hand.
 const REST_DEG_S: f64 = 2.0;
 const REST_G: f64 = 0.05;
 
 /// The longest part of a recording in which the sensor was steady.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SteadyPart {
-    /// Rows from 0, the end excluded.
     pub rows: Range<usize>,
-    /// Whether the units tell that the sensor was at rest; without units its values are steady, and nothing else is known.
+    /// Known by units; else only steady.
     pub is_rest: bool,
 }
 
 impl SteadyPart {
-    /// `None` where no column is one of an inertial sensor.
+    /// `None` without inertial columns.
     pub(crate) fn find(columns: &[ColumnFacts], sensors: &[SensorGuess]) -> Option<Self> {
         let inertial: Vec<(usize, Option<f64>)> = sensors.iter().flat_map(SensorGuess::inertial).collect();
         let rows = columns[inertial.first()?.0].values.len();
@@ -36,7 +33,7 @@ impl SteadyPart {
         let block = BLOCK * alike;
         let blocks = rows.div_ceil(block);
         let mut is_steady = vec![true; blocks];
-        // The means of the blocks of each force, which change where the sensor was turned, and by how much they may.
+        // Forces change with attitude.
         let mut forces: Vec<(Vec<f64>, f64)> = Vec::new();
         for &(at, factor) in &inertial {
             let ColumnFacts { values, step, .. } = &columns[at];
@@ -55,7 +52,7 @@ impl SteadyPart {
                 let is_quiet = *deviation <= MOST_NOISE * quiet;
                 let is_usual = |limit: f64| is_force || (mean - usual).abs() < limit;
                 let is_rest = limit.is_none_or(|limit| is_usual(limit) && *deviation < limit);
-                // A block without a value says nothing.
+                // Without a value.
                 *steady &= mean.is_nan() || is_quiet && is_rest;
             }
             if let Some(limit) = limit.filter(|_| is_force) {
@@ -64,7 +61,7 @@ impl SteadyPart {
         }
         let is_turned =
             |first: usize, at: usize| forces.iter().any(|(means, limit)| (means[at] - means[first]).abs() >= *limit);
-        // A movement may begin or end in the blocks beside those that it moves.
+        // Movements may reach into the next block.
         let mut longest = longest_run(&is_steady, is_turned);
         if longest.start > 0 && longest.len() > 2 {
             longest.start += 1;
@@ -77,7 +74,7 @@ impl SteadyPart {
     }
 }
 
-/// Rows until the noise is as good as independent: those at which the differences stop to grow.
+/// Lag at which differences stop to grow.
 fn rows_alike(values: &[f64]) -> usize {
     let grows = |lag: &usize| noise_at_lag(values, 2 * lag) > GROWS * noise_at_lag(values, *lag);
     let mut lag = 1;
@@ -87,7 +84,7 @@ fn rows_alike(values: &[f64]) -> usize {
     lag
 }
 
-/// The longest run of true, which ends where `is_other` of its first place and the next one too.
+/// Ends where `is_other`.
 fn longest_run(flags: &[bool], is_other: impl Fn(usize, usize) -> bool) -> Range<usize> {
     let mut longest = 0..0;
     let mut first = 0;
@@ -103,7 +100,6 @@ fn longest_run(flags: &[bool], is_other: impl Fn(usize, usize) -> bool) -> Range
     longest
 }
 
-/// Median and standard deviation of the finite values by the median of their distances from it, which single outliers do not move.
 fn moments(values: &[f64]) -> (f64, f64) {
     let median = |values: &mut Vec<f64>| {
         values.sort_by(f64::total_cmp);

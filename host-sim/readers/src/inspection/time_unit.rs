@@ -1,12 +1,11 @@
-//! The unit of times that a file does not say, by the sample rate that they give.
+//! Units of times by the sample rate.
 
 use crate::columns::unit::Unit;
 use crate::rows::batch::usual_unit;
 
-/// Sample rates, Hz, that a clock without a unit is taken for, the likeliest first.
+/// The likeliest first, Hz.
 const LIKELY_HZ: [std::ops::RangeInclusive<f64>; 2] = [10.0..=10_000.0, 0.2..=40_000.0];
 
-/// The unit of times that do not say it, and why.
 pub(crate) fn time_unit(times: &[f64]) -> Option<(Unit, String)> {
     let finite: Vec<f64> = times.iter().copied().filter(|time| time.is_finite()).collect();
     let (origin, last) = (*finite.first()?, *finite.last()?);

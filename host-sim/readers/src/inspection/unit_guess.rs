@@ -1,14 +1,13 @@
-//! Units that a file does not say, by the numbers: gravity and the sensitivities of common gyroscopes.
+//! Units by gravity and common gyroscopes.
 
 use crate::inspection::column_facts::ColumnFacts;
 use std::f64::consts::PI;
 use time_base::quantile;
 
-/// Largest relative difference of the mean specific force from gravity: the bias and the scale error of a cheap sensor.
+/// Bias and scale of a cheap sensor.
 const GRAVITY_TOLERANCE: f64 = 0.05;
-/// Gravity in the units of accelerometers.
 const GRAVITY: [(f64, &str); 3] = [(9.806_65, "m/s^2"), (1.0, "g"), (1000.0, "mg")];
-/// Gravity in whole numbers: counts of a converter of 16 bits with 2, 4, 8 and 16 g full scale, or fewer bits, and mm/s².
+/// 16 bits at 2 to 16 g, fewer bits, mm/s².
 const GRAVITY_IN_COUNTS: [(f64, &str); 7] = [
     (16_384.0, "g/16384"),
     (8192.0, "g/8192"),
@@ -19,29 +18,24 @@ const GRAVITY_IN_COUNTS: [(f64, &str); 7] = [
     (9806.65, "m/s^2/1000"),
 ];
 
-/// Sensitivities of common gyroscopes, LSB per deg/s: InvenSense MPU and ICM, Bosch BMI and BMG.
+/// LSB per deg/s: InvenSense MPU and ICM, Bosch BMI and BMG.
 const LSB_PER_DEG_S: [f64; 10] = [262.4, 262.144, 131.0, 131.072, 65.5, 65.536, 32.8, 32.768, 16.4, 16.384];
-/// The same, deg/s per LSB: ST L3G and LSM6.
+/// deg/s per LSB: ST L3G and LSM6.
 const DEG_S_PER_LSB: [f64; 5] = [4.375e-3, 8.75e-3, 17.5e-3, 35e-3, 70e-3];
-/// Relative difference of a step from a sensitivity.
 const SAME_STEP: f64 = 1e-3;
-/// Noise of a rate, in the unit of the file, beyond which it is not in rad/s: 3 deg/s, more than any gyroscope at rest has.
+/// 3 deg/s: above any gyroscope at rest.
 const NO_RAD_S_ABOVE: f64 = 0.05;
-/// Noise of a rate, in the unit of the file, below which it is more likely in rad/s: 0.6 deg/s. Cheap gyroscopes, 0.003 to 0.05
-/// deg/s/sqrt(Hz) at 25 to 400 Hz, have 0.015 to 1 deg/s, and 0.00026 to 0.017 rad/s.
+/// 0.6 deg/s. Cheap gyroscopes have 0.015 to 1 deg/s, or 0.00026 to 0.017 rad/s.
 const LIKELY_RAD_S_BELOW: f64 = 0.01;
 
-/// A unit that is guessed.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct UnitGuess {
-    /// As `--units` takes it.
     pub(crate) unit: &'static str,
     pub(crate) reason: String,
-    /// Whether nothing else is plausible.
     pub(crate) is_safe: bool,
 }
 
-/// The usual length of the vector of some axes: of the means of blocks, so that the sensor may be turned between rests.
+/// Block means: may be turned between rests.
 pub(crate) fn usual_length(axes: &[&ColumnFacts]) -> f64 {
     let blocks = axes.iter().map(|axis| axis.blocks.len()).min().unwrap_or(0);
     let length = |block: usize| axes.iter().map(|axis| axis.blocks[block].powi(2)).sum::<f64>().sqrt();
@@ -49,7 +43,6 @@ pub(crate) fn usual_length(axes: &[&ColumnFacts]) -> f64 {
     quantile(&mut lengths, 1, 2)
 }
 
-/// The unit of specific forces in which the length of three axes is gravity.
 pub(crate) fn force_unit(axes: &[&ColumnFacts]) -> Option<UnitGuess> {
     let length = usual_length(axes);
     let are_whole = axes.iter().all(|axis| axis.is_whole());
@@ -63,7 +56,7 @@ pub(crate) fn force_unit(axes: &[&ColumnFacts]) -> Option<UnitGuess> {
     })
 }
 
-/// The unit of rates: by their step, which is that of a common sensor; by their noise; or by the unit of the specific forces beside them.
+/// By step, noise, or the forces' unit.
 pub(crate) fn rate_unit(axes: &[&ColumnFacts], force: Option<&str>) -> UnitGuess {
     const UNITS: [(&str, f64); 2] = [("deg/s", 1.0), ("rad/s", PI / 180.0)];
     let sensitivities = || LSB_PER_DEG_S.iter().map(|lsb| lsb.recip()).chain(DEG_S_PER_LSB);

@@ -1,21 +1,19 @@
-//! How a recording of any inertial sensor is read.
+//! Options for reading a recording of any inertial sensor.
 
 use crate::columns::column_selection::{AvailableColumn, ChosenColumn, ColumnSelection, SelectionError};
 use measurement::SensorProfile;
 
-/// What the user says of a recording.
+/// The recording as the user states it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadOptions {
-    /// The sensor that was recorded.
     pub sensor: SensorProfile,
-    /// Which columns are read, and in which units they are.
+    /// Columns and units.
     pub selection: ColumnSelection,
-    /// Topic, message or array of a file with several.
     pub topic: Option<String>,
 }
 
 impl ReadOptions {
-    /// Of a recording of `sensor` of which nothing else is said.
+    /// Defaults for `sensor`.
     #[must_use]
     pub fn of_sensor(sensor: SensorProfile) -> Self {
         Self { sensor, selection: ColumnSelection::default(), topic: None }

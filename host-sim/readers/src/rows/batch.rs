@@ -1,4 +1,4 @@
-//! Consecutive rows of a recording, column by column: what every format becomes.
+//! Batches of rows, column by column.
 
 use crate::columns::column_selection::{ChosenColumn, Role};
 use crate::columns::unit::{SECOND, Unit};
@@ -7,26 +7,24 @@ use crate::input::input_error::Reason;
 use measurement::ChannelProfile;
 use time_base::{Order, ROWS_OF_FIRST, ROWS_OF_SET_CLOCK, StampOrder};
 
-/// Largest share of rows whose time stamps may go back; they are left out. More are another recording.
+/// Largest share of rows whose time goes back.
 const MAX_BACKWARDS: f64 = 0.1;
 
-/// Sample rates, Hz, that a time column without a unit may have.
+/// For times without a unit.
 const PLAUSIBLE_HZ: std::ops::RangeInclusive<f64> = 0.2..=40_000.0;
 
-/// Larger first time stamps, in the unit of the file, are taken off all of them: a float has too few digits for ns since 1970.
+/// Larger ones are subtracted: too few digits for ns since 1970.
 const LARGEST_OWN_TIME: f64 = (1u64 << 40) as f64;
 
 /// A number as a file holds it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Number {
-    /// Exact: time stamps in ns since 1970 need more digits than a float has.
+    /// For ns since 1970.
     Integer(i64),
-    /// Any other.
     Real(f64),
 }
 
 impl Number {
-    /// The nearest float.
     pub(crate) fn value(self) -> f64 {
         match self {
             Self::Integer(integer) => integer as f64,
@@ -34,7 +32,6 @@ impl Number {
         }
     }
 
-    /// How much larger it is than `origin`.
     fn since(self, origin: Self) -> f64 {
         match (self, origin) {
             (Self::Integer(now), Self::Integer(origin)) => (i128::from(now) - i128::from(origin)) as f64,
@@ -43,42 +40,38 @@ impl Number {
     }
 }
 
-/// A channel and how its numbers are read.
+/// A channel and its numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ValueColumn {
-    /// The channel; its LSB is not that of the numbers.
+    /// Its LSB is not that of the numbers.
     pub profile: ChannelProfile,
-    /// Size of 1 in the unit of the profile.
+    /// For 1, in the profile's unit.
     pub factor: f64,
-    /// As the file names it.
     pub label: String,
-    /// The register whose words these are.
     pub register: Option<RegisterField>,
 }
 
 /// A register of a sensor, of which a table has the words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RegisterField {
-    /// Its place among those of the sensor.
+    /// Among the sensor's.
     pub place: usize,
-    /// The least and the largest number that it can hold.
     pub limits: (i16, i16),
 }
 
-/// Consecutive rows, of which each may have a verdict `V` by who knows the sensor.
+/// Rows, with a verdict `V` each by the sensor's reader.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Batch<V = ()> {
-    /// Number of rows.
     pub rows: usize,
-    /// Time stamps, s once the unit is known; large ones count from the first. Empty where there are none.
+    /// s once the unit is known, large ones from the first; may be empty.
     pub times: Vec<f64>,
-    /// Running numbers; empty where there are none.
+    /// May be empty.
     pub indices: Vec<u64>,
-    /// The numbers of each channel in the unit of the file, NaN where there is none.
+    /// In the file's unit; NaN if missing.
     pub values: Vec<Vec<f64>>,
-    /// One a row; empty where there are none.
+    /// May be empty.
     pub verdicts: Vec<V>,
-    /// Positions before which a row was left out because its time goes back.
+    /// Positions behind rows with earlier times.
     pub backwards: Vec<usize>,
 }
 
@@ -90,7 +83,7 @@ impl<V> Default for Batch<V> {
 }
 
 impl Batch {
-    /// The same rows with their verdicts.
+    /// The rows with their verdicts.
     #[must_use]
     pub fn with_verdicts<V>(self, verdicts: Vec<V>) -> Batch<V> {
         let Self { rows, times, indices, values, backwards, verdicts: _ } = self;
@@ -99,7 +92,6 @@ impl Batch {
 }
 
 impl<V> Batch<V> {
-    /// The first rows, which are removed.
     fn split_off_front(&mut self, rows: usize) -> Self {
         fn front<T>(values: &mut Vec<T>, rows: usize) -> Vec<T> {
             // As many are likely to follow.
@@ -121,7 +113,7 @@ impl<V> Batch<V> {
         }
     }
 
-    /// Leaves out the rows whose flag is not set, and what was left out before them.
+    /// With what was left out before them.
     pub fn retain(&mut self, is_kept: &[bool]) {
         fn retain<T>(values: &mut Vec<T>, is_kept: &[bool]) {
             let mut is_kept = is_kept.iter();
@@ -146,7 +138,7 @@ impl<V> Batch<V> {
 pub struct RowBefore(Option<Vec<f64>>);
 
 impl RowBefore {
-    /// Whether each row of the next batch has the numbers of the row before it; the first row of all has none before it.
+    /// True for each row that equals the one before.
     pub fn equals<V>(&mut self, batch: &Batch<V>) -> Vec<bool> {
         let Some(last) = batch.rows.checked_sub(1) else { return Vec::new() };
         let first =
@@ -157,14 +149,13 @@ impl RowBefore {
     }
 }
 
-/// Why a row cannot be used: the column at fault, by its position among the chosen ones, and the reason.
+/// Column (position) and reason.
 #[derive(Debug)]
 pub(crate) struct RowFault {
     pub(crate) column: Option<usize>,
     pub(crate) reason: Reason,
 }
 
-/// A row whose time goes back.
 #[derive(Debug)]
 struct BackRow {
     time: f64,
@@ -173,50 +164,38 @@ struct BackRow {
     values: Vec<f64>,
 }
 
-/// Rows that a later one may show to be wrong.
+/// Rows kept back for a later verdict.
 pub(crate) const HELD_ROWS: usize = ROWS_OF_FIRST + 1;
 
-/// Numbers at which counters of samples begin anew.
 const COUNTERS: [u64; 3] = [1 << 8, 1 << 16, 1 << 32];
-/// Part of a counter that may be missing where it begins anew.
 const MOST_MISSING: u64 = 8;
 
-/// What the number of a column is for.
 #[derive(Debug, Clone, Copy)]
 enum Use {
     Time,
     Index,
-    /// A value; of a register with the least and the largest number of its field.
     Value(Option<(i16, i16)>),
 }
 
-/// Makes batches of the rows of a file.
 #[derive(Debug)]
 pub(crate) struct BatchBuilder {
-    /// Of each chosen column.
     uses: Vec<Use>,
     batch: Batch,
-    /// The first time stamp.
     first_time: Option<Number>,
     order: StampOrder,
-    /// Rows whose time goes back, each with its time and number, until more of them come or another row.
     back: Vec<BackRow>,
     last_index: Option<u64>,
     index_offset: u64,
     rows: u64,
-    /// What the file may cost.
     meter: Option<Meter>,
     backwards: u64,
-    /// The first row whose time went back: number of the row, and by how much.
     first_backwards: Option<(u64, f64)>,
-    /// Whether the first row is not judged yet.
     is_first_open: bool,
-    /// The numbers of the row that is added.
     row: Vec<f64>,
 }
 
 impl BatchBuilder {
-    /// Of rows with these columns; those with a register are checked against their field.
+    /// Checks registers against their fields.
     pub(crate) fn new(chosen: &[ChosenColumn], columns: &[ValueColumn], budget: Option<Budget>) -> Self {
         let mut registers = columns.iter().map(|column| column.register.map(|register| register.limits));
         let uses = chosen.iter().map(|column| match column.role {
@@ -241,29 +220,26 @@ impl BatchBuilder {
         }
     }
 
-    /// Rows that were added, those that were left out included.
     pub(crate) fn rows(&self) -> u64 {
         self.rows
     }
 
-    /// Rows that wait to be taken.
     pub(crate) fn waiting(&self) -> usize {
         self.batch.rows
     }
 
-    /// The first time stamp, in the unit of the file.
     pub(crate) fn first_time(&self) -> f64 {
         self.first_time.map_or(0.0, Number::value)
     }
 
-    /// Adds a row: one number for each chosen column. A row whose time goes back is left out.
+    /// One number per column; earlier times are left out.
     pub(crate) fn push(&mut self, row: &[Number]) -> Result<(), RowFault> {
         self.rows += 1;
         let fault = |column: usize, reason: Reason| Err(RowFault { column: Some(column), reason });
         if let Some(meter) = &mut self.meter {
             meter.add_values(row.len() as u64).map_err(|reason| RowFault { column: None, reason })?;
         }
-        // A row at fault leaves nothing behind.
+        // All or nothing.
         let (mut time, mut index) = (None, None);
         let mut values = std::mem::take(&mut self.row);
         values.clear();
@@ -309,7 +285,7 @@ impl BatchBuilder {
         Ok(())
     }
 
-    /// Adds a row where its time says it belongs; `time` is the first time stamp and that of the row.
+    /// By its time; `time` is the first stamp and its own.
     fn place(&mut self, time: Option<(Number, f64)>, index: Option<u64>, values: &[f64]) {
         let Some((first, stamp)) = time else {
             self.add(None, index, values);
@@ -346,7 +322,6 @@ impl BatchBuilder {
         }
     }
 
-    /// Adds a row to the batch.
     fn add(&mut self, time: Option<f64>, index: Option<u64>, values: &[f64]) {
         if let Some(time) = time {
             self.order.accept(time);
@@ -362,7 +337,6 @@ impl BatchBuilder {
         self.batch.rows += 1;
     }
 
-    /// Removes a row of the batch, and counts it.
     fn remove(&mut self, row: usize) {
         let is_kept: Vec<bool> = (0..self.batch.rows).map(|at| at != row).collect();
         self.batch.retain(&is_kept);
@@ -370,7 +344,6 @@ impl BatchBuilder {
         self.batch.backwards.sort_unstable();
     }
 
-    /// Leaves out the rows whose time goes back: the others have gone on without them.
     fn leave_out_back(&mut self) {
         for row in std::mem::take(&mut self.back) {
             self.backwards += 1;
@@ -380,7 +353,6 @@ impl BatchBuilder {
         }
     }
 
-    /// Leaves out the first row where the next ones are far from it.
     fn check_first(&mut self) {
         let is_time = self.is_first_open && self.batch.times.len() == ROWS_OF_FIRST;
         if is_time {
@@ -391,7 +363,7 @@ impl BatchBuilder {
         }
     }
 
-    /// Goes on with a clock that was set back, when enough rows go on by it.
+    /// A clock set back that goes on.
     fn check_clock(&mut self) {
         let is_first_wrong = self.order.has_first_alone() && self.back.len() == ROWS_OF_FIRST;
         if !is_first_wrong && self.back.len() < ROWS_OF_SET_CLOCK {
@@ -411,28 +383,22 @@ impl BatchBuilder {
         }
     }
 
-    /// The rows that were added since they were taken last, but for those that a later one may show to be wrong.
     pub(crate) fn take(&mut self) -> Batch {
         let held = if self.batch.times.is_empty() { 0 } else { HELD_ROWS };
         self.batch.split_off_front(self.batch.rows.saturating_sub(held))
     }
 
-    /// The last rows.
     pub(crate) fn take_last(&mut self) -> Batch {
         self.leave_out_back();
         let next = empty(self.batch.values.len());
         std::mem::replace(&mut self.batch, next)
     }
 
-    /// Sentences on stamps that go back and are understood.
     pub(crate) fn notes(&self) -> Vec<String> {
         self.order.notes()
     }
 
-    /// A sentence on the rows whose time goes back; `None` without one.
-    ///
-    /// # Errors
-    /// There is no row, or the times of many rows go back.
+    /// On rows with earlier times, `None` without any; an error if they are many, or without a row.
     pub(crate) fn backwards(&self) -> Result<Option<String>, Reason> {
         if self.rows == self.backwards {
             return Err(Reason::NoData);
@@ -445,12 +411,12 @@ impl BatchBuilder {
     }
 }
 
-/// Checks a register count against its field; a missing one is NaN.
+/// NaN if missing.
 fn check_count(number: Number, (low, high): (i16, i16)) -> Result<(), Reason> {
     let value = match number {
         Number::Integer(value) => value,
         Number::Real(value) if value.is_nan() => return Ok(()),
-        // A float beyond the range of i64 saturates.
+        // Saturates.
         Number::Real(value) if value.fract() == 0.0 => value as i64,
         Number::Real(value) => return Err(Reason::NotInteger(value.to_string())),
     };
@@ -462,8 +428,7 @@ fn empty(columns: usize) -> Batch {
     Batch { values: vec![Vec::new(); columns], ..Batch::default() }
 }
 
-/// The unit of times that do not say it, of which the first is `origin`: of a clock that counts from 1970 (2001 to 2096) the one that gives
-/// this date, else seconds if they give a plausible sample rate. `None` where neither is so.
+/// Unit of times from `origin` on: a date of 2001 to 2096, else seconds at a plausible rate; `None` otherwise.
 pub(crate) fn usual_unit(times: &[f64], origin: f64) -> Option<Unit> {
     let units = || ["s", "ms", "us", "ns"].into_iter().filter_map(Unit::parse);
     let by_date = units().find(|unit| (1e9..4e9).contains(&(origin * unit.factor)));

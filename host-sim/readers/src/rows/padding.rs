@@ -1,12 +1,12 @@
-//! Rows at either end of a recording that are all equal: memory that was erased or never written, or a value that was held.
+//! Equal rows at either end: erased memory or a held value.
 
 use crate::rows::batch::{Batch, RowBefore};
 
-/// Fewest equal rows that are padding, and how many times as many as the most equal rows within the recording.
+/// Fewest rows, and ratio to equal rows within.
 const LEAST_ROWS: u64 = 64;
 const TIMES_AS_MANY: u64 = 8;
 
-/// The rows between the padding, by their numbers from 0.
+/// Rows between the padding, from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Unpadded {
     pub first: u64,
@@ -17,7 +17,7 @@ impl Unpadded {
     /// All rows.
     pub const ALL: Self = Self { first: 0, end: u64::MAX };
 
-    /// What is said of `rows` rows, of which only these are used.
+    /// For `rows` rows.
     pub fn note(self, rows: u64) -> String {
         let (before, after) = (self.first, rows - self.end);
         format!(
@@ -26,7 +26,7 @@ impl Unpadded {
         )
     }
 
-    /// Leaves out the padding of a batch that begins with this row.
+    /// A batch that begins with this row.
     pub fn apply<V>(self, first_row: u64, batch: &mut Batch<V>) {
         if self != Self::ALL {
             let rows = first_row..first_row + batch.rows as u64;
@@ -39,9 +39,7 @@ impl Unpadded {
 #[derive(Debug, Default)]
 pub struct PaddingFinder {
     rows: u64,
-    /// Equal rows at the start, as long as there is no other.
     leading: Option<u64>,
-    /// Equal rows until now, and most of them within the recording.
     run: u64,
     longest: u64,
     before: RowBefore,
@@ -70,11 +68,11 @@ impl PaddingFinder {
         self.rows
     }
 
-    /// The rows without padding; `None` where there is none.
+    /// `None` without padding.
     pub fn finish(&self) -> Option<Unpadded> {
         let is_padding = |run: &u64| *run >= LEAST_ROWS.max(TIMES_AS_MANY * self.longest);
         let leading = self.leading.filter(is_padding).unwrap_or(0);
-        // Rows that are all equal are a constant.
+        // Constant.
         let trailing = Some(self.run).filter(|run| self.leading.is_some() && is_padding(run)).unwrap_or(0);
         (leading + trailing > 0).then_some(Unpadded { first: leading, end: self.rows - trailing })
     }
@@ -102,7 +100,6 @@ mod tests {
             assert_eq!(found(&noise, batch_rows), None);
             assert_eq!(found(&held(0, 240), batch_rows), Some(Unpadded { first: 0, end: 4999 }));
             assert_eq!(found(&held(1500, 100), batch_rows), Some(Unpadded { first: 1500, end: 6499 }));
-            // Too few to be told from rows that are equal by chance.
             assert_eq!(found(&held(30, 30), batch_rows), None);
             assert_eq!(found(&vec![3.0; 5000], batch_rows), None);
         }

@@ -1,37 +1,29 @@
-//! Numbers of a file as integer counts, because the analysis sums counts exactly.
-//!
-//! Where the numbers are multiples of a step, that step is the LSB and nothing is lost. Elsewhere the LSB is a power of two far
-//! below the noise: rounding to it adds LSB²/12 to the variance of a sample, at most [`MAX_COST`] of that of the noise.
+//! Numbers as integer counts: multiples of a step keep it as LSB, others get a power of two that adds at most
+//! [`MAX_COST`] of the noise's variance, LSB²/12.
 
-/// Largest part of the variance of the noise that rounding adds.
+/// For the noise's variance.
 const MAX_COST: f64 = 1e-4;
-/// Largest count. Differences of two counts fit into 32 bits.
+/// Differences fit into 32 bits.
 const MAX_COUNT: f64 = (1u32 << 30) as f64;
-/// Numbers that are examined for a step, spread evenly over the column.
 const EXAMINED: usize = 4096;
-/// Fewest distinct numbers that show a step.
 const MIN_DISTINCT: usize = 3;
-/// Largest distance of a number from its multiple, in steps.
 const ON_STEP: f64 = 0.02;
-/// Largest whole numbers whose distances, and the multiples next to these, double precision has exactly.
+/// Exact in double precision.
 const EXACT: f64 = (1u64 << 51) as f64;
-/// Largest part of the numbers that may lie beyond the largest count; where more do, the LSB is raised.
+/// Beyond the largest count; more raise the LSB.
 const MAX_BEYOND: f64 = 1e-3;
-/// Largest noise in counts: of a finer step, as of the many digits of a text, counts would leave no room in the estimator's sums of
-/// fourth powers.
+/// Sums of fourth powers need room.
 const MOST_NOISE_COUNTS: f64 = (1u32 << 17) as f64;
-/// The median of the absolute values of a normal distribution, in standard deviations.
 pub(crate) const MEDIAN_OF_NORMAL: f64 = 0.674_5;
 
 /// How the numbers of a column become counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ColumnQuantizer {
-    /// Size of a count, in the unit of the file.
+    /// In the file's unit.
     pub lsb: f64,
-    /// Number whose count is 0; less than one LSB from 0.
+    /// Count 0; less than one LSB.
     offset: f64,
-    /// Variance that rounding adds, as a part of that of the noise between neighbours; `None` where the numbers are multiples
-    /// of the LSB, which costs nothing.
+    /// Relative to the noise's variance; `None` for multiples.
     pub cost: Option<f64>,
 }
 
@@ -39,7 +31,7 @@ impl ColumnQuantizer {
     /// Numbers that are counts.
     pub const COUNTS: Self = Self { lsb: 1.0, offset: 0.0, cost: None };
 
-    /// The quantizer of `values`; those that are not finite have no influence.
+    /// For finite `values`.
     pub fn new(values: &[f64]) -> Self {
         let noise = difference_noise(values);
         match step(values).filter(|(lsb, _)| noise <= MOST_NOISE_COUNTS * lsb) {
@@ -53,7 +45,7 @@ impl ColumnQuantizer {
         let finite = || values.iter().copied().filter(|value| value.is_finite());
         let largest = finite().map(f64::abs).fold(0.0, f64::max);
         let noise = difference_noise(values);
-        // A column that never changes is as good in one count as in many.
+        // A constant.
         let scale = if noise > 0.0 { noise * (12.0 * MAX_COST).sqrt() } else { largest };
         let mut lsb = if scale > 0.0 { scale.log2().floor().exp2() } else { 1.0 };
         let beyond = finite().filter(|value| value.abs() > MAX_COUNT * lsb).count();
@@ -64,12 +56,12 @@ impl ColumnQuantizer {
         Self { lsb, offset: 0.0, cost: Some(cost) }
     }
 
-    /// The count of `value`; `None` where it is not finite or beyond the range of counts.
+    /// `None` out of range.
     pub fn count(&self, value: f64) -> Option<i32> {
         self.count_on_step(value).0
     }
 
-    /// The same, and whether `value` is a multiple of the LSB, where all are; else true.
+    /// And true for a multiple, or if they are none.
     pub fn count_on_step(&self, value: f64) -> (Option<i32>, bool) {
         let steps = (value - self.offset) / self.lsb;
         let count = steps.round();
@@ -78,18 +70,13 @@ impl ColumnQuantizer {
     }
 }
 
-/// The step that all `values` are multiples of, but for an offset below one step, and the offset; `None` where there is none.
-///
-/// Of the numbers of a converter the smallest distance of two is one, two or three steps, of others the step is the greatest common divisor
-/// of the distances between neighbours in the order of size. It is refined at growing distances from the median, like a vernier, as long as
-/// every number lies on it.
+/// Common step and offset below it, by the smallest distance or the common divisor; `None` without one.
 pub(crate) fn step(values: &[f64]) -> Option<(f64, f64)> {
     let largest = values.iter().copied().filter(|value| value.is_finite()).map(f64::abs).fold(0.0, f64::max);
     let stride = values.len().div_ceil(EXAMINED).max(1);
     let mut examined: Vec<f64> = values.iter().copied().step_by(stride).filter(|value| value.is_finite()).collect();
     examined.sort_by(f64::total_cmp);
-    // Half a unit in the last place of a number in single or double precision; decimal texts are read as doubles. Whole numbers are exact
-    // as far as double precision is.
+    // Half a unit in the last place, single or double; whole numbers are exact.
     let is_single = examined.iter().all(|&value| f64::from(value as f32) == value);
     let is_whole = largest <= EXACT && examined.iter().all(|value| value.fract() == 0.0);
     let precision = if is_single { f64::from(f32::EPSILON) } else { 2.0 * f64::EPSILON };
@@ -115,7 +102,7 @@ pub(crate) fn step(values: &[f64]) -> Option<(f64, f64)> {
     let coarse = [1.0, 2.0, 3.0].into_iter().map(|parts| smallest / parts);
     coarse.chain(common_divisor(&between, 2.0 * rounding)).find_map(|step| {
         let step = refined(step, &distances)?;
-        // If the numbers themselves are multiples, their distance from 0 tells the step better than those from each other.
+        // Distances from 0 are more precise.
         let (squares, products) = examined.iter().fold((0.0, 0.0), |(squares, products), &value| {
             let steps = (value / step).round();
             (squares + steps * steps, products + steps * value)
@@ -129,8 +116,7 @@ pub(crate) fn step(values: &[f64]) -> Option<(f64, f64)> {
     })
 }
 
-/// The greatest common divisor of `distances` (in ascending order), each of which is off by `error` at most: Euclid's algorithm, with the
-/// error of each remainder. `None` where it is not larger than what the errors leave.
+/// For ascending `distances`, each within `error` (Euclid); `None` within the errors.
 fn common_divisor(distances: &[f64], error: f64) -> Option<f64> {
     let mut divisor = *distances.first()?;
     let mut of_divisor = error;
@@ -140,7 +126,6 @@ fn common_divisor(distances: &[f64], error: f64) -> Option<f64> {
         let rest = (distance - times * divisor).abs();
         let of_rest = error + times * of_divisor;
         if of_rest > ON_STEP * divisor {
-            // Farther than the divisor is known.
             break;
         }
         if rest > 2.0 * of_rest {
@@ -155,7 +140,7 @@ fn common_divisor(distances: &[f64], error: f64) -> Option<f64> {
     (of_divisor < ON_STEP * divisor).then_some(divisor)
 }
 
-/// The step near `step` of which all `distances` (in ascending order) are multiples.
+/// Near `step`, for ascending `distances`.
 fn refined(mut step: f64, distances: &[f64]) -> Option<f64> {
     for &distance in distances {
         let steps = (distance / step).round();
@@ -167,13 +152,12 @@ fn refined(mut step: f64, distances: &[f64]) -> Option<f64> {
     Some(step)
 }
 
-/// Standard deviation of the noise by the median difference of neighbours, which slow changes and single outliers do not move;
-/// by all differences where most are 0.
+/// By the median difference, which outliers do not move; by all if most are 0.
 pub(crate) fn difference_noise(values: &[f64]) -> f64 {
     noise_at_lag(values, 1)
 }
 
-/// The same by the differences of values that are `lag` apart.
+/// Values `lag` apart.
 pub(crate) fn noise_at_lag(values: &[f64], lag: usize) -> f64 {
     let stride = values.len().div_ceil(1 << 17).max(1);
     let pairs = values.windows(lag + 1).step_by(stride).map(|pair| pair[lag] - pair[0]);
@@ -198,7 +182,7 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    /// Nearly normal noise with a standard deviation of 1: the sum of twelve uniform numbers.
+    /// Sum of twelve uniform numbers.
     fn noise(seed: u64, samples: usize) -> Vec<f64> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         (0..samples).map(|_| (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0).collect()
@@ -207,7 +191,7 @@ mod tests {
     #[test]
     fn multiples_of_a_step_keep_it_and_their_counts() {
         let noise = noise(1, 20_000);
-        // 16 bits of ±2000 deg/s in rad/s, of ±8 g in m/s² with gravity; a step below the noise by a factor of 300; even counts.
+        // ±2000 deg/s in rad/s, ±8 g in m/s²; a fine step; even counts.
         for (step, mean, deviation, single) in [
             (1.0 / 16.4 * std::f64::consts::PI / 180.0, 0.0, 3.0, false),
             (1.0 / 16.4 * std::f64::consts::PI / 180.0, 12.0, 3.0, true),
@@ -215,7 +199,7 @@ mod tests {
             (9.80665 / 4096.0, 4096.0, 2.0, false),
             (1e-6, 500.0, 300.0, false),
             (2.0, 0.0, 40.0, false),
-            // Whole numbers that single precision has room for, and others.
+            // Single precision.
             (1.0, 1e7, 3.0, false),
             (1.0, 5e8, 3.0, false),
         ] {
@@ -244,8 +228,7 @@ mod tests {
         assert!(found.iter().zip(&counts).all(|(found, count)| found - count == shift));
     }
 
-    /// The variance of the rounded numbers less that of the numbers is the cost: its standard deviation over 100,000 samples
-    /// is 2·LSB/√12·σ/√n, for a cost of 1e-4 six parts in 100,000.
+    /// 2·LSB/√12·σ/√n: 6·10⁻⁵ for a cost of 10⁻⁴.
     #[test]
     fn other_numbers_cost_at_most_what_is_stated() {
         let values: Vec<f64> = noise(3, 100_000).iter().map(|x| 9.81 + 1.7e-3 * x).collect();
@@ -262,8 +245,7 @@ mod tests {
         assert!((added - cost).abs() < 5.0 * 6e-5, "{added} for {cost}");
     }
 
-    /// A vibration of 0.1 rad/s at a quarter of the sample rate, written with six decimals: neighbours differ by 10⁵ steps, and none of
-    /// the numbers that are examined lie beside each other.
+    /// 0.1 rad/s, six decimals: neighbours 10⁵ steps apart.
     #[test]
     fn the_step_of_a_vibrating_channel_is_that_of_its_numbers() {
         let noise = noise(6, 20_000);
@@ -279,7 +261,6 @@ mod tests {
         }
     }
 
-    /// Numbers of which no two are closer than two and three steps.
     #[test]
     fn a_step_that_no_two_neighbours_have_is_found() {
         let values: Vec<f64> =
@@ -287,7 +268,7 @@ mod tests {
         assert_eq!(step(&values), Some((3.0, -1.0)));
     }
 
-    /// Nine decimals of a noise of 0.09 are multiples of 1e-9: 9e7 counts would be more than the estimator has room for.
+    /// Nine decimals of 0.09 would be 9e7 counts.
     #[test]
     fn the_digits_of_a_text_are_no_counts() {
         let values: Vec<f64> = noise(5, 20_000).iter().map(|x| (9e7 * x).round() * 1e-9).collect();
@@ -297,7 +278,6 @@ mod tests {
         assert!(quantizer.lsb > 1e-3 && quantizer.cost.is_some(), "{quantizer:?}");
     }
 
-    /// Euclid's algorithm found remainders without end, which were the errors of its products.
     #[test]
     fn whole_numbers_beyond_double_precision_have_no_common_divisor() {
         let times = [1_700_000_000_000_072_828_i64, -1, -7_908_400_996_633_745_333, -415_939_286_374_804_831];
@@ -313,7 +293,6 @@ mod tests {
             assert!(quantizer.lsb > 0.0 && quantizer.lsb.is_finite(), "{values:?}: {quantizer:?}");
             assert!(values.iter().all(|&value| value.is_nan() || quantizer.count(value).is_some()), "{values:?}");
         }
-        // One spike does not take the resolution from the others.
         let mut values = noise(4, 20_000);
         values[777] = 1e30;
         let quantizer = ColumnQuantizer::new(&values);

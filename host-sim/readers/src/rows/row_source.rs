@@ -1,4 +1,4 @@
-//! Rows of a file of any format as batches of columns.
+//! Rows of any format as batches.
 
 use crate::columns::column_selection::{ChosenColumn, Role};
 use crate::input::budget::Budget;
@@ -12,58 +12,46 @@ use time_base::TimeRange;
 
 /// Rows of a batch.
 pub const BATCH: usize = 1 << 14;
-/// Rows that tell the unit of times that do not say it.
+/// For unstated units.
 const ROWS_OF_UNIT: usize = 1 << 16;
 
-/// Takes the numbers of a row, one for each of the chosen columns.
 pub(crate) type EachRow<'a> = dyn FnMut(&[Number]) -> Result<(), Refusal> + 'a;
 
-/// Why a row is not taken.
 #[derive(Debug)]
 pub(crate) enum Refusal {
-    /// It cannot be used.
     Fault(RowFault),
-    /// No more rows are wanted.
     Enough,
 }
 
-/// How the reading of a file ended.
 #[derive(Debug, Default)]
 pub(crate) struct Ending {
-    /// Why there are no more rows, where the file is damaged or ends early.
     pub(crate) damage: Option<String>,
-    /// What the user should know, one sentence each.
     pub(crate) notes: Vec<String>,
 }
 
-/// Rows of a file, one after the other.
 pub(crate) trait RowSource: Send {
-    /// The columns that are read.
     fn chosen(&self) -> &[ChosenColumn];
 
-    /// The rate that the file states beside its rows, Hz.
+    /// Stated, Hz.
     fn rate_hz(&self) -> Option<f64>;
 
-    /// What the file may cost, where its rows can be many more than its bytes.
+    /// If rows can exceed bytes.
     fn budget(&self) -> Option<Budget>;
 
-    /// Gives all rows, until one is not taken.
+    /// All rows until a refusal.
     ///
     /// # Errors
     /// The file is damaged, or a row is at fault.
     fn read(&mut self, each: &mut EachRow) -> Result<Ending, InputError>;
 }
 
-/// Which rows of a recording are wanted.
+/// The rows of a recording that are wanted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WantedRows {
-    /// A part by time.
     pub part: Option<TimeRange>,
-    /// The sample rate that the user states, Hz: it places the part where there are no times.
+    /// User's rate, Hz, without times.
     pub stated_hz: Option<f64>,
-    /// Rows of the file that are read at most.
     pub most_rows: u64,
-    /// Rows of a batch.
     pub batch_rows: usize,
 }
 
@@ -74,25 +62,19 @@ impl WantedRows {
     }
 }
 
-/// What was read, beside the batches.
+/// Result, without batches.
 #[derive(Debug, Default, Clone, PartialEq)]
 pub struct RowsRead {
-    /// Rows of the file.
     pub rows: u64,
-    /// Rows outside of the part that is wanted, as far as it was read for it.
     pub outside: u64,
-    /// Rows at either end that are all equal, which are padding.
     pub padding: u64,
-    /// Whether the user stopped the reading before the end.
     pub is_stopped: bool,
-    /// Why the file was not read to its end, where it is damaged.
     pub damage: Option<String>,
-    /// What the user should know, one sentence each.
     pub notes: Vec<String>,
 }
 
 impl RowsRead {
-    /// Whether the file was read to its end, or to that of the part that is wanted.
+    /// To the end of file or part.
     #[must_use]
     pub fn is_complete(&self) -> bool {
         self.damage.is_none() && !self.is_stopped
@@ -111,14 +93,14 @@ pub struct PartFilter {
 }
 
 impl PartFilter {
-    /// Of what is wanted of a file that states this rate, Hz.
+    /// The file states this rate, Hz.
     #[must_use]
     pub fn new(wanted: WantedRows, file_hz: Option<f64>) -> Self {
         let period_s = wanted.stated_hz.or(file_hz).map(f64::recip);
         Self { part: wanted.part, period_s, first_index: None, first_s: None, rows: 0, kept: 0, last_s: 0.0 }
     }
 
-    /// Leaves out what is outside of the part; whether later rows may be inside.
+    /// False if no later row is inside.
     ///
     /// # Errors
     /// Neither times nor a rate place the rows.
@@ -150,7 +132,7 @@ impl PartFilter {
         Ok(self.last_s < to_s)
     }
 
-    /// Checks that the part has rows.
+    /// The part must have rows.
     ///
     /// # Errors
     /// It has none.
@@ -172,10 +154,9 @@ pub struct FileRows<'a> {
     monitor: ReadMonitor,
 }
 
-/// What a reading has to give to, and what it has given.
 struct Delivery<'a> {
     builder: BatchBuilder,
-    /// Of times without a unit, batches that wait for it.
+    /// Until the unit is known.
     waiting: Vec<Batch>,
     waiting_rows: usize,
     time_unit_s: Option<f64>,
@@ -188,7 +169,7 @@ struct Delivery<'a> {
 }
 
 impl<'a> FileRows<'a> {
-    /// Of rows whose channels may be words of registers.
+    /// Channels may be register words.
     pub(crate) fn new(
         file: &'a Path,
         source: Box<dyn RowSource + 'a>,
@@ -220,14 +201,14 @@ impl<'a> FileRows<'a> {
         &self.monitor
     }
 
-    /// The rate that the file states beside its rows, Hz, where it has no time stamps: they say more.
+    /// Hz, without time stamps.
     #[must_use]
     pub fn rate_hz(&self) -> Option<f64> {
         let has_times = self.source.chosen().iter().any(|column| column.role == Role::Time);
         self.source.rate_hz().filter(|_| !has_times)
     }
 
-    /// Reads all rows and calls `give` with each batch, until it returns false.
+    /// Until `give` returns false.
     ///
     /// # Errors
     /// The file is damaged, or the part has no row.
@@ -263,7 +244,7 @@ impl<'a> FileRows<'a> {
             Ok(())
         });
         monitor.end();
-        // What the consumer refuses comes first: it ended the reading.
+        // The consumer's refusal comes first.
         if let Some(error) = delivery.error.take() {
             return Err(error);
         }
@@ -282,7 +263,7 @@ impl<'a> FileRows<'a> {
 }
 
 impl Delivery<'_> {
-    /// Gives the rows that were built, once the unit of their times is known.
+    /// Once the unit is known.
     fn deliver(&mut self, file: &Path) {
         let batch = self.builder.take();
         self.waiting_rows += batch.rows;

@@ -1,4 +1,4 @@
-//! All columns of a source of rows as they are, to be looked at.
+//! Whole columns of a source.
 
 use crate::columns::column_selection::{AvailableColumn, ChosenColumn};
 use crate::columns::unit::Unit;
@@ -6,60 +6,49 @@ use crate::input::input_error::InputError;
 use crate::rows::batch::BatchBuilder;
 use crate::rows::row_source::{Ending, Refusal, RowSource};
 
-/// Numbers that are held at most, 128 MiB.
+/// 128 MiB.
 const MOST_VALUES: u64 = 1 << 24;
 
-/// Most rows of a recording that is read from a file: they take 2 GiB. A longer one is given in parts.
+/// 2 GiB in memory; longer ones go in parts.
 pub const MAX_SAMPLES: u64 = 1 << 25;
 
-/// Rows of so many columns that are looked at: a recording of a day of a usual sensor.
 fn most_rows(columns: usize) -> u64 {
     MOST_VALUES / (columns.max(1) as u64)
 }
 
-/// A column and its numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct WholeColumn {
     pub(crate) column: AvailableColumn,
-    /// One a row, in the unit of the file; NaN where there is none.
+    /// File's unit; NaN if missing.
     pub(crate) values: Vec<f64>,
 }
 
-/// A sensor that the format or the names of the columns tell.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct WholeSensor {
-    /// For `--topic`; empty where the file has one sensor.
+    /// May be empty.
     pub(crate) name: String,
-    /// Channel, `time` or `sample`; position of the column; and the unit that the format says.
+    /// Channel, `time` or `sample`; position; stated unit.
     pub(crate) columns: Vec<(&'static str, usize, Option<Unit>)>,
 }
 
-/// The rows of a source.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct WholeTable {
-    /// For `--topic`; empty where there is one source.
+    /// May be empty.
     pub(crate) name: String,
-    /// Its type in the file; empty where there is none.
+    /// May be empty.
     pub(crate) kind: String,
-    /// The columns, in their order.
     pub(crate) columns: Vec<WholeColumn>,
-    /// Sensors that the format knows.
     pub(crate) sensors: Vec<WholeSensor>,
-    /// Whether its columns are arrays, which may lie in several groups.
+    /// Arrays of perhaps several groups.
     pub(crate) is_of_arrays: bool,
-    /// The rate that the file states beside its rows, Hz.
+    /// Stated, Hz.
     pub(crate) rate_hz: Option<f64>,
-    /// Whether there are more rows than are held.
     pub(crate) is_cut: bool,
-    /// What the user should know, one sentence each.
     pub(crate) notes: Vec<String>,
 }
 
 impl WholeTable {
-    /// With the rows of `source`, whose columns were chosen as they are.
-    ///
-    /// # Errors
-    /// It has no row that can be read.
+    /// Columns as they are; an error if no row can be read.
     pub(crate) fn read(mut self, source: &mut dyn RowSource) -> Result<Self, InputError> {
         let chosen = source.chosen().to_vec();
         let most = most_rows(chosen.len());
@@ -86,7 +75,6 @@ impl WholeTable {
         Ok(Self { columns, is_cut, rate_hz: source.rate_hz(), ..self })
     }
 
-    /// Number of rows.
     pub(crate) fn rows(&self) -> usize {
         self.columns.first().map_or(0, |column| column.values.len())
     }

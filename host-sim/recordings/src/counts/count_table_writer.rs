@@ -1,4 +1,4 @@
-//! Recordings written as a table of register counts, which [`count_table`](crate::reading::count_table) reads back.
+//! Tables of register counts, as [`count_table`](crate::reading::count_table) reads them.
 
 use crate::recording::Recording;
 use adis16405_driver::Channel;
@@ -9,10 +9,8 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// Suffix of every column that holds counts.
 const COUNTS: &str = "_counts";
 
-/// Whether a first line names a channel of register counts.
 pub(crate) fn is_header(header: &str) -> bool {
     let is_channel = |name: &str| {
         let channel = delimited_text::field(name).strip_suffix(COUNTS);
@@ -21,13 +19,10 @@ pub(crate) fn is_header(header: &str) -> bool {
     header.split([',', ';', '\t', ' ']).any(is_channel)
 }
 
-/// Writes the samples of `recording` as a table, gzip if the name of `file` ends in `.gz`.
+/// Writes a table, gzip for a name in `.gz`.
 ///
-/// The columns are `sample` and `time_s`, where every sample has them, and the counts of the recorded channels. A table has no
-/// flags: samples with a fault are rows like the others, and neither the gyroscopes' range nor the reason of a refusal is in it.
-///
-/// # Errors
-/// The file cannot be created or written.
+/// Columns: `sample` and `time_s`, if every sample has them, and counts. Neither faults nor the gyroscopes' range is in
+/// it.
 pub fn write(recording: &Recording, file: &Path) -> io::Result<()> {
     write_text(file, |out| write_rows(recording, out))
 }
@@ -55,7 +50,7 @@ fn write_rows(recording: &Recording, out: &mut dyn Write) -> io::Result<()> {
     let mut row = String::new();
     for sample in &recording.samples {
         row.clear();
-        // `{}` of a float is the shortest text that reads back to the same value.
+        // `{}` of a float reads back to the same value.
         let index = sample.time_stamp.index.filter(|_| has_index).map(|index| index.to_string());
         let time = sample.time_stamp.time_s.filter(|_| has_time).map(|time| time.to_string());
         let counts = recording.channels.iter().map(|channel| sample.counts.get(*channel).to_string());

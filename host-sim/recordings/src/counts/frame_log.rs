@@ -1,6 +1,4 @@
-//! Logs of the SPI bus: one line a transaction (chip select low), `time_s,mosi,miso`, bytes in hexadecimal.
-//!
-//! Times are written with as many digits as they need to be read back exactly.
+//! Logs of the SPI bus: a line per transaction, `time_s,mosi,miso`, bytes in hexadecimal; times read back exactly.
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -15,24 +13,21 @@ use std::time::{Duration, Instant};
 /// First line of every log.
 pub const HEADER: &str = "time_s,mosi,miso";
 
-/// Longest time that a line stays in memory while others follow, and most bytes of them.
+/// Longest delay of a line, and most pending bytes.
 const MAX_DELAY: Duration = Duration::from_secs(1);
 const MAX_BUFFERED: usize = 1 << 22;
-/// Bytes between two looks at the clock.
 const CLOCK_BYTES: usize = 1 << 12;
 
 const TIME: &str = "time_s";
 const MOSI: &str = "mosi";
 const MISO: &str = "miso";
 
-/// Bytes of one SPI transaction, chip select low.
+/// One SPI transaction.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Frame {
-    /// When chip select went low, s.
+    /// Fall of chip select, s.
     pub time_s: f64,
-    /// Bytes to the part; an even number.
     pub mosi: Vec<u8>,
-    /// Bytes from the part; as many.
     pub miso: Vec<u8>,
 }
 
@@ -54,7 +49,6 @@ impl FrameLogReader {
         Self::new(file.name(), Lines::open(&file)?)
     }
 
-    /// As [`open`](Self::open), of a file that was opened before.
     pub(crate) fn new(file: &Path, mut lines: Lines) -> Result<Self, InputError> {
         match lines.next_line()? {
             None => Err(InputError::file(file, Reason::Empty)),
@@ -119,15 +113,11 @@ pub(crate) fn bytes(text: &str) -> Result<Vec<u8>, Reason> {
         .ok_or_else(|| Reason::NotHex(delimited_text::quote(text)))
 }
 
-/// A log that is being written; gzip if the name ends in `.gz`.
-///
-/// What was written before the last second is in the file, also where the program ends without [`finish`](Self::finish): a
-/// gzip log is a row of members, each of which is written at once.
+/// A log being written, gzip for a name in `.gz`; complete up to the last second without [`finish`](Self::finish).
 #[derive(Debug)]
 pub struct FrameLogWriter<W = File> {
     out: W,
     is_gzip: bool,
-    /// Lines that are not written yet.
     text: String,
     /// `None` where there is no clock.
     written: Option<Instant>,
@@ -135,9 +125,6 @@ pub struct FrameLogWriter<W = File> {
 
 impl FrameLogWriter {
     /// Creates `file` and writes the header.
-    ///
-    /// # Errors
-    /// The file cannot be created or written.
     pub fn create(file: &Path) -> io::Result<Self> {
         let is_gzip = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gz"));
         Ok(Self { is_gzip, written: Some(Instant::now()), ..FrameLogWriter::new(File::create(file)?) })
@@ -151,12 +138,8 @@ impl<W: Write> FrameLogWriter<W> {
     }
 
     /// Adds one frame.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn write(&mut self, frame: &Frame) -> io::Result<()> {
         let (before, text) = (self.text.len(), &mut self.text);
-        // Writing into a string cannot fail. `{}` of a float is the shortest text that reads back to the same value.
         let _ = write!(text, "{},", frame.time_s);
         for byte in &frame.mosi {
             let _ = write!(text, "{byte:02X}");
@@ -177,9 +160,6 @@ impl<W: Write> FrameLogWriter<W> {
     }
 
     /// Writes what is buffered, and ends the log.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn finish(mut self) -> io::Result<()> {
         self.flush()
     }

@@ -1,4 +1,4 @@
-//! Recordings written as a NumPy array of doubles in SI units, for programs that know no register counts.
+//! NumPy arrays of doubles in SI units.
 
 use crate::recording::Recording;
 use std::fs::File;
@@ -8,12 +8,8 @@ use std::path::Path;
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.806_65;
 
-/// Writes `recording` as a matrix: a row a sample; its time in s, where every sample has one, then the recorded channels in the
-/// order of the burst. Angular rates are in rad/s, accelerations in m/s², other channels in their own unit. Returns the names
-/// of the columns.
-///
-/// # Errors
-/// The file cannot be created or written.
+/// Writes a row per sample: time in s, if every sample has one, then channels in the order of the burst; rad/s, m/s²,
+/// others in their unit. Returns the names of the columns.
 pub fn write(recording: &Recording, file: &Path) -> io::Result<Vec<String>> {
     let has_time = recording.samples.iter().all(|sample| sample.time_stamp.time_s.is_some());
     let units: Vec<SiUnit> = recording.channels.iter().map(|channel| SiUnit::of(channel.unit())).collect();
@@ -33,10 +29,9 @@ pub fn write(recording: &Recording, file: &Path) -> io::Result<Vec<String>> {
     Ok(names)
 }
 
-/// Bytes up to the numbers.
 const HEADER: usize = 128;
 
-/// Writes doubles in the order of the rows: format 1.0 of NumPy, whose header is written when the number of rows is known.
+/// Row-major NumPy format 1.0; the header is written at the end.
 pub(crate) struct MatrixWriter {
     out: BufWriter<File>,
     rows: u64,
@@ -57,7 +52,7 @@ impl MatrixWriter {
         Ok(())
     }
 
-    /// Ends a matrix of so many columns.
+    /// `columns` per row.
     pub(crate) fn finish(mut self, columns: usize) -> io::Result<()> {
         let start = [&b"\x93NUMPY\x01\x00"[..], &(HEADER as u16 - 10).to_le_bytes()].concat();
         let shape = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, {columns}), }}", self.rows);
@@ -70,14 +65,13 @@ impl MatrixWriter {
 
 /// The unit of a column in SI.
 pub(crate) struct SiUnit {
-    /// End of the name of the column.
     pub(crate) suffix: &'static str,
     /// From the channel's unit.
     pub(crate) factor: f64,
 }
 
 impl SiUnit {
-    /// For a channel in `unit`; rates and specific forces alone have another unit in SI.
+    /// Only rates and specific forces are converted.
     pub(crate) fn of(unit: &'static str) -> Self {
         let (suffix, factor) = match unit {
             "deg/s" => ("rad_s", std::f64::consts::PI / 180.0),
@@ -109,14 +103,14 @@ mod tests {
         let names = write(&recorder.finish(), &file).expect("written");
         assert_eq!(names, ["time_s", "gyro_x_rad_s", "accl_z_m_s2", "temp_degC"]);
         let bytes = std::fs::read(&file).expect("a file");
-        // numpy.lib.format, version 1.0: magic, version, length of the header, header, and the numbers, aligned to 64 bytes.
+        // Magic, version, length, header; numbers aligned to 64 bytes.
         let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (3, 4), }";
         assert_eq!(bytes[..10], *b"\x93NUMPY\x01\x00\x76\x00");
         assert_eq!(std::str::from_utf8(&bytes[10..128]).expect("text").trim_end(), header);
         assert_eq!((bytes[127], bytes.len()), (b'\n', 128 + 3 * 4 * 8));
         let values: Vec<f64> =
             bytes[128..].chunks_exact(8).map(|of| f64::from_le_bytes(of.try_into().expect("eight"))).collect();
-        // Data sheet: 0.025 °/s, 3.33 mg and 0.14 °C per count; 25 °C at 0 counts.
+        // 0.025 °/s, 3.33 mg, 0.14 °C per count; 25 °C at 0.
         let expected = [0.02, (200.0 * 0.025_f64).to_radians(), -300.0 * 3.33e-3 * 9.806_65, 25.0 + 10.0 * 0.14];
         for (found, expected) in values[8..].iter().zip(expected) {
             assert!((found - expected).abs() < 1e-12, "{found}, not {expected}");

@@ -1,4 +1,4 @@
-//! What was on the SPI bus, by this program or by a logic analyzer.
+//! SPI transactions of this program or a logic analyzer.
 
 use crate::counts::frame_log::{FrameLogReader, HEADER};
 use crate::counts::spi_export::{self, CapturedFrame, SpiExportReader};
@@ -7,14 +7,12 @@ use readers::{FileBytes, InputError};
 
 /// Transactions of the SPI bus, by this program or by a logic analyzer.
 pub enum FrameReader {
-    /// A log of this program.
     Log(FrameLogReader),
-    /// An export of a logic analyzer.
     Export(Box<SpiExportReader>),
 }
 
 impl FrameReader {
-    /// Opens `file`, plain or gzip; `None` where its first line is that of a table.
+    /// Opens `file`, plain or gzip; `None` for a table.
     ///
     /// # Errors
     /// The file cannot be read, or its header is that of none of the formats.

@@ -1,4 +1,4 @@
-//! The serial link to a device that runs the firmware, and the recording of its raw bursts as a frame log.
+//! The serial link to the firmware, and recording of its raw bursts as a frame log.
 
 use crate::counts::frame_log::{Frame, FrameLogWriter};
 use adis16405_driver::{BURST_REQUEST, Register};
@@ -14,16 +14,16 @@ use std::time::{Duration, Instant};
 /// Baud rate of the firmware's boards, Bd.
 pub const BAUD: u32 = 460_800;
 
-/// Longest time that a read waits for bytes. Deadlines are checked as often.
+/// Longest wait of a read, and so the resolution of deadlines.
 const READ_TIMEOUT: Duration = Duration::from_millis(50);
 
 /// Longest time without a burst during a recording.
 const MAX_SILENCE: Duration = Duration::from_secs(10);
 
-/// Silence during a recording after which the device is asked again for its raw stream.
+/// Silence after which the raw stream is requested again.
 const ASK_AGAIN: Duration = Duration::from_secs(2);
 
-/// Opens the serial port `port`, a device file or a pseudo-terminal, at `baud` Bd.
+/// Opens a device file or pseudo-terminal at `baud` Bd.
 ///
 /// # Errors
 /// There is no such port, or it cannot be set up.
@@ -34,7 +34,7 @@ pub fn open(port: &str, baud: u32) -> io::Result<SerialPort> {
     Ok(port)
 }
 
-/// Names of the serial ports of this machine, as far as the system says them.
+/// As far as the system lists them.
 #[cfg(feature = "serial")]
 #[must_use]
 pub fn ports() -> Vec<String> {
@@ -51,21 +51,18 @@ pub struct SerialLink<P> {
 }
 
 impl<P: Read + Write> SerialLink<P> {
-    /// A link over `port`. Its reads must time out, or [`next`](Self::next) does not return at its deadline.
+    /// Reads of `port` must time out, for the deadline of [`next`](Self::next).
     pub fn new(port: P) -> Self {
         Self { port, decoder: Decoder::new(), received: VecDeque::new(), disconnected: false }
     }
 
-    /// Sends a command line, ended by a carriage return.
-    ///
-    /// # Errors
-    /// The port cannot be written.
+    /// Sends a line, ended by a carriage return.
     pub fn send_command(&mut self, text: &str) -> io::Result<()> {
         self.port.write_all(format!("{text}\r").as_bytes())?;
         self.port.flush()
     }
 
-    /// The next message or text line; `None` when the device has disconnected, or at `deadline`.
+    /// `None` after a disconnection, or at `deadline`.
     ///
     /// # Errors
     /// The port fails.
@@ -92,18 +89,18 @@ impl<P: Read + Write> SerialLink<P> {
         Ok(self.received.pop_front())
     }
 
-    /// Whether the device has closed the port.
+    /// True if the device has closed the port.
     pub fn is_disconnected(&self) -> bool {
         self.disconnected
     }
 
-    /// Numbers of messages received, missing and damaged so far.
+    /// Messages received, missing and damaged.
     pub fn counters(&self) -> DecoderCounters {
         self.decoder.counters()
     }
 }
 
-/// Whether the other end has closed the port: a pseudo-terminal then answers EIO.
+/// A closed pseudo-terminal answers EIO.
 fn is_hang_up(error: &io::Error) -> bool {
     const EIO: i32 = 5;
     error.kind() == ErrorKind::BrokenPipe || error.raw_os_error() == Some(EIO)
@@ -113,19 +110,15 @@ fn is_hang_up(error: &io::Error) -> bool {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SerialRecordingError {
-    /// The port failed.
     #[error("serial port: {0}")]
     Port(io::Error),
-    /// The log could not be written.
     #[error("recording: {0}")]
     Log(io::Error),
     /// No burst came for 10 s.
     #[error("the device sent no bursts for 10 s, after {0} of them")]
     Silent(u64),
-    /// The device closed the port.
     #[error("the device hung up, after {0} bursts")]
     Disconnected(u64),
-    /// The length of the recording is not positive and finite.
     #[error("a duration of {0} s: it must be positive and finite")]
     Duration(f64),
 }
@@ -133,26 +126,23 @@ pub enum SerialRecordingError {
 /// Counts of a recording over the serial link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SerialRecordingSummary {
-    /// Bursts in the log.
     pub bursts: u64,
-    /// Sample periods between the first and the last burst of which no burst came: lost on the device or on the link. While
-    /// the device restarted none are counted.
+    /// Sample periods without a burst between first and last, except during restarts.
     pub missing: u64,
-    /// Restarts of the device.
     pub restarts: u64,
-    /// Whether the recording was ended before its time.
+    /// True if ended early.
     pub interrupted: bool,
-    /// Bursts until the device hung up or fell silent, where it did after the first of them.
+    /// Bursts before the device hung up or fell silent.
     pub lost_after: Option<u64>,
-    /// Of the link.
     pub counters: DecoderCounters,
 }
 
-/// Turns the raw stream on, writes `seconds` of it, by the device's clock, to the frame log `file`, and turns it off. It ends
-/// early, with what came until then, as soon as `is_interrupted` returns true. The file is created at the first burst.
+/// Records `seconds` of the raw stream, by the device's clock, to the frame log `file`. Ends early when
+/// `is_interrupted` returns true. The file is created at the first burst.
 ///
 /// # Errors
-/// The device is silent or hangs up before its first burst, or the port or the file fails. The bursts that came until then are in the file.
+/// The device is silent or hangs up before its first burst, or the port or the file fails. The bursts that came until
+/// then are in the file.
 pub fn record<P: Read + Write>(
     link: &mut SerialLink<P>,
     file: &Path,
@@ -186,7 +176,7 @@ pub fn record<P: Read + Write>(
                 break Err(SerialRecordingError::Silent(bursts(&recorder)));
             }
             Ok(None) => {
-                // A device that has restarted has forgotten the command; if it cannot be sent, the silence is reported.
+                // A restarted device has forgotten the command.
                 if asked.elapsed() >= ASK_AGAIN && silent_since.elapsed() >= ASK_AGAIN {
                     let _ = link.send_command("w 1");
                     asked = Instant::now();
@@ -195,7 +185,7 @@ pub fn record<P: Read + Write>(
             Err(error) => break Err(SerialRecordingError::Port(error)),
         }
     };
-    // A device that has disconnected cannot be told; the outcome says so already.
+    // The outcome already reports a disconnection.
     let _ = link.send_command("w 0");
     let mut summary = SerialRecordingSummary {
         bursts: 0,
@@ -211,7 +201,7 @@ pub fn record<P: Read + Write>(
             (recorder.bursts(), recorder.missing(), recorder.restarts());
         finished = recorder.finish().map_err(SerialRecordingError::Log);
     }
-    // What came until then is in the log, and is as good as without the end.
+    // The log is good up to here.
     summary.interrupted = match outcome {
         Err(SerialRecordingError::Disconnected(bursts) | SerialRecordingError::Silent(bursts)) if bursts > 0 => {
             summary.lost_after = Some(bursts);
@@ -223,17 +213,13 @@ pub fn record<P: Read + Write>(
     Ok(summary)
 }
 
-/// Whether `start`, the first bytes of a file, has a message of the raw stream of a device.
+/// True if `start` has a message of a raw stream.
 pub(crate) fn is_capture(start: &[u8]) -> bool {
     let mut decoder = Decoder::new();
     start.iter().any(|&byte| matches!(decoder.push(byte), Some(Received::Message { message: Message::Raw(_), .. })))
 }
 
-/// Writes the bursts of `capture`, the bytes that a device sent while its raw stream was on, as a frame log to `out`. A
-/// restart of the device takes no time: how long it lasted is not known.
-///
-/// # Errors
-/// The capture cannot be read or the log cannot be written.
+/// Writes the bursts of `capture`, bytes of a raw stream, as a frame log to `out` (an error of either); restarts take no time.
 pub(crate) fn log_of_capture(mut capture: impl Read, out: impl Write) -> io::Result<()> {
     let mut recorder = RawStreamRecorder::new(FrameLogWriter::new(out));
     let mut decoder = Decoder::new();
@@ -253,7 +239,7 @@ pub(crate) fn log_of_capture(mut capture: impl Read, out: impl Write) -> io::Res
     }
 }
 
-/// Adds a message to the log, which is created before the first burst.
+/// The log is created before the first burst.
 fn write(recorder: &mut Option<RawStreamRecorder>, file: &Path, raw: &RawMessage) -> io::Result<()> {
     if recorder.is_none() && !raw.bursts.is_empty() {
         *recorder = Some(RawStreamRecorder::create(file)?);
@@ -270,28 +256,23 @@ fn next_raw<P: Read + Write>(link: &mut SerialLink<P>, deadline: Instant) -> io:
     Ok(None)
 }
 
-/// Writes the raw stream of a device to a frame log.
-///
-/// Time goes on where the device restarts and its clock begins at 0 again: by as much as has passed on the host since the last
-/// message.
+/// Writes a raw stream to a frame log. After a restart, time goes on by the host's clock.
 pub struct RawStreamRecorder<W = File> {
     log: FrameLogWriter<W>,
-    /// Register SENS_AVG as last written to the log.
+    /// SENS_AVG as last logged.
     sens_avg: Option<u16>,
     bursts: u64,
     missing: u64,
     restarts: u64,
-    /// Time in the log of the first burst, µs.
+    /// First burst in the log, µs.
     first_us: Option<u64>,
-    /// The newest burst.
     last: Option<LastBurst>,
-    /// Time in the log less the device's time, µs.
+    /// Log time less device time, µs.
     offset_us: i128,
 }
 
-/// The newest burst in a log.
 struct LastBurst {
-    /// By the device's counter and clock.
+    /// Device counter and clock.
     number: u64,
     at_us: u64,
     /// In the log, µs.
@@ -302,9 +283,6 @@ struct LastBurst {
 
 impl RawStreamRecorder {
     /// Creates the log.
-    ///
-    /// # Errors
-    /// The file cannot be created.
     pub fn create(file: &Path) -> io::Result<Self> {
         FrameLogWriter::create(file).map(Self::new)
     }
@@ -315,22 +293,19 @@ impl<W: Write> RawStreamRecorder<W> {
         Self { log, sens_avg: None, bursts: 0, missing: 0, restarts: 0, first_us: None, last: None, offset_us: 0 }
     }
 
-    /// Adds the bursts of one message, each at the time of its data-ready edge. At the start and where SENS_AVG changes, a
-    /// frame that writes it comes first, from which a replay takes the gyroscopes' range.
-    ///
-    /// # Errors
-    /// The file cannot be written.
+    /// Adds the bursts of a message at their data-ready times. A frame that writes SENS_AVG comes first and at changes,
+    /// for the range in a replay.
     pub fn write(&mut self, raw: &RawMessage) -> io::Result<()> {
         self.write_received(raw, Some(Instant::now()))
     }
 
-    /// As [`write`](Self::write), of a message that the host received at another time than now.
+    /// For a message received at `received`, where it is known.
     fn write_received(&mut self, raw: &RawMessage, received: Option<Instant>) -> io::Result<()> {
         if raw.bursts.is_empty() {
             return Ok(());
         }
         let (mut number, mut at_us) = (raw.first, raw.at_us);
-        // With new settings the device counts from the start, without a restart.
+        // New settings restart the device's count.
         if let Some(last) = self.last.as_mut().filter(|last| number < last.number) {
             last.number = number.saturating_sub(1);
         }
@@ -365,9 +340,6 @@ impl<W: Write> RawStreamRecorder<W> {
     }
 
     /// Writes what is buffered and closes the log.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn finish(self) -> io::Result<()> {
         self.log.finish()
     }
@@ -383,7 +355,7 @@ impl<W: Write> RawStreamRecorder<W> {
         self.bursts
     }
 
-    /// Sample periods between the first and the last burst of which no burst came, those of restarts left out.
+    /// Sample periods without a burst, except during restarts.
     pub fn missing(&self) -> u64 {
         self.missing
     }

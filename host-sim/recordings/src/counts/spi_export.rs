@@ -1,6 +1,7 @@
-//! Exports of logic analyzers' SPI decoders: what was on the bus, transaction by transaction, with its times.
+//! SPI exports of logic analyzers.
 //!
-//! - Saleae Logic 2, data table: `name,type,start_time,duration,…,mosi,miso` with rows of type `enable`, `result` and `disable`.
+//! - Saleae Logic 2, data table: `name,type,start_time,duration,…,mosi,miso` with rows of type `enable`, `result` and
+//!   `disable`.
 //! - sigrok-cli: `-A spi=mosi-transfer:miso-transfer --protocol-decoder-jsontrace`, one line an event.
 
 use crate::counts::frame_log::Frame;
@@ -16,17 +17,16 @@ const MICROSECOND: f64 = 1e-6;
 /// A transaction on the bus.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CapturedFrame {
-    /// The bytes, and when chip select went low.
+    /// Bytes, and fall of chip select.
     pub frame: Frame,
-    /// When chip select went high, s; `None` where the export does not say.
+    /// Rise of chip select, s; `None` if not exported.
     pub end_s: Option<f64>,
 }
 
-/// How an export is laid out.
 #[derive(Debug, Clone, PartialEq)]
 enum Layout {
-    /// Positions of type, start, duration, MOSI and MISO.
     SaleaeTable {
+        /// Positions of the columns.
         kind: usize,
         start: usize,
         duration: usize,
@@ -37,7 +37,6 @@ enum Layout {
 }
 
 impl Layout {
-    /// The layout whose first line is `header`.
     fn of_header(header: &str) -> Option<Self> {
         let names: Vec<String> = header.split(',').map(|name| delimited_text::field(name).to_lowercase()).collect();
         let position = |wanted: &str| names.iter().position(|name| name == wanted);
@@ -54,7 +53,6 @@ impl Layout {
     }
 }
 
-/// Whether a first line is that of an export.
 pub(crate) fn is_header(header: &str) -> bool {
     Layout::of_header(header).is_some()
 }
@@ -66,14 +64,12 @@ pub struct SpiExportReader {
     layout: Layout,
     line: u64,
     last_s: f64,
-    /// The transaction that is being read.
     open: Option<CapturedFrame>,
-    /// Transactions of sigrok whose other line has not come yet.
+    /// Sigrok transactions without their other line.
     waiting: VecDeque<(bool, CapturedFrame)>,
 }
 
 impl SpiExportReader {
-    /// Over a file that was opened before.
     pub(crate) fn new(file: &Path, mut lines: Lines) -> Result<Self, InputError> {
         let header = lines.next_line()?.and_then(|(line, header)| Some((line, Layout::of_header(header)?)));
         let (line, layout) = header.ok_or_else(|| InputError::file(file, Reason::NotFrameLog))?;
@@ -138,7 +134,7 @@ impl SpiExportReader {
         Err(InputError::line(&self.file, self.line, reason))
     }
 
-    /// A row of Saleae's data table: a transaction goes from `enable` to `disable`.
+    /// From `enable` to `disable`.
     fn table_row(&mut self, text: &str, positions: [usize; 5]) -> Result<Option<CapturedFrame>, Reason> {
         let fields: Vec<&str> = text.split(',').map(delimited_text::field).collect();
         let expected = positions.into_iter().max().unwrap_or(0) + 1;
@@ -165,7 +161,7 @@ impl SpiExportReader {
         }
     }
 
-    /// An event of sigrok: the begin and the end of the bytes of one line; MISO and MOSI of a transaction begin together.
+    /// Bytes of one line; MISO and MOSI begin together.
     fn event(&mut self, text: &str) -> Result<Option<CapturedFrame>, Reason> {
         let text = text.trim_end_matches(',');
         if !text.starts_with("{\"ph\"") {
@@ -192,7 +188,6 @@ impl SpiExportReader {
             self.waiting.push_back((is_mosi, captured));
             return Ok(None);
         }
-        // The end of the second line ends the transaction.
         match (self.waiting.pop_front(), self.waiting.pop_front()) {
             (Some((first_is_mosi, first)), Some((second_is_mosi, second)))
                 if first_is_mosi != second_is_mosi && first.frame.time_s == second.frame.time_s =>
@@ -215,7 +210,7 @@ fn starting_at(time_s: f64) -> CapturedFrame {
     CapturedFrame { frame: Frame { time_s, ..Frame::default() }, end_s: None }
 }
 
-/// The bytes of a word in hexadecimal: `0x3E`, `0x3E00` or `3E`.
+/// `0x3E`, `0x3E00` or `3E`.
 fn word(text: &str) -> Result<Vec<u8>, Reason> {
     let digits = text.strip_prefix("0x").unwrap_or(text);
     if digits.is_empty() {

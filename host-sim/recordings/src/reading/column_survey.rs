@@ -1,4 +1,4 @@
-//! What the numbers of a column show before they become counts.
+//! Numbers of a column before they become counts.
 
 use crate::batch_source::channel;
 use crate::recording::Verdict;
@@ -7,23 +7,18 @@ use measurement::ChannelProfile;
 use readers::{ColumnQuantizer, ValueColumn};
 use std::collections::BTreeMap;
 
-/// How often a range of the data sheet a value may be before it is no measurement.
+/// Factor on a data sheet's range of plausible values.
 const MAX_RANGES: f64 = 2.0;
 
-/// The same in the unit of a channel whose range is not known: far above what any sensor measures in deg/s, g or gauss, and the largest
-/// count of 32 bits.
+/// For unknown ranges: above any sensor in deg/s, g or gauss, and the largest 32-bit count.
 const LARGEST_VALUE: f64 = 4.3e9;
 
-/// Largest part of the variance of the noise that rounding adds without a note: ten times what it adds where there is room for it, and
-/// a twentieth of a percent of N.
+/// Largest relative variance by rounding without a note: a twentieth of a percent of N.
 const NOTED_COST: f64 = 1e-3;
 
-/// Consecutive rows of a column of which all are kept or none.
 const RUN: usize = 64;
-/// Numbers of a column that are kept at most.
 const MOST_KEPT: usize = 1 << 17;
 
-/// Why a number of a row is no measurement, if so.
 pub(crate) fn refusal(column: &ValueColumn, value: f64, verdict: Option<&Verdict>) -> Option<&'static str> {
     if value.is_nan() {
         return Some("missing");
@@ -50,19 +45,18 @@ fn refusal_of_register(channel: Channel, count: f64, verdict: Verdict) -> Option
     fault.cause()
 }
 
-/// The largest value of a channel that is a measurement, in its unit.
+/// In the channel's unit.
 fn largest_value(profile: &ChannelProfile) -> f64 {
     profile.range.map_or(LARGEST_VALUE, |range| MAX_RANGES * range)
 }
 
-/// Numbers of a column, evenly spread in runs of neighbours with NaN between the runs: all numbers of a column up to 2¹⁷.
+/// Evenly spread runs of a column's numbers, NaN between; all up to 2¹⁷.
 #[derive(Debug, Clone)]
 pub(crate) struct ColumnSurvey {
     values: Vec<f64>,
-    /// Numbers seen, and how many runs there are for one that is kept.
+    /// Numbers, and stride of the kept runs.
     seen: usize,
     stride: usize,
-    /// Whether a number can be used, and whether one is not zero.
     is_usable: bool,
     has_other_than_zero: bool,
     /// Numbers that are refused, by cause.
@@ -81,7 +75,7 @@ impl ColumnSurvey {
         }
     }
 
-    /// Adds the numbers of rows that arrived, and makes those that are refused NaN.
+    /// Sets refused numbers to NaN.
     pub(crate) fn add(&mut self, column: &ValueColumn, values: &mut [f64], verdicts: &[Verdict]) {
         for (row, value) in values.iter_mut().enumerate() {
             if let Some(cause) = refusal(column, *value, verdicts.get(row)) {
@@ -107,28 +101,24 @@ impl ColumnSurvey {
         }
     }
 
-    /// Numbers that were added.
     pub(crate) fn rows(&self) -> usize {
         self.seen
     }
 
-    /// Whether all numbers that can be used are zero.
     pub(crate) fn is_zero(&self) -> bool {
         self.is_usable && !self.has_other_than_zero
     }
 
-    /// Whether the next number is in a run that is kept. The stride is a power of two.
+    /// True in a kept run; the stride is a power of two.
     fn is_kept(&self) -> bool {
         (self.seen / RUN) & (self.stride - 1) == 0
     }
 
-    /// Drops every second run.
     fn thin(&mut self) {
         let kept = self.values.chunks(RUN).step_by(2).flatten().copied().collect();
         self.values = kept;
     }
 
-    /// The numbers that are kept.
     fn values(&self) -> Vec<f64> {
         if self.stride == 1 {
             return self.values.clone();
@@ -137,21 +127,18 @@ impl ColumnSurvey {
         self.values.chunks(RUN).flat_map(run).collect()
     }
 
-    /// How the numbers become counts; `None` where none can be used.
     pub(crate) fn quantizer(&self, column: &ValueColumn) -> Option<ColumnQuantizer> {
         let of_values =
             || if column.register.is_some() { ColumnQuantizer::COUNTS } else { ColumnQuantizer::new(&self.values()) };
         self.is_usable.then(of_values)
     }
 
-    /// The same for numbers that are no multiples of the step of those that were kept.
     pub(crate) fn quantizer_without_step(&self) -> ColumnQuantizer {
         ColumnQuantizer::without_step(&self.values())
     }
 }
 
-/// What the user should know of the counts that stand for the numbers of some channels; `None` where rounding to them costs nothing that
-/// counts.
+/// A note on channels whose rounding costs precision; `None` if negligible.
 pub(crate) fn rounding_note<'a>(
     channels: impl Iterator<Item = (&'a ChannelProfile, &'a ColumnQuantizer)>,
 ) -> Option<String> {

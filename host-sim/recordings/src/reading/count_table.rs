@@ -1,4 +1,4 @@
-//! Tables of register counts of an ADIS16405: text tables whose numbers fit their registers.
+//! Text tables of ADIS16405 register counts.
 
 use crate::batch_source::{channel, for_each_batch};
 use crate::file_format::{self, RecordedInput, options_of_counts};
@@ -7,10 +7,9 @@ use adis16405_driver::{Burst, Channel, Counts, GyroRange};
 use readers::{Batch, FileBytes, FileRows, InputError, InputFile, ReadMonitor, Reason, StreamError, WantedRows};
 use time_base::TimeRange;
 
-/// Reads a table, plain or gzip, into a recording whose rates were taken in `range`.
+/// Reads a table, plain or gzip, with rates in `range`.
 ///
-/// The header names the columns: `<channel>_counts` for any of the twelve channels in any order, and the optional time stamps
-/// `sample` (an index that grows by one a sample) and `time_s`.
+/// Columns: `<channel>_counts` in any order, optional `sample` (index) and `time_s`.
 ///
 /// # Errors
 /// The file cannot be read, or a row is at fault.
@@ -21,7 +20,7 @@ pub fn read(file: impl Into<FileBytes>, range: GyroRange) -> Result<Recording, I
     rows.finish(file)
 }
 
-/// The rows of a table of counts as a recording, whose channels are known with the first row.
+/// Channels are known with the first row.
 struct RecordedCounts {
     range: GyroRange,
     recorder: Option<Recorder>,
@@ -43,8 +42,7 @@ impl RecordedCounts {
     }
 }
 
-/// Calls `take` with the channels of a table, and each row: when its sample was taken, and counts in the range of their register fields;
-/// channels that the table lacks are as in [`NOT_RECORDED`].
+/// Calls `take` with the channels and each row: time stamp and counts, absent channels as in [`NOT_RECORDED`].
 ///
 /// # Errors
 /// As [`read`], and what `take` refuses.

@@ -1,33 +1,24 @@
-//! Rows in which a channel is at full scale, counted while they are read.
-//!
-//! The full scale is that of the data sheet, else that of 16 bits if the counts reach it and do not exceed it. How large a count is, is known
-//! at the end: until then a row is a candidate while it has the largest or the smallest number of its column.
+//! Counts rows with a channel at full scale by the data sheet, else at 16 bits if reached but not exceeded.
 
 use readers::{ColumnQuantizer, ValueColumn};
 use std::collections::BTreeMap;
 
-/// Largest and smallest count of 16 bits.
 const MAX_16_BITS: i32 = i16::MAX as i32;
 const MIN_16_BITS: i32 = i16::MIN as i32;
-/// Channels that are looked at: two bits each of a mask.
 const MOST_COLUMNS: usize = 64;
-/// Half a count of 16 bits, in the range.
+/// Relative to the range.
 const HALF_COUNT: f64 = 1.0 / 65_536.0;
 
-/// The largest, or the smallest, number of a column.
 #[derive(Debug, Clone, Copy)]
 struct Extreme {
     value: f64,
-    /// Row of the recording in which it is first, and how many rows have it.
     first_row: u64,
     count: u64,
 }
 
-/// Counts the rows at full scale.
 pub(crate) struct FullScale {
-    /// Of each column: its largest number and its smallest one.
+    /// Largest and smallest number by column.
     extremes: Vec<[Extreme; 2]>,
-    /// Rows by the extremes that they have.
     rows: BTreeMap<u128, u64>,
 }
 
@@ -35,20 +26,20 @@ impl FullScale {
     pub(crate) fn new(columns: &[ValueColumn]) -> Self {
         let none = |value: f64| Extreme { value, first_row: 0, count: 0 };
         let of_column = |column: &ValueColumn| {
-            // At the full scale of the data sheet all larger numbers are one.
+            // Larger numbers are at full scale too.
             let range = column.profile.range.map(|range| range * (1.0 - HALF_COUNT) / column.factor);
             [none(range.unwrap_or(f64::NEG_INFINITY)), none(range.map_or(f64::INFINITY, |range| -range))]
         };
         Self { extremes: columns.iter().take(MOST_COLUMNS).map(of_column).collect(), rows: BTreeMap::new() }
     }
 
-    /// Adds consecutive rows from this one on, column by column; numbers that are refused are NaN.
+    /// Rows from `first` on, by column; refused numbers are NaN.
     pub(crate) fn add_rows(&mut self, columns: &[ValueColumn], first_row: u64, values: &[Vec<f64>]) {
         let is_candidate = |(values, [most, least]): (&Vec<f64>, &[Extreme; 2])| {
             values.iter().any(|value| *value >= most.value || *value <= least.value)
         };
         let watched = columns.iter().zip(values).zip(&self.extremes);
-        // Hardly any row has the largest or the smallest number of its column so far.
+        // Hardly any row has an extreme.
         let has_candidate = watched
             .filter(|((column, _), _)| is_watched(column))
             .any(|((_, values), extremes)| is_candidate((values, extremes)));
@@ -60,7 +51,7 @@ impl FullScale {
         }
     }
 
-    /// Adds a usable row, by its number from 0; numbers that are refused are NaN.
+    /// Refused numbers are NaN.
     fn add(&mut self, columns: &[ValueColumn], row: u64, numbers: impl Iterator<Item = f64>) {
         let mut mask = 0u128;
         for (at, (number, column)) in numbers.zip(columns).take(MOST_COLUMNS).enumerate() {
@@ -89,7 +80,7 @@ impl FullScale {
         }
     }
 
-    /// Rows at full scale, and of each channel a sentence on its samples there.
+    /// Rows at full scale, and a note per channel.
     pub(crate) fn finish(&self, columns: &[ValueColumn], quantizers: &[Option<ColumnQuantizer>]) -> (u64, Vec<String>) {
         let (mut mask, mut notes) = (0u128, Vec::new());
         for (at, (extremes, column)) in self.extremes.iter().zip(columns).enumerate() {
@@ -118,12 +109,11 @@ impl FullScale {
     }
 }
 
-/// Whether a column may be at full scale: a supply or a temperature without a range is often constant.
+/// Supply and temperature without a range are often constant.
 fn is_watched(column: &ValueColumn) -> bool {
     column.profile.range.is_some() || column.profile.quantity.is_inertial()
 }
 
-/// Forgets that rows had an extreme that is none any more.
 fn forget(rows: &mut BTreeMap<u128, u64>, bit: u128) {
     let had: Vec<u128> = rows.keys().copied().filter(|mask| mask & bit != 0).collect();
     for mask in had {
@@ -140,7 +130,6 @@ mod tests {
     use measurement::{ChannelProfile, Quantity};
     use readers::{ColumnQuantizer, ValueColumn};
 
-    /// Rows at full scale, and those of the first channel by its note, of counts in two channels.
     fn found(range: Option<f64>, rows: &[[f64; 2]]) -> (u64, Vec<String>) {
         let profile = ChannelProfile { range, ..ChannelProfile::generic("gyro_x", Quantity::AngularRate) };
         let column = ValueColumn { profile, factor: 1.0, label: String::new(), register: None };
@@ -152,7 +141,6 @@ mod tests {
         scale.finish(&columns, &[Some(ColumnQuantizer::COUNTS); 2])
     }
 
-    /// Counts from 0 to 49.
     fn counts() -> Vec<[f64; 2]> {
         (0..50_000).map(|at| [f64::from(at * 7919 % 50), 1.0]).collect()
     }

@@ -1,4 +1,4 @@
-//! The rows of any sensor written as a table with units in its header, and as a NumPy array: a batch at a time, as they are read.
+//! Rows of any sensor as a table with units, and as a NumPy array, batch by batch.
 
 use crate::batch_source::for_each_batch;
 use crate::counts::count_table_writer::write_text;
@@ -13,41 +13,34 @@ use time_base::TimeRange;
 /// The rows of a file that are written.
 #[derive(Debug)]
 pub struct SensorRows<'a> {
-    /// The file.
     pub input: &'a RecordedInput,
-    /// How it is read.
     pub options: ReadOptions,
-    /// A part by time.
     pub part: Option<TimeRange>,
-    /// The sample rate of a recording without times, which places the part, Hz.
+    /// Places the part if there are no times, Hz.
     pub stated_hz: Option<f64>,
 }
 
 /// Why rows are not written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// They cannot be read.
     #[error(transparent)]
     Read(#[from] StreamError),
-    /// The file cannot be written.
     #[error(transparent)]
     Write(#[from] io::Error),
 }
 
-/// What was written.
+/// Result of a writing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WrittenRows {
-    /// Names of the columns.
     pub columns: Vec<String>,
-    /// What the user should know, one sentence each.
+    /// Remarks for the user, one sentence each.
     pub notes: Vec<String>,
-    /// Whether the file was read to its end.
     pub is_complete: bool,
 }
 
 impl SensorRows<'_> {
-    /// Writes the rows as CSV, gzip if the name of `file` ends in `.gz`: `sample` and `time_s`, where the recording has them, and
-    /// the channels with their units in the header, as in `gyro_x [deg/s]`. Times count from the first sample; a missing value is `NaN`.
+    /// Writes CSV, gzip for a name in `.gz`: `sample` and `time_s`, if recorded, then channels as `gyro_x [deg/s]`;
+    /// times from the first sample, `NaN` if missing.
     ///
     /// # Errors
     /// The rows cannot be read, or the file not written.
@@ -66,7 +59,6 @@ impl SensorRows<'_> {
                 text.clear();
                 for row in 0..batch.rows {
                     let start = text.len();
-                    // Writing into a string cannot fail. `{}` of a float is the shortest text that reads back to the same value.
                     if let Some(index) = batch.indices.get(row) {
                         let _ = write!(text, ",{index}");
                     }
@@ -91,8 +83,7 @@ impl SensorRows<'_> {
         failure.map_or_else(|| Ok(written.unwrap_or_else(WrittenRows::none)), Err)
     }
 
-    /// Writes the rows as a NumPy array of doubles in SI units: the time in s first, if there is one, angular rates in rad/s, specific
-    /// forces in m/s², others in the unit of the analysis.
+    /// Writes a NumPy array of doubles: time in s, if any, rad/s, m/s², others in the analysis' unit.
     ///
     /// # Errors
     /// The rows cannot be read, or the file not written.
@@ -117,7 +108,7 @@ impl SensorRows<'_> {
         Ok(written)
     }
 
-    /// Calls `write` with the columns, each batch, and the names of the columns that it wrote.
+    /// Calls `write` with columns, batch, and names.
     fn for_each_batch(
         &self,
         mut write: impl FnMut(&[ValueColumn], &Batch, &mut Vec<String>) -> io::Result<()>,

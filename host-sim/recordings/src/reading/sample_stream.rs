@@ -1,8 +1,4 @@
-//! The samples of a recording on their time base, read in batches.
-//!
-//! A first reading tells the rate, the length, and the size of a count. The rows of a recording that is short enough are kept from it; a
-//! longer one is read once more for its samples. Both go the same way, so that memory does not depend on the length of a recording, and
-//! nothing else does either.
+//! Samples on their time base, in batches, in bounded memory: a first reading finds rate, length and counts.
 
 use crate::batch_source::{BatchSource, RecordedRows};
 use crate::file_format::{RecordedInput, options_of_counts};
@@ -26,22 +22,21 @@ type Batch = readers::Batch<Verdict>;
 
 pub use readers::{RowsRead, StreamError};
 
-/// Sample periods at the start of a recording whose samples are kept.
+/// Sample periods kept from the start.
 const BEGINNING: u64 = 1 << 16;
-/// Rows that are kept of a longer recording, to begin with.
+/// Rows kept of a longer recording at first.
 const ROWS_OF_BEGINNING: usize = 1 << 16;
-/// Numbers that are kept, so that the file is not read again: 64 MiB.
+/// 64 MiB, to avoid a second reading.
 const MOST_KEPT_VALUES: u64 = 1 << 23;
 
-/// Fewest channels whose equal rows may be one sample that was read twice; fewer are equal by chance.
+/// Fewest channels for a repeated sample; fewer are equal by chance.
 const MIN_CHANNELS_OF_REPEAT: usize = 3;
 
-/// Which recordings become one measurement in memory, instead of being read in blocks.
+/// Limits of a measurement in memory.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KeptInMemory {
-    /// Those of at most so many rows.
     pub rows: u64,
-    /// Those of at most so many rows where a larger part than `most_lost` of the samples never arrived.
+    /// Most rows with more than `most_lost` missing.
     pub rows_with_losses: u64,
     /// Part of the samples.
     pub most_lost: f64,
@@ -56,22 +51,21 @@ impl KeptInMemory {
         self.rows_with_losses.max(self.rows)
     }
 
-    /// Whether so many samples in so many sample periods are one measurement.
+    /// True for a measurement in memory.
     fn has_room(self, samples: u64, periods: u64) -> bool {
         samples <= if lost_part(samples, periods) > self.most_lost { self.rows_with_losses } else { self.rows }
     }
 }
 
-/// What is read of a recording.
+/// How a recording is read.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
-    /// The sample rate, Hz, if it is stated: it overrides the one that the time stamps show.
+    /// Stated rate, Hz; overrides the time stamps.
     pub stated_hz: Option<f64>,
-    /// A part by time.
     pub part: Option<TimeRange>,
-    /// Which recordings become one measurement.
+    /// Limits of a measurement in memory.
     pub kept: KeptInMemory,
-    /// Rows that are read at a time; the result is the same for any number.
+    /// Per batch; does not affect the result.
     pub batch_rows: usize,
 }
 
@@ -82,7 +76,7 @@ impl Reading {
         Self { stated_hz, part: None, kept, batch_rows: BATCH }
     }
 
-    /// The same of a part.
+    /// The reading of a part.
     #[must_use]
     pub fn of_part(self, part: Option<TimeRange>) -> Self {
         Self { part, ..self }
@@ -102,17 +96,14 @@ pub struct SampleStream {
     monitor: ReadMonitor,
 }
 
-/// What is known of the samples before they are used.
 struct SurveyedSamples {
-    /// The samples at the start, or all of a recording that is held in memory.
     beginning: Measurement,
     description: RecordingDescription,
     notes: Vec<String>,
-    /// Whether `beginning` is all of it.
+    /// `beginning` is all.
     is_in_memory: bool,
 }
 
-/// Where the rows are.
 enum Origin<'a> {
     File { input: RecordedInput, options: Box<ReadOptions>, range: Option<GyroRange> },
     Recording(Cow<'a, Recording>),
@@ -126,7 +117,7 @@ impl Origin<'_> {
         }
     }
 
-    /// How many rows there are, where the first `rows` of them tell it.
+    /// Estimate by the first `rows`.
     fn expected_rows(&self, rows: u64) -> Option<u64> {
         match self {
             Self::File { input, .. } => input.expected_rows(rows),
@@ -143,7 +134,7 @@ impl Origin<'_> {
 }
 
 impl SampleStream {
-    /// What a simulation or a log of the bus recorded.
+    /// From a simulation or a bus log.
     ///
     /// # Errors
     /// It has no time base.
@@ -152,7 +143,7 @@ impl SampleStream {
         Self::open(origin, reading, &ReadMonitor::default()).map_err(without_file)
     }
 
-    /// Opens a table of register counts whose rates were taken in `range`.
+    /// ADIS16405 register counts with rates in `range`.
     ///
     /// # Errors
     /// The file is damaged, or has no time base: see [`TimeBaseError`].
@@ -177,53 +168,52 @@ impl SampleStream {
         Ok(Self { origin, reading, survey, samples, monitor: monitor.clone() })
     }
 
-    /// The samples at the start of the recording with their time stamps: all of one that is held in memory, else those of the first 2¹⁶
-    /// sample periods, of which the size of a count may be that of these samples alone.
+    /// The samples at the start with stamps: all if in memory, else 2¹⁶ sample periods.
     #[must_use]
     pub fn beginning(&self) -> &Measurement {
         &self.samples.beginning
     }
 
-    /// The same, of a recording that is not read any more.
+    /// Ends the reading.
     #[must_use]
     pub fn into_beginning(self) -> Measurement {
         self.samples.beginning
     }
 
-    /// What is known of the recording before its samples are used.
+    /// Description before the samples are used.
     #[must_use]
     pub fn description(&self) -> &RecordingDescription {
         &self.samples.description
     }
 
-    /// What the user should know, one sentence each.
+    /// Remarks for the user, one sentence each.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.samples.notes
     }
 
-    /// What was read of the file.
+    /// The rows read.
     #[must_use]
     pub fn rows_read(&self) -> &RowsRead {
         &self.survey.read
     }
 
-    /// What the time stamps show; `None` where there are none.
+    /// `None` without stamps.
     #[must_use]
     pub fn stamps(&self) -> Option<&StampQuality> {
         self.survey.stamps.as_ref()
     }
 
-    /// Whether the recording is one measurement in memory: its [beginning](Self::beginning) is all of it.
+    /// True if the [beginning](Self::beginning) is all.
     #[must_use]
     pub fn is_in_memory(&self) -> bool {
         self.samples.is_in_memory
     }
 
-    /// Reads the recording once and calls `take` with each block of its samples.
+    /// Reads once, calling `take` with each block.
     ///
-    /// False if what the [description](Self::description) says has changed on the way, so that it has to be read again: a number
-    /// is no multiple of the step of the others, or the reading was stopped. That happens a bounded number of times.
+    /// False if the [description](Self::description) has changed (a number off the step, a stop): read again, at most a
+    /// bounded number of times.
     ///
     /// # Errors
     /// The file is damaged.
@@ -278,22 +268,19 @@ fn without_file(error: StreamError) -> TimeBaseError {
     }
 }
 
-/// What was counted of the rows that are placed.
 #[derive(Debug, Clone, Default)]
 struct Totals {
-    /// Place of the first usable sample, and of the last one.
     first: Option<Placed>,
     last: Placed,
-    /// Rows that were left out since the last usable one.
     left_out: u64,
     samples: u64,
     never_arrived: u64,
-    /// Rows that were left out, by cause, without those that never arrived.
+    /// By cause, without those that never arrived.
     dropped: BTreeMap<&'static str, u64>,
     flagged: BTreeMap<&'static str, u64>,
 }
 
-/// Cause of rows that are left out because their time goes back.
+/// Cause of rows whose time goes back.
 const TIME_BACKWARDS: &str = "time_backwards";
 
 impl Totals {
@@ -302,7 +289,7 @@ impl Totals {
         self.left_out += 1;
     }
 
-    /// Counts a row; its sample period from the first usable sample, if it is used.
+    /// Returns the sample period from the first usable sample, if used.
     fn add(&mut self, place: Place, verdict: Option<&Verdict>, has_index: bool) -> Option<u64> {
         if let Some(cause) = verdict.and_then(|verdict| verdict.loss) {
             self.leave_out(cause);
@@ -312,14 +299,13 @@ impl Totals {
             self.leave_out("repeated");
             return None;
         };
-        // Hardly any row has one.
         let warnings = verdict.map(|verdict| verdict.faults & Faults::WARNINGS).filter(|faults| !faults.is_empty());
         for cause in warnings.into_iter().flat_map(Faults::causes) {
             *self.flagged.entry(cause).or_insert(0) += 1;
         }
         let lost = match self.first {
             None => 0,
-            // A row that is left out has an index too.
+            // Rows left out have an index too.
             Some(_) if has_index => (placed.period - self.last.period - 1).saturating_sub(self.left_out),
             Some(_) => placed.missing - self.last.missing,
         };
@@ -330,32 +316,30 @@ impl Totals {
         Some(placed.period.saturating_sub(first.period))
     }
 
-    /// Sample periods from the first usable sample to the last, both included.
+    /// From the first to the last usable sample, inclusive.
     fn periods(&self) -> u64 {
         self.first.map_or(0, |first| (self.last.period - first.period).saturating_add(1))
     }
 
-    /// Samples that are missing or were refused, by cause.
     fn dropped(&self, has_index: bool) -> BTreeMap<&'static str, u64> {
         let mut dropped = self.dropped.clone();
-        // By their stamps, rows that were left out are missing between the others.
+        // Rows left out are gaps by the stamps.
         let left_out = dropped.get(TIME_BACKWARDS).copied().filter(|_| !has_index).unwrap_or(0);
         dropped.insert("gap", self.never_arrived.saturating_sub(left_out));
         dropped
     }
 }
 
-/// Finds the sample periods of rows, which may be known only when later rows have come.
+/// Sample periods of rows, which may need later rows.
 struct Placer {
     clock: Clock,
     can_repeat: bool,
     before: RowBefore,
-    /// Batches whose rows are not all placed, and how many of the first one are.
+    /// Not all placed, with the number placed in the first.
     waiting: VecDeque<Batch>,
     placed: usize,
     totals: Totals,
     has_index: bool,
-    /// Sample periods of the usable rows of the first batch.
     periods: Vec<u64>,
     is_used: Vec<bool>,
 }
@@ -375,8 +359,7 @@ impl Placer {
         }
     }
 
-    /// Takes the next rows, or their end. Returns the batches of which all rows are placed now, without the rows that are not used; their
-    /// `indices` are the sample periods from the first usable sample.
+    /// Takes rows or the end; returns completed batches, `indices` being sample periods from the first usable sample.
     fn place(&mut self, batch: Option<Batch>) -> Result<Vec<Batch>, TimeBaseError> {
         let is_last = batch.is_none();
         let batch = batch.unwrap_or_default();
@@ -404,7 +387,6 @@ impl Placer {
         Ok(complete)
     }
 
-    /// The first batch, without the rows that are not used.
     fn complete(&mut self) -> Option<Batch> {
         let mut batch = self.waiting.pop_front()?;
         for _ in batch.backwards.iter().filter(|at| **at >= self.placed) {
@@ -418,7 +400,6 @@ impl Placer {
         Some(batch)
     }
 
-    /// What the clock has to know of the rows.
     fn stamps(&mut self, batch: &Batch) -> Vec<RowStamp> {
         // Without times no row is a repeat.
         let can_repeat = self.can_repeat && !batch.times.is_empty();
@@ -432,15 +413,12 @@ impl Placer {
     }
 }
 
-/// A column whose numbers become counts.
 struct StreamedColumn {
     column: ValueColumn,
     survey: ColumnSurvey,
-    /// `None` where no number can be used.
     quantizer: Option<ColumnQuantizer>,
 }
 
-/// What the first reading of a recording has found.
 struct Survey {
     sensor: SensorProfile,
     unpadded: Unpadded,
@@ -454,14 +432,13 @@ struct Survey {
     full_scale: u64,
     full_scale_notes: Vec<String>,
     read: RowsRead,
-    /// The first rows, or all of them, of so many.
     kept: VecDeque<Batch>,
     has_all_rows: bool,
     rows: u64,
 }
 
 impl Survey {
-    /// Reads `most_rows` rows, without the padding at either end of them.
+    /// Reads up to `most_rows`, without padding.
     fn read(origin: &Origin, reading: Reading, most_rows: u64, monitor: &ReadMonitor) -> Result<Self, StreamError> {
         let mut padding = PaddingFinder::default();
         let survey = Self::read_kept(origin, reading, most_rows, monitor, Unpadded::ALL, &mut padding);
@@ -472,7 +449,7 @@ impl Survey {
         Ok(survey)
     }
 
-    /// The same of these rows. A file that has fewer rows than its first ones let expect is read once more, since they have to be kept.
+    /// Reads again if fewer rows than expected have to be kept.
     fn read_kept(
         origin: &Origin,
         reading: Reading,
@@ -506,13 +483,13 @@ impl Survey {
         let mut surveys = vec![ColumnSurvey::new(); columns.len()];
         let mut full_scale = FullScale::new(&columns);
         let mut rows_before = 0u64;
-        // The numbers of a batch, NaN where they are refused.
+        // NaN if refused.
         let mut usable: Vec<Vec<f64>> = Vec::new();
         let are_registers = columns.iter().any(|column| column.register.is_some());
         let read = source.for_each_batch(wanted, |mut batch| {
             let all_rows = batch.rows as u64;
             unpadded.apply(rows_before, &mut batch);
-            // Registers that do not change are frozen ones, which the burst validator counts.
+            // The burst validator counts frozen registers.
             if !are_registers {
                 padding.add(&batch);
             }
@@ -569,14 +546,13 @@ impl Survey {
         })
     }
 
-    /// Makes the measurement of the rows that are kept.
     fn samples(&mut self, limit: KeptInMemory) -> Result<SurveyedSamples, StreamError> {
         let has_room = limit.has_room(self.totals.samples, self.totals.periods());
         let is_in_memory = self.has_all_rows && has_room;
         let before = if is_in_memory { u64::MAX } else { BEGINNING };
         let mut off_step = vec![false; self.columns.len()];
         let mut beginning = self.measurement(before, &mut off_step)?;
-        // A column leaves its step once.
+        // At most once per column.
         while off_step.contains(&true) {
             self.leave_step(&mut off_step);
             beginning = self.measurement(before, &mut off_step)?;
@@ -606,7 +582,6 @@ impl Survey {
         }
     }
 
-    /// Sentences on the rows, the columns and the clock.
     fn notes(&self) -> Vec<String> {
         let mut notes = self.read.notes.clone();
         notes.extend(self.full_scale_notes.iter().cloned());
@@ -626,7 +601,7 @@ impl Survey {
         notes
     }
 
-    /// Sentences on numbers that are no measurement; channels that have as many share one.
+    /// Channels with equal counts share a note.
     fn missing_notes(&self) -> Vec<String> {
         let mut channels: BTreeMap<(&str, u64, usize), Vec<&str>> = BTreeMap::new();
         for StreamedColumn { column, survey, .. } in self.columns.iter().filter(|of| of.quantizer.is_some()) {
@@ -635,7 +610,7 @@ impl Survey {
                     "missing" => "missing",
                     "not_finite" => "infinite",
                     "out_of_range" => "outside of any range",
-                    // The reports count the faults of a register.
+                    // Reports count register faults.
                     _ => continue,
                 };
                 channels.entry((what, *count, survey.rows())).or_default().push(column.profile.name);
@@ -648,7 +623,7 @@ impl Survey {
         channels.into_iter().map(note).collect()
     }
 
-    /// Gives the columns that are set in `off_step` other counts, and unsets them.
+    /// Requantizes the columns set in `off_step`.
     fn leave_step(&mut self, off_step: &mut [bool]) {
         for (of, off_step) in self.columns.iter_mut().zip(off_step) {
             if std::mem::take(off_step) {
@@ -657,14 +632,13 @@ impl Survey {
         }
     }
 
-    /// The usable samples of rows that are placed.
     fn block(&self, rows: &Batch, off_step: &mut [bool]) -> SampleBlock {
         let channels = self.columns.iter().zip(&rows.values).zip(off_step);
         let channels = channels.filter_map(|((of, values), off_step)| of.channel(values, &rows.verdicts, off_step));
         SampleBlock { channels: channels.collect(), slots: rows.indices.clone() }
     }
 
-    /// The samples of the rows that are kept, before the sample period `before`.
+    /// Before the sample period `before`.
     fn measurement(&self, before: u64, off_step: &mut [bool]) -> Result<Measurement, StreamError> {
         let mut measurement = Measurement {
             profile: self.sensor.clone(),
@@ -692,7 +666,7 @@ impl Survey {
     }
 }
 
-/// The columns of vectors that are zero in every row, beside others that are not: messages have fields that a program never fills.
+/// All-zero vectors beside others: unfilled fields.
 fn never_filled(columns: &[ValueColumn], surveys: &[ColumnSurvey]) -> Vec<usize> {
     let of_group = |group: &[&str; 3]| -> Vec<usize> {
         let is_own = |at: &usize| group.contains(&columns[*at].profile.name) && columns[*at].register.is_none();
@@ -703,7 +677,6 @@ fn never_filled(columns: &[ValueColumn], surveys: &[ColumnSurvey]) -> Vec<usize>
     if unfilled.len() < columns.len() { unfilled } else { Vec::new() }
 }
 
-/// Adds the samples of a block at `times_s`.
 fn append(measurement: &mut Measurement, block: SampleBlock, times_s: &[f64]) {
     let samples = measurement.slots.len();
     measurement.slots.extend(block.slots);
@@ -721,17 +694,16 @@ fn append(measurement: &mut Measurement, block: SampleBlock, times_s: &[f64]) {
 }
 
 impl StreamedColumn {
-    /// Its profile with the size of its counts; `None` where no number can be used.
     fn profile(&self) -> Option<ChannelProfile> {
         let lsb = self.quantizer.as_ref()?.lsb * self.column.factor;
         Some(ChannelProfile { lsb, ..self.column.profile })
     }
 
-    /// Its numbers as counts; `off_step` is set where one is no multiple of the step of the others.
+    /// Sets `off_step` for a number off the step.
     fn channel(&self, values: &[f64], verdicts: &[Verdict], off_step: &mut bool) -> Option<MeasuredChannel> {
         let (quantizer, profile) = (self.quantizer.as_ref()?, self.profile()?);
         if self.column.register.is_some() && verdicts.iter().all(|verdict| verdict.refused.is_empty()) {
-            // All words of the register are counts, but for those that are missing.
+            // All but missing words are counts.
             if !values.iter().any(|value| value.is_nan()) {
                 return Some(MeasuredChannel::new(profile, values.iter().map(|value| *value as i32).collect()));
             }
@@ -740,7 +712,7 @@ impl StreamedColumn {
         let mut refused: BTreeMap<&'static str, Vec<usize>> = BTreeMap::new();
         for (position, &value) in values.iter().enumerate() {
             let count = match refusal(&self.column, value, verdicts.get(position)) {
-                // The word of a register that is refused stays as it was read.
+                // A refused register word stays.
                 Some(cause) => {
                     refused.entry(cause).or_default().push(position);
                     quantizer.count(value).filter(|_| self.column.register.is_some())
@@ -760,13 +732,12 @@ impl StreamedColumn {
     }
 }
 
-/// Rows that are kept from the first reading.
 struct Kept {
     limit: KeptInMemory,
     batches: VecDeque<Batch>,
     rows: u64,
     has_all_rows: bool,
-    /// Whether they are dropped as soon as more are expected than can be kept.
+    /// Dropped as soon as too many are expected.
     is_by_expectation: bool,
 }
 
@@ -775,7 +746,7 @@ impl Kept {
         Self { limit, batches: VecDeque::new(), rows: 0, has_all_rows: true, is_by_expectation: false }
     }
 
-    /// Keeps a batch; true if from now on not all rows are kept. `expected` tells by a number of rows how many there are in all.
+    /// True if not all rows are kept any more; `expected` estimates the total.
     fn add(&mut self, batch: &Batch, expected: impl Fn(u64) -> Option<u64>) -> bool {
         let had_all_rows = self.has_all_rows;
         self.rows += batch.rows as u64;
@@ -803,9 +774,8 @@ impl Kept {
 /// A recording on its time base.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EstimatedTimeBase {
-    /// The usable samples.
     pub measurement: Measurement,
-    /// What the time stamps show; `None` where the samples have none.
+    /// `None` without stamps.
     pub stamps: Option<StampQuality>,
 }
 
@@ -817,14 +787,14 @@ pub fn measurement(recording: &Recording, rate_hz: Option<f64>) -> Result<Measur
     time_base(recording, rate_hz).map(|base| base.measurement)
 }
 
-/// The usable samples of `recording` on their time base, and what the time stamps show.
+/// Usable samples on their time base, and stamp quality.
 ///
-/// `rate_hz` overrides the rate that the time stamps show. Gaps are read from the sample index where there is one, else from
-/// the time stamps; without either only samples that are left out for a fault are missing.
+/// `rate_hz` overrides the stamps. Gaps follow from the index, else from stamps; with neither, only refused samples are
+/// missing.
 ///
 /// # Errors
-/// There is no usable rate or the given one contradicts the stamps, there are fewer than 4 usable samples, no two of them
-/// are neighbours, or the gaps are more than 64 times as long as the samples.
+/// There is no usable rate or the given one contradicts the stamps, there are fewer than 4 usable samples, no two of
+/// them are neighbours, or the gaps are more than 64 times as long as the samples.
 pub fn time_base(recording: &Recording, rate_hz: Option<f64>) -> Result<EstimatedTimeBase, TimeBaseError> {
     let (origin, monitor) = (Origin::Recording(Cow::Borrowed(recording)), ReadMonitor::default());
     let reading = Reading::new(rate_hz, KeptInMemory::ALL);

@@ -8,7 +8,6 @@ use recordings::ColumnSelection;
 use recordings::file_format::RecordedInput;
 use std::path::Path;
 
-/// Every format with its bytes cut off or flipped: samples, or one line of error that names the file.
 #[test]
 fn damaged_files_of_every_format_end_in_a_result_or_one_line() {
     let Some(samples) = samples("damaged_files_of_every_format_end_in_a_result_or_one_line") else { return };
@@ -26,7 +25,6 @@ fn damaged_files_of_every_format_end_in_a_result_or_one_line() {
             match case {
                 0 => bytes.truncate(rng.random_range(1..length.min(200))),
                 1..4 => bytes.truncate(rng.random_range(1..length)),
-                // In the headers, where lengths and types are; then anywhere.
                 4..9 => (0..1 << (case - 4)).for_each(|_| bytes[rng.random_range(0..length.min(2000))] = rng.random()),
                 _ => (0..1 << (2 * (case - 8)))
                     .for_each(|_| bytes[rng.random_range(0..length)] ^= 1 << rng.random_range(0..8)),
@@ -45,7 +43,6 @@ fn damaged_files_of_every_format_end_in_a_result_or_one_line() {
                 None => read += 1,
                 Some(line) => {
                     let is_line = !line.contains(char::is_control) && line.len() < 2000;
-                    // Samples without a time base are those of any file.
                     assert!(
                         is_line && (line.contains("damaged.") || case == 5 || case == 10),
                         "{name}, case {case}: {line:?}"
@@ -55,6 +52,5 @@ fn damaged_files_of_every_format_end_in_a_result_or_one_line() {
             }
         }
     }
-    // Both occur often: damage is found, and what it leaves is used.
     assert!(refused > 50 && read > 50, "{refused} refused, {read} read");
 }

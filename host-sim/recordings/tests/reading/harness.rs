@@ -21,7 +21,6 @@ use std::path::Path;
 /// Recordings of so many rows are read into memory, longer ones in blocks.
 const ROWS_IN_MEMORY: u64 = 1 << 18;
 
-/// The samples of a file, and what the user is told of their reading.
 pub(crate) struct Reading {
     pub(crate) samples: Measurement,
     pub(crate) notes: Vec<String>,
@@ -81,7 +80,6 @@ impl Reading {
     }
 }
 
-/// The options of the command that say how a file is read.
 #[derive(Default)]
 pub(crate) struct Options {
     columns: Vec<String>,
@@ -136,7 +134,6 @@ impl Options {
     }
 }
 
-/// Reads a file of this name and content.
 pub(crate) fn read<T: AsRef<str>>(name: &str, content: &[u8], options: &[T]) -> Result<Reading, StreamError> {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join(name);
@@ -144,7 +141,6 @@ pub(crate) fn read<T: AsRef<str>>(name: &str, content: &[u8], options: &[T]) -> 
     read_file(&file, options)
 }
 
-/// Reads a file.
 pub(crate) fn read_file<T: AsRef<str>>(file: &Path, options: &[T]) -> Result<Reading, StreamError> {
     let options = Options::new(options);
     let kept = KeptInMemory { rows: ROWS_IN_MEMORY, rows_with_losses: ROWS_IN_MEMORY, most_lost: 1.0 };
@@ -174,7 +170,6 @@ fn bursts(input: &RecordedInput) -> Result<Recording, InputError> {
     Ok(recorder.finish())
 }
 
-/// The rows of any sensor as a table, as they are converted.
 pub(crate) fn rows<T: AsRef<str>>(file: &Path, options: &[T]) -> Result<String, StreamError> {
     let folder = tempfile::tempdir().expect("a folder");
     let table = folder.path().join("table.csv");
@@ -183,7 +178,6 @@ pub(crate) fn rows<T: AsRef<str>>(file: &Path, options: &[T]) -> Result<String, 
     Ok(std::fs::read_to_string(&table).expect("a table"))
 }
 
-/// The rows of any sensor as an array in `array`; the names of its columns.
 pub(crate) fn write_array(file: &Path, array: &Path) -> Result<Vec<String>, StreamError> {
     let input = RecordedInput::open(file)?;
     Ok(sensor_rows(&input, &[""; 0])?.write_array(array).map_err(unwritten)?.columns)
@@ -202,13 +196,11 @@ fn unwritten(error: WriteError) -> StreamError {
     }
 }
 
-/// What is in a file.
 pub(crate) fn inspect(file: &Path) -> Vec<InspectedTable> {
     let input = RecordedInput::open(file).unwrap_or_else(|error| panic!("{error}"));
     input.inspect(None, &ColumnSelection::parse(&[], &[]).expect("nothing")).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// `bytes` as a gzip stream.
 pub(crate) fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
     encoder.write_all(bytes).expect("memory");

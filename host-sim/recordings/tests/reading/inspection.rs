@@ -1,4 +1,4 @@
-//! What a file is found to hold, and the options that are proposed where it does not say enough.
+//! The content that is found in a file, and the options that are proposed for it.
 
 use super::harness::{inspect, normal, read_file};
 use recordings::inspection::{InspectedTable, Proposal};
@@ -7,7 +7,6 @@ use tempfile::TempDir;
 
 const ROWS: u32 = 6000;
 
-/// The file and what is in its only table.
 fn inspected(folder: &TempDir, text: &str) -> (PathBuf, InspectedTable) {
     let file = folder.path().join("rows.csv");
     std::fs::write(&file, text).expect("written");
@@ -21,15 +20,13 @@ fn only(table: &InspectedTable) -> &Proposal {
     proposal
 }
 
-/// The options of a proposal.
 fn options(proposal: &Proposal) -> Vec<String> {
     let [columns, units] = [&proposal.columns, &proposal.units].map(|list| list.join(","));
     let options = [("--columns", columns), ("--units", units)].into_iter().filter(|(_, value)| !value.is_empty());
     options.flat_map(|(name, value)| [name.to_owned(), value]).collect()
 }
 
-/// Rows `t x y z x y z` without a heading at 100 Hz, with blank lines between them and the numbers of the sensors between their values: an
-/// accelerometer at rest, and a gyroscope of 131 LSB per deg/s.
+/// Rows `t x y z x y z` without a heading at 100 Hz: an accelerometer at rest, and a gyroscope of 131 LSB per deg/s.
 #[test]
 fn columns_without_names_are_proposed_by_their_numbers() {
     const MPU_RAD_S: f64 = 1.0 / 131.0 * std::f64::consts::PI / 180.0;
@@ -64,7 +61,6 @@ fn columns_without_names_are_proposed_by_their_numbers() {
     }
 }
 
-/// Without evidence nothing is taken, and a rate never is.
 #[test]
 fn a_guess_in_doubt_is_not_safe() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -86,7 +82,6 @@ fn a_guess_in_doubt_is_not_safe() {
     assert!(only(&no_rate).lacks_rate && !only(&no_rate).is_safe());
 }
 
-/// Gravity in m/s² and in g in one file would be a contradiction: the mean of a gyroscope may be 1 by its bias.
 #[test]
 fn a_bias_of_1_is_not_taken_for_gravity_beside_it() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -103,7 +98,7 @@ fn a_bias_of_1_is_not_taken_for_gravity_beside_it() {
     assert!((table.rate.expect("a rate").hz / 200.0 - 1.0).abs() < 1e-6);
 }
 
-/// A sensor that is moved in the middle. The part at rest is found in blocks of 128 rows; the one beside the movement is left out.
+/// The part at rest is found in blocks of 128 rows; the one beside the movement is left out.
 #[test]
 fn the_part_at_rest_is_found() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -120,7 +115,6 @@ fn the_part_at_rest_is_found() {
     assert!((part.from_s - 39.68).abs() < 1e-9 && (part.to_s - 100.0).abs() < 1e-6, "{part:?}");
 }
 
-/// Names of several sensors in one table.
 #[test]
 fn sensors_whose_names_begin_differently_have_a_proposal_each() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,5 +1,4 @@
-//! Kinds of files that people have, drawn anew: where a table begins in its file, whose rows it has, what its columns are, and what its times
-//! mean.
+//! Kinds of files that people have, drawn anew.
 
 use super::harness::{Reading, inspect, normal, read, read_file};
 use rand::seq::SliceRandom;
@@ -28,7 +27,6 @@ fn text(name: &str, content: &str, options: &[&str]) -> Reading {
         .unwrap_or_else(|error| panic!("{error}\n{}", &content[..content.len().min(600)]))
 }
 
-/// Writes a file, and gives what is found in it and what each proposal reads.
 fn as_proposed(content: &[u8], more: &[&str]) -> (Vec<InspectedTable>, Vec<(Proposal, Reading)>) {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("rows.csv");
@@ -47,7 +45,6 @@ fn is_near(read: &Reading, channel: &str, deviation: f64) -> bool {
     (read.neighbours(channel) / deviation - 1.0).abs() < TOLERANCE
 }
 
-/// Lines that loggers write before a table; none is a row of four numbers.
 fn preamble(random: &mut ChaCha8Rng) -> String {
     let mut lines = vec![
         "GPIO initialized.".to_owned(),
@@ -134,7 +131,6 @@ fn what_the_lines_before_a_table_say_is_read() {
     assert!((read.rate_hz() / 50.0 - 1.0).abs() < 1e-6 && is_near(&read, "gyro_x", RATE));
 }
 
-/// Two sensors in one table: rows with blanks for the other, a label, a heading for each kind, or a number of the device.
 #[test]
 fn rows_of_different_origin_are_several_sensors() {
     for seed in 0..12 {
@@ -163,7 +159,6 @@ fn rows_of_different_origin_are_several_sensors() {
                     (0, _) => format!("{time},,,,{x:.6},{y:.6},{z:.6}\n"),
                     (1, 0) => format!("GYRO;{time};{x:.6};{y:.6};{z:.6}\n"),
                     (1, _) => format!("ACCE;{time};{x:.6};{y:.6};{z:.6}\n"),
-                    // The one in deg/s, the other in g.
                     (_, 0) => {
                         format!("gyro {time} {:.6} {:.6} {:.6}\n", x.to_degrees(), y.to_degrees(), z.to_degrees())
                     }
@@ -212,7 +207,6 @@ fn a_list_in_a_cell_is_as_many_columns() {
     }
 }
 
-/// The parts of a time in several columns, through a midnight.
 #[test]
 fn the_parts_of_a_time_are_one_time() {
     type Row = fn(u64) -> String;
@@ -242,7 +236,6 @@ fn the_parts_of_a_time_are_one_time() {
     }
 }
 
-/// A sensor that is turned between rests, or whose axes differ, in columns without names beside others.
 #[test]
 fn the_accelerometer_is_found_by_gravity_and_the_likeness_of_its_axes() {
     for seed in 0..30 {
@@ -255,7 +248,6 @@ fn the_accelerometer_is_found_by_gravity_and_the_likeness_of_its_axes() {
         let is_rate_first = random.random_bool(0.3);
         let row = |row: u32| {
             let turn = f64::from(row) / f64::from(ROWS) * f64::from(turns);
-            // A quarter of each interval it turns.
             let (whole, part) = (turn.floor(), turn.fract());
             let angle: f64 = 0.9 * (whole + ((part - 0.75).max(0.0) * 4.0)) + tilt;
             let turning =
@@ -283,7 +275,6 @@ fn the_accelerometer_is_found_by_gravity_and_the_likeness_of_its_axes() {
     }
 }
 
-/// Memory that was erased or never written, at either end, with times that go on or not.
 #[test]
 fn padding_is_no_rest_and_no_row_to_whoever_looks() {
     for seed in 0..12 {
@@ -315,7 +306,6 @@ fn padding_is_no_rest_and_no_row_to_whoever_looks() {
     }
 }
 
-/// A number of the packet is an index, whatever its column is called, and needs a rate.
 #[test]
 fn a_packet_number_is_no_time() {
     for (seed, name) in ["Packet number", "PacketCounter", "sample_number", ""].into_iter().enumerate() {
@@ -344,7 +334,6 @@ fn a_packet_number_is_no_time() {
     }
 }
 
-/// A message has fields that its sender never fills: three zeros in every row are no sensor, and one is.
 #[test]
 fn a_vector_that_is_never_filled_is_left_out_with_a_note() {
     let mut normal = normal(8);
@@ -385,7 +374,6 @@ fn mcap(messages: &[(u64, [f64; 3])]) -> Vec<u8> {
     file
 }
 
-/// A folder that `ros2 bag record` wrote, of one file or split into several; a file of it may be compressed.
 #[test]
 fn a_bag_in_a_folder_is_one_recording() {
     for seed in 0..8 {
@@ -397,7 +385,6 @@ fn a_bag_in_a_folder_is_one_recording() {
         let bag = folder.path().join("run");
         std::fs::create_dir(&bag).expect("a folder");
         let files = random.random_range(1..5);
-        // In the order of numbers, not of letters.
         let first = random.random_range(7..10);
         for (number, part) in (first..).zip(messages.chunks(messages.len().div_ceil(files))) {
             let (name, content) = (bag.join(format!("run_{number}.mcap")), mcap(part));
@@ -421,7 +408,6 @@ fn a_bag_in_a_folder_is_one_recording() {
     }
 }
 
-/// A device that is turned between rests: its rests are those of each attitude.
 #[test]
 fn a_device_that_is_turned_between_rests_is_at_rest_in_each() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -448,8 +434,7 @@ fn a_device_that_is_turned_between_rests_is_at_rest_in_each() {
         }
         std::fs::write(&file, content).expect("written");
         let steady = inspect(&file).remove(0).steady.expect("a sensor");
-        // Whole blocks of 128 rows, or of 256 where the turns make neighbours alike; those that a turn touches and one at either end are left
-        // out.
+        // Whole blocks of 128 or 256 rows; those that a turn touches and one at either end are left out.
         let is_inside =
             rests.iter().any(|rest| rest.start <= steady.rows.start + 128 && steady.rows.end <= rest.end + 128);
         let longest = rests.iter().map(ExactSizeIterator::len).max().unwrap_or(0);

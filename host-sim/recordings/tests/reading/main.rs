@@ -1,6 +1,4 @@
-//! What is read of a file: its samples, rate and losses, the notes beside them, or the words with which it is refused.
-//!
-//! Every test goes through [`harness::read`], so that a change of the crate's interface changes that one function.
+//! Samples, rate, losses and notes of a file, or the words of its refusal, by [`harness::read`].
 
 mod damage;
 mod harness;

@@ -1,5 +1,4 @@
-//! Recordings of other sensors that other people made: they open as the documentation says, and their Allan deviations are those that other
-//! programs find (`reference_curves.py`).
+//! Recordings of other sensors by other people, against the curves of other programs (`reference_curves.py`).
 
 use super::harness::{Reading, inspect, read_file};
 use serde_json::Value;
@@ -7,7 +6,6 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use system_tests::{python, recording};
 
-/// A file of the folder `others`.
 fn other(test: &str, file: &str) -> Option<PathBuf> {
     recording(test, &format!("others/{file}"))
 }
@@ -20,17 +18,14 @@ fn refusal(file: &Path, options: &[&str]) -> String {
     read_file(file, options).err().expect("refused").to_string()
 }
 
-/// What `reference_curves.py` finds with a reader and its argument.
+/// Result of `reference_curves.py` with a reader and its argument.
 fn reference(test: &str, reader: &str, file: &Path, argument: &str) -> Option<Value> {
     let arguments = [reader, file.to_str().expect("UTF-8"), argument];
     let output = python(test, "host-sim/recordings/tests/reference_curves.py", &arguments)?;
     Some(serde_json::from_slice(&output).expect("JSON"))
 }
 
-/// Compares the points of the curves at 1, 2, 4 and 8 samples, or of a recording with gaps the one at 1 sample.
-///
-/// Numbers that are no multiples of a step are rounded to counts that add at most 1e-4 to the variance, 5e-5 to the deviation, and by chance
-/// 1e-2/√n (1 σ): with 12,000 samples 5 σ are 4.6e-4.
+/// Compares the points at 1, 2, 4 and 8 samples, or with gaps the one at 1 sample; 5 σ of the rounding are 4.6e-4.
 fn compare(read: &Reading, reference: &Value) {
     for (channel, expected) in reference["curves"].as_object().expect("channels") {
         for (at, expected) in expected.as_array().expect("a curve").iter().enumerate() {
@@ -42,7 +37,6 @@ fn compare(read: &Reading, reference: &Value) {
     }
 }
 
-/// A recording that is read with these options.
 struct Case {
     file: &'static str,
     options: &'static [&'static str],
@@ -149,7 +143,6 @@ fn recordings_of_other_people_have_the_curves_of_other_programs() {
     }
 }
 
-/// Any field, array and message is read by its path; an error names those that there are.
 #[test]
 fn any_column_is_read_by_its_path() {
     let test = "any_column_is_read_by_its_path";
@@ -187,7 +180,6 @@ fn any_column_is_read_by_its_path() {
     }
 }
 
-/// What files are found to hold; their source says the units.
 #[test]
 fn other_peoples_files_are_described() {
     let test = "other_peoples_files_are_described";

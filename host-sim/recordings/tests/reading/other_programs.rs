@@ -7,7 +7,6 @@ use serde_json::Value;
 use std::path::PathBuf;
 use system_tests::recorded_samples;
 
-/// A file, and what is known of it.
 pub(crate) struct Sample {
     pub(crate) name: String,
     pub(crate) file: PathBuf,
@@ -15,7 +14,6 @@ pub(crate) struct Sample {
     truth: Value,
 }
 
-/// The files that `make_samples.py` has written; `None`, with a note, without Python.
 pub(crate) fn samples(test: &str) -> Option<Vec<Sample>> {
     let folder = recorded_samples(test)?;
     let text = std::fs::read(folder.join("truth.json")).expect("written");
@@ -34,11 +32,8 @@ fn number(value: &Value) -> f64 {
     value.as_f64().expect("a number")
 }
 
-/// Rows and losses to a sample; the rate within 20 ppm, which is the jitter of the stamps (uniform in 2 % of a period, 0.6 % standard
-/// deviation) over √n and the length of the record with room.
-///
-/// The Allan deviation of neighbours is that which numpy computes from the samples as they were written. The counts that
-/// stand for floats add noise of at most a = 10⁻² of its deviation: a²/2 to the deviation, and by chance a/√n (1 σ).
+/// Rows and losses to a sample; the rate within 20 ppm by the jitter of the stamps. Counts for floats add a²/2 to the
+/// deviation, and by chance a/√n (1 σ), with a = 10⁻² of it.
 #[test]
 fn samples_of_other_programs_have_their_rate_losses_and_numbers() {
     let Some(samples) = samples("samples_of_other_programs_have_their_rate_losses_and_numbers") else { return };
@@ -56,7 +51,6 @@ fn samples_of_other_programs_have_their_rate_losses_and_numbers() {
     }
 }
 
-/// The rows of a file of any format as a table; and by way of an array and of a table to the rounding of its floats.
 #[test]
 fn every_format_is_converted() {
     let Some(samples) = samples("every_format_is_converted") else { return };
@@ -85,7 +79,6 @@ fn every_format_is_converted() {
     }
 }
 
-/// Structures of a `.mat`, topics of a bag and publishers of a log are several sensors; one that is recorded by several messages is not.
 #[test]
 fn several_sensors_of_a_file_have_a_name_each() {
     let Some(samples) = samples("several_sensors_of_a_file_have_a_name_each") else { return };
@@ -122,7 +115,6 @@ fn several_sensors_of_a_file_have_a_name_each() {
     assert_eq!(acc.columns[2], ("run 1/imu/acc.2".to_owned(), Some("m/s^2")));
 }
 
-/// A ULog with an array without an element: a field without a number, which is no reason to refuse the others.
 #[test]
 fn a_field_without_a_number_leaves_the_others() {
     let record =
@@ -138,7 +130,6 @@ fn a_field_without_a_number_leaves_the_others() {
     assert_eq!((read.samples.len(), read.samples.channels.len()), (100, 3));
 }
 
-/// A ULog to which data were appended after a crash: the message before them has no end, and what stands there is no sample.
 #[test]
 fn data_that_were_appended_to_a_log_are_no_message() {
     let record =

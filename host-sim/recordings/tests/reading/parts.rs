@@ -2,7 +2,6 @@
 
 use super::harness::{normal, read};
 
-/// By an index and a stated rate, by time stamps, and by the number of the row; with samples lost before, in and after the part.
 #[test]
 fn a_part_is_what_a_file_of_it_would_be() {
     let mut normal = normal(13);

@@ -9,7 +9,6 @@ use recordings::{InputError, count_table};
 use std::fmt::Display;
 use std::path::Path;
 
-/// A file, the options of its reading, and words of its refusal.
 type Case<'a> = (&'a str, &'a [u8], &'a [&'a str], &'a [&'a str]);
 
 /// Checks an error about the file `name`: one line without a character that a terminal obeys.
@@ -21,7 +20,6 @@ fn check(name: &str, error: &impl Display, words: &[&str]) {
     }
 }
 
-/// Checks that a file is refused in these words, also where its counts are converted.
 fn refuses((name, content, options, words): Case) {
     let Err(error) = read(name, content, options) else { panic!("{name} {words:?} is read") };
     check(name, &error, words);

@@ -11,7 +11,6 @@ use recordings::sample_stream::{KeptInMemory, Reading, SampleStream};
 use recordings::{Reason, count_table_writer};
 use std::path::Path;
 
-/// What was recorded in memory and the table that is written of it are read in the same blocks.
 #[test]
 fn a_recording_has_the_blocks_of_its_table() {
     const KEPT: KeptInMemory = KeptInMemory { rows: 1 << 14, rows_with_losses: 1 << 14, most_lost: 1.0 };
@@ -95,7 +94,6 @@ fn more_rows_than_are_held_in_memory_are_refused() {
     let error = refusal(&file);
     assert!(matches!(error.reason, Reason::TooManySamples), "{error}");
     assert_eq!(error.row, Some((1 << 25) + 1));
-    // Fewer where a small file expands to them.
     let file = folder.path().join("ones.csv.gz");
     std::fs::write(&file, gzip(&rows)).expect("written");
     let error = refusal(&file);

@@ -10,7 +10,6 @@ const ROWS: u32 = 6000;
 /// Standard deviation of the noise in the tables, rad/s.
 const NOISE: f64 = 0.02;
 
-/// A table of white noise in `gyro_x`.
 struct Case {
     name: &'static str,
     heading: &'static str,
@@ -199,7 +198,6 @@ const TABLES: &[Case] = &[
     },
 ];
 
-/// A sentence of NMEA with its checksum.
 fn sentence(content: &str) -> String {
     format!("${content}*{:02X}\r\n", content.bytes().fold(0u8, |sum, byte| sum ^ byte))
 }
@@ -229,8 +227,7 @@ fn a_table_of_any_country_and_program_has_its_rate_and_every_row() {
     }
 }
 
-/// Three channels at 5 Hz of noise whose deviation is one count, 0.001: two neighbouring rows are equal in 0.28³ of the cases, 2 %. Where
-/// the stamps are whole seconds, all of a second are at one time. With finer stamps a fifth of the rows is written again 50 ms later.
+/// Neighbouring rows are equal in 0.28³ of the cases; the stamps are whole seconds, or a fifth is written again.
 #[test]
 fn rows_that_are_equal_by_chance_are_samples() {
     let columns = ["--columns", "time=0,gyro_x=1,gyro_y=2,gyro_z=3", "--units", "rad/s"];
@@ -287,7 +284,6 @@ fn rows_without_a_number_are_missing_samples() {
     }
 }
 
-/// Rows of several sensors in turn, with a label each, of different widths.
 #[test]
 fn rows_of_several_kinds_are_several_sensors() {
     let mut normal = normal(22);
@@ -307,7 +303,6 @@ fn rows_of_several_kinds_are_several_sensors() {
     assert!(refusal(&["--topic", "up"]).contains("it has left, right"));
 }
 
-/// Two devices that a number tells from each other, and two sensors of different rates in one table, with blanks where the other has a row.
 #[test]
 fn rows_of_different_origin_are_no_series() {
     let mut normal = normal(33);
@@ -340,7 +335,6 @@ fn rows_of_different_origin_are_no_series() {
     }
 }
 
-/// Rows that are all equal at either end: zeros, and a value that is held.
 #[test]
 fn padding_is_named_and_left_out() {
     let mut normal = normal(34);
@@ -362,7 +356,6 @@ fn padding_is_named_and_left_out() {
     }
 }
 
-/// A gyroscope that is held at full scale of 16 bits for a while.
 #[test]
 fn samples_at_full_scale_are_counted_and_told() {
     let count = |row: u64| if (1000..1050).contains(&row) { 32_767 } else { (row * 7919 % 1009) as i64 - 504 };
@@ -373,8 +366,7 @@ fn samples_at_full_scale_are_counted_and_told() {
     assert!(read.notes_contain(note), "{:?}", read.notes);
 }
 
-/// As [`docs/own-logger.md`](../../../../docs/own-logger.md) has it: register counts with a logger's own names. Data sheet: 0.05 deg/s a
-/// count in the range of 300 deg/s, 0.0125 in that of 75.
+/// Data sheet: 0.05 deg/s a count in the range of 300 deg/s, 0.0125 in that of 75.
 #[test]
 fn counts_of_other_names_have_the_stated_range() {
     let rows: String = (0..64).map(|i| format!("{},{}\n", 4883 * i, i * i % 7)).collect();
@@ -419,7 +411,6 @@ fn a_nominal_rate_that_is_a_little_wrong_is_taken() {
     assert_eq!((read.rate_hz(), read.missing()), (102.4, 0));
 }
 
-/// A stated rate holds against any column of times, and what they show is told.
 #[test]
 fn a_stated_rate_beats_any_time_stamps() {
     for (rate, hz) in [("30", 30.0), ("300", 300.0), ("819.2", 819.2), ("1000", 1000.0)] {
@@ -436,7 +427,6 @@ fn a_stated_rate_beats_any_time_stamps() {
     assert_eq!((read.rate_hz(), read.samples.len(), read.missing()), (100.0, 2000, 0));
 }
 
-/// The same samples, whatever is around them.
 #[test]
 fn compression_padding_line_ends_and_quotation_marks_change_nothing() {
     let rows = counts("time_s,gyro_x_counts", 2000, |i| format!("{},", i as f64 / 100.0));
@@ -461,7 +451,6 @@ fn compression_padding_line_ends_and_quotation_marks_change_nothing() {
     }
 }
 
-/// Kinds of damage and of punctuation, each in the same table of noise: every intact row is read, and what is left out is told.
 #[test]
 fn a_damaged_place_costs_its_rows_and_is_told() {
     let mut normal = normal(31);
@@ -508,14 +497,12 @@ fn a_damaged_place_costs_its_rows_and_is_told() {
         );
         assert!(read.notes_contain(note), "{name}: {:?}", read.notes);
     }
-    // A tenth of the rows is another file.
     let text = table(&|rows| rows.iter_mut().step_by(8).for_each(|row| row.push_str(",x")));
     let error = read("damaged.csv", text.as_bytes(), &[""; 0]).err().expect("refused").to_string();
     assert!(error.contains("line 10") && error.contains("5 fields"), "{error}");
 }
 
-/// Words for no value at places that are drawn, as many in each channel as is drawn: the samples stay, and the channels are told with how
-/// many of their values are missing.
+/// The channels are told with how many of their values are missing.
 #[test]
 fn values_that_are_missing_are_told_by_channel() {
     const WORDS: [&str; 9] = ["-", "#N/A", "1.#QNAN", "ovf", "NaN", "", "null", "---", "n/a"];
@@ -525,7 +512,6 @@ fn values_that_are_missing_are_told_by_channel() {
         let mut cells: Vec<[String; 3]> =
             (0..ROWS).map(|_| [(); 3].map(|()| format!("{:.5}", NOISE * normal()))).collect();
         let [x, y] = [(); 2].map(|()| random.random_range(1..400_usize));
-        // Two channels lack values in the same rows, the third in others.
         for (row, axes) in [(x, &[0, 1][..]), (y, &[2])]
             .into_iter()
             .flat_map(|(count, axes)| sample(&mut random, ROWS as usize, count).into_iter().map(move |row| (row, axes)))
@@ -540,7 +526,6 @@ fn values_that_are_missing_are_told_by_channel() {
             for channel in channels {
                 assert_eq!(read.refused(channel, "missing"), count, "{seed}: {word}");
             }
-            // Channels that lack as many are told together.
             let channels = if x == y { "gyro_x, gyro_y, gyro_z".to_owned() } else { channels.join(", ") };
             let are = if count == 1 { "is" } else { "are" };
             let note = format!("{count} of {ROWS} values of {channels} {are} missing");
@@ -549,7 +534,6 @@ fn values_that_are_missing_are_told_by_channel() {
     }
 }
 
-/// Delimiters after the last cell, texts with delimiters, headings in two lines, lines before the table.
 #[test]
 fn a_table_is_found_in_what_is_around_it() {
     let mut normal = normal(32);

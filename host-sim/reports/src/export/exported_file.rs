@@ -1,4 +1,4 @@
-//! What an exported file is, which axis it takes, and how it writes numbers.
+//! An exported file, its axes, its numbers.
 
 /// The number that stands for three axes, where a format has one number a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
@@ -14,39 +14,31 @@ pub enum AxisChoice {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
-    /// The report has no gyroscope and no accelerometer in a unit that is known.
     #[error("no gyroscope and no accelerometer in the report")]
     NoInertialChannel,
-    /// The format has a number for each axis, and the report lacks one.
     #[error("{channel} is not in the report, and the format has a number for each axis")]
     NoAxis {
         /// Such as `gyro_y`.
         channel: String,
     },
-    /// The format has only a Gauss-Markov process for slow noise, and the models have no slow noise.
     #[error(
         "no channel of the {0}s shows bias instability, random walk or a Markov process, from which the Gauss-Markov process \
          of the format is made: the record is too short"
     )]
     NoSlowNoise(&'static str),
-    /// A coefficient that is none: negative, or beyond 10³⁰.
+    /// Negative, or beyond 10³⁰.
     #[error("{channel}: {term}, {parameter}: {value} is no coefficient of noise: the report is damaged")]
     NoCoefficient {
-        /// Such as `gyro_y`.
         channel: String,
-        /// Such as `angle_random_walk`.
         term: String,
-        /// Such as `value`.
         parameter: String,
         /// As the report has it.
         value: String,
     },
-    /// Parts of a sensor with different rates, in a format with the noise of samples at one rate.
     #[error(
         "parts at {0} Hz: the format has noise of samples at one rate; kalibr, openvins, orbslam3 and csv have densities"
     )]
     SeveralRates(String),
-    /// A name that could be read as something else: it has characters such as a comma, a quotation mark or a control character.
     #[error("{0:?} is no name of a channel, a term or a unit: the report is damaged")]
     NoName(String),
 }
@@ -56,16 +48,16 @@ pub enum ExportError {
 pub struct Export {
     /// The whole file.
     pub text: String,
-    /// Fields of the format that the report does not say; they stand in the file as comments.
+    /// Fields of the format that the report lacks; comments in the file.
     pub missing: Vec<String>,
 }
 
-/// A sample rate with nine digits: a measured rate has no more, and its last bits are those of a division.
+/// Nine digits: the last bits of a measured rate are rounding.
 pub(super) fn rate(hz: f64) -> f64 {
     format!("{hz:.8e}").parse().unwrap_or(hz)
 }
 
-/// Four digits, which is finer than any interval, and an exponent with its sign: YAML 1.1, which Python's parser reads, takes `4.7e1` for a text.
+/// Four digits and an exponent with its sign: YAML 1.1 takes `4.7e1` for a text.
 pub(super) fn scientific(value: f64) -> String {
     let text = format!("{value:.3e}");
     if text.contains("e-") { text } else { text.replace('e', "e+") }

@@ -9,7 +9,6 @@ use std::fmt::Write;
 /// Milligal in m/s².
 const MILLIGAL: f64 = 1e-5;
 
-/// A Python module with a function that makes the parameters.
 pub(super) fn gtsam(report: &SavedReport) -> Result<Export, ExportError> {
     let [gyroscope, accelerometer] = both(report)?;
     let mut text = String::from(
@@ -41,7 +40,6 @@ pub(super) fn gtsam(report: &SavedReport) -> Result<Export, ExportError> {
     Ok(Export { text, missing: Vec::new() })
 }
 
-/// The entries on the IMU's noise in Basalt's calibration file, which has cameras and constant biases beside them.
 pub(super) fn basalt(report: &SavedReport) -> Result<Export, ExportError> {
     let [gyroscope, accelerometer] = both(report)?;
     let mut text = String::from("{\n    \"value0\": {\n");
@@ -66,7 +64,7 @@ pub(super) fn basalt(report: &SavedReport) -> Result<Export, ExportError> {
     Ok(Export { text, missing: Vec::new() })
 }
 
-/// The block `imunoise`. Its biases are Gauss-Markov processes with one correlation time for all axes.
+/// The block `imunoise`; one correlation time for all axes.
 pub(super) fn kf_gins(report: &SavedReport) -> Result<Export, ExportError> {
     let [gyroscope, accelerometer] = both(report)?;
     let slow = gauss_markov(&six_axes(&gyroscope, &accelerometer), report);
@@ -111,7 +109,6 @@ const NOTHING: Coefficient = Coefficient { value: 0.0, is_bound: false, estimate
 const WHITE: fn(&AxisNoise<'_>) -> Coefficient = |axis| axis.white.unwrap_or(NOTHING);
 const WALK: fn(&AxisNoise<'_>) -> Coefficient = |axis| axis.walk.unwrap_or(NOTHING);
 
-/// The three axes of gyroscope and accelerometer.
 fn both(report: &SavedReport) -> Result<[[AxisNoise<'_>; 3]; 2], ExportError> {
     let sensors = [Sensor::Gyroscope, Sensor::Accelerometer];
     if sensors.iter().all(|sensor| sensor.axes(report).is_empty()) {
@@ -120,7 +117,6 @@ fn both(report: &SavedReport) -> Result<[[AxisNoise<'_>; 3]; 2], ExportError> {
     Ok([Sensor::Gyroscope.three_axes(report)?, Sensor::Accelerometer.three_axes(report)?])
 }
 
-/// All six axes.
 fn six_axes<'a>(gyroscope: &[AxisNoise<'a>; 3], accelerometer: &[AxisNoise<'a>; 3]) -> Vec<AxisNoise<'a>> {
     gyroscope.iter().chain(accelerometer).cloned().collect()
 }

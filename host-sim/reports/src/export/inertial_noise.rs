@@ -11,22 +11,18 @@ use noise_analysis::fit::gauss_markov::{self, GaussMarkovFit, SlowNoise, SlowOct
 /// Standard gravity, m/s².
 pub(super) const GRAVITY: f64 = 9.806_65;
 
-/// Kinds of the three coefficients in a report.
 const KINDS: [&str; 3] = ["angle_random_walk", "bias_instability", "rate_random_walk"];
 
-/// A sensor of three axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Sensor {
     Gyroscope,
     Accelerometer,
 }
 
-/// A coefficient of one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Coefficient {
-    /// The estimate, or its upper 95 % bound where nothing else is known, in SI units.
+    /// In SI units; the upper 95 % bound if only that is known.
     pub value: f64,
-    /// Whether it is the bound, by the rule of the screen.
     pub is_bound: bool,
     /// The estimate in SI units.
     pub estimate: f64,
@@ -47,7 +43,6 @@ pub(super) struct AxisNoise<'a> {
 }
 
 impl Sensor {
-    /// Prefix of the names of its channels.
     pub(super) fn prefix(self) -> &'static str {
         match self {
             Self::Gyroscope => "gyro_",
@@ -55,7 +50,6 @@ impl Sensor {
         }
     }
 
-    /// In words.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Gyroscope => "gyroscope",
@@ -73,20 +67,17 @@ impl Sensor {
         }
     }
 
-    /// The axes that the report has, in its order.
     pub(super) fn axes(self, report: &SavedReport) -> Vec<AxisNoise<'_>> {
         let own = report.channels.iter().filter(|channel| channel.name.starts_with(self.prefix()));
         own.filter_map(|channel| self.axis(channel)).collect()
     }
 
-    /// One axis; `None` where its unit is not known.
     fn axis(self, channel: &SavedChannel) -> Option<AxisNoise<'_>> {
         let to_si = self.to_si(&channel.unit)?;
         let [white, bias_instability, walk] = KINDS.map(|kind| coefficient(channel, kind, to_si));
         Some(AxisNoise { channel, to_si, white, bias_instability, walk })
     }
 
-    /// The axes x, y and z.
     pub(super) fn three_axes(self, report: &SavedReport) -> Result<[AxisNoise<'_>; 3], ExportError> {
         let axes = self.axes(report);
         let axis = |letter: &str| {
@@ -98,7 +89,7 @@ impl Sensor {
     }
 }
 
-/// A coefficient, unless its upper bound is zero.
+/// `None` if the upper bound is zero.
 fn coefficient(channel: &SavedChannel, kind: &str, to_si: f64) -> Option<Coefficient> {
     let SavedParameter { value, low, high, .. } = channel.coefficient(kind)?;
     let is_bound = is_upper_bound(value, low) && high.is_finite();
@@ -107,7 +98,6 @@ fn coefficient(channel: &SavedChannel, kind: &str, to_si: f64) -> Option<Coeffic
     is_number.then_some(Coefficient { value: shown * to_si, is_bound, estimate: value * to_si })
 }
 
-/// The number that stands for all axes, of those that have one.
 pub(super) fn combine(values: impl Iterator<Item = f64> + Clone, choice: AxisChoice) -> Option<f64> {
     let count = values.clone().count();
     (count > 0).then(|| match choice {
@@ -116,14 +106,14 @@ pub(super) fn combine(values: impl Iterator<Item = f64> + Clone, choice: AxisCho
     })
 }
 
-/// The Gauss-Markov process, in SI units, that stands for everything slow in the models of `axes`.
+/// The Gauss-Markov process, in SI units, for all slow noise in the models of `axes`.
 pub(super) fn gauss_markov(axes: &[AxisNoise<'_>], report: &SavedReport) -> Option<GaussMarkovFit> {
     let period = 1.0 / report.sample_rate_hz;
     let slow: Vec<SlowNoise> = axes.iter().map(|axis| slow_noise(axis, period)).collect();
     gauss_markov::fit(&slow, period)
 }
 
-/// B, K and the Markov process of an axis, unless it stands in the place of white noise, beside its whole model.
+/// B, K and the Markov process of an axis, unless it replaces white noise, and the whole model.
 fn slow_noise(axis: &AxisNoise<'_>, period: f64) -> SlowNoise {
     let AxisNoise { channel, to_si, bias_instability, walk, .. } = axis;
     let mut terms = Vec::new();

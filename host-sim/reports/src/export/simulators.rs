@@ -1,11 +1,10 @@
-//! MATLAB and Gazebo, which simulate the sensor: numbers for each axis, and a noise that does not show is left out.
+//! MATLAB and Gazebo: numbers for each axis, without terms that are not significant.
 
 use super::exported_file::{Export, ExportError, rate, scientific};
 use super::inertial_noise::{AxisNoise, Coefficient, Sensor, gauss_markov};
 use crate::saved_report::SavedReport;
 use std::fmt::Write;
 
-/// A script that makes `gyro` and `accel`.
 pub(super) fn matlab(report: &SavedReport) -> Result<Export, ExportError> {
     let mut text = String::from(
         "% Noise of the continuous process for imuSensor: two-sided densities, which is the default NoiseType.\n\
@@ -54,8 +53,8 @@ pub(super) fn matlab(report: &SavedReport) -> Result<Export, ExportError> {
 
 /// A model with one link and an IMU on it.
 ///
-/// Gazebo's bias obeys `b ← e^(−Δt/T)·b + N(0, σ_d²)` with `σ_d² = −σ_b²·T/2·(e^(−2Δt/T) − 1)`: `dynamic_bias_stddev` is σ_b, the
-/// density of the driving noise. A process of standard deviation s has `σ_b = s·√(2/T)`.
+/// Gazebo's bias obeys `b ← e^(−Δt/T)·b + N(0, σ_d²)` with `σ_d² = −σ_b²·T/2·(e^(−2Δt/T) − 1)`: `dynamic_bias_stddev`
+/// σ_b is `s·√(2/T)` for a process of deviation s.
 pub(super) fn gazebo(report: &SavedReport) -> Result<Export, ExportError> {
     let rate = rate(report.sample_rate_hz);
     let mut text = format!(

@@ -5,20 +5,19 @@ use super::inertial_noise::{AxisNoise, Coefficient, Sensor, combine};
 use crate::saved_report::SavedReport;
 use std::fmt::Write;
 
-/// One number of a format.
 struct Field {
     key: &'static str,
     sensor: Sensor,
     of: fn(&AxisNoise<'_>) -> Option<Coefficient>,
     unit: &'static str,
-    /// Factor from the coefficient of the continuous process to the number that the program wants.
+    /// Factor on the coefficient of the continuous process.
     factor: f64,
 }
 
 const WHITE: fn(&AxisNoise<'_>) -> Option<Coefficient> = |axis| axis.white;
 const WALK: fn(&AxisNoise<'_>) -> Option<Coefficient> = |axis| axis.walk;
 
-/// Kalibr and what took over its file: all numbers are those of the continuous process.
+/// Kalibr and OpenVINS: the continuous process.
 const KALIBR: [Field; 4] = [
     field("accelerometer_noise_density", Sensor::Accelerometer, WHITE, "m/s^2/sqrt(Hz)"),
     field("accelerometer_random_walk", Sensor::Accelerometer, WALK, "m/s^3/sqrt(Hz)"),
@@ -26,7 +25,7 @@ const KALIBR: [Field; 4] = [
     field("gyroscope_random_walk", Sensor::Gyroscope, WALK, "rad/s^2/sqrt(Hz)"),
 ];
 
-/// ORB-SLAM3: continuous too; it multiplies white noise by sqrt(f) and divides the random walk by it.
+/// ORB-SLAM3: continuous; it multiplies white noise by sqrt(f) and divides the random walk by it.
 const ORB_SLAM3: [Field; 4] = [
     field("IMU.NoiseGyro", Sensor::Gyroscope, WHITE, "rad/s/sqrt(Hz)"),
     field("IMU.NoiseAcc", Sensor::Accelerometer, WHITE, "m/s^2/sqrt(Hz)"),
@@ -43,7 +42,6 @@ const fn field(
     Field { key, sensor, of, unit, factor: 1.0 }
 }
 
-/// `imu.yaml`.
 pub(super) fn kalibr(report: &SavedReport, axes: AxisChoice) -> Result<Export, ExportError> {
     let head = "# Kalibr imu.yaml. Noise of the continuous process: the discrete deviation at a rate f is density*sqrt(f), the step walk/sqrt(f).\n";
     let mut export = fields(head, &KALIBR, "", report, axes)?;
@@ -51,7 +49,6 @@ pub(super) fn kalibr(report: &SavedReport, axes: AxisChoice) -> Result<Export, E
     Ok(export)
 }
 
-/// `kalibr_imu_chain.yaml`.
 pub(super) fn openvins(report: &SavedReport, axes: AxisChoice) -> Result<Export, ExportError> {
     let head = "%YAML:1.0\n# OpenVINS kalibr_imu_chain.yaml. Noise of the continuous process.\n\
                 # Not measured here: T_i_b, time_offset and the intrinsic matrices, which stand for a perfectly calibrated sensor.\n\n\
@@ -74,8 +71,7 @@ pub(super) fn openvins(report: &SavedReport, axes: AxisChoice) -> Result<Export,
 
 /// The lines on the IMU in a configuration of VINS-Mono or VINS-Fusion.
 ///
-/// Both enter the covariance multiplied by dt² a step, white noise and the driving noise of the random walk alike
-/// (`V·noise·Vᵀ` with `V` in proportion to `dt`), so both are standard deviations of samples: N·√f and K·√f.
+/// The covariance takes both times dt² a step (`V·noise·Vᵀ`), so both are deviations of samples: N·√f and K·√f.
 pub(super) fn vins(report: &SavedReport, axes: AxisChoice) -> Result<Export, ExportError> {
     let rate = report.sample_rate_hz;
     let sampled = |key, sensor, of, unit| Field { factor: rate.sqrt(), ..field(key, sensor, of, unit) };
@@ -92,7 +88,6 @@ pub(super) fn vins(report: &SavedReport, axes: AxisChoice) -> Result<Export, Exp
     fields(&head, &fields_of, "", report, axes)
 }
 
-/// The lines on the IMU in the settings of ORB-SLAM3.
 pub(super) fn orbslam3(report: &SavedReport, axes: AxisChoice) -> Result<Export, ExportError> {
     let head = "%YAML:1.0\n# The IMU's part of ORB-SLAM3's settings. Noise of the continuous process: ORB-SLAM3 multiplies and divides by sqrt(IMU.Frequency) itself.\n\n";
     let mut export = fields(head, &ORB_SLAM3, "", report, axes)?;
@@ -100,9 +95,7 @@ pub(super) fn orbslam3(report: &SavedReport, axes: AxisChoice) -> Result<Export,
     Ok(export)
 }
 
-/// `head`, then every field with the numbers of its axes in comments.
-///
-/// These programs divide by every number, so the upper bound stands for a term of which nothing else is known.
+/// `head` and every field, with its axes in comments; an upper bound stands for an unknown term.
 fn fields(
     head: &str,
     fields: &[Field],

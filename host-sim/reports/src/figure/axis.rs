@@ -5,7 +5,6 @@ use crate::rounding::{column_prefix, significant};
 /// Values from `from` to `to` along pixels from `start` to `end`.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Axis {
-    /// Name with the unit, such as `averaging time τ, s`.
     pub label: String,
     pub is_logarithmic: bool,
     pub from: f64,
@@ -14,24 +13,22 @@ pub(super) struct Axis {
     pub end: f64,
 }
 
-/// A tick; those without a label are fine lines of a logarithmic grid.
+/// Without a label: a fine line of a logarithmic grid.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Tick {
     pub value: f64,
     pub label: Option<String>,
 }
 
-/// Whether a logarithmic axis can show `value`.
 pub(super) fn has_logarithm(value: f64) -> bool {
     value.is_finite() && value > 0.0
 }
 
-/// Decades that a logarithmic axis shows at least, and at most.
 const LEAST_DECADES: f64 = 0.4;
 const MOST_DECADES: f64 = 40.0;
 
 impl Axis {
-    /// A logarithmic axis over `values`, wider by a twentieth at both ends. Values that it cannot show are left out.
+    /// Logarithmic over the `values` it can show, a twentieth wider at both ends.
     pub(super) fn logarithmic(label: &str, values: impl Iterator<Item = f64>, pixels: [f64; 2]) -> Self {
         let logs = values.filter(|value| has_logarithm(*value)).map(f64::log10);
         let (mut low, mut high) = logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), of| (of.min(a), of.max(b)));
@@ -45,7 +42,7 @@ impl Axis {
         Self { label: label.to_owned(), is_logarithmic: true, from, to, start: pixels[0], end: pixels[1] }
     }
 
-    /// A linear axis over `values`, wider by a twentieth at both ends.
+    /// Linear over `values`, a twentieth wider at both ends.
     pub(super) fn linear(label: &str, values: impl Iterator<Item = f64>, pixels: [f64; 2]) -> Self {
         let finite = values.filter(|value| value.is_finite());
         let (mut low, mut high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), of| (of.min(a), of.max(b)));
@@ -61,20 +58,19 @@ impl Axis {
         Self { label: label.to_owned(), is_logarithmic: false, from, to, start: pixels[0], end: pixels[1] }
     }
 
-    /// The same axis from `from` to `to`.
     pub(super) fn between(mut self, from: f64, to: f64) -> Self {
         (self.from, self.to) = (from, to);
         self
     }
 
-    /// The pixel of `value`, `None` outside of the axis or where it cannot be shown.
+    /// `None` outside of the axis.
     pub(super) fn at(&self, value: f64) -> Option<f64> {
         let pixel = self.unbounded(value)?;
         let (low, high) = (self.start.min(self.end), self.start.max(self.end));
         (low - 0.5..=high + 0.5).contains(&pixel).then_some(pixel)
     }
 
-    /// The pixel of `value`, moved to the nearer end if it is outside.
+    /// Moved to the nearer end if outside.
     pub(super) fn clamped(&self, value: f64) -> Option<f64> {
         let value = if self.is_logarithmic && value == 0.0 { self.from } else { value };
         let (low, high) = (self.start.min(self.end), self.start.max(self.end));
@@ -90,7 +86,7 @@ impl Axis {
         part.is_finite().then_some(self.start + part * (self.end - self.start))
     }
 
-    /// The text at the axis: its name, and the unit with the prefix of the numbers at the ticks.
+    /// Name, and unit with the prefix of the ticks.
     pub(super) fn title(&self) -> String {
         match self.label.rsplit_once(", ") {
             Some((name, unit)) => format!("{name}, {}{unit}", self.prefix().0),
@@ -98,7 +94,6 @@ impl Axis {
         }
     }
 
-    /// Prefix of the unit, and its factor: of units of time, frequency and temperature none.
     fn prefix(&self) -> (&'static str, f64) {
         const WITHOUT: [&str; 7] = ["s", "min", "h", "d", "Hz", "°C", "σ"];
         match self.label.rsplit_once(", ") {
@@ -111,7 +106,7 @@ impl Axis {
         if self.is_logarithmic { self.decades() } else { self.steps() }
     }
 
-    /// Lines at `digit · 10^decade`; labels between the decades where there are fewer than three.
+    /// Lines at `digit · 10^decade`, labelled between decades if fewer than three.
     fn decades(&self) -> Vec<Tick> {
         let (first, last) = (self.from.log10().floor() as i32, self.to.log10().ceil() as i32);
         let inside = |value: f64| value >= self.from * (1.0 - 1e-9) && value <= self.to * (1.0 + 1e-9);
@@ -157,7 +152,7 @@ impl Axis {
     }
 }
 
-/// `0.002` or `2·10⁻³`: all labels of an axis are written in one way.
+/// `0.002` or `2·10⁻³`, the same for all labels of an axis.
 fn decade_label(digit: u8, decade: i32, is_plain: bool) -> String {
     if is_plain {
         return significant(f64::from(digit) * 10f64.powi(decade), 1);

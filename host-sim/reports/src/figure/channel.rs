@@ -11,12 +11,12 @@ use allan_core::{Model, NoiseTerm};
 use noise_analysis::report::{ChannelReport, Finding, ModelReport, Report, SlopeMethodReport, SlopeMethodValue};
 use std::f64::consts::{LN_2, PI};
 
-/// Standard deviations that the panel of the residual shows at least and at most.
+/// Bounds of the residual panel, standard deviations.
 const RESIDUAL: std::ops::RangeInclusive<f64> = 4.0..=30.0;
-/// Points of a term's line for each octave.
+/// Points of a term's line per octave.
 const PER_OCTAVE: u32 = 2;
 
-/// The Allan deviation with its bounds, the models and each term; beneath, what the models leave.
+/// Allan deviation with bounds, models and terms, and the residuals beneath.
 pub(super) fn allan_deviation_plot(report: &Report, channel: &ChannelReport) -> Plot {
     let data = measured(channel, Look::Measured, "measured, 95 % bounds");
     let has_terms = channel.refitted.adev != channel.before.adev;
@@ -28,7 +28,7 @@ pub(super) fn allan_deviation_plot(report: &Report, channel: &ChannelReport) -> 
     lines.push(data);
     let [curve, residual] = frames([330.0, 120.0]).map(|frame| below_legend(frame, &lines));
     let across = Axis::logarithmic("averaging time τ, s", lines.iter().flat_map(places), [LEFT, RIGHT]);
-    // The terms may lead out of the panel, but for the flat line of B.
+    // Terms may lead out of the panel, except the flat line of B.
     let shown = lines.iter().filter(|line| line.look != Look::Term || is_flat(line)).flat_map(heights);
     let up = Axis::logarithmic(&format!("Allan deviation σ(τ), {}", unit(&channel.unit)), shown, curve);
     lines.extend(slopes(channel).into_iter().flatten());
@@ -42,8 +42,7 @@ pub(super) fn allan_deviation_plot(report: &Report, channel: &ChannelReport) -> 
     }
 }
 
-/// What was measured, the baseline model and the model with its effects, both fitted to the first half, and the error of each on the
-/// second; the baseline model alone where the effects do not lower its error.
+/// The measured curve, both models fitted to the first half, and their errors on the second.
 pub(super) fn story_plot(report: &Report, channel: &ChannelReport, [before, after]: [f64; 2]) -> Plot {
     let is_lowered = after < before;
     let mut lines = vec![
@@ -94,9 +93,7 @@ pub(super) fn story_plot(report: &Report, channel: &ChannelReport, [before, afte
     Plot { id: "story".to_owned(), title, description, panels: vec![Panel::new(across, up, lines)] }
 }
 
-/// The slopes by which the slope method reads N, B and K: −½ through N at 1 s, flat at the minimum, +½ through K at 3 s. Each reaches
-/// a factor of four to both sides of that time, and on to where the curve has it if that is farther off. `None` where no such slope
-/// occurs.
+/// Slopes of N at 1 s, B at the minimum and K at 3 s, over a factor of four to both sides and to the curve.
 fn slopes(channel: &ChannelReport) -> [Option<Line>; 3] {
     let SlopeMethodReport { angle_random_walk, bias_instability, rate_random_walk } = &channel.read_off;
     let line = |slope: &str, found: &SlopeMethodValue, at_s: f64, deviation: &dyn Fn(f64) -> f64| {
@@ -121,10 +118,9 @@ fn slopes(channel: &ChannelReport) -> [Option<Line>; 3] {
     ]
 }
 
-/// The slopes of N, B and K, as they stand beside their lines.
 const SLOPES: [&str; 3] = ["−½", "0", "+½"];
 
-/// The slopes that are not drawn; empty where all are.
+/// The slopes that are not drawn.
 fn describe_slopes(channel: &ChannelReport) -> String {
     let lines = slopes(channel);
     let absent: Vec<&str> =
@@ -154,13 +150,12 @@ fn describe(channel: &ChannelReport) -> String {
     )
 }
 
-/// A model at the octaves, without what cannot be shown.
 pub(super) fn model_line(channel: &ChannelReport, model: &ModelReport, name: &str, look: Look) -> Line {
     let pairs = channel.curve.iter().map(|point| point.tau_s).zip(model.adev.iter().copied());
     Line::new(name, look, pairs.filter(|&(tau, adev)| has_logarithm(tau) && has_logarithm(adev)).collect())
 }
 
-/// Each term of the model to use on its own; N, B and K with their numbers.
+/// The terms of the model to use; N, B and K with numbers.
 fn terms(report: &Report, channel: &ChannelReport) -> Vec<Line> {
     let (model, rate_hz) = (&channel.refitted, report.sample_rate_hz);
     let [n, b, k] = &summary::coefficients_in_short(report, &channel.name);
@@ -193,12 +188,10 @@ fn terms(report: &Report, channel: &ChannelReport) -> Vec<Line> {
     lines
 }
 
-/// Is true of a level line, as that of B is.
 fn is_flat(line: &Line) -> bool {
     line.points.first().map(|of| of.1) == line.points.last().map(|of| of.1)
 }
 
-/// What the models leave, in standard deviations of each point.
 fn residual_panel(channel: &ChannelReport, has_terms: bool, across: Axis, frame: [f64; 2]) -> Panel {
     let of = |model: &ModelReport| -> Vec<(f64, f64)> {
         let pairs = channel.curve.iter().zip(&model.adev);
@@ -225,7 +218,6 @@ fn residual_panel(channel: &ChannelReport, has_terms: bool, across: Axis, frame:
     Panel::new(across, up, lines)
 }
 
-/// Frequencies of the lines that were traced in a channel.
 fn traced_lines(report: &Report, channel: &ChannelReport) -> Vec<Place> {
     let of = |finding: &Finding| {
         let frequency = finding.effect.frequency_hz()?.value;
@@ -239,7 +231,7 @@ fn traced_lines(report: &Report, channel: &ChannelReport) -> Vec<Place> {
         .collect()
 }
 
-/// The measured spectrum with its bounds, the traced lines, and the model behind the filter. `None` where there is none.
+/// The spectrum with bounds, traced lines and the filtered model; `None` without one.
 pub(super) fn spectrum_plot(report: &Report, channel: &ChannelReport) -> Option<Plot> {
     let spectrum = channel.figure_data.spectrum.as_ref()?;
     let along = |values: &[f64]| -> Vec<(f64, f64)> {
@@ -271,7 +263,7 @@ pub(super) fn spectrum_plot(report: &Report, channel: &ChannelReport) -> Option<
     })
 }
 
-/// The bias over time, with what it follows; beneath, what is left. `None` where there is none.
+/// The bias over time with its covariates, and the rest beneath; `None` without one.
 pub(crate) fn bias_plot(channel: &ChannelReport) -> Option<Plot> {
     let bias = channel.figure_data.bias_over_time.as_ref()?;
     let (scale, per) = time_unit(bias.time_s.last().copied().unwrap_or(0.0));
@@ -313,7 +305,6 @@ pub(crate) fn bias_plot(channel: &ChannelReport) -> Option<Plot> {
     })
 }
 
-/// The unit of a time axis, and its length in s.
 pub(super) fn time_unit(length_s: f64) -> (f64, &'static str) {
     match length_s {
         length if length < 300.0 => (1.0, "s"),
@@ -322,7 +313,6 @@ pub(super) fn time_unit(length_s: f64) -> (f64, &'static str) {
         _ => (86_400.0, "d"),
     }
 }
-/// The measured Allan deviation with its bounds, without points that the axis cannot show.
 pub(super) fn measured(channel: &ChannelReport, look: Look, name: &str) -> Line {
     let shown = || channel.curve.iter().filter(|point| has_logarithm(point.tau_s) && has_logarithm(point.adev));
     let points = shown().map(|point| (point.tau_s, point.adev)).collect();

@@ -1,5 +1,4 @@
-//! A picture of the evidence for a finding: a line in the spectrum, a place in time, a covariate beside the bias, two levels in a
-//! histogram, or what the baseline model leaves of the curve.
+//! The picture of a finding's evidence: line, time, covariate, histogram, or residual.
 
 use super::axis::Axis;
 use super::channel::{allan_deviation_plot, spectrum_plot, time_unit};
@@ -13,14 +12,13 @@ use noise_analysis::effects::{
 };
 use noise_analysis::report::{ChannelReport, Finding, Report};
 
-/// A line is shown with the frequencies from this part of its own to its inverse.
+/// Frequencies around a line, from this part of its own to the inverse.
 const AROUND: f64 = 0.5;
-/// Of the channels of one unit.
+/// Looks of the channels of one unit.
 const LOOKS: [Look; 3] = [Look::Measured, Look::SecondAxis, Look::ThirdAxis];
-/// Bars of a histogram.
 const BARS: usize = 40;
 
-/// The picture for the finding at `index`, which is told as `number`; `None` where the report has nothing to show it with.
+/// The picture of the finding at `index`, called `number`; `None` if the report has no data for it.
 pub(crate) fn evidence(report: &Report, index: usize, number: usize) -> Option<Plot> {
     let finding = report.findings.get(index)?;
     let clearest = finding.channels.get(finding.clearest)?;
@@ -83,14 +81,13 @@ pub(crate) fn evidence(report: &Report, index: usize, number: usize) -> Option<P
     Some(Plot { id: format!("finding-{number}"), title, ..plot })
 }
 
-/// The spectrum around a line.
 fn line_in_spectrum(report: &Report, channel: &ChannelReport, frequency: f64) -> Option<Plot> {
     let whole = spectrum_plot(report, channel)?;
     let panel = whole.panels.first()?;
     let cut = |line: &Line| {
         let near = |at: &f64| (AROUND * frequency..=frequency / AROUND).contains(at);
         let kept: Vec<usize> = (0..line.points.len()).filter(|&at| near(&line.points[at].0)).collect();
-        // The average of the band with the line stands where the line is, not in the middle of the band.
+        // The band with the line is drawn at the line.
         let mut points: Vec<(f64, f64)> = kept.iter().map(|&at| line.points[at]).collect();
         let distance = |at: f64| (at / frequency).ln().abs();
         if let Some(nearest) = points.iter_mut().min_by(|a, b| distance(a.0).total_cmp(&distance(b.0))) {
@@ -117,14 +114,13 @@ fn line_in_spectrum(report: &Report, channel: &ChannelReport, frequency: f64) ->
     })
 }
 
-/// A place in time, s from the first sample.
+/// s from the first sample.
 struct TimePlace {
     label: String,
     from_s: f64,
     to_s: f64,
 }
 
-/// The bias over time of the channels of a finding, with the place in time.
 fn in_time(report: &Report, channel: &ChannelReport, finding: &Finding, at: Option<TimePlace>) -> Option<Plot> {
     let same_unit =
         report.channels.iter().filter(|other| other.unit == channel.unit && finding.channels.contains(&other.name));
@@ -158,16 +154,13 @@ fn in_time(report: &Report, channel: &ChannelReport, finding: &Finding, at: Opti
     })
 }
 
-/// What a bias follows.
 struct Covariate<'a> {
-    /// Name of its channel.
     name: &'a str,
-    /// Name of the parameter that says how much a channel follows it.
+    /// Parameter of the sensitivity to it.
     sensitivity: &'a str,
 }
 
-/// The means of the channels in the unit of `clearest` that show the finding at `index` over those of a covariate, block by block. The
-/// legend has each channel's own sensitivity.
+/// Block means of the channels in the unit of `clearest` over a covariate, with each channel's sensitivity.
 fn beside(report: &Report, clearest: &ChannelReport, index: usize, covariate: &Covariate) -> Option<Plot> {
     let other = report.channels.iter().find(|other| other.name == covariate.name)?;
     let along = other.figure_data.bias_over_time.as_ref()?;
@@ -215,7 +208,6 @@ fn beside(report: &Report, clearest: &ChannelReport, index: usize, covariate: &C
     })
 }
 
-/// How often each bias occurs.
 fn histogram(channel: &ChannelReport) -> Option<Plot> {
     let bias = channel.figure_data.bias_over_time.as_ref()?;
     let (low, high) = bias.mean.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &of| (a.min(of), b.max(of)));
@@ -245,7 +237,6 @@ fn histogram(channel: &ChannelReport) -> Option<Plot> {
     })
 }
 
-/// The curve with the baseline model and the model, and what they leave.
 fn residual(report: &Report, channel: &ChannelReport) -> Plot {
     allan_deviation_plot(report, channel)
 }

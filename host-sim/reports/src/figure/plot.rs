@@ -7,34 +7,29 @@ use std::fmt::Write;
 
 /// Width of every figure, pixels.
 pub(super) const WIDTH: f64 = 760.0;
-/// Edges of the panels, pixels.
+/// Left edge of the panels, pixels.
 pub(super) const LEFT: f64 = 76.0;
 pub(super) const RIGHT: f64 = 744.0;
 /// Top of the first panel: below the legend.
 pub(super) const TOP: f64 = 34.0;
-/// Distance of two panels, and what is below the last: labels of the axis.
+/// Distance of two panels, and space for the last axis' labels.
 const BETWEEN: f64 = 22.0;
 const BELOW: f64 = 48.0;
-/// Above the first panel, for the upper half of the highest tick's label.
+/// Space above the first panel for a tick's label.
 const ABOVE: f64 = 10.0;
 
 /// How the style sheet draws a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Look {
-    /// Measured, the one that a figure is about.
     Measured,
-    /// The second and third axis of an overview.
+    /// Second and third axis of an overview.
     SecondAxis,
     ThirdAxis,
-    /// The model to use.
     Model,
     /// The baseline model of the first half.
     Before,
-    /// One term of a model.
     Term,
-    /// A data sheet, a limit, zero.
     Reference,
-    /// What the channel follows.
     Followed,
 }
 
@@ -58,24 +53,19 @@ impl Look {
 pub(super) struct Line {
     pub name: String,
     pub look: Look,
-    /// Where the line is, and its values.
     pub points: Vec<(f64, f64)>,
     /// Bounds of each value; empty without.
     pub bounds: Vec<(f64, f64)>,
-    /// Whether each value has a dot.
     pub has_dots: bool,
-    /// Whether the values are joined.
     pub is_joined: bool,
-    /// Whether it is in the legend.
     pub in_legend: bool,
     /// Text beside an end of the line; empty without.
     pub mark: String,
-    /// The text is beside the right end, not the left one.
+    /// At the right end, not the left one.
     pub mark_is_right: bool,
 }
 
 impl Line {
-    /// A line in the legend, without bounds and dots.
     pub(super) fn new(name: impl Into<String>, look: Look, points: Vec<(f64, f64)>) -> Self {
         let name = name.into();
         let (bounds, mark) = (Vec::new(), String::new());
@@ -112,20 +102,17 @@ impl Line {
         self
     }
 
-    /// With a text beside its left end.
     pub(super) fn marked(mut self, mark: impl Into<String>) -> Self {
         self.mark = mark.into();
         self
     }
 
-    /// With a text beside its right end.
     pub(super) fn marked_right(mut self, mark: impl Into<String>) -> Self {
         self.mark_is_right = true;
         self.marked(mark)
     }
 }
 
-/// A vertical line, or the area between two places, with a label.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Place {
     pub label: String,
@@ -133,7 +120,6 @@ pub(super) struct Place {
     pub to: f64,
 }
 
-/// One coordinate system.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Panel {
     pub across: Axis,
@@ -145,15 +131,14 @@ pub(super) struct Panel {
 /// A figure with what it says to somebody who does not see it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Plot {
-    /// Name of its file and of its element in the page.
     pub id: String,
     pub title: String,
-    /// What is to be seen, in words with numbers.
+    /// Alternative text with numbers.
     pub description: String,
     pub(super) panels: Vec<Panel>,
 }
 
-/// Tops and bottoms of panels of the given heights.
+/// Top and bottom of each panel.
 pub(super) fn frames<const PANELS: usize>(heights: [f64; PANELS]) -> [[f64; 2]; PANELS] {
     let mut top = TOP;
     heights.map(|height| {
@@ -163,10 +148,9 @@ pub(super) fn frames<const PANELS: usize>(heights: [f64; PANELS]) -> [[f64; 2]; 
     })
 }
 
-/// Distance of two rows of the legend.
 const LEGEND_ROW: f64 = 20.0;
 
-/// The row and the left edge of the entry of each of `lines` in a legend, in rows up to `last`.
+/// Row and left edge of each of `lines` in a legend, up to the row `last`.
 fn legend_places<'l>(lines: impl Iterator<Item = &'l Line>, last: f64) -> Vec<(f64, f64, &'l Line)> {
     let (mut left, mut row) = (LEFT, 0.0);
     let mut entries: Vec<(f64, f64, &Line)> = Vec::new();
@@ -174,7 +158,7 @@ fn legend_places<'l>(lines: impl Iterator<Item = &'l Line>, last: f64) -> Vec<(f
         if entries.iter().any(|(.., known)| known.name == line.name) {
             continue;
         }
-        // Letters of 16 px, as the first figures of the page have them, are up to 9.1 px wide.
+        // Letters of 16 px are up to 9.1 px wide.
         let width = 40.0 + 9.1 * line.name.chars().count() as f64;
         if row < last && left > LEFT && left + width > WIDTH {
             (left, row) = (LEFT, row + 1.0);
@@ -185,14 +169,12 @@ fn legend_places<'l>(lines: impl Iterator<Item = &'l Line>, last: f64) -> Vec<(f
     entries
 }
 
-/// The edges of a first panel below the legend of its `lines`, which may have several rows.
 pub(super) fn below_legend(frame: [f64; 2], lines: &[Line]) -> [f64; 2] {
     let rows = legend_places(lines.iter(), f64::INFINITY).last().map_or(0.0, |(row, ..)| *row);
     frame.map(|edge| edge + LEGEND_ROW * rows)
 }
 
 impl Plot {
-    /// Top of the first panel.
     fn top(&self) -> f64 {
         self.panels.first().map_or(TOP, |panel| panel.up.end)
     }
@@ -201,7 +183,7 @@ impl Plot {
         self.panels.last().map_or(TOP, |panel| panel.up.start) + BELOW
     }
 
-    /// The drawing as a file of its own has it: with its style, its ground and its legend.
+    /// A file of its own: style, ground and legend.
     pub(crate) fn file(&self, style: &str) -> Markup {
         let ground = html! {
             style { (maud::PreEscaped(style)) }
@@ -210,7 +192,7 @@ impl Plot {
         self.svg(0.0, &ground)
     }
 
-    /// The drawing as the page has it, whose legend stands beside it.
+    /// For the page, whose legend stands beside it.
     pub(crate) fn drawing(&self) -> Markup {
         self.svg(self.top() - ABOVE, &html! {})
     }
@@ -256,7 +238,6 @@ impl Plot {
         }
     }
 
-    /// Swatches and names above the first panel: in rows, where it has room for them.
     fn legend(&self) -> Markup {
         let entries = legend_places(self.panels.iter().flat_map(|panel| &panel.lines), (self.top() - TOP) / LEGEND_ROW);
         html! {
@@ -273,7 +254,7 @@ impl Plot {
         }
     }
 
-    /// The values for the page's script: axes and lines of every panel.
+    /// Axes and lines of every panel, for the page's script.
     pub(crate) fn values(&self) -> String {
         let panels: Vec<String> = self.panels.iter().map(Panel::values).collect();
         format!("[{}]", panels.join(","))
@@ -331,7 +312,6 @@ impl Panel {
         }
     }
 
-    /// The lines of the ticks that are chosen.
     fn grid(&self, is_chosen: impl Fn(&Tick) -> bool) -> String {
         let (x, y) = (&self.across, &self.up);
         let at = |axis: &Axis| -> Vec<f64> {
@@ -356,7 +336,6 @@ impl Panel {
         }
     }
 
-    /// The bounds: the area between those of a line, a bar for each point that stands alone.
     fn bounds(&self, line: &Line) -> Markup {
         if !line.is_joined {
             return self.error_bars(line);
@@ -388,7 +367,7 @@ impl Panel {
     }
 
     fn line(&self, line: &Line) -> Markup {
-        // Values beyond the panel lead out of it: the panel cuts them off.
+        // The panel clips values beyond it.
         let visible: Vec<(f64, f64)> =
             line.points.iter().filter_map(|&(x, y)| Some((self.across.at(x)?, self.up.unclipped(y)?))).collect();
         let inside = |(_, y): &&(f64, f64)| (self.up.end - 0.5..=self.up.start + 0.5).contains(y);
@@ -402,7 +381,6 @@ impl Panel {
         }
     }
 
-    /// The text of a line at its end.
     fn mark(&self, line: &Line) -> Markup {
         let visible = |&(x, y): &(f64, f64)| Some((self.across.at(x)?, self.up.at(y)?));
         let ends = if line.mark_is_right {
@@ -420,7 +398,7 @@ impl Panel {
     }
 
     fn values(&self) -> String {
-        // Places that are those of the line before are not repeated.
+        // Equal places are not repeated.
         let places = |line: &Line| numbers(line.points.iter().map(|of| of.0));
         let before = [None].into_iter().chain(self.lines.iter().map(Some));
         let lines: Vec<String> = self
@@ -455,7 +433,7 @@ impl Panel {
 }
 
 impl Axis {
-    /// The pixel of `value`, which may be outside by as much as the axis is long.
+    /// The pixel of `value`, up to one axis length outside.
     fn unclipped(&self, value: f64) -> Option<f64> {
         if self.is_logarithmic && !has_logarithm(value) {
             return None;
@@ -484,13 +462,12 @@ impl Axis {
     }
 }
 
-/// A coordinate with a tenth of a pixel.
 fn pixel(value: f64) -> String {
     let text = format!("{value:.1}");
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
-/// A path through the points, rounded to tenths of a pixel: the first place, then the way from each to the next.
+/// A relative path through the points, in tenths of a pixel.
 fn path(points: impl Iterator<Item = (f64, f64)>) -> String {
     let (mut path, mut last) = ("m".to_owned(), [0.0; 2]);
     for (x, y) in points {
@@ -508,7 +485,6 @@ fn path(points: impl Iterator<Item = (f64, f64)>) -> String {
     path
 }
 
-/// A list of numbers in JSON with four significant digits.
 fn numbers(values: impl Iterator<Item = f64>) -> String {
     let number = |value: f64| match value {
         value if !value.is_finite() => "null".to_owned(),
@@ -520,7 +496,7 @@ fn numbers(values: impl Iterator<Item = f64>) -> String {
     format!("[{}]", list.join(","))
 }
 
-/// A text in JSON that is safe inside an element of HTML.
+/// JSON that is safe inside an HTML element.
 fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
     for letter in text.chars() {
@@ -539,12 +515,11 @@ fn quoted(text: &str) -> String {
     out.push('"');
     out
 }
-/// Places of the points of a line.
 pub(super) fn places(line: &Line) -> Vec<f64> {
     line.points.iter().map(|point| point.0).collect()
 }
 
-/// The values of a line, and its bounds as far as a factor of three: those of a point with one degree of freedom span decades.
+/// Values, and bounds up to a factor of three.
 pub(super) fn heights(line: &Line) -> Vec<f64> {
     let bounds = line.points.iter().zip(&line.bounds);
     let near = bounds.flat_map(|(&(_, y), &(low, high))| [low.max(y / 3.0), high.min(3.0 * y)]);

@@ -1,4 +1,4 @@
-//! The numbers of a finding as a sentence has them: one, or each channel's own.
+//! Numbers of a finding in a sentence: one, or each channel's.
 
 use super::channel_names::channel_list;
 use super::shown_effect::ShownEffect;
@@ -9,29 +9,23 @@ use std::f64::consts::FRAC_1_SQRT_2;
 /// Significant digits of the numbers of a brief sentence.
 const BRIEF_DIGITS: i32 = 2;
 
-/// The effects of a finding, and how their numbers are written.
 pub(super) struct Amounts<'a> {
-    /// One of every channel.
+    /// The effect in every channel.
     pub shown: &'a [ShownEffect<'a>],
-    /// What stands before the number of a channel.
     pub label: Label,
-    /// Without intervals.
     pub is_brief: bool,
 }
 
-/// What stands before the number of a channel.
+/// Text before a channel's number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Label {
-    /// Nothing: there is no other channel.
     Nothing,
-    /// The axis: all channels are gyros, or all accelerometers.
+    /// All gyros, or all accelerometers: the axis.
     Axis,
-    /// The sensor and its axis.
     Channel,
 }
 
 impl Label {
-    /// For the channels of a finding.
     pub(super) fn new(channels: &[String]) -> Self {
         match channels {
             [] | [_] => Self::Nothing,
@@ -41,56 +35,52 @@ impl Label {
     }
 }
 
-/// `gyro_` of `gyro_z`; the name itself of what has no axis.
+/// `gyro_` of `gyro_z`; the name itself without an axis.
 fn sensor(channel: &str) -> &str {
     channel.rfind('_').map_or(channel, |at| &channel[..=at])
 }
 
-/// A parameter of one channel.
 struct OfChannel<'a> {
     channel: &'a str,
     parameter: Parameter,
 }
 
 impl Amounts<'_> {
-    /// One number for all channels.
     pub(super) fn one(&self, parameter: &Parameter) -> String {
         if self.is_brief { rounded_quantity(parameter) } else { bounded_quantity(parameter) }
     }
 
-    /// The parameter `name` of each channel: `0.27 °/s` of one, `x 21.2, y 11.9, z −27.8 m°/s/°C` of several.
+    /// `0.27 °/s` of one channel, `x 21.2, y 11.9, z −27.8 m°/s/°C` of several.
     pub(super) fn each(&self, name: &'static str) -> String {
         self.written(self.parameters(name))
     }
 
-    /// The same times `factor`, which is positive.
+    /// Times a positive `factor`.
     pub(super) fn each_scaled(&self, name: &'static str, factor: f64) -> String {
         self.written(self.parameters(name).map(|of| OfChannel { parameter: scaled(of.parameter, factor), ..of }))
     }
 
-    /// The same in another unit.
+    /// In another unit.
     pub(super) fn each_as(&self, name: &'static str, unit: &str, factor: f64) -> String {
         let converted = |of: Parameter| Parameter { unit: unit.to_owned(), ..scaled(of, factor) };
         self.written(self.parameters(name).map(|of| OfChannel { parameter: converted(of.parameter), ..of }))
     }
 
-    /// The values of the parameter `name`.
     pub(super) fn values(&self, name: &'static str) -> Vec<f64> {
         self.parameters(name).map(|of| of.parameter.value).collect()
     }
 
-    /// The largest value of the parameter `name`, at least `least`.
     pub(super) fn largest(&self, name: &'static str, least: f64) -> f64 {
         self.values(name).into_iter().fold(least, f64::max)
     }
 
-    /// The channels in which the parameter `name` may be 0 or of either sign.
+    /// Channels in which the parameter may be 0 or of either sign.
     pub(super) fn with_bound_alone(&self, name: &'static str) -> Vec<String> {
         let is_bound = |of: &OfChannel| of.parameter.low <= 0.0 && of.parameter.high >= 0.0;
         self.parameters(name).filter(is_bound).map(|of| of.channel.to_owned()).collect()
     }
 
-    /// A line that has a width in some channels has an amplitude in the others: its deviation is 1/√2 of that.
+    /// A line with a width in some channels has an amplitude in the others: √2 times the deviation.
     fn parameters(&self, name: &'static str) -> impl Iterator<Item = OfChannel<'_>> {
         self.shown.iter().filter_map(move |&ShownEffect { channel, effect }| {
             let mut parameters = effect.parameters();
@@ -110,8 +100,7 @@ impl Amounts<'_> {
         }
     }
 
-    /// Numbers of one unit share a prefix; the unit stands behind the last of them, and the kind of sensor before the first unless all
-    /// are of one kind. One number that all channels have is told once.
+    /// One prefix per unit, the unit behind the last number, the sensor before the first; equal numbers once.
     fn list(&self, each: &[OfChannel]) -> String {
         let is_alike = |one: &OfChannel, other: &OfChannel| {
             sensor(one.channel) == sensor(other.channel) && one.parameter.unit == other.parameter.unit
@@ -145,13 +134,11 @@ impl Amounts<'_> {
     }
 }
 
-/// The numbers of channels of one kind, and their unit.
 struct Group {
     numbers: Vec<String>,
     unit: String,
 }
 
-/// The number with its unit, if it is that of all channels.
 fn same_for_all(groups: &[Group]) -> Option<String> {
     let first = groups.first()?;
     let number = first.numbers.first()?;

@@ -3,12 +3,12 @@
 use crate::formatting::words;
 use noise_analysis::report::ChannelReport;
 
-/// The name of a channel as the sentences and the tables have it, such as `accel x`.
+/// Such as `accel x`.
 pub(crate) fn channel_name(channel: &ChannelReport) -> String {
     channel_list(std::slice::from_ref(&channel.name))
 }
 
-/// Beginnings of the names of gyros, accelerometers and magnetometers; the other channels are conditions, such as the temperature.
+/// Prefixes of gyros, accelerometers and magnetometers; the others are conditions.
 pub(crate) const SENSED: [&str; 3] = ["gyro_", "accl_", "magn_"];
 
 /// Gyros and accelerometers, in a list of channels.

@@ -1,4 +1,4 @@
-//! An effect of every kind, and of every form of it that has words of its own: `docs/findings.md` has their sentences.
+//! Effects of every kind and form, for `docs/findings.md`.
 
 use noise_analysis::bounds::{BoundedEstimate, ChannelEstimate};
 use noise_analysis::effects::*;
@@ -7,7 +7,6 @@ const fn exact(value: f64) -> BoundedEstimate {
     BoundedEstimate::exact(value)
 }
 
-/// With 95 % bounds at this distance.
 fn about(value: f64, distance: f64) -> BoundedEstimate {
     BoundedEstimate::new(value, value - distance, value + distance)
 }
@@ -25,7 +24,6 @@ const MOMENT: BoundedEstimate = exact(740.0);
 
 const CURVE: CurveEvidence = CurveEvidence { excess: 0.1, tau_s: 1.0, sigmas: 9.0, gain_sigmas: 9.0 };
 
-/// A steady line of this size and frequency, by the spectrum.
 fn line_of(frequency_hz: BoundedEstimate, amplitude: ChannelEstimate) -> SinusoidalLine {
     let spectrum = SpectrumEvidence {
         frequency_hz: frequency_hz.value,
@@ -38,7 +36,6 @@ fn line_of(frequency_hz: BoundedEstimate, amplitude: ChannelEstimate) -> Sinusoi
     SinusoidalLine { frequency_hz, amplitude, multiples: None, evidence }
 }
 
-/// A steady line at this frequency.
 pub(super) fn line(frequency_hz: f64) -> SinusoidalLine {
     line_of(about(frequency_hz, 0.1), rate(0.2, 0.01))
 }
@@ -87,7 +84,6 @@ fn unexplained(place: UnexplainedPlace, excess_percent: Option<BoundedEstimate>)
     Unexplained { place, excess_percent, observation: Observation::PointOfCurve { p_value: 1e-9 } }
 }
 
-/// The effects.
 pub(super) fn examples() -> Vec<Effect> {
     let tau = UnexplainedPlace::AveragingTime(exact(80.0));
     let line_of_curve = UnexplainedPlace::LineOfCurve { tau_s: exact(80.0), frequency_hz: exact(0.005) };

@@ -1,4 +1,4 @@
-//! What each channel shows of a finding.
+//! A finding as each channel shows it.
 
 use noise_analysis::effects::Effect;
 use noise_analysis::report::Report;
@@ -6,13 +6,12 @@ use noise_analysis::report::Report;
 /// A finding as one of its channels shows it.
 #[derive(Debug, Clone, Copy)]
 pub struct ShownEffect<'a> {
-    /// Name of the channel, such as `gyro_z`.
     pub channel: &'a str,
     /// With the channel's own numbers.
     pub effect: &'a Effect,
 }
 
-/// What every channel shows of the finding at `index`, in the order of the finding's channels.
+/// The finding at `index`, in the order of its channels.
 #[must_use]
 pub fn shown_effects(report: &Report, index: usize) -> Vec<ShownEffect<'_>> {
     let of_channel = |name: &String| {

@@ -8,7 +8,7 @@ use maud::{Markup, html};
 use noise_analysis::report::assessment::{Coefficient, NavigationDrift};
 use noise_analysis::report::{ChannelReport, ModelErrorReport, ModelReport, Report};
 
-/// Content of a column's heading, and whether the column holds numbers.
+/// Heading, and whether the column has numbers.
 type Heading = (Markup, bool);
 
 fn text(heading: &str) -> Heading {
@@ -19,14 +19,13 @@ fn numbers(heading: &str) -> Heading {
     (html! { (heading) }, true)
 }
 
-/// The cells of headings.
 fn cells(headings: &[Heading]) -> Markup {
     html! {
         @for (heading, numeric) in headings { th class=[numeric.then_some("number")] scope="col" { (heading) } }
     }
 }
 
-/// A table of the given class, empty for none, with `rows` (`tr` elements).
+/// `rows` are `tr` elements.
 fn table(class: &str, headings: &[Heading], rows: &Markup) -> Markup {
     html! {
         div.scroll {
@@ -38,14 +37,14 @@ fn table(class: &str, headings: &[Heading], rows: &Markup) -> Markup {
     }
 }
 
-/// N, B and K of the gyros and accelerometers in the units of their users, the data sheet's, and the error before and after.
+/// In users' units, with data sheet and errors.
 pub(super) fn coefficients_of_all(report: &Report) -> Markup {
     coefficients(&summary::coefficient_tables(report), true)
 }
 
-/// The same of groups of channels, each a link to its section where it has one.
+/// For groups of channels, each a link to its section where it has one.
 pub(super) fn coefficients(groups: &[CoefficientTable], has_sections: bool) -> Markup {
-    // An accelerometer's random walks have other names than a gyro's.
+    // An accelerometer's random walks have other names.
     let headings = |group: &CoefficientTable| {
         let columns = group.names.iter().zip(["N", "B", "K"]).zip(&group.units);
         let columns = columns.map(|((name, letter), unit)| {
@@ -75,12 +74,11 @@ pub(super) fn coefficients(groups: &[CoefficientTable], has_sections: bool) -> M
     html! { @if let Some(first) = groups.first() { (table("", &headings(first), &rows)) } }
 }
 
-/// `2.424 ± 0.005`, which a narrow column breaks before the interval and nowhere else.
+/// Breaks only before the interval: `2.424 ± 0.005`.
 fn broken_before_interval(value: &str) -> String {
     value.replacen(' ', "\n", 1).replace(' ', "\u{a0}")
 }
 
-/// The terms of a model with all their parameters.
 pub(super) fn terms(model: &ModelReport) -> Markup {
     let rows = html! {
         @for term in &model.terms {
@@ -97,7 +95,6 @@ pub(super) fn terms(model: &ModelReport) -> Markup {
     table("", &[text("term"), text("unit"), numbers("fit")], &rows)
 }
 
-/// Errors of both models on the fitted and on the unseen half.
 pub(super) fn errors(channel: &ChannelReport) -> Markup {
     let cell = |error: &ModelErrorReport| {
         html! { td.number { (percent(error.rms_percent)) span.under { (optional(error.deviance_per_point)) }
@@ -132,7 +129,6 @@ pub(super) fn errors(channel: &ChannelReport) -> Markup {
     table("", &[text("model"), numbers("fitted half"), numbers("unseen half")], &rows)
 }
 
-/// The coefficients in other units.
 pub(super) fn units(coefficients: &[Coefficient]) -> Markup {
     let rows = html! {
         @for coefficient in coefficients {
@@ -149,7 +145,6 @@ pub(super) fn units(coefficients: &[Coefficient]) -> Markup {
     table("", &[text("coefficient"), text("unit"), numbers("continuous"), numbers("discrete, of samples")], &rows)
 }
 
-/// Predicted and observed error of the integrated channel.
 pub(super) fn drift(drifts: &[NavigationDrift]) -> Markup {
     let rows = html! {
         @for drift in drifts {
@@ -166,7 +161,6 @@ pub(super) fn drift(drifts: &[NavigationDrift]) -> Markup {
     table("", &[text("error after"), text("unit"), numbers("predicted"), numbers("unseen half")], &rows)
 }
 
-/// The measured curve with its intervals, beside the models.
 pub(super) fn curve(channel: &ChannelReport) -> Markup {
     let (headings, rows) = curve_numbers(channel);
     let headings: Vec<Heading> = headings.iter().map(|heading| numbers(heading)).collect();

@@ -1,5 +1,4 @@
-//! The page in headless Chromium: what is drawn against the report, both colour schemes, two widths, the keyboard, and that nothing
-//! is requested. Where there is no Chromium the tests say so and pass.
+//! The page in headless Chromium: drawing, colour schemes, widths, keyboard, no requests; passes without Chromium.
 
 use crate::fixture;
 use noise_analysis::bounds::BoundedEstimate;
@@ -13,7 +12,6 @@ use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
 
-/// Names of the program.
 const CHROMIUM: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 
 fn chromium() -> Option<&'static str> {
@@ -25,7 +23,6 @@ fn chromium() -> Option<&'static str> {
     found
 }
 
-/// The fixture with everything that a figure shows.
 fn report() -> Report {
     let mut report = fixture::report();
     report.part.name = "ADIS16405".to_owned();
@@ -83,7 +80,6 @@ fn report() -> Report {
     report
 }
 
-/// What Chromium shows of the page of `report` at each of the widths.
 fn facts(program: &str, report: &Report, is_dark: bool, widths: &[u32]) -> Vec<Value> {
     let dir = tempfile::tempdir().expect("a folder");
     let page = reports::page::write(report, Some("fan.csv"), dir.path()).expect("a page");
@@ -97,7 +93,7 @@ fn facts(program: &str, report: &Report, is_dark: bool, widths: &[u32]) -> Vec<V
     let file = dir.path().join("harness.html");
     std::fs::write(&file, harness).expect("a file");
     const START: &str = "<pre id=\"facts\">";
-    // The browser's own time runs on while an image is decoded: on a busy machine it takes more of it.
+    // Decoding an image takes virtual time on a busy machine.
     let mut shown = [10, 100, 1_000, 10_000].into_iter().map(|budget_s| dump(program, &file, is_dark, budget_s));
     let dom = shown.find(|dom| dom.contains(START)).expect("the facts");
     let start = dom.find(START).expect("the facts") + START.len();
@@ -122,7 +118,6 @@ fn list<'a>(value: &'a Value, name: &str) -> &'a [Value] {
     value[name].as_array().map_or(&[], Vec::as_slice)
 }
 
-/// The pixel that an axis of the page's data gives a value.
 fn pixel(axis: &Value, value: f64) -> f64 {
     let of = |name: &str| axis[name].as_f64().expect(name);
     let part = if axis["log"] == true {
@@ -133,7 +128,7 @@ fn pixel(axis: &Value, value: f64) -> f64 {
     of("start") + part * (of("end") - of("start"))
 }
 
-/// A tenth of a pixel of rounding, and what four significant digits of a value are on an axis of 330 pixels over a decade.
+/// Rounding, and four digits on an axis of 330 pixels over a decade.
 const PIXEL: f64 = 0.1 + 330.0 * 0.5e-3 / std::f64::consts::LN_10;
 
 #[test]
@@ -142,7 +137,7 @@ fn what_is_drawn_is_what_was_measured() {
     let report = report();
     let facts = facts(program, &report, false, &[1300]);
     let figures = list(&facts[0], "figures");
-    // The story, the strongest finding, gyros and accelerometers, three figures a channel, four of the evidence.
+    // Story, finding, gyros, accelerometers, three a channel, four of evidence.
     assert_eq!(figures.len(), 4 + 3 * 6 + 4);
     let figure = |id: &str| figures.iter().find(|figure| figure["id"] == id).expect("the figure");
     let line = |id: &str, name: &str| {
@@ -154,7 +149,7 @@ fn what_is_drawn_is_what_was_measured() {
     };
     let check = |id: &str, name: &str, expected: &[(f64, f64)]| {
         let (panel, values, drawn) = line(id, name);
-        // What was measured octave by octave is points that are not joined.
+        // Measured points are not joined.
         let points = [list(&drawn, "points"), list(&drawn, "dots")].concat();
         assert_eq!(points.len(), expected.len(), "{id} {name}");
         assert_eq!(drawn["visible"], true, "{id} {name}");
@@ -167,7 +162,6 @@ fn what_is_drawn_is_what_was_measured() {
             }
         }
     };
-    // The page begins with the channel whose error is lowered most.
     assert_eq!(figures[0]["id"], "story");
     let gain = |channel: &ChannelReport| {
         let [before, after] =
@@ -206,13 +200,11 @@ fn what_is_drawn_is_what_was_measured() {
         let density: Vec<(f64, f64)> =
             spectrum.frequency_hz.iter().copied().zip(spectrum.density.iter().copied()).collect();
         check(&format!("{name}-spectrum"), "measured, 95 % bounds", &density);
-        // The record of 10,000 s has its time in minutes.
         let bias = channel.figure_data.bias_over_time.as_ref().expect("a bias");
         let mean: Vec<(f64, f64)> = bias.time_s.iter().map(|time| time / 60.0).zip(bias.mean.iter().copied()).collect();
         let (_, _, drawn) = line(&format!("{name}-bias"), "mean of 40 s");
         assert_eq!(list(&drawn, "points").len(), mean.len());
     }
-    // N²/τ + the minimum of the data sheet.
     let (_, sheet, _) = line("overview-gyros", "data sheet");
     let taus: Vec<f64> = report.channels[0].curve.iter().map(|point| point.tau_s).collect();
     for (index, tau) in taus.iter().enumerate() {
@@ -222,8 +214,7 @@ fn what_is_drawn_is_what_was_measured() {
     }
 }
 
-/// The channels of a burst, each with as many points of its spectrum as an hour has (191 or 192 of the virtual sensor's, at most
-/// 400 where lines are many) and 240 blocks of its bias.
+/// Twelve channels, 191 to 400 points of a spectrum, 240 blocks of the bias.
 #[test]
 fn the_page_of_an_hour_of_twelve_channels_is_below_700_kilobytes() {
     let mut report = report();
@@ -235,7 +226,7 @@ fn the_page_of_an_hour_of_twelve_channels_is_below_700_kilobytes() {
     for channel in &mut report.channels {
         let data = &mut channel.figure_data;
         let (points, blocks) = (200, 240);
-        // Irregular digits, as measured ones are.
+        // Irregular digits, as measured.
         let digits = |k: usize| 0.0123456 + ((k * 7919) % 1000) as f64 * 1.00037e-6;
         let values = |count: usize| (0..count).map(digits).collect::<Vec<f64>>();
         let frequency_hz: Vec<f64> = (0..points).map(|bin| 0.00123456 * 1.06f64.powi(bin as i32)).collect();
@@ -261,8 +252,7 @@ fn the_page_fits_and_can_be_read_in_both_colour_schemes() {
             assert_eq!(facts["dark"], is_dark);
             assert_eq!(facts["overflow"], 0, "at {width} pixels");
             let cut: Vec<&str> = list(&facts, "cut").iter().filter_map(Value::as_str).collect();
-            // On a telephone the links to the sections and the tables of a channel are scrolled; figures and the first screen's table are
-            // not.
+            // Section links and tables scroll on a telephone; figures do not.
             let is_scrolled = |of: &str| (of.is_empty() || of.ends_with("scroll")) && !of.starts_with("verdict");
             let is_allowed = |of: &&&str| width.as_u64().is_some_and(|width| width <= 400) && is_scrolled(of);
             assert!(cut.iter().all(|of| is_allowed(&of)), "{cut:?} at {width} pixels");
@@ -282,7 +272,6 @@ fn values_are_read_by_keyboard_and_pointer_and_tables_are_copied() {
         let of = |name: &str| figure[name].as_str().unwrap_or_default();
         assert_eq!(figure["focused"], true, "{}", of("id"));
         assert!(of("label").chars().count() > 40, "{}: {}", of("id"), of("label"));
-        // The first value of the first panel, with the name of its axis.
         let label = figure["panels"][0]["x"]["label"].as_str().expect("a label");
         let (axis, unit) = label.rsplit_once(", ").expect("a unit");
         assert!(of("read").starts_with(axis) && of("read") != of("before"), "{}: {}", of("id"), of("read"));
@@ -292,7 +281,6 @@ fn values_are_read_by_keyboard_and_pointer_and_tables_are_copied() {
             let place = read.split(':').next().unwrap_or_default();
             assert!(place.ends_with(unit), "{}: {read} without {unit}", of("id"));
             let words = read.split([' ', '(']).map(|word| word.trim_end_matches(')'));
-            // Ten to a power as scripts write it, such as 2.3e-5 or 2.3e−5.
             let is_exponent = |word: &str| word.starts_with(|c: char| c.is_ascii_digit()) && word.contains('e');
             assert!(!words.into_iter().any(is_exponent), "{}: {read}", of("id"));
         }
@@ -301,7 +289,7 @@ fn values_are_read_by_keyboard_and_pointer_and_tables_are_copied() {
     assert!(csv.starts_with("gyro,\"N, °/√h angle random walk\","), "{csv}");
     assert!(csv.contains("\naccel,\"N, µg/√Hz velocity random walk\","), "{csv}");
     assert!(csv.contains("\nx,2.21 ± 0.14,"), "{csv}");
-    // The first figure as it is on light ground, with twice the pixels: ground, measured points and models.
+    // Twice the pixels on light ground.
     let png = &facts[0]["png"];
     let view = reports::figure::pictures(&report())[0].svg.clone();
     let size = view.split("viewBox=\"0 0 ").nth(1).and_then(|rest| rest.split('"').next()).expect("a size");

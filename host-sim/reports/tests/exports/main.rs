@@ -1,4 +1,4 @@
-//! The numbers of a report in the units of other programs, read back by their own parsers.
+//! The numbers of a report in other programs, read back by their parsers.
 
 use clap::ValueEnum;
 use reports::export::{AxisChoice, Export, ExportFormat, export};
@@ -13,11 +13,11 @@ const RATE_HZ: f64 = 100.0;
 const GYRO: [[f64; 3]; 3] = [[0.0368, 0.0093, 0.0013], [0.05, 0.0093, 0.0], [0.03, 0.0, 0.002]];
 /// g/√Hz, g, g/√s.
 const ACCL: [[f64; 3]; 3] = [[340e-6, 0.2e-3, 1e-5], [300e-6, 0.1e-3, 2e-5], [400e-6, 0.3e-3, 0.0]];
-/// Upper bounds of the K that is 0.
+/// Upper bound of the K that is 0.
 const GYRO_Y_BOUND: f64 = 0.0007;
 const ACCL_Z_BOUND: f64 = 3e-6;
 const GRAVITY: f64 = 9.806_65;
-/// Half of the last of four digits, twice for a square, relative to 1.
+/// Four digits, squared.
 const FOUR_DIGITS: f64 = 1.1e-3;
 
 /// IEEE Std 952.
@@ -48,7 +48,6 @@ fn report() -> Value {
     json!({"schema": 2, "sample_rate_hz": RATE_HZ, "channels": gyro.chain(accl).collect::<Vec<_>>()})
 }
 
-/// The coefficient at `index` (N, B, K) of the three axes in SI units; a K of 0 as its bound.
 fn si(sensor: [[f64; 3]; 3], index: usize) -> [f64; 3] {
     let (factor, bound) = if sensor == GYRO { (PI / 180.0, GYRO_Y_BOUND) } else { (GRAVITY, ACCL_Z_BOUND) };
     sensor.map(|axis| factor * if index == 2 && axis[2] == 0.0 { bound } else { axis[index] })
@@ -62,19 +61,17 @@ fn worst(values: [f64; 3]) -> f64 {
     values.into_iter().fold(0.0, f64::max)
 }
 
-/// A report in the format of this name, or why there is none.
 fn written(report: &Value, format: &str, axis: AxisChoice) -> Result<Export, String> {
     let report = SavedReport::from_json(&report.to_string()).map_err(|error| error.to_string())?;
     let format = ExportFormat::from_str(format, false).expect(format);
     export(&report, format, axis).map_err(|error| error.to_string())
 }
 
-/// The file that a report becomes.
 fn exported(report: &Value, format: &str) -> String {
     written(report, format, AxisChoice::Rms).unwrap_or_else(|error| panic!("{format}: {error}")).text
 }
 
-/// Every number of a file with its key; an array gives its first number under the key itself.
+/// An array also has its first number under its key.
 fn numbers(text: &str) -> Vec<(String, Vec<f64>)> {
     let line = |line: &str| {
         let (key, rest) = line.split_once([':', '='])?;
@@ -99,7 +96,7 @@ fn assert_number(file: &str, key: &str, expected: &[f64]) {
     assert_close(&found.1, expected, key);
 }
 
-/// Keys and numbers of the formats that have one number a sensor. VINS has deviations of samples, N·√f and K·√f.
+/// VINS has N·√f and K·√f.
 fn one_number_a_sensor(of: fn([f64; 3]) -> f64) -> [(&'static str, Vec<(&'static str, f64)>); 4] {
     let [gyro_n, gyro_k, accl_n, accl_k] = [of(si(GYRO, 0)), of(si(GYRO, 2)), of(si(ACCL, 0)), of(si(ACCL, 2))];
     let kalibr = vec![
@@ -171,7 +168,7 @@ fn formats_with_a_number_for_each_axis_have_their_units() {
         assert_number(&file, key, &expected);
     }
     let basalt: Value = serde_json::from_str(&exported(&report(), "basalt")).expect("JSON");
-    // Basalt's `Calibration` calls all four continuous and multiplies the first two by sqrt(imu_update_rate).
+    // `Calibration` multiplies the first two by sqrt(imu_update_rate).
     for (key, expected) in [
         ("accel_noise_std", si(ACCL, 0)),
         ("gyro_noise_std", si(GYRO, 0)),
@@ -191,7 +188,7 @@ fn formats_with_a_number_for_each_axis_have_their_units() {
             let vector = block.split_once(property).and_then(|(_, rest)| rest.split_once('[')?.1.split_once(']'));
             let found: Vec<f64> =
                 vector.expect(property).0.split(' ').map(|word| word.parse().expect("a number")).collect();
-            // A simulated sensor has no noise where none was found.
+            // No noise if none was found.
             let factor = if sensor == GYRO { PI / 180.0 } else { GRAVITY };
             for (found, axis) in found.iter().zip(sensor) {
                 assert!(
@@ -208,8 +205,7 @@ fn formats_with_a_number_for_each_axis_have_their_units() {
     assert_eq!(csv.lines().count(), 1 + 6 * 3);
 }
 
-/// Of a sensor whose slow noise *is* a Gauss-Markov process, KF-GINS and Gazebo get that process: its deviation in deg/h and
-/// mGal, and the density `s·√(2/T)` of the noise that drives it.
+/// Deviation in deg/h and mGal; driving density `s·√(2/T)`.
 #[test]
 fn a_gauss_markov_process_is_exported_as_it_is() {
     let (deviation, time) = (0.01, 50.0);

@@ -1,4 +1,4 @@
-//! A finding of several channels has each channel's own number, wherever a report tells of it.
+//! Each channel of a finding has its own number.
 
 use crate::fixture;
 use noise_analysis::bounds::{BoundedEstimate, ChannelEstimate};
@@ -8,9 +8,8 @@ use reports::json::ReportJson;
 use reports::rounding::significant;
 use std::collections::BTreeMap;
 
-/// Three gyros that show one cause, with numbers of their own.
 const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
-/// The size in each, in units of a kind, the largest in the last.
+/// The largest in the last one.
 const SIZES: [f64; 3] = [21.2, 11.9, -27.8];
 /// Half of the interval, relative to the size.
 const HALF_WIDTH: f64 = 0.02;
@@ -24,7 +23,7 @@ fn rate(value: f64) -> ChannelEstimate {
     about(value).in_unit("deg/s")
 }
 
-/// What may have a sign, and what is never negative.
+/// Kinds that may be negative.
 fn signed_kinds() -> Vec<fn(f64) -> Effect> {
     vec![
         |size| TemperatureSensitivity { sensitivity: rate(1e-3 * size), sigmas: 9.0 }.into(),
@@ -90,7 +89,6 @@ fn other_kinds() -> Vec<fn(f64) -> Effect> {
     ]
 }
 
-/// A report in which every gyro shows `kind` with its own size; the last shows it most clearly.
 fn report(kind: fn(f64) -> Effect, sizes: [f64; 3], validated: Validation) -> Report {
     let mut report = fixture::report();
     report.findings = vec![Finding {
@@ -106,7 +104,6 @@ fn report(kind: fn(f64) -> Effect, sizes: [f64; 3], validated: Validation) -> Re
     report
 }
 
-/// Whoever subtracts the number of one channel from another makes that one worse.
 #[test]
 fn every_channel_of_a_finding_has_its_own_number_and_sign() {
     let positive = SIZES.map(f64::abs);
@@ -135,7 +132,6 @@ fn every_channel_of_a_finding_has_its_own_number_and_sign() {
     }
 }
 
-/// The unit of a channel's number is its own.
 #[test]
 fn channels_of_two_units_have_their_numbers_by_unit() {
     let mut report = report(signed_kinds()[0], SIZES, Validation::Yes);
@@ -156,7 +152,6 @@ fn one_number_that_all_channels_have_is_told_once() {
     assert_eq!(text.physics, "The bias follows the temperature: 21.2 ± 0.4 m°/s/°C each.");
 }
 
-/// Half of the record contradicts the number: subtracting it makes that half worse.
 #[test]
 fn what_the_second_half_contradicts_is_not_to_be_subtracted() {
     let kinds = signed_kinds();
@@ -170,7 +165,6 @@ fn what_the_second_half_contradicts_is_not_to_be_subtracted() {
     }
 }
 
-/// The picture shows the channels that the sentence names, each with its own slope.
 #[test]
 fn the_picture_of_a_sensitivity_has_a_line_for_every_channel() {
     let mut report = report(signed_kinds()[0], SIZES, Validation::Yes);

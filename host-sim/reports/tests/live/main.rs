@@ -8,7 +8,6 @@ use ratatui::style::Color;
 use reports::finding_text::FindingText;
 use reports::live::{CurveGroup, LiveView};
 
-/// The view of the report of the other tests, with a finding and a departure.
 fn view() -> LiveView {
     let health = "Health: 1,000,000 samples used, 212 lost, 3 refused, 0 used with a warning.".to_owned();
     let status = "replayed 12 min of 2 h 47 min, 60 times real time".to_owned();
@@ -55,13 +54,13 @@ fn the_screen_has_verdict_curve_findings_health_and_keys_in_80_columns() {
     ] {
         assert!(screen.contains(expected), "{expected}:\n{screen}");
     }
-    // The points of each gyro are the letters of its axis, in the left half below the tables.
+    // The points are letters in the left half below the tables.
     let below = screen.split("σ(τ) of the gyros").nth(1).expect("the curves");
     let left: String = below.lines().map(|line| line.chars().take(40).collect::<String>() + "\n").collect();
     assert!(left.matches(['x', 'y', 'z']).count() >= 4, "{left}");
 }
 
-/// Against the files beside this one. After a change that is meant, delete the file, run the test, and read what it wrote.
+/// After a wanted change, delete the file, run the test, and read the new one.
 #[test]
 fn the_screen_is_as_it_was_read() {
     for (columns, rows) in [(80, 24), (120, 40)] {

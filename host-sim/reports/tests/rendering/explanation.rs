@@ -1,4 +1,4 @@
-//! How the noise changes, in the long form and on the page of a report whose numbers are known.
+//! Changes of the noise in the long form and on the page.
 
 use crate::fixture::report;
 use noise_analysis::bounds::BoundedEstimate;
@@ -11,7 +11,6 @@ use noise_analysis::report::{
 };
 use reports::{full_tables, summary};
 
-/// The text, with single spaces in the place of line breaks.
 fn text(report: &Report) -> String {
     let mut out = Vec::new();
     full_tables::write(report, None, &mut out).expect("a vector can be written");
@@ -53,7 +52,6 @@ fn changes() -> Nonstationarity {
     }
 }
 
-/// A report with everything that is told of the course of a record.
 fn followed() -> Report {
     let mut report = report();
     report.channels[2].nonstationarity = Some(changes());
@@ -147,7 +145,6 @@ fn spikes_and_knocks_are_told_with_their_rate_and_the_errors_without_them() {
     }
 }
 
-/// What the analysis knows of the course of a record is in every form of the report.
 #[test]
 fn every_report_tells_how_the_noise_changes() {
     let mut report = report();
@@ -174,7 +171,7 @@ fn every_report_tells_how_the_noise_changes() {
         validated: Validation::Yes,
         share_percent: Default::default(),
     };
-    // The line that is followed is at 21.1 Hz in the first half; the other finding is another line.
+    // The followed line is at 21.1 Hz.
     report.findings = vec![line(20.7), line(40.0)];
     let (found, _) = summary::findings(&report);
     assert!(
@@ -193,7 +190,6 @@ fn every_report_tells_how_the_noise_changes() {
     let folder = tempfile::tempdir().expect("a folder");
     let page =
         std::fs::read_to_string(reports::page::write(&report, None, folder.path()).expect("a page")).expect("text");
-    // The fixture's curve of the first half leaves 1.711.
     for told in [
         "fitted to the later quarter",
         "with the line where accel x has it in the second half, the model leaves 3.9; this uses the second half of accel x",

@@ -54,7 +54,6 @@ pub(crate) fn report() -> Report {
     }
 }
 
-/// A record without a single octave.
 pub(crate) fn empty() -> Report {
     let mut report = report();
     report.samples = 1;
@@ -97,7 +96,7 @@ pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
     let value = |value: f64, per: &str, from_s: f64, to_s: f64| {
         Some(SlopeMethodValue { value: value * scale, unit: rate_unit(unit, per), from_s, to_s })
     };
-    // Half of the record lacks the longest averaging time.
+    // The second half lacks the longest averaging time.
     let unseen_adev = curve[..17].iter().map(|point| 1.05 * point.adev).collect();
     ChannelReport {
         unseen_adev,
@@ -123,7 +122,6 @@ pub(crate) fn channel(name: &str, unit: &str) -> ChannelReport {
     }
 }
 
-/// An error without a large deviation.
 fn error(deviance: f64, rms: f64) -> ModelErrorReport {
     ModelErrorReport {
         deviance_per_point: Some(deviance),
@@ -135,7 +133,7 @@ fn error(deviance: f64, rms: f64) -> ModelErrorReport {
     }
 }
 
-/// An assessment whose numbers occur nowhere else in the report.
+/// Numbers that occur nowhere else.
 fn assessment(scale: f64) -> Assessment {
     let parameter = |value: f64, unit: &str| Parameter {
         value: scale * value,
@@ -166,10 +164,7 @@ fn assessment(scale: f64) -> Assessment {
             correlation: 0.002,
             whiteness_p: 0.4321,
         }),
-        angle_random_walk_by_spectrum: Some(parameter(0.036_77, "deg/sqrt(s)")),
         coefficients_from: CoefficientsFrom::OctavesAgainstSamples,
-        angle_random_walk_by_spectrum_note: Some("+1.9 % from the fit".to_owned()),
-        markov_time_by_autocorrelation: Some(parameter(2.1, "s")),
         record: [("bias_instability", Some(7.5)), ("rate_random_walk", None)]
             .map(|(kind, more_hours)| RecordLength { kind: kind.to_owned(), half_s: None, more_hours })
             .into(),
@@ -191,7 +186,7 @@ pub(crate) fn term(kind: NoiseTerm, value: f64, unit: &str) -> TermReport {
     TermReport::new(&FittedTerm::exact(kind, value).with_bounds(value * 0.94, value * 1.07), unit)
 }
 
-/// The point of one octave: about `1.5·N/n` degrees of freedom, and a bounded wobble inside the interval.
+/// About `1.5·N/n` degrees of freedom, and a wobble inside the interval.
 fn point(octave: u32, scale: f64) -> CurvePoint {
     let n = 1u64 << octave;
     let tau_s = n as f64 / RATE_HZ;
@@ -207,7 +202,6 @@ fn point(octave: u32, scale: f64) -> CurvePoint {
         high: adev * (1.0 + 1.3 * spread),
         edf,
         replaced_percent: 0.0,
-        // Within a sixteenth of the record.
         adev_by_spectrum: (16 * n <= SAMPLES).then_some(1.003 * adev),
         rounding: 0.0,
         accuracy_percent: 100.0 / (2.0 * (SAMPLES as f64 / n as f64 - 1.0)).sqrt(),

@@ -74,7 +74,7 @@ fn measured(core: Core, call: &str, metric: &str) -> Option<f64> {
         return is_m4f.then(|| f64::from(driver_footprint::call_bytes(driver_footprint::M4F, call)));
     }
     let name = match (call, metric) {
-        // Of the image that counts records of sensor noise, on the Cortex-M4F alone.
+        // The image that counts records of sensor noise, on the Cortex-M4F alone.
         ("trace::trace", "average") => "trace_nothing".into(),
         ("trace::trace", "most") => "trace_tone".into(),
         ("trace::trace", "stack") => "trace_tone_stack".into(),
@@ -98,7 +98,7 @@ fn cell(count: Option<f64>) -> String {
     figure((count / unit).round() * unit)
 }
 
-/// Whether a cell has this count. The compiler may change it by a tenth; the least that can be told apart are some instructions or words.
+/// True if a cell has this count. The compiler may change it by a tenth; the least that can be told apart are some instructions or words.
 fn is_stated(count: Option<f64>, stated: &str) -> bool {
     let is_near = |count: f64| (count - number(stated)).abs() <= TOLERANCE * number(stated) + 16.0;
     count.map_or(stated == "—", is_near)

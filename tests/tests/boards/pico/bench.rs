@@ -97,7 +97,7 @@ pub(crate) struct Outcome {
     pub(crate) received: Vec<(u64, u8)>,
     /// Bytes from the USB port, likewise.
     pub(crate) received_by_usb: Vec<(u64, u8)>,
-    /// What the USB descriptors say: vendor and product, their names, the serial number, the current.
+    /// The USB descriptors: vendor and product, their names, the serial number, the current.
     pub(crate) usb_device: String,
     /// Pulses on the sensor's RST line.
     pub(crate) resets: u32,
@@ -177,7 +177,7 @@ pub(crate) fn run_example(part: VirtualAdis16405, seconds: f64, keys: &[&str], e
     run_image(&example_bench(), SOUND, part, seconds, keys, events)
 }
 
-/// What [`run`] gives, with the path of the image: as it is flashed, with a USB host that reads, or without its port on USB.
+/// Result of [`run`], with the path of the image: as it is flashed, with a USB host that reads, or without its port on USB.
 pub(crate) fn run_to_measure(usb: bool, part: VirtualAdis16405, seconds: f64, keys: &[&str]) -> (Outcome, PathBuf) {
     let uart_alone;
     let (bench, board) = if usb {

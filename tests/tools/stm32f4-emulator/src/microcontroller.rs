@@ -25,9 +25,9 @@ pub(crate) struct Microcontroller {
     exti: Exti,
     exti_slot: usize,
     rcc_slot: usize,
-    /// Whether the next reset is reported as one by the supply.
+    /// True if the next reset is reported as one by the supply.
     pub(crate) brown_out: bool,
-    /// Whether the crystal oscillator never becomes ready.
+    /// True if the crystal oscillator never becomes ready.
     pub(crate) crystal_fails: bool,
 }
 

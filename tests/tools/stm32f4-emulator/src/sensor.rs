@@ -19,7 +19,7 @@ pub(crate) struct Sensor {
     deselected_at: Option<u64>,
     frame: Vec<(u8, u8)>,
     last_byte: Option<u64>,
-    /// Whether a frame is under way.
+    /// True if a frame is under way.
     pub(crate) selected: bool,
 }
 
@@ -48,7 +48,7 @@ impl Sensor {
         }
     }
 
-    /// What the sensor has seen until now.
+    /// Record of the sensor until now.
     pub(crate) fn record(&self) -> BusRecord {
         let violations = self.part.violations().iter().map(ToString::to_string).collect();
         BusRecord { samples: self.part.samples(), violations, ..self.record.clone() }

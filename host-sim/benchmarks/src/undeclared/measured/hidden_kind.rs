@@ -1,4 +1,4 @@
-//! The kinds of effects that can be added to samples that were measured.
+//! Kinds of effects that can be added to measured samples.
 
 use crate::undeclared::effect::EffectKind;
 use crate::undeclared::outside::OutsideKind;
@@ -8,9 +8,7 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum HiddenKind {
-    /// One that the report has a name for.
     Known(EffectKind),
-    /// One that the analysis was not made for.
     Outside(OutsideKind),
 }
 

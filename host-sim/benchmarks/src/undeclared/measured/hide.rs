@@ -11,20 +11,18 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use virtual_sensor::{InjectedEffect, OutputRegister};
 
-/// Random streams of a seed: that of the effect, that of the repeated samples; the dither of channel `n` has `DITHER + n`.
+/// Effect, repeated samples; channel `n` has `DITHER + n`.
 const EFFECT: u64 = 1 << 32;
 const REPEATED: u64 = EFFECT + 1;
 const DITHER: u64 = EFFECT + 2;
 
-/// An effect that is hidden.
 pub(super) enum HiddenEffect {
-    /// With its kind.
     Known(EffectKind, InjectedEffect),
     Outside(OutsideEffect),
 }
 
 impl HiddenEffect {
-    /// Whether it is in `channel`; an effect without channels concerns the samples of all.
+    /// An effect without channels is in all.
     pub(super) fn shows_in(&self, channel: OutputRegister) -> bool {
         match self {
             Self::Known(_, effect) => effect.channels().is_empty() || effect.channels().contains(&channel),
@@ -33,11 +31,10 @@ impl HiddenEffect {
     }
 }
 
-/// Distance in samples at which equal samples are equal by chance.
+/// Distance in samples of chance equality.
 const BY_CHANCE: usize = 64;
 
-/// `stretch` with an effect. The counts of a channel that it is in are made continuous by a uniform dither of one count, and are
-/// rounded again: an effect of size 0 changes none. A sample that was read twice stays so.
+/// `stretch` with an effect, dithered and rounded again, so that size 0 changes none; repeated samples stay repeated.
 pub(super) fn hide(stretch: &Measurement, effect: &HiddenEffect, seed: u64) -> Measurement {
     let mut changed = stretch.clone();
     match effect {
@@ -65,8 +62,7 @@ pub(super) fn hide(stretch: &Measurement, effect: &HiddenEffect, seed: u64) -> M
     changed
 }
 
-/// Of each sample whether it is the one before, read again: the channels of `quantity` all equal those of the sample before, and at
-/// least twice as many samples do so as by chance, as those do that are [`BY_CHANCE`] apart.
+/// Repeated samples: all channels of `quantity` equal the sample before, twice as often as at [`BY_CHANCE`].
 fn read_again(stretch: &Measurement, quantity: Quantity) -> Vec<bool> {
     let of_quantity = || stretch.channels.iter().filter(|channel| channel.profile.quantity == quantity);
     let is_equal = |at: usize, distance: usize| {
@@ -78,7 +74,6 @@ fn read_again(stretch: &Measurement, quantity: Quantity) -> Vec<bool> {
     if are_read_again { equal } else { vec![false; equal.len()] }
 }
 
-/// Whether samples of gyros or of accelerometers were read twice.
 pub(super) fn has_samples_read_again(stretch: &Measurement) -> bool {
     [Quantity::AngularRate, Quantity::SpecificForce].into_iter().any(|of| read_again(stretch, of).contains(&true))
 }
@@ -89,7 +84,7 @@ fn random(seed: u64, stream: u64) -> ChaCha8Rng {
     random
 }
 
-/// Adds the effect to the counts of one channel, which were taken in the sample periods `slots`.
+/// In the sample periods `slots`.
 fn change_channel(
     channel: &mut MeasuredChannel,
     slots: &[u64],
@@ -101,7 +96,7 @@ fn change_channel(
     let lsb = channel.profile.lsb;
     let mut dither = random(seed, DITHER + output as u64);
     let continuous = |count: i32, dither: &mut ChaCha8Rng| lsb * (f64::from(count) + dither.random_range(-0.5..0.5));
-    // One value for each sample period: in a gap the last one before it.
+    // A gap holds the last value.
     let mut values: Vec<f64> = Vec::new();
     for (&slot, &count) in slots.iter().zip(&channel.counts) {
         let value = continuous(count, &mut dither);
@@ -130,7 +125,7 @@ fn change_channel(
     channel.counts = slots.iter().map(|&slot| counts[slot as usize]).collect();
 }
 
-/// Replaces each sample with the probability `share` by the one before, in every channel.
+/// With the probability `share`, in every channel.
 fn repeat_samples(measurement: &mut Measurement, share: f64, seed: u64) {
     let mut random = random(seed, REPEATED);
     for at in 1..measurement.len() {
@@ -140,7 +135,7 @@ fn repeat_samples(measurement: &mut Measurement, share: f64, seed: u64) {
     }
 }
 
-/// The courses over time that a recording of noise does not tell.
+/// Unknown in a recording of noise.
 pub(super) fn no_environment() -> EnvironmentCourse {
     EnvironmentCourse { temperature_c: Vec::new(), supply_v: Vec::new(), force_g: [const { Vec::new() }; 3] }
 }

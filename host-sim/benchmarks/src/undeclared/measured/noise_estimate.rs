@@ -1,5 +1,4 @@
-//! N, B and K of measured noise and the filter that N has passed, for the detection limit: Whittle's fit to the medians of the
-//! periodogram in narrow bands, which lines and other narrow disturbances do not move.
+//! N, B and K of measured noise and N's filter: Whittle's fit to band medians, which lines hardly move.
 
 use crate::undeclared::channel_under_test::{Densities, baseline_densities, fit_baseline, low_pass_gain};
 use adis16405_driver::Channel;
@@ -7,28 +6,23 @@ use measurement::{MeasuredChannel, Measurement};
 use std::f64::consts::PI;
 use virtual_sensor::{NoiseModel, OutputRegister};
 
-/// Bands of the periodogram an octave; the lowest have a few ordinates each.
 const BANDS_PER_OCTAVE: f64 = 6.0;
 /// Fewest ordinates of a band.
 const FEWEST: usize = 5;
-/// Corners of the filter that are tried: from the highest, in half the sample rate, each so many times the next.
+/// Corners: the highest over half the sample rate, and the ratio of neighbours.
 const HIGHEST_CORNER: f64 = 1.5;
 const CORNERS: usize = 24;
 const CORNER_RATIO: f64 = 1.15;
-/// Log likelihood that a filter must gain.
 const LEAST_GAIN: f64 = 10.0;
 
-/// Noise of the gyros and accelerometers of a recording.
+/// For gyros and accelerometers.
 pub(super) struct NoiseEstimate {
-    /// N before its filter, B and K.
     pub(super) model: NoiseModel,
-    /// Corner of the filter of each channel, in the order of the burst, Hz; infinite where none shows.
+    /// By channel, Hz; infinite without a filter.
     pub(super) corners_hz: [f64; 12],
-    /// Those that change.
     pub(super) channels: Vec<OutputRegister>,
 }
 
-/// The noise of every gyro and accelerometer of `samples` that changes.
 pub(super) fn noise_estimate(samples: &Measurement) -> NoiseEstimate {
     let (mut model, mut channels) = (NoiseModel::noiseless(), Vec::new());
     let mut corners_hz = [f64::INFINITY; 12];
@@ -45,20 +39,19 @@ pub(super) fn noise_estimate(samples: &Measurement) -> NoiseEstimate {
     NoiseEstimate { model, corners_hz, channels }
 }
 
-/// The values of a channel in its unit, one after the other.
+/// In the channel's unit.
 fn values(channel: &MeasuredChannel) -> Vec<f64> {
     channel.counts.iter().map(|&count| f64::from(count) * channel.profile.lsb).collect()
 }
 
-/// N, B and K of values that are `period_s` s apart and rounded to multiples of `resolution`, and the corner of a filter that N has
-/// passed, Hz; `None` of a constant.
+/// N, B, K and N's corner, Hz, of values rounded to `resolution`; `None` of a constant.
 fn coefficients(values: &[f64], period_s: f64, resolution: f64) -> Option<([f64; 3], f64)> {
     let bands = bands(values, period_s)?;
     let rounding = resolution * resolution / 12.0 * period_s;
     let counts: Vec<f64> = bands.iter().map(|band| band.ordinates).collect();
-    // From the density at the highest frequencies and nothing else.
+    // From the highest frequencies.
     let white = bands.last().map_or(0.0, |band| band.density);
-    // The squares of N, B and K behind a filter, and their log likelihood but for a constant.
+    // And log likelihood up to a constant.
     let fit = |corner_hz: f64| {
         let of_band = |band: &Band| {
             let [white, flicker, walk] = baseline_densities(period_s, band.frequency_hz);
@@ -82,7 +75,6 @@ fn coefficients(values: &[f64], period_s: f64, resolution: f64) -> Option<([f64;
     Some((coefficients, corner_hz))
 }
 
-/// A band of the periodogram.
 struct Band {
     frequency_hz: f64,
     /// Two-sided, unit²/Hz.
@@ -90,8 +82,7 @@ struct Band {
     ordinates: f64,
 }
 
-/// The medians of the periodogram over their bias. Hann's window keeps the slow noise out of the high frequencies; the lowest two
-/// ordinates have a part of the mean.
+/// Medians over their bias, under Hann's window, without the lowest two ordinates.
 fn bands(values: &[f64], period_s: f64) -> Option<Vec<Band>> {
     let length = values.len();
     let mean = values.iter().sum::<f64>() / length as f64;
@@ -103,7 +94,7 @@ fn bands(values: &[f64], period_s: f64) -> Option<Vec<Band>> {
     let transform = fourier::forward(length);
     let mut output = transform.make_output_vec();
     transform.process(&mut input, &mut output).ok()?;
-    // The mean square of Hann's window is 3/8.
+    // Mean square 3/8.
     let scale = period_s / (0.375 * length as f64);
     let mut from = 2;
     let mut bands = Vec::new();
@@ -113,7 +104,7 @@ fn bands(values: &[f64], period_s: f64) -> Option<Vec<Band>> {
         let mut ordinates: Vec<f64> = output[from..to].iter().map(|bin| scale * bin.norm_sqr()).collect();
         ordinates.sort_by(f64::total_cmp);
         let middle = ordinates.len() / 2;
-        // The expectation of an order statistic of exponential variables of mean 1: 1/n + 1/(n − 1) + …
+        // 1/n + 1/(n − 1) + … for exponential order statistics.
         let expected: f64 = (ordinates.len() - middle..=ordinates.len()).map(|left| 1.0 / left as f64).sum();
         bands.push(Band {
             frequency_hz: 0.5 * (from + to - 1) as f64 / (length as f64 * period_s),
@@ -135,8 +126,7 @@ mod tests {
     use std::f64::consts::TAU;
     use virtual_sensor::ChannelNoise;
 
-    /// 2¹⁷ samples at 100 Hz of noise in which each of N, B and K governs a decade or more, and a line of ten times its standard
-    /// deviation. Over 8 seeds the medians tell N to 1 % and B and K, which have some hundred ordinates each, to a fifth.
+    /// N to 1 %, B and K to a fifth over 8 seeds; the line has ten standard deviations.
     #[test]
     fn the_coefficients_are_those_of_the_noise_in_spite_of_a_line() {
         let truth = [0.02, 0.03, 0.01];
@@ -161,7 +151,7 @@ mod tests {
         assert!(ratios.iter().zip(allowed).all(|(ratio, allowed)| (ratio - 1.0).abs() < allowed), "{ratios:?}");
         assert_eq!(coefficients(&[1.0; 100], 0.01, 1.0), None);
     }
-    /// White noise behind a filter of first order, as of an inertial sensor for a drone: 2·N²/(1 + (f/f₀)²) from one side.
+    /// 2·N²/(1 + (f/f₀)²).
     #[test]
     fn the_filter_of_the_noise_is_found() {
         let (n, truth_hz) = (0.004, 45.0);
@@ -170,7 +160,7 @@ mod tests {
             let density = |frequency: f64| 2.0 * n * n / (1.0 + (frequency / truth_hz).powi(2));
             let values = gaussian_noise(density, 250.0, 12_000, &mut random);
             let ([found, ..], corner_hz) = coefficients(&values, 0.004, 1e-4).expect("noise");
-            // The corners that are tried are 15 % apart, and a lower one takes a larger N.
+            // Corners are 15 % apart.
             assert!((corner_hz / truth_hz).ln().abs() < 0.15, "{corner_hz}");
             assert!((found / n - 1.0).abs() < 0.1, "{found}");
         }

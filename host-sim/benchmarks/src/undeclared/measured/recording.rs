@@ -1,4 +1,4 @@
-//! Recordings of measured noise, and their parts.
+//! Recordings of measured noise.
 
 use adis16405_driver::GyroRange;
 use measurement::{MeasuredChannel, Measurement, SensorProfile};
@@ -15,9 +15,7 @@ use std::path::Path;
 /// A recording of a sensor at rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseRecording {
-    /// As the table names it.
     pub name: String,
-    /// All of it.
     pub samples: Measurement,
 }
 
@@ -25,29 +23,25 @@ pub struct NoiseRecording {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeasuredNoiseError {
-    /// It cannot be read.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// Its sensor always moves.
     #[error("{0}: the sensor is never at rest")]
     Moving(String),
-    /// It has no time base.
     #[error("{file}: {reason}")]
     TimeBase {
         /// The file, as it was named.
         file: String,
-        /// The cause.
         reason: TimeBaseError,
     },
 }
 
 impl NoiseRecording {
-    /// Reads a file of any format that the reader of recordings knows: of register counts all, of other files the longest part at
-    /// rest. `rate_hz` is the sample rate of a recording without time stamps. Columns and units that a file with one sensor does not
-    /// say are those that its inspection proposes.
+    /// Reads register counts completely, other files in their longest part at rest. `rate_hz` is for files without
+    /// stamps; missing columns and units are proposed by the inspection.
     ///
     /// # Errors
-    /// The file cannot be read, neither its time stamps nor `rate_hz` tell the sample rate, or the sensor is never at rest.
+    /// The file cannot be read, neither its time stamps nor `rate_hz` tell the sample rate, or the sensor is never at
+    /// rest.
     pub fn read(file: &Path, rate_hz: Option<f64>) -> Result<Self, MeasuredNoiseError> {
         let file_name = || file.display().to_string();
         let input = RecordedInput::open(file)?;
@@ -76,17 +70,17 @@ impl NoiseRecording {
     }
 }
 
-/// How the only sensor in `tables` is read, and when it is at rest, where that is not all the time.
+/// Proposal for the only sensor, and its time at rest.
 fn only_sensor(tables: &[InspectedTable], rate_hz: Option<f64>) -> (ReadOptions, Option<TimeRange>) {
     let mut proposals = tables.iter().flat_map(|table| table.proposals.iter().map(move |proposal| (table, proposal)));
     let (mut selection, mut topic, mut rest) = (ColumnSelection::default(), None, None);
-    // Which of several is meant, the error of the reader asks.
+    // The reader's error asks which of several.
     if let (Some((table, proposal)), None) = (proposals.next(), proposals.next()) {
         selection = ColumnSelection::parse(&proposal.columns, &proposal.units).unwrap_or_default();
         topic.clone_from(&proposal.topic);
         rest = table.steady.as_ref().filter(|steady| steady.rows.len() < table.rows).and_then(
             |SteadyPart { rows, .. }| {
-                // By a rate of the user's where the file has none.
+                // At the user's rate if the file has none.
                 let [from, to] = [rows.start, rows.end].map(|row| row as f64);
                 let by_rate = |rate_hz: f64| TimeRange { from_s: from / rate_hz, to_s: to / rate_hz };
                 table.steady_s.or_else(|| rate_hz.map(by_rate))
@@ -96,7 +90,7 @@ fn only_sensor(tables: &[InspectedTable], rate_hz: Option<f64>) -> (ReadOptions,
     (ReadOptions { sensor: SensorProfile::generic(), selection, topic }, rest)
 }
 
-/// The samples on the time base of their stamps; without stamps, at `rate_hz`.
+/// By stamps, or at `rate_hz`.
 fn with_rate(
     rate_hz: Option<f64>,
     open: impl Fn(Option<f64>) -> Result<SampleStream, StreamError>,
@@ -108,7 +102,7 @@ fn with_rate(
     opened.map(SampleStream::into_beginning)
 }
 
-/// The samples in the sample periods `periods`, as a recording of their own.
+/// The sample periods `periods` as a recording.
 pub(super) fn part(whole: &Measurement, periods: Range<u64>) -> Measurement {
     let [from, to] = [periods.start, periods.end].map(|slot| whole.slots.partition_point(|of| *of < slot));
     let first = whole.slots.get(from).copied().unwrap_or(0);

@@ -1,4 +1,4 @@
-//! The score of an effect that is hidden in a stretch of measured noise.
+//! Score of an effect in measured noise.
 
 use super::hidden_kind::HiddenKind;
 use super::hide::{HiddenEffect, hide};
@@ -10,54 +10,43 @@ use noise_analysis::report::{ChannelEffect, ChannelReport, Effect, ModelReport, 
 use serde::Serialize;
 use std::collections::BTreeSet;
 
-/// Deviance per point from which on a model is said to fail.
+/// Deviance per point of a failing model.
 pub(super) const FAILS: f64 = 3.0;
 
-/// Deviances per point on the unseen half of the stretch, in the first channel that the effect is in; absent where there are too few
-/// samples.
+/// Deviances per point on the unseen half, in the effect's first channel; absent for too few samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MeasuredErrors {
-    /// Of N, B and K, with the effect.
     pub before: Option<f64>,
-    /// Of the model with the added terms, with the effect.
     pub after: Option<f64>,
-    /// The same two without what the rules of the first half exclude.
+    /// Deviance without what the first half's rules exclude.
     pub excluding: [Option<f64>; 2],
-    /// Of the curve of the first half taken for a model, with the effect.
+    /// Curve of the first half as a model.
     pub first_half_curve: Option<f64>,
-    /// Of N, B and K, untouched.
     pub untouched_before: Option<f64>,
-    /// Of the model with the added terms, untouched.
+    /// With added terms, untouched.
     pub untouched_after: Option<f64>,
 }
 
 /// The score of an effect in a stretch.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MeasuredScore {
-    /// The recording.
     pub recording: String,
-    /// Start of the stretch, s from the first sample of the recording.
+    /// s from the recording's first sample.
     pub from_s: f64,
-    /// What was hidden.
     pub kind: HiddenKind,
-    /// Names of the channels that it is in.
     pub channels: Vec<&'static str>,
-    /// Size over the detection limit.
+    /// Size over detection limit.
     pub strength: f64,
-    /// Whether it was named; of an effect that the analysis was not made for, whether it is reported as unexplained or by a name that
-    /// describes it.
+    /// Named; outside the vocabulary also `unexplained`.
     pub named: bool,
-    /// What the report says in the channels of the effect, as `channel: kind`.
+    /// Report on the effect's channels, `channel: kind`.
     pub found: Vec<String>,
-    /// Names that the report gives and the report of the untouched stretch does not, other than the right one, as `channel: kind`.
+    /// Names beyond those of the untouched stretch and the right one, `channel: kind`.
     pub wrong_names: Vec<String>,
-    /// Parameters of an effect that was named.
     pub estimates: Vec<ParameterScore>,
-    /// On the unseen half.
     pub errors: MeasuredErrors,
 }
 
-/// Hides an effect in a stretch, analyses it and scores the report.
 pub(super) fn hidden(stretch: &Stretch<'_>, kind: HiddenKind, effect: &HiddenEffect, strength: f64) -> MeasuredScore {
     let report = analyze(&hide(&stretch.samples, effect, stretch.seed));
     let is_in = |channel: &Channel| {
@@ -85,7 +74,7 @@ fn channel_report(report: &Report, channel: Channel) -> Option<&ChannelReport> {
     report.channels.iter().find(|of| of.name == channel.name())
 }
 
-/// Whether the effect was named, the names that are right, and its parameters.
+/// True if it was named, right names, parameters.
 fn answer(
     kind: HiddenKind,
     effect: &HiddenEffect,
@@ -118,8 +107,7 @@ fn answer(
     }
 }
 
-/// Whether none of `others` is of the same kind with the parameters of `effect`: with two estimates of each of which one at least is within
-/// the interval of the other.
+/// True if none of `others` has the kind and parameters: one estimate within the other's interval.
 fn is_new(effect: &Effect, others: &[ChannelEffect]) -> bool {
     let parameters = effect.parameters();
     let is_same = |other: &ChannelEffect| {
@@ -133,8 +121,7 @@ fn is_new(effect: &Effect, others: &[ChannelEffect]) -> bool {
     !others.iter().any(is_same)
 }
 
-/// The names of the first report that neither the second one, of the untouched stretch, has in the same channel nor are `right` in one of
-/// the channels `own` nor are those of a part of the effect.
+/// New names in the first report that are neither `right` in `own` channels nor of a part of the effect.
 fn wrong_names(
     own: &[Channel],
     right: &[&str],
@@ -149,7 +136,6 @@ fn wrong_names(
     named_as(&new)
 }
 
-/// The effects that `report` lists in `channels`, of those that count.
 fn names(report: &Report, channels: &[Channel], counts: impl Fn(&Effect) -> bool) -> BTreeSet<(Channel, &'static str)> {
     let of_channel = |channel: &Channel| {
         let effects = channel_report(report, *channel).map(|of| of.effects.as_slice()).unwrap_or_default();
@@ -191,7 +177,7 @@ impl MeasuredErrors {
         }
     }
 
-    /// Whether the model with the added terms is farther from the unseen half, as it was recorded, than N, B and K, and fails there.
+    /// True if the added terms fail and are worse than N, B and K as recorded.
     #[must_use]
     pub fn grew(&self) -> bool {
         self.before.zip(self.after).is_some_and(|(before, after)| after > before.max(FAILS))

@@ -1,4 +1,4 @@
-//! A part of a recording, and the effects that are drawn for it.
+//! A part of a recording, and its effects.
 
 use super::hidden_kind::HiddenKind;
 use super::hide::{HiddenEffect, has_samples_read_again, no_environment};
@@ -20,33 +20,30 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use virtual_sensor::{OutputRegister, SensorScenario};
 
-/// Part of the strength that is asked for which an effect must have.
+/// Least part of the required strength.
 const LEAST_STRENGTH: f64 = 0.95;
-/// Largest size of an effect whose strength does not grow with it, over the one at the strength that is asked for.
+/// Factor on a size whose strength does not grow with it.
 const LARGEST_SIZE: f64 = 10.0;
-/// Number of draws of a channel whose noise is not below a count.
+/// Draws of a channel with noise above a count.
 const DRAWS: usize = 100;
-/// Full scale of an output whose range is not known, in standard deviations of the noise of a sample.
+/// For unknown ranges, in deviations of a sample.
 const UNKNOWN_FULL_SCALE: f64 = 1000.0;
-/// Random stream of the first kind of effect; those of the stretches and of what is added are in `measured` and `hide`.
+/// First kind of effect; `measured` and `hide` have others.
 const DRAWN: u64 = 1;
 
-/// A part of a recording, with its own report.
 pub(super) struct Stretch<'a> {
     pub(super) recording: &'a str,
-    /// Seed of everything that is drawn for it.
     pub(super) seed: u64,
     pub(super) from_s: f64,
     pub(super) samples: Measurement,
-    /// Of its gyros and accelerometers.
     pub(super) noise: NoiseEstimate,
     pub(super) report: Report,
 }
 
 impl Stretch<'_> {
-    /// An effect of `kind` at `strength` with its own strength; `None` where no channel of the stretch can have it.
+    /// At `strength`, with its own; `None` if no channel suits.
     pub(super) fn draw(&self, kind: HiddenKind, strength: f64) -> Option<(HiddenEffect, f64)> {
-        // Each kind has its own random numbers, so that one more kind changes none of the others.
+        // Own random numbers: a new kind changes no other.
         let of_kind = match kind {
             HiddenKind::Known(kind) => kind as u64,
             HiddenKind::Outside(kind) => EffectKind::ALL.len() as u64 + kind as u64,
@@ -57,12 +54,12 @@ impl Stretch<'_> {
         let channel = |random: &mut ChaCha8Rng| self.noise.channels.choose(random).copied();
         let first = *self.noise.channels.first()?;
         match kind {
-            // Nobody knows how many of its own losses and repetitions are chance.
+            // Its own losses and repetitions are unknown.
             HiddenKind::Known(EffectKind::DroppedSamples) if self.samples.periods() > self.samples.len() as u64 => None,
             HiddenKind::Known(EffectKind::RepeatedSamples) if has_samples_read_again(&self.samples) => None,
             HiddenKind::Known(kind) => {
                 let of_channel = |random: &mut ChaCha8Rng| channel(random).unwrap_or(first);
-                // The strength of a slow drift beside a walk grows more slowly than its size.
+                // Drift beside a walk grows more slowly than its size.
                 let ranges = [1.0, LARGEST_SIZE].map(|most| (strength, most * strength));
                 let mut drawn = ranges.into_iter().map(|range| {
                     draw_effects(&[kind], range, LEAST_STRENGTH * strength, &truth, of_channel, &mut random)
@@ -98,7 +95,6 @@ impl Stretch<'_> {
         self.samples.channels.iter().find(|of| of.profile.name == channel.name())
     }
 
-    /// The stretch as the detection limit knows it: noise of N, B and K.
     fn described(&self) -> TrueRecording {
         let size = |channel: Channel| self.measured(channel).map_or(1.0, |of| of.profile.lsb);
         let full_scale = |channel: Channel| {
@@ -124,8 +120,7 @@ impl Stretch<'_> {
     }
 }
 
-/// Whether the second of the codes that `effect` takes away from `counts` has so many samples that its absence is seen at `strength`: a
-/// code of which `n` samples are expected is empty by chance with the probability exp(−n).
+/// True if the second missing code of `counts` is significant at `strength`: exp(−n) for n expected samples.
 fn are_seen_to_be_missing(counts: &[i32], effect: &OutsideEffect, strength: f64) -> bool {
     let mut samples: BTreeMap<i32, u32> = BTreeMap::new();
     counts.iter().for_each(|&code| *samples.entry(code).or_insert(0) += 1);
@@ -140,8 +135,7 @@ fn are_seen_to_be_missing(counts: &[i32], effect: &OutsideEffect, strength: f64)
 mod tests {
     use super::*;
 
-    /// A hundred codes, every fourth of which is missing. With a false alarm of 10⁻⁴ a code, of z = 3.719, the second needs ½z² = 6.9
-    /// samples at strength 1, and nine times as many at 3.
+    /// Every fourth of a hundred codes; the second needs ½z² = 6.9 samples at strength 1, nine times as many at 3.
     #[test]
     fn missing_codes_are_hidden_where_two_of_them_have_samples() {
         let mut random = ChaCha8Rng::seed_from_u64(1);
@@ -152,7 +146,7 @@ mod tests {
         for (samples, strength, expected) in [(6, 1.0, false), (7, 1.0, true), (62, 3.0, false), (63, 3.0, true)] {
             assert_eq!(are_seen_to_be_missing(&of_each(samples), &unit, strength), expected, "{samples}");
         }
-        // One of them is in reach.
+        // One is in reach.
         let few: Vec<i32> = (0..10_000).map(|at| at % 3 - 1).collect();
         assert!(!are_seen_to_be_missing(&few, &unit, 1.0));
     }

@@ -8,12 +8,10 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 
-/// The scores, in the order of the stretches.
+/// In the order of the stretches.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct MeasuredNoiseTable {
-    /// Kinds that no channel of a stretch could have at the strength that was asked for, one entry a stretch.
     pub not_hidden: Vec<HiddenKind>,
-    /// Of those that were hidden.
     pub scores: Vec<MeasuredScore>,
 }
 
@@ -25,7 +23,7 @@ impl MeasuredNoiseTable {
         Proportion::count(known.map(|score| score.named))
     }
 
-    /// Effects that the analysis was not made for, and that were reported as unexplained or by a name that describes them.
+    /// Outside the vocabulary: unexplained, or a name that describes it.
     #[must_use]
     pub fn outside_told(&self) -> Proportion {
         let outside = self.scores.iter().filter(|score| matches!(score.kind, HiddenKind::Outside(_)));
@@ -38,16 +36,13 @@ impl MeasuredNoiseTable {
         Proportion::count(self.scores.iter().map(|score| !score.wrong_names.is_empty()))
     }
 
-    /// Stretches with an effect whose error on the unseen half grew.
+    /// Whose error on the unseen half grew.
     #[must_use]
     pub fn grew(&self) -> Proportion {
         Proportion::count(self.scores.iter().map(|score| score.errors.grew()))
     }
 
     /// Writes the table and its summary as text.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         let heads = ["named", "wrong", "grew", "near", "held", "before", "after", "untouched"];
         writeln!(out, "Effects in measured noise; deviance per point on the unseen half: medians\n")?;
@@ -113,7 +108,7 @@ impl MeasuredNoiseTable {
         writeln!(out)
     }
 
-    /// A line for each effect of which there are names of the sort `what`.
+    /// One line per effect with names of the sort `what`.
     fn write_rest(
         &self,
         out: &mut dyn Write,

@@ -1,4 +1,4 @@
-//! The parts of a recording, the effects in its counts, and the whole benchmark, on generated noise in place of a recording.
+//! On generated noise in place of a recording.
 
 use super::hide::{HiddenEffect, has_samples_read_again, hide};
 use super::recording::part;
@@ -8,7 +8,6 @@ use crate::undeclared::{DrawnRecording, RecordingGroup};
 use measurement::Measurement;
 use virtual_sensor::{InjectedEffect, OutputRegister, SensorScenario};
 
-/// Noise of the benchmark's own generator, as a recording.
 fn recorded(seconds: f64, seed: u64) -> NoiseRecording {
     let mut drawn = DrawnRecording::from_group(RecordingGroup::Nothing, seconds, seed);
     drawn.simulation.scenario = SensorScenario::default();
@@ -32,15 +31,13 @@ fn an_effect_of_size_0_changes_no_count_and_a_larger_one_its_channel_alone() {
     }
     let [before, after] = [&samples, &changed].map(|of| of.channels.iter().find(|of| of.profile.name == "gyro_y"));
     let (before, after) = (before.expect("gyro y"), after.expect("gyro y"));
-    // The difference is the sinusoid with the error of rounding the sum: 0.5 °/s are 10 counts, ½·10² + 1/12 in the mean square, of
-    // which a dither and the count below it add as much again.
+    // 0.5 °/s are 10 counts, ½·10² + 1/12; dithers double the 1/12.
     let squares = before.counts.iter().zip(&after.counts).map(|(a, b)| f64::from(b - a).powi(2));
     let mean = squares.sum::<f64>() / before.counts.len() as f64;
     assert!((mean - 50.0).abs() < 1.0, "{mean}");
 }
 
-/// Every third sample is the one before: so it is with a sinusoid. Samples that are equal by chance, as of a channel that hardly leaves
-/// one count, get theirs.
+/// Repeated samples stay so; chance equality of a quiet channel changes.
 #[test]
 fn samples_that_were_read_twice_stay_so() {
     let mut samples = recorded(20.0, 4).samples;
@@ -60,25 +57,22 @@ fn samples_that_were_read_twice_stay_so() {
     assert_eq!(repeated(&changed), samples.len() / 3);
     samples.channels.iter_mut().flat_map(|channel| &mut channel.counts).for_each(|count| *count = 0);
     let changed = gyro_y(&hide(&samples, &sinusoid(0.5), 7));
-    // Neighbours of a sinusoid of 10 counts are equal near its turns, and elsewhere by the dither.
+    // Neighbours are equal near the turns.
     assert!(repeated(&changed) < samples.len() / 12, "{}", repeated(&changed));
 }
 
 #[test]
 fn a_part_has_its_own_periods_and_gaps() {
     let mut whole = recorded(20.0, 2).samples;
-    // 100 periods are missing after the sample of period 999.
     whole.slots[1000..].iter_mut().for_each(|slot| *slot += 100);
     let cut = part(&whole, 900..1300);
     assert_eq!((cut.len(), cut.periods(), cut.dropped["gap"]), (300, 400, 100));
     assert_eq!(cut.channels[1].counts[0], whole.channels[1].counts[900]);
     assert_eq!(cut.channels[1].counts[299], whole.channels[1].counts[1199]);
-    // A hidden effect goes on through the gap.
     let changed = hide(&cut, &sinusoid(0.5), 3);
     assert_eq!(changed.slots, cut.slots);
 }
 
-/// Every kind is drawn at its strength, or counted as not hidden.
 #[test]
 fn every_kind_is_hidden_in_every_stretch_or_counted() {
     let recordings = vec![recorded(60.0, 3)];
@@ -94,7 +88,6 @@ fn every_kind_is_hidden_in_every_stretch_or_counted() {
     assert_eq!(table.scores.len() + table.not_hidden.len(), HiddenKind::ALL.len());
     assert!(table.not_hidden.len() <= 3, "{:?}", table.not_hidden);
     assert!(table.scores.iter().all(|score| score.strength >= 0.95 * 3.0));
-    // Of eleven effects of three times the limit the analysis names at least half.
     assert!(2 * table.named().yes >= table.named().all, "{:?}", table.named());
     let mut text = Vec::new();
     table.write(&mut text).expect("text");

@@ -37,7 +37,7 @@ pub(super) fn percent(shown: &Shown, channels: &[ChannelReport], profile: &Senso
             model_avar: adev * adev,
             adev_of: &adev_of,
         };
-        let added: AddedVariance = shown.parts.iter().map(|part| part.avar(&at)).sum();
+        let added: AddedVariance = shown.parts.iter().map(|part| part.kind().avar(&at)).sum();
         let own = added.modelled + added.corrected;
         let total = at.model_avar.max(added.modelled) + added.corrected;
         // Rounding can take a whole share beyond 100.

@@ -37,8 +37,10 @@ pub(super) fn distance(whole: &Effect, half: &Effect) -> f64 {
 pub(super) fn compare(pairs: &[(&Effect, &Effect)]) -> Validation {
     let deviations: Vec<f64> = pairs
         .iter()
-        .flat_map(|(whole, half)| whole.lasting().into_iter().zip(half.lasting()))
-        .filter_map(|(whole, half)| deviation(&whole?, &half?))
+        .flat_map(|(whole, half)| {
+            let whole = whole.lasting();
+            half.lasting().into_iter().filter_map(move |(name, half)| deviation(whole.get(name)?, &half))
+        })
         .collect();
     let Some(largest) = deviations.iter().copied().reduce(f64::max) else { return Validation::Untestable };
     // Of this many deviations the largest, had they been independent (Šidák).

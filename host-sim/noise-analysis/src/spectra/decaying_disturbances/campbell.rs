@@ -1,48 +1,34 @@
-//! Rate, size and time constant of disturbances that begin at once and decay, from the third and fourth cumulant of a filtered record.
+//! Rate, size and time constant of decaying disturbances, from the cumulants of a filtered record.
 //!
-//! Of disturbances at the rate λ (a Poisson process), each with a size A of its own, a filter that answers one of size 1 by r(t) makes a
-//! signal whose n-th cumulant is `κₙ = λ·E[Aⁿ]·∫r(t)ⁿ dt` (Campbell's theorem; S. Rice, "Mathematical analysis of random noise", Bell
-//! Syst. Tech. J. 23, 1944, section 1.5). Gaussian noise of any spectrum has no third and no fourth one. So `κ₄/κ₃` tells the size, and
-//! `κ₃` the rate: those of equal disturbances, `E[A⁴]/E[A³]` where the sizes differ.
-//!
-//! The filters are those that are matched to a decay. With `⟨f, T⟩ = ∫r³ dt` for the filter f and the time constant T, `κ₃/√⟨f, f⟩` is
-//! largest for f = T: powers of a covariance are a covariance (I. Schur, J. reine angew. Math. 140, 1911), for which Schwarz's inequality
-//! holds. It is the estimate by generalised least squares too, as the covariance of two such sums in Gaussian noise is 6⟨f, g⟩ (F. Mehler).
-//!
-//! The bounds are by the jackknife of the logarithms, with stretches of the record left out one by one (R. Miller, "The jackknife - a
-//! review", Biometrika 61, 1974). A few stretches have most of the disturbances: a variance of m values with the kurtosis k has the
-//! relative variance (k − 1)/m, as one of 2m/(k − 1) degrees of freedom (F. Satterthwaite, Biometrics Bull. 2, 1946). That of the size is no
-//! less than chance overlaps make it.
+//! A filter's response r(t) to disturbances of size A at the rate λ has `κₙ = λ·E[Aⁿ]·∫r(t)ⁿ dt` (Campbell's theorem;
+//! S. Rice, Bell Syst. Tech. J. 23, 1944, section 1.5). `κ₄/κ₃` gives the size, `κ₃` the rate. `κ₃/√⟨f, f⟩` with `⟨f,
+//! T⟩ = ∫r³ dt` is largest for the filter f = T (I. Schur, J. reine angew. Math. 140, 1911). Bounds by the jackknife
+//! (R. Miller, Biometrika 61, 1974), with 2m/(k − 1) degrees of freedom for kurtosis k (F. Satterthwaite, Biometrics
+//! Bull. 2, 1946).
 
 use super::matched_filter::WhitenedRecord;
 use super::overlaps::variance_of_ratio;
 use crate::bounds::BoundedEstimate;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// Filters from a fourth to four times the time constant of the one that finds the disturbances, four an octave: either end is
-/// beyond what a response tells.
+/// Filters from 1/4 to 4 times the detecting filter's time constant, four an octave.
 const OCTAVES: i32 = 2;
 const STEPS: i32 = 4;
-/// Times within a block at which disturbances are taken to begin.
 const ONSETS: usize = 4;
-/// Probability below the upper end of a 95 % interval.
+/// Quantile of the upper end of a 95 % interval.
 const UPPER: f64 = 0.975;
 
-/// Disturbances of a rate and a size.
 pub(super) struct CampbellEstimate {
-    /// Blocks.
     pub time_constant: BoundedEstimate,
-    /// Of the absolute value, in the unit of the record.
+    /// Magnitude, in the unit of the record.
     pub size: BoundedEstimate,
-    /// 1/block
     pub rate: BoundedEstimate,
-    /// Standard deviation of the sum of all, `√(λA²T/2)`, in the unit of the record.
+    /// Standard deviation of the sum, `√(λA²T/2)`, in the unit of the record.
     pub deviation: BoundedEstimate,
 }
 
 impl CampbellEstimate {
-    /// Of disturbances upwards (`sign` 1) or downwards (−1), near the filter for `time` blocks. The blocks are means of
-    /// `samples_per_block` samples. `None` if the cumulants are not those of such disturbances.
+    /// For disturbances of this `sign`, near the filter for `time` blocks; `None` if the cumulants are of others.
     pub(super) fn new(record: &WhitenedRecord, time: f64, sign: f64, samples_per_block: usize) -> Option<Self> {
         let filter = |step: i32| {
             let own = time * (f64::from(step) / f64::from(STEPS)).exp2();
@@ -69,7 +55,7 @@ impl CampbellEstimate {
     }
 }
 
-/// Half of the 95 % interval of an estimate, of which these are the values without one of the stretches each.
+/// Half of the 95 % interval, by the values `without` one stretch each.
 fn half_width(without: &[f64], least_variance: f64) -> Option<f64> {
     let count = without.len() as f64;
     let mean = without.iter().sum::<f64>() / count;
@@ -81,21 +67,19 @@ fn half_width(without: &[f64], least_variance: f64) -> Option<f64> {
     (variance > 0.0).then(|| students_t * variance.max(least_variance).sqrt())
 }
 
-/// What one filter makes of the record and of a decay of its own time constant.
 struct Moments {
-    /// Blocks.
     time: f64,
-    /// Means of the second, third and fourth power of the output in each stretch of the record, and their sums.
+    /// Mean second, third and fourth power of the output per stretch, and their sums.
     stretches: Vec<[f64; 3]>,
     sums: [f64; 3],
-    /// Root of the sum of the cubes of its covariance.
+    /// Root of the sum of the cubed covariance.
     scale: f64,
-    /// Sums of the third and fourth power of its response to a decay of height 1.
+    /// Sums of the third and fourth power of the response to height 1.
     response: [f64; 2],
 }
 
 impl Moments {
-    /// Of the filter for a decay of `time` blocks, in stretches for one of `middle` blocks.
+    /// Filter for a decay of `time` blocks; stretches for one of `middle` blocks.
     fn new(record: &WhitenedRecord, [time, middle]: [f64; 2], sign: f64, samples_per_block: usize) -> Option<Self> {
         let filtered = record.filtered(time, false)?;
         let inner = record.inner(&filtered.output, middle)?;
@@ -117,17 +101,17 @@ impl Moments {
         Some(Self { time, stretches, sums, scale, response })
     }
 
-    /// Third and fourth cumulant of the output, without one of the stretches.
+    /// Third and fourth cumulant without one stretch.
     fn cumulants(&self, left_out: Option<usize>) -> [f64; 2] {
         let count = (self.stretches.len() - usize::from(left_out.is_some())) as f64;
         let left_out = left_out.map_or([0.0; 3], |at| self.stretches[at]);
         let [second, third, fourth] = std::array::from_fn(|at| (self.sums[at] - left_out[at]) / count);
-        // The lowest orders are not passed: the mean of the output is 0.
+        // The mean of the output is 0.
         [third, fourth - 3.0 * second * second]
     }
 }
 
-/// Means of the block in which a decay of height 1 begins and of the next one, for each time within the block.
+/// Means of the onset block and the next one, of height 1, per onset.
 fn onsets(time: f64, samples_per_block: usize) -> Vec<[f64; 2]> {
     let samples = samples_per_block as f64;
     let kept = (-1.0 / (time * samples)).exp();
@@ -140,14 +124,13 @@ fn onsets(time: f64, samples_per_block: usize) -> Vec<[f64; 2]> {
     (0..ONSETS.min(samples_per_block)).map(onset).collect()
 }
 
-/// The logarithms of time constant, size, rate and deviation, without one of the stretches; `None` where a cumulant is not positive.
+/// Logarithms of time constant, size, rate and deviation without one stretch; `None` if a cumulant is not positive.
 fn logarithms(filters: &[Moments], left_out: Option<usize>) -> Option<[f64; 4]> {
     let cumulants: Vec<[f64; 2]> = filters.iter().map(|of| of.cumulants(left_out)).collect();
     let heights: Vec<f64> = cumulants.iter().zip(filters).map(|([third, _], of)| third / of.scale).collect();
     let largest = (1..filters.len().checked_sub(1)?).max_by(|a, b| heights[*a].total_cmp(&heights[*b]))?;
     let near = |of: &[f64]| -> Option<[f64; 3]> { of.get(largest - 1..=largest + 1)?.try_into().ok() };
     let [before, at, after] = near(&heights)?;
-    // The vertex of the parabola through three neighbours.
     let curvature = before - 2.0 * at + after;
     let vertex = if curvature < 0.0 { 0.5 * (before - after) / curvature } else { after - before };
     let vertex = vertex.clamp(-1.0, 1.0);

@@ -1,5 +1,4 @@
-//! The matched filter for an exponential decay in noise of a record's own spectrum (G. Turin, "An introduction to matched filters", IRE
-//! Trans. IT-6, 1960).
+//! The matched filter for an exponential decay in noise of the record's own spectrum (G. Turin, IRE Trans. IT-6, 1960).
 
 use crate::spectra::periodogram::{smooth_length, taper};
 use crate::spectra::slow_background::SlowBackground;
@@ -7,46 +6,45 @@ use crate::spectra::whittle::SpectralBand;
 use fourier::Complex;
 use std::f64::consts::TAU;
 
-/// Largest part of the blocks that may have no samples.
+/// Largest part of empty blocks.
 const MOST_EMPTY: f64 = 1.0 / 32.0;
-/// Lowest order, in periods per record, that the filters pass: below, the density is known to the scatter of a few ordinates.
+/// Lowest order that the filters pass, periods per record.
 const LOWEST: usize = 6;
 /// White noise, a random walk and ten Markov processes.
 const TERMS: usize = 12;
-/// An ordinate over the noise that is a line, which chance exceeds at one of 10⁶, and ordinates on either side that its taper reaches.
+/// Ordinate over the noise of a line (chance: 10⁻⁶), and ordinates on either side that its taper reaches.
 const LINE: f64 = 14.0;
 const LINE_REACH: usize = 2;
-/// Ordinates on either side whose mean is a band of its own above this multiple of the noise, by chance with 10⁻⁴.
+/// Ordinates on either side whose mean above this multiple of the noise is a band (chance: 10⁻⁴).
 const BAND_REACH: usize = 8;
 const BAND: f64 = 2.0;
-/// Time constants, and blocks beyond them, at either end of the record in which the filters respond to the ends.
+/// Time constants, and blocks beyond, in which the filters respond to the record's ends.
 const END_TIMES: f64 = 4.0;
 const END_BLOCKS: usize = 16;
 
-/// The Fourier transform of a record in blocks and the density of its noise.
+/// Transform of a record in blocks, and the density of its noise.
 pub(super) struct WhitenedRecord {
     length: usize,
     transform: Vec<Complex<f64>>,
-    /// One over the density, 0 at lines.
+    /// 1/density, 0 at lines.
     weights: Vec<f64>,
-    /// What a delay of a block turns each order by.
+    /// Phase factor of a delay of one block per order.
     turns: Vec<Complex<f64>>,
 }
 
-/// What a filter makes of a record.
 pub(super) struct FilteredRecord {
     pub output: Vec<f64>,
-    /// Autocovariance of the output in noise of the density. It is also the response to a decay of height 1 that begins with a block.
+    /// Autocovariance of the output in noise; also the response to a decay of height 1 at a block's start.
     pub covariance: Vec<f64>,
 }
 
 impl WhitenedRecord {
-    /// Of the means of blocks; `None` if too many are missing, or if they have no noise.
+    /// `None` if too many means are missing, or without noise.
     pub(super) fn new(means: &[f64]) -> Option<Self> {
         let mut values = filled(means)?;
         let length = values.len();
         let forward = fourier::forward(length);
-        // A periodic continuation without a jump.
+        // Continued periodically without a jump.
         let end = length / 256;
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         let (first, last) = (mean(values.get(..end)?), mean(values.get(length - end..)?));
@@ -57,7 +55,6 @@ impl WhitenedRecord {
         let mut tapered: Vec<f64> = values.iter().enumerate().map(|(at, value)| taper(at, length) * value).collect();
         let squares: f64 = (0..length).map(|at| taper(at, length).powi(2)).sum();
         let mut transform = forward.make_output_vec();
-        // An error means buffers of the wrong length; these are the plan's own.
         forward.process(&mut tapered, &mut transform).ok()?;
         let ordinates: Vec<f64> = transform.iter().map(|bin| bin.norm_sqr() / squares).collect();
         forward.process(&mut values, &mut transform).ok()?;
@@ -65,7 +62,6 @@ impl WhitenedRecord {
         Some(Self { length, transform, weights: weights(&ordinates)?, turns })
     }
 
-    /// By the filter for a decay of `time` blocks, or for one in reversed time.
     pub(super) fn filtered(&self, time: f64, is_reversed: bool) -> Option<FilteredRecord> {
         let decays = self.decays(time);
         let of_filter = |order: usize| if is_reversed { decays[order] } else { decays[order].conj() };
@@ -74,26 +70,24 @@ impl WhitenedRecord {
         Some(FilteredRecord { output, covariance })
     }
 
-    /// What the filter for a decay of `time` blocks makes of one that is `first` in the block in which it begins and `second` in the
-    /// next one.
+    /// Response of the filter for `time` blocks to a decay with these means in its first two blocks.
     pub(super) fn response(&self, time: f64, [first, second]: [f64; 2]) -> Option<Vec<f64>> {
         let decays = self.decays(time);
         let of_decay = |order: usize| first + second * self.turns[order] * decays[order];
         self.inverse(|order| self.weights[order] * decays[order].conj() * of_decay(order))
     }
 
-    /// The blocks at which a filter for a decay of `time` blocks does not respond to the ends of the record.
+    /// The output without the filter's responses to the ends of the record.
     pub(super) fn inner<'a>(&self, output: &'a [f64], time: f64) -> Option<&'a [f64]> {
         let ends = (END_TIMES * time) as usize + END_BLOCKS;
         output.get(ends..self.length.checked_sub(ends)?)
     }
 
-    /// Blocks of a stretch of four time constants, in which the filter's responses to a disturbance lie.
+    /// Blocks of four time constants, which contain the responses to a disturbance.
     pub(super) fn stretch(time: f64) -> usize {
         ((END_TIMES * time) as usize).max(END_BLOCKS)
     }
 
-    /// The transform of a decay of height 1.
     fn decays(&self, time: f64) -> Vec<Complex<f64>> {
         let kept = (-1.0 / time).exp();
         self.turns.iter().map(|turn| 1.0 / (1.0 - kept * turn)).collect()
@@ -111,7 +105,7 @@ impl WhitenedRecord {
     }
 }
 
-/// The means without their gaps, each of which continues the one before; `None` if too many are missing.
+/// The means with their gaps filled; `None` if too many are missing.
 fn filled(means: &[f64]) -> Option<Vec<f64>> {
     let present = means.iter().filter(|mean| mean.is_finite()).count();
     if ((means.len() - present) as f64) > MOST_EMPTY * means.len() as f64 {
@@ -125,7 +119,7 @@ fn filled(means: &[f64]) -> Option<Vec<f64>> {
     Some(means.iter().take(smooth_length(means.len())).map(fill).collect())
 }
 
-/// One over the density of the noise at each order, up to a factor; 0 at lines and where the density is not known.
+/// 1/density at each order, up to a factor; 0 at lines and if unknown.
 fn weights(ordinates: &[f64]) -> Option<Vec<f64>> {
     let mut bands: Vec<SpectralBand> = Vec::new();
     let mut first = 1;

@@ -1,25 +1,22 @@
-//! How much chance overlaps of disturbances move the ratio of the fourth to the third cumulant of a filtered record.
+//! The scatter of κ₄/κ₃ of a filtered record by chance overlaps of disturbances.
 //!
-//! Two equal disturbances u apart add to the sum of the fourth powers `G₄(u) = 4R₃₁ + 6R₂₂ + 4R₁₃` beyond their own, and to that of the
-//! cubes `G₃(u) = 3R₂₁ + 3R₁₂`, with `Rₚ_q(u) = Σ r(t)ᵖ·r(t+u)^q` of the response r of the filter. Of n disturbances in N blocks n²/2N pairs
-//! are u apart, a Poisson number, and the sums of all are `n·Σr⁴` and `n·Σr³`. So the logarithm of the ratio has the variance
-//! `Σᵤ (G₄/Σr⁴ − G₃/Σr³)²/2N`, whatever n is. A record in which by chance none overlap shows nothing of it.
+//! Two responses r at the distance u add `G₄(u) = 4R₃₁ + 6R₂₂ + 4R₁₃` and `G₃(u) = 3R₂₁ + 3R₁₂`, `Rₚ_q(u) = Σ
+//! r(t)ᵖ·r(t+u)^q`. With n²/2N pairs of n in N blocks, ln(κ₄/κ₃) has the variance `Σᵤ (G₄/Σr⁴ − G₃/Σr³)²/2N`, whatever
+//! n is.
 
 use fourier::Complex;
 
-/// The variance for a response and so many blocks of the record.
 pub(super) fn variance_of_ratio(response: &[f64], blocks: f64) -> Option<f64> {
     let (forward, inverse) = (fourier::forward(response.len()), fourier::inverse(response.len()));
     let transform = |power: i32| {
         let (mut powers, mut bins) =
             (response.iter().map(|of| of.powi(power)).collect::<Vec<f64>>(), forward.make_output_vec());
-        // An error means buffers of the wrong length; these are the plan's own.
         forward.process(&mut powers, &mut bins).ok()?;
         Some(bins)
     };
     let [first, second, third] = [transform(1)?, transform(2)?, transform(3)?];
     let sum = |power: i32| response.iter().map(|of| of.powi(power)).sum::<f64>();
-    // R₁₃(u) is R₃₁(−u), the transform of which is the conjugate one.
+    // R₁₃(u) = R₃₁(−u): the conjugate transform.
     let both = |one: Complex<f64>, other: Complex<f64>| 2.0 * (one.conj() * other).re;
     let difference = |at: usize| {
         let fourth = 4.0 * both(third[at], first[at]) + 6.0 * second[at].norm_sqr();
@@ -39,12 +36,11 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    /// The scatter of the ratio of both cumulants over simulated records with 40 equal responses and no noise.
+    /// Simulated records with 40 equal responses and no noise.
     #[test]
     fn the_variance_is_that_of_simulated_records() {
         const BLOCKS: usize = 4096;
         let mut response: Vec<f64> = (0..BLOCKS).map(|at| (-(at.min(BLOCKS - at) as f64) / 2.0).exp()).collect();
-        // The filters do not pass the mean.
         let mean = response.iter().sum::<f64>() / BLOCKS as f64;
         response.iter_mut().for_each(|of| *of -= mean);
         let mut random = ChaCha8Rng::seed_from_u64(3);
@@ -62,7 +58,7 @@ mod tests {
         let mean = ratios.iter().sum::<f64>() / 400.0;
         let variance = ratios.iter().map(|of| (of - mean).powi(2)).sum::<f64>() / 400.0;
         let expected = variance_of_ratio(&response, BLOCKS as f64).expect("transforms");
-        // The scatter of a variance of 400 values with a kurtosis of up to 10 is √(9/400), 15 %; the logarithm is linear to some tenths.
+        // A variance of 400 values scatters by up to 15 %; the logarithm is linear to some tenths.
         assert!((variance / expected - 1.0).abs() < 0.5, "{variance} {expected}");
     }
 }
