@@ -45,7 +45,7 @@ image feather thumbv7em-none-eabihf bin
 image pico thumbv6m-none-eabi uf2
 
 # The page
-run cargo run --locked --quiet --package browser -- "$target/browser"
+run cargo run --locked --quiet --package browser -- "$target/browser" "$out/observatory-pico.uf2"
 cp "$target/browser/observatory.html" "$out"
 
 cd "$out"

@@ -147,8 +147,9 @@ systems() { # what needs no compiler of C
     )
 }
 page() { # the tests open it
-    run "$TARGET/debug/build-page" --quick "$TARGET/browser"
-    export BROWSER_PAGE=$TARGET/browser
+    export BROWSER_PAGE=$TARGET/browser-test
+    printf 'the bytes of an image' >"$TARGET/browser-test.uf2" # the tests expect them
+    run "$TARGET/debug/build-page" --quick "$BROWSER_PAGE" "$TARGET/browser-test.uf2"
 }
 documentation() {
     RUSTDOCFLAGS="-D warnings" run cargo doc --quiet --locked --no-deps --package adis16405-driver --package allan-core --all-features

@@ -1,48 +1,38 @@
 //! `analyze` and `replay`: the report of a recording in a file, or of each of its sensors.
 
 use crate::cli::{
-    AnalyzeArguments, ExportTarget, GyroRangeArgument, InputArguments, OutputArguments, PROGRAM, RecordingArguments,
-    ReplayArguments,
+    AnalyzeArguments, ExportTarget, InputArguments, OutputArguments, RecordingArguments, ReplayArguments,
 };
 use crate::inspect::{self, read_or_ask};
 use crate::output::{self, Analysed, Incomplete, note};
 use crate::output_files::OutputFiles;
 use crate::progress::{self, Progress};
 use crate::several_recordings::write_several;
-use crate::streaming;
 use crate::tip::UnknownSensor;
 use adis16405_driver::GyroRange;
 use anyhow::{Context, Result, bail};
-use measurement::{Measurement, SensorProfile, adis16405, profile_file};
-use noise_analysis::analysis::{analyze_and_release, analyze_condensed};
-use noise_analysis::effects::Effect;
-use noise_analysis::record::long_record::{MOST_LOST, MOST_SAMPLES, MOST_SAMPLES_WITH_LOSSES};
-use noise_analysis::report::{Report, Stretch};
+use measurement::{Measurement, SensorProfile, profile_file};
+use noise_analysis::analysis::analyze_and_release;
+use noise_analysis::report::Report;
+use observatory::recording_report::{
+    KEPT, OpenOptions, OpenRecording, OpenStream, ReadSamples, named, reading_record, replayed, state_longest_at_rest,
+};
+use observatory::streaming;
 use recordings::ReadOptions;
-use recordings::file_format::{FileFormat, RecordedFormat, RecordedInput};
+use recordings::file_format::RecordedInput;
 use recordings::recording::Recording;
-use recordings::sample_stream::{KeptInMemory, Reading, SampleStream, StreamError, part_of};
-use recordings::time_base::TimeRange;
+use recordings::sample_stream::{KeptInMemory, Reading, SampleStream, part_of};
 use recordings::{ColumnSelection, FileHash, Printable, ReadMonitor, count_table};
-use reports::reading::{ReadingRecord, rows_left_out};
+use reports::reading::ReadingRecord;
 use reports::saved_report::SavedReport;
-use reports::summary::longest_at_rest;
-use simulation::Replay;
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
-/// Name of the sensor whose register counts need no profile.
-const ADIS16405: &str = "adis16405";
 /// Rows that a quick report keeps in memory at most; they tell the clock of the time stamps.
 const QUICK_ROWS: u64 = 1 << 17;
-/// Recordings that are not condensed for their analysis.
-const KEPT: KeptInMemory =
-    KeptInMemory { rows: MOST_SAMPLES, rows_with_losses: MOST_SAMPLES_WITH_LOSSES, most_lost: MOST_LOST };
 /// Longest profile file.
 const PROFILE_BYTES: u64 = 1 << 20;
-/// Name of a sensor without a data sheet.
-const GENERIC: &str = "generic";
 
 /// Analyses the recording of the arguments and writes its report, or what each of its sensors has.
 pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
@@ -165,17 +155,8 @@ pub(crate) fn report(
     end_reading: &mut EndReading,
 ) -> Result<Analysed> {
     let mut analysed = report_of_samples(recording, is_quick, monitor, end_reading)?;
-    let report = &mut analysed.report;
-    if report.findings.iter().any(|finding| matches!(finding.effect, Effect::MotionInterval(_))) {
-        let by_motions = || {
-            // From the first sample of the part that was read.
-            let from_s = recording.from.unwrap_or(0.0);
-            let longest = longest_at_rest(report)?;
-            Some(Stretch { from_s: from_s + longest.from_s, to_s: from_s + longest.to_s })
-        };
-        let by_file = inspect::part_at_rest(recording).map(|TimeRange { from_s, to_s }| Stretch { from_s, to_s });
-        report.longest_at_rest = by_file.or_else(by_motions);
-    }
+    let from_s = recording.from.unwrap_or(0.0);
+    state_longest_at_rest(&mut analysed.report, from_s, || inspect::part_at_rest(recording));
     Ok(analysed)
 }
 
@@ -187,10 +168,11 @@ fn report_of_samples(
 ) -> Result<Analysed> {
     let quick = KeptInMemory { rows: QUICK_ROWS, rows_with_losses: QUICK_ROWS, most_lost: 1.0 };
     let OpenStream { mut stream, hash, notes } = open_stream(recording, monitor, if is_quick { quick } else { KEPT })?;
+    let file = || output::source_name(&recording.input.file);
     if is_quick {
         let estimators = streaming::curves(&mut stream)?;
         end_reading(&stream, &notes);
-        let reading = reading_record(recording, true, &stream, notes);
+        let reading = reading_record(&stream, file(), recording.options(true), notes);
         let bar = progress::fitting(stream.description().channels.len());
         let report = estimators.report(&|| bar.inc(1));
         bar.finish_and_clear();
@@ -199,32 +181,10 @@ fn report_of_samples(
     let mut reading = ReadingRecord::default();
     let report = analyze_stream(stream, &mut |stream| {
         end_reading(stream, &notes);
-        reading = reading_record(recording, false, stream, notes.clone());
+        reading = reading_record(stream, file(), recording.options(false), notes.clone());
     })?;
     // The hash is made while the samples are analysed.
     Ok(Analysed { report, reading: Some(ReadingRecord { sha256: finished(hash), ..reading }) })
-}
-
-/// What was read of a recording.
-fn reading_record(
-    recording: &RecordingArguments,
-    is_quick: bool,
-    stream: &SampleStream,
-    notes: Vec<String>,
-) -> ReadingRecord {
-    let read = stream.rows_read();
-    ReadingRecord {
-        file: output::source_name(&recording.input.file),
-        sha256: None,
-        program: PROGRAM.to_owned(),
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        options: recording.options(is_quick),
-        rows: read.rows,
-        left_out: rows_left_out(&stream.description().dropped, read.outside, read.padding),
-        complete: read.is_complete(),
-        damage: read.damage.clone(),
-        notes,
-    }
 }
 
 fn finished(hash: Option<FileHash>) -> Option<String> {
@@ -232,15 +192,9 @@ fn finished(hash: Option<FileHash>) -> Option<String> {
 }
 
 /// The report of all samples of `stream`; `end_reading` is called when they were read, before they are analysed.
-fn analyze_stream(mut stream: SampleStream, end_reading: &mut dyn FnMut(&SampleStream)) -> Result<Report> {
-    if stream.is_in_memory() {
-        end_reading(&stream);
-        return Ok(progress::analysing(|watch| analyze_and_release(stream.into_beginning(), watch)));
-    }
-    let long = streaming::long_record(&mut stream)?;
-    end_reading(&stream);
-    drop(stream);
-    Ok(progress::analysing(|watch| analyze_condensed(&long, watch)))
+fn analyze_stream(stream: SampleStream, end_reading: &mut dyn FnMut(&SampleStream)) -> Result<Report> {
+    let samples = ReadSamples::read(stream, end_reading)?;
+    Ok(progress::analysing(|watch| samples.analyze(watch)))
 }
 
 fn note_all(notes: &[String]) {
@@ -250,31 +204,8 @@ fn note_all(notes: &[String]) {
 /// Opens a recording of any format, or the part of it that the arguments say.
 fn open_stream(recording: &RecordingArguments, monitor: &ReadMonitor, kept: KeptInMemory) -> Result<OpenStream> {
     let reading = Reading::new(recording.rate, kept).of_part(recording.time_range());
-    let (mut hash, mut notes) = (None, Vec::new());
-    let opened = match open(&recording.input, monitor)? {
-        Opened::Counts(input) => {
-            hash = input.begin_hash().ok();
-            SampleStream::counts(input, recording.input.range.into(), reading)
-        }
-        Opened::AnySensor(input, options) => {
-            hash = input.begin_hash().ok();
-            SampleStream::any_sensor(input, *options, reading)
-        }
-        Opened::Replayed(replayed, of_log) => {
-            notes = of_log;
-            SampleStream::recorded(replayed, reading).map_err(StreamError::from)
-        }
-    };
-    let stream = opened.map_err(|error| named(error, &recording.input.file))?;
-    notes.extend_from_slice(stream.notes());
-    Ok(OpenStream { stream, hash, notes })
-}
-
-/// An open recording, the hash of its file, and what the user should know of it.
-struct OpenStream {
-    stream: SampleStream,
-    hash: Option<FileHash>,
-    notes: Vec<String>,
+    let opened = open(&recording.input, monitor)?.into_stream(reading);
+    opened.map_err(|error| named(error, &recording.input.file))
 }
 
 /// All samples of a recording in memory. What the user should know is noted.
@@ -283,15 +214,6 @@ fn open_measured(recording: &RecordingArguments) -> Result<SampleStream> {
     note_all(&notes);
     note_all(stream.rows_read().damage.as_slice());
     Ok(stream)
-}
-
-/// An error with the name of the file.
-pub(crate) fn named(error: StreamError, file: &Path) -> anyhow::Error {
-    match error {
-        // The others name the file themselves.
-        StreamError::TimeBase(error) => anyhow::Error::from(error).context(file.display().to_string()),
-        error => error.into(),
-    }
 }
 
 /// Analyses what the driver reads of a table of register counts or a frame log over the emulated bus.
@@ -304,7 +226,7 @@ pub(crate) fn analyze_replay(arguments: &ReplayArguments) -> Result<Report> {
             Printable(&file.display().to_string())
         );
     }
-    let (recording, notes) = replayed(&input, *range)?;
+    let (recording, notes) = replayed(&input, (*range).into())?;
     note_all(&notes);
     analyze_recording(recording, *rate).with_context(|| file.display().to_string())
 }
@@ -315,42 +237,14 @@ pub(crate) fn analyze_recording(recording: Recording, rate_hz: Option<f64>) -> R
     analyze_stream(stream, &mut |stream| note_all(stream.notes()))
 }
 
-/// An open file, by the way in which it is read.
-enum Opened {
-    /// Register counts of an ADIS16405.
-    Counts(RecordedInput),
-    /// Numbers of any sensor.
-    AnySensor(RecordedInput, Box<ReadOptions>),
-    /// A log of the bus of an ADIS16405, which was read, and what the user should know of it.
-    Replayed(Recording, Vec<String>),
-}
-
 /// Opens a file of any format.
-fn open(arguments: &InputArguments, monitor: &ReadMonitor) -> Result<Opened> {
-    let InputArguments { file, range, sensor, columns, units, topic, .. } = arguments;
-    let sensor = sensor.as_deref().map(|name| sensor_profile(name, (*range).into())).transpose()?;
+fn open(arguments: &InputArguments, monitor: &ReadMonitor) -> Result<OpenRecording> {
+    let InputArguments { range, sensor, columns, units, topic, .. } = arguments;
+    let range = (*range).into();
+    let sensor = sensor.as_deref().map(|name| sensor_profile(name, range)).transpose()?;
     let selection = ColumnSelection::parse(columns, units)?;
     let input = arguments.open(monitor)?;
-    if let Some(topic) = topic
-        .as_ref()
-        .filter(|_| input.format().is_text() && input.format() != RecordedFormat::File(FileFormat::TextTable))
-    {
-        let name = file.display().to_string();
-        bail!("{}: --topic {}: a file of text has no topics; leave it out", Printable(&name), Printable(topic));
-    }
-    let is_adis16405 = sensor.as_ref().is_none_or(|sensor| sensor.name == adis16405::NAME);
-    match input.format() {
-        RecordedFormat::FrameLog | RecordedFormat::SpiExport => {
-            let (recording, notes) = replayed(&input, *range)?;
-            Ok(Opened::Replayed(recording, notes))
-        }
-        RecordedFormat::CountTable if is_adis16405 && selection.is_empty() => Ok(Opened::Counts(input)),
-        _ => {
-            let sensor = sensor.unwrap_or_else(SensorProfile::generic);
-            let options = ReadOptions { sensor, selection, topic: topic.clone() };
-            Ok(Opened::AnySensor(input, Box::new(options)))
-        }
-    }
+    OpenRecording::new(input, OpenOptions { sensor, selection, topic: topic.clone(), range })
 }
 
 /// A recording to write anew.
@@ -363,23 +257,22 @@ pub(crate) enum Recorded {
 
 /// Opens a file of any format to write it anew; register counts are read, or the part of them that the arguments say.
 pub(crate) fn open_rows(arguments: &RecordingArguments) -> Result<Recorded> {
-    let RecordingArguments { input: InputArguments { range, .. }, rate, .. } = arguments;
-    let part = arguments.time_range();
+    let (rate, part) = (arguments.rate, arguments.time_range());
     Ok(match open(&arguments.input, &ReadMonitor::default())? {
-        Opened::Counts(input) => {
-            let recording = count_table::read_part(&input, (*range).into(), part, *rate);
+        OpenRecording::Counts(input, range) => {
+            let recording = count_table::read_part(&input, range, part, rate);
             Recorded::Counts(recording.map_err(|error| named(error, &arguments.input.file))?)
         }
-        Opened::Replayed(recording, notes) => {
+        OpenRecording::Replayed(recording, notes) => {
             note_all(&notes);
             Recorded::Counts(match part {
                 Some(part) => {
-                    part_of(recording, part, *rate).map_err(|error| named(error.into(), &arguments.input.file))?
+                    part_of(recording, part, rate).map_err(|error| named(error.into(), &arguments.input.file))?
                 }
                 None => recording,
             })
         }
-        Opened::AnySensor(input, options) => Recorded::AnySensor(input, options),
+        OpenRecording::AnySensor(input, options) => Recorded::AnySensor(input, options),
     })
 }
 
@@ -388,34 +281,15 @@ pub(crate) fn read_measurement(arguments: &RecordingArguments) -> Result<Measure
     Ok(open_measured(arguments)?.into_beginning())
 }
 
-/// What the driver reads of a log or of counts, and what the user should know of it.
-fn replayed(input: &RecordedInput, range: GyroRangeArgument) -> Result<(Recording, Vec<String>)> {
-    let Replay { recording, other_transactions, timing } = simulation::replay(input.bytes(), range.into())?;
-    let mut notes = timing.notes();
-    if other_transactions > 0 {
-        notes.push(format!("{other_transactions} transactions that are no bursts"));
-    }
-    Ok((recording, notes))
-}
-
 /// The profile of a known sensor, or of a profile file; `range` is that of an ADIS16405's gyros.
 fn sensor_profile(name: &str, range: GyroRange) -> Result<SensorProfile> {
-    match name.to_lowercase().as_str() {
-        ADIS16405 => return Ok(adis16405::profile(range.lsb())),
-        GENERIC => return Ok(SensorProfile::generic()),
-        known => {
-            if let Some(profile) = profile_file::included(known) {
-                return Ok(profile);
-            }
-        }
+    if let Some(known) = profile_file::by_name(name, range.lsb()) {
+        return Ok(known);
     }
     let mut text = String::new();
     let read = |file: File| file.take(PROFILE_BYTES + 1).read_to_string(&mut text);
     File::open(name).and_then(read).map_err(|error| match error.kind() {
-        ErrorKind::NotFound => {
-            let known = [ADIS16405, GENERIC].into_iter().chain(profile_file::included_names());
-            UnknownSensor(name.to_owned(), known.collect()).into()
-        }
+        ErrorKind::NotFound => UnknownSensor(name.to_owned(), profile_file::sensor_names().collect()).into(),
         _ => anyhow::Error::from(error).context(format!("sensor {}", Printable(name))),
     })?;
     if text.len() as u64 > PROFILE_BYTES {

@@ -1,19 +1,12 @@
-//! The bench: drives the console of a device through the checklist of docs/bench.md and says what passes, what fails, and what is probably
-//! wrong. Pages and tables are those of the ADIS16400/ADIS16405 data sheet, Rev. B.
-
-mod transcript;
-mod verdicts;
+//! The bench on serial ports.
 
 use link::{DecoderCounters, Received};
-use recordings::Printable;
+use observatory::bench::BenchRun;
 use recordings::serial::SerialLink;
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
 
-pub use transcript::{BenchPlan, Step, Transcript};
-pub use verdicts::{Cause, Check, checks};
-
-use transcript::Topic;
+pub use observatory::bench::{BenchPlan, Cause, Check, Step, Transcript, checks, write_table};
 
 /// Time for which one of two ports is listened to.
 const TURN: Duration = Duration::from_millis(1);
@@ -32,9 +25,9 @@ pub trait Console {
     /// # Errors
     /// The port fails.
     fn next(&mut self, until_s: f64) -> io::Result<Option<Received>>;
-    /// Of the decoder.
+    /// Counters of the decoder.
     fn counters(&self) -> DecoderCounters;
-    /// What has come on a second port since the last call; `None` without one.
+    /// Messages of a second port since the last call; `None` without one.
     fn second_port(&mut self) -> Option<Vec<Received>> {
         None
     }
@@ -98,28 +91,24 @@ pub fn run(
     plan: &BenchPlan,
     mut progress: impl FnMut(&Step, usize, usize),
 ) -> io::Result<Transcript> {
-    let steps = plan.steps();
-    let mut transcript = Transcript::default();
-    for (index, step) in steps.iter().enumerate() {
-        if step.topic == Topic::Reads && verdicts::reads_are_wrong(&transcript)
-            || step.needs_sensor && verdicts::is_deaf(&transcript)
-        {
-            continue;
-        }
-        progress(step, index, steps.len());
-        if step.topic == Topic::Bursts {
+    let mut bench = BenchRun::new(plan, console.counters());
+    while let Some((position, step)) = bench.begin_step() {
+        progress(&step, position, bench.steps());
+        if step.counts_bursts() {
             console.second_port();
         }
-        let received = ask(console, step)?;
-        if step.topic == Topic::Bursts {
-            transcript.second_port = console.second_port();
+        let until_s = console.now_s() + step.seconds;
+        console.send(&step.command)?;
+        while let Some(received) = console.next(until_s)? {
+            if bench.take(received) {
+                break;
+            }
         }
-        transcript.push(step, received);
-        if transcript.is_silent() {
-            break;
+        if step.counts_bursts() {
+            bench.set_second_port(console.second_port());
         }
     }
-    transcript.counters = console.counters();
+    let transcript = bench.finish(console.counters());
     for command in transcript.settings_before() {
         console.send(&command)?;
         // The device takes some bytes at a time.
@@ -127,48 +116,4 @@ pub fn run(
         while console.next(until_s)?.is_some() {}
     }
     Ok(transcript)
-}
-
-/// Writes a row for each check, and then what is probably wrong.
-///
-/// # Errors
-/// `out` cannot be written.
-pub fn write_table(checks: &[Check], out: &mut impl Write) -> io::Result<()> {
-    let width = |text: fn(&Check) -> &str| checks.iter().map(|check| text(check).chars().count()).max().unwrap_or(0);
-    let (names, figures) = (width(|check| check.name).max(5), width(|check| check.measured.as_str()).max(8));
-    writeln!(out, "      {:<names$}  {:<figures$}  limit", "check", "measured")?;
-    for Check { name, measured, limit, cause } in checks {
-        let verdict = match (cause, measured.is_empty()) {
-            (Some(_), _) => "FAIL",
-            (None, true) => "-",
-            (None, false) => "pass",
-        };
-        let measured = Printable(measured).to_string();
-        writeln!(out, "{verdict:<4}  {name:<names$}  {measured:<figures$}  {limit}")?;
-    }
-    let mut causes: Vec<&Cause> = Vec::new();
-    for cause in checks.iter().filter_map(|check| check.cause.as_ref()) {
-        if !causes.contains(&cause) {
-            causes.push(cause);
-        }
-    }
-    if !causes.is_empty() {
-        writeln!(out, "\nProbably; begin with the first, from which others may follow:")?;
-    }
-    causes.iter().enumerate().try_for_each(|(index, cause)| writeln!(out, "{}. {cause}", index + 1))
-}
-
-/// Sends a command and receives until the answer is whole or its time is over.
-fn ask(console: &mut impl Console, step: &Step) -> io::Result<Vec<Received>> {
-    let until_s = console.now_s() + step.seconds;
-    console.send(&step.command)?;
-    let mut answer = Vec::new();
-    while let Some(received) = console.next(until_s)? {
-        let is_last = step.is_answered_by(&received);
-        answer.push(received);
-        if is_last {
-            break;
-        }
-    }
-    Ok(answer)
 }

@@ -5,6 +5,7 @@ use crate::tip::similar_name;
 use adis16405_driver::GyroRange;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use observatory::recording_report::PROGRAM;
 use recordings::file_format::RecordedInput;
 use recordings::time_base::TimeRange;
 use recordings::{InputError, MemoryTable, ReadMonitor, serial};
@@ -15,9 +16,6 @@ use std::ffi::OsString;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
-
-/// Name of the program.
-pub(crate) const PROGRAM: &str = "imunoise";
 
 /// Heading of the options that say how a recording is read.
 const INPUT: &str = "Input";
@@ -526,8 +524,7 @@ impl RecordingArguments {
 
     /// The part of the recording that is read; `None` for all of it.
     pub(crate) fn time_range(&self) -> Option<TimeRange> {
-        let is_part = self.from.is_some() || self.to.is_some();
-        is_part.then(|| TimeRange { from_s: self.from.unwrap_or(0.0), to_s: self.to.unwrap_or(f64::INFINITY) })
+        TimeRange::between(self.from, self.to)
     }
 }
 

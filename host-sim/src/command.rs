@@ -8,6 +8,8 @@ use crate::output_files::OutputFiles;
 use crate::{analyze, batch, compare, convert, export, interrupt, monitor, record, simulate, tip};
 use anyhow::{Context, Result};
 use clap::{CommandFactory, Parser};
+use observatory::message_text::summary;
+use observatory::recording_report::PROGRAM;
 use recordings::Printable;
 use std::ffi::OsString;
 use std::io::{self, Write};
@@ -98,7 +100,7 @@ fn run_subcommand(Cli { command }: Cli) -> Result<()> {
         Command::Completions { shell } => {
             // Into memory first: the generator panics where its output is closed.
             let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Cli::command(), cli::PROGRAM, &mut script);
+            clap_complete::generate(shell, &mut Cli::command(), PROGRAM, &mut script);
             output::print(|out| out.write_all(&script))
         }
         Command::Monitor(arguments) => monitor_source(&arguments),
@@ -139,7 +141,7 @@ fn monitor_device(arguments: &MonitorArguments, deadline: Option<Instant>) -> Re
     }
     if live::has_terminal() {
         live::show(&mut DeviceSource::new(&mut cable, port.to_owned()), deadline)?;
-        return output::print(|out| writeln!(out, "{}", monitor::summary(&cable.counters())));
+        return output::print(|out| writeln!(out, "{}", summary(&cable.counters())));
     }
     Ok(monitor::show(&mut cable, deadline, monitor::LONG_SILENCE, &mut io::stdout().lock())?)
 }

@@ -1,12 +1,13 @@
 //! `convert`: a recording in another format.
 
-use crate::analyze::{Recorded, named, open_rows};
+use crate::analyze::{Recorded, open_rows};
 use crate::cli::{ConvertArguments, InputArguments, RecordingArguments, RecordingFormat};
 use crate::inspect::read_or_ask;
 use crate::output::{Incomplete, note};
 use crate::output_files::OutputFiles;
 use crate::recording_file;
 use anyhow::{Error, Result, anyhow, bail};
+use observatory::recording_report::named;
 use recordings::row_writer::{SensorRows, WriteError, WrittenRows};
 use std::path::Path;
 

@@ -21,5 +21,4 @@ pub mod recording_analysis;
 mod recording_file;
 mod several_recordings;
 mod simulate;
-mod streaming;
 mod tip;

@@ -1,9 +1,9 @@
 //! `monitor` on a terminal: the whole screen shows the verdict and the curves of a record while it grows.
 
-mod device_view;
+mod device_source;
 mod growing_recording;
 
-pub(crate) use device_view::DeviceSource;
+pub(crate) use device_source::DeviceSource;
 pub(crate) use growing_recording::GrowingRecording;
 
 use crate::interrupt;

@@ -4,12 +4,12 @@ use crate::analyze::analyze_recording;
 use crate::bench::{self, BenchPlan, SerialConsole};
 use crate::cli::BenchArguments;
 use crate::interrupt;
-use crate::monitor;
 use crate::output::{self, note, progress_bar};
 use crate::tip::{DeniedPort, UnknownPort};
 use adis16405_driver::GyroRange;
 use anyhow::{Context, Error, Result, ensure};
 use noise_analysis::report::Report;
+use observatory::message_text::summary;
 use recordings::serial::{self, SerialLink};
 use simulation::Simulation;
 use std::io::{ErrorKind, Read, Write};
@@ -79,7 +79,7 @@ pub(crate) fn record_device(log: &Path, port: &str, baud: u32, seconds: f64) -> 
         "{} bursts, {} missing between them; {}",
         recorded.bursts,
         recorded.missing,
-        monitor::summary(&recorded.counters)
+        summary(&recorded.counters)
     ));
     let recording = simulation::replay(log, GyroRange::default())?.recording;
     analyze_recording(recording, None).with_context(|| port.to_owned())

@@ -1,5 +1,5 @@
 "use strict";
-(() => {
+const observatory = (() => {
   const element = (id) => document.getElementById(id);
   const show = (id, isShown) => { element(id).hidden = !isShown; };
   const STAGES = ["samples", "models of the whole record and of the first half", "effects", "assessment"];
@@ -31,12 +31,12 @@
   const workerUrl = URL.createObjectURL(new Blob([element("worker").textContent], { type: "text/javascript" }));
   class Thread {
     #worker = null;
-    #call = null;
+    #calls = [];
     async run(name, request, file, progress = () => {}) {
       const started = await this.#started();
       if (started !== this.#worker) throw new Error(CANCELLED);
       return new Promise((resolve, reject) => {
-        this.#call = { resolve, reject, progress };
+        this.#calls.push({ resolve, reject, progress });
         started.postMessage({ name, request, file });
       });
     }
@@ -44,9 +44,12 @@
       if (this.#worker) return this.#worker;
       const begun = this.#worker = new Worker(workerUrl);
       begun.onmessage = ({ data }) => {
-        if ("task" in data) return this.#call.progress(data);
-        if (data.isBroken) this.end(data.error);
-        else if ("error" in data) this.#call.reject(new Error(data.error)); else this.#call.resolve(data);
+        // One that was ended may have sent it before.
+        if (begun !== this.#worker) return;
+        if ("task" in data) return this.#calls[0].progress(data);
+        if (data.isBroken) return this.end(data.error);
+        const { resolve, reject } = this.#calls.shift();
+        if ("error" in data) reject(new Error(data.error)); else resolve(data);
       };
       begun.onerror = ({ message }) => this.end(message ?? "the browser starts no worker");
       begun.postMessage(await compiled);
@@ -55,11 +58,11 @@
     end(why) {
       this.#worker?.terminate();
       this.#worker = null;
-      this.#call?.reject(new Error(why));
+      for (const { reject } of this.#calls.splice(0)) reject(new Error(why));
     }
   }
 
-  // What is done, one after the other: its progress and its error are shown.
+  // Tasks, one after the other, with their progress and errors.
   const thread = new Thread();
   let job = null;
   const call = (name, request, file, total) => thread.run(name, request, file, ({ task, done }) => {
@@ -116,12 +119,15 @@
     show("report", true);
     element("result").focus();
   };
-  const save = (name, content, type) => {
+  const saveFrom = (name, address) => {
     const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([content], { type }));
-    link.download = name;
+    [link.href, link.download] = [address, name];
     link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+  };
+  const save = (name, content, type) => {
+    const address = URL.createObjectURL(new Blob([content], { type }));
+    saveFrom(name, address);
+    setTimeout(() => URL.revokeObjectURL(address), 60_000);
   };
   element("save-page").addEventListener("click", () => save(`${report.name}.html`, report.html, "text/html"));
   element("save-json").addEventListener("click", () => save(`${report.name}.json`, `${report.json}\n`, "application/json"));
@@ -221,4 +227,5 @@
       showReport(await call("simulate", request, null, request.seconds * SIMULATED_HZ), "simulation");
     });
   });
+  return { element, show, Thread, save, saveFrom, open, bytesOf };
 })();

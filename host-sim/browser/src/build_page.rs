@@ -1,15 +1,16 @@
-//! `cargo run -p browser -- [--quick] [FOLDER]` builds the page: FOLDER/index.html with the program beside it, for a web server, and
-//! FOLDER/observatory.html, one file with everything inside, which is opened from a disk. FOLDER is `target/browser` if none is named.
-//! `--quick` builds in less time a program that is larger and slower.
+//! `cargo run -p browser -- [--quick] [FOLDER [UF2]]` builds the page: FOLDER/index.html with the program beside it, for a web server, and
+//! FOLDER/observatory.html, one file with everything inside, which is opened from a disk. FOLDER is `target/browser` if none is named. UF2
+//! is the image of the Pico that the page offers. `--quick` builds in less time a program that is larger and slower.
 
 use clap::ValueEnum;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use reports::export::ExportFormat;
 use sha2::{Digest, Sha256};
+use std::collections::VecDeque;
 use std::error::Error;
 use std::ffi::OsString;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 use std::{env, fs};
@@ -17,19 +18,32 @@ use std::{env, fs};
 const PAGE: &str = include_str!("../page/page.html");
 /// After that of a report.
 const STYLE: &str = include_str!("../page/style.css");
-const SCRIPT: &str = include_str!("../page/page.js");
+const SCRIPT: &str = concat!(include_str!("../page/page.js"), include_str!("../page/device.js"));
 const WORKER: &str = include_str!("../page/worker.js");
 const TARGET: &str = "wasm32-unknown-unknown";
 /// Profiles of cargo: for whoever uses the page, and for whoever builds often.
 const PROFILE: &str = "browser";
 const QUICK_PROFILE: &str = "quick";
-/// The program beside the page, compressed: not every server compresses it.
+/// The program and the image of the Pico beside the page; the program compressed: not every server compresses it.
 const PROGRAM: &str = "observatory.wasm.gz";
+const IMAGE: &str = "observatory-pico.uf2";
+/// The package of npm with `wasm-opt`, which takes a tenth off the program, and what every browser with Web Serial or wasm-unsafe-eval knows.
+const OPTIMIZER: &str = "binaryen@132.0.0";
+const FEATURES: [&str; 6] = [
+    "--enable-bulk-memory",
+    "--enable-multivalue",
+    "--enable-mutable-globals",
+    "--enable-nontrapping-float-to-int",
+    "--enable-reference-types",
+    "--enable-sign-ext",
+];
 
 fn main() -> ExitCode {
-    let (options, folders): (Vec<OsString>, Vec<OsString>) = env::args_os().skip(1).partition(|of| *of == "--quick");
+    let (options, mut paths): (VecDeque<OsString>, VecDeque<OsString>) =
+        env::args_os().skip(1).partition(|of| *of == "--quick");
     let profile = if options.is_empty() { PROFILE } else { QUICK_PROFILE };
-    match run(folders.first().map(PathBuf::from), profile) {
+    let mut path = || paths.pop_front().map(PathBuf::from);
+    match run(path(), path(), profile) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
@@ -38,25 +52,37 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(folder: Option<PathBuf>, profile: &str) -> Result<(), Box<dyn Error>> {
+fn run(folder: Option<PathBuf>, image: Option<PathBuf>, profile: &str) -> Result<(), Box<dyn Error>> {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from);
     let folder = folder.unwrap_or_else(|| target.join("browser"));
-    let mut program = GzEncoder::new(Vec::new(), Compression::best());
-    program.write_all(&build(&workspace, &target, profile)?)?;
-    let program = program.finish()?;
+    let image = image.map(|file| read(&file)).transpose()?;
+    let program = compressed(&build(&workspace, &target, profile)?)?;
     fs::create_dir_all(&folder)?;
+    let image_inside = image.as_ref().map(|image| Ok::<_, io::Error>(base64(&compressed(image)?))).transpose()?;
+    let image_beside = image.as_ref().map(|_| IMAGE);
     let files = [
-        ("index.html", page(None).into_bytes()),
-        ("observatory.html", page(Some(&base64(&program))).into_bytes()),
+        ("index.html", page(image_beside, None).into_bytes()),
+        ("observatory.html", page(image_inside.as_deref(), Some(&base64(&program))).into_bytes()),
         (PROGRAM, program),
     ];
+    let files = files.into_iter().chain(image.map(|image| (IMAGE, image)));
     for (name, content) in files {
         let file = folder.join(name);
         fs::write(&file, &content).map_err(|error| format!("{}: {error}", file.display()))?;
         println!("{}, {} kB", file.display(), content.len() / 1000);
     }
     Ok(())
+}
+
+fn read(file: &Path) -> Result<Vec<u8>, String> {
+    fs::read(file).map_err(|error| format!("{}: {error}", file.display()))
+}
+
+fn compressed(content: &[u8]) -> io::Result<Vec<u8>> {
+    let mut compressed = GzEncoder::new(Vec::new(), Compression::best());
+    compressed.write_all(content)?;
+    compressed.finish()
 }
 
 /// Compiles the library for browsers in a profile of cargo.
@@ -74,13 +100,32 @@ fn build(workspace: &Path, target: &Path, profile: &str) -> Result<Vec<u8>, Box<
     if !status.success() {
         return Err(format!("the page does not build; its target comes with: rustup target add {TARGET}").into());
     }
-    let file = target.join(TARGET).join(profile).join("browser.wasm");
-    Ok(fs::read(&file).map_err(|error| format!("{}: {error}", file.display()))?)
+    let program = target.join(TARGET).join(profile).join("browser.wasm");
+    Ok(read(&if profile == QUICK_PROFILE { program } else { optimized(program, &target.join("optimizer"))? })?)
 }
 
-/// The page, with the program inside as text or beside it. Its policy allows the scripts in it and in a report, by their hashes; no
-/// request but that for the program; and that only until it is loaded, as the script sees to.
-fn page(program: Option<&str>) -> String {
+/// The program as `wasm-opt` makes it smaller, which npm installs once in `folder`; as it was, with a note, where there is no npm.
+fn optimized(program: PathBuf, folder: &Path) -> Result<PathBuf, Box<dyn Error>> {
+    let tool = folder.join("node_modules/.bin/wasm-opt");
+    if !tool.exists() {
+        fs::create_dir_all(folder)?;
+        let mut npm = Command::new("npm");
+        let install =
+            npm.args(["install", "--no-save", "--no-audit", "--no-fund", "--prefix"]).arg(folder).arg(OPTIMIZER);
+        if !install.status().is_ok_and(|status| status.success()) {
+            eprintln!("note: npm does not install {OPTIMIZER}: the program is a tenth larger");
+            return Ok(program);
+        }
+    }
+    let smaller = program.with_extension("optimized.wasm");
+    let status = Command::new(tool).args(FEATURES).arg("-Os").arg(program).arg("-o").arg(&smaller).status()?;
+    if status.success() { Ok(smaller) } else { Err("wasm-opt fails".into()) }
+}
+
+/// The page, with the compressed image of the Pico as text or its name, if there is one, and with the program inside as text or beside it. Its policy allows
+/// the scripts in it and in a report, by their hashes; no request but that for the program; and that only until it is loaded, as the
+/// script sees to.
+fn page(image: Option<&str>, program: Option<&str>) -> String {
     let scripts = [SCRIPT, reports::page::SCRIPT].map(|script| format!("'sha256-{}'", base64(&Sha256::digest(script))));
     let connect = if program.is_some() { "" } else { " connect-src 'self';" };
     let policy = format!(
@@ -88,13 +133,16 @@ fn page(program: Option<&str>) -> String {
          base-uri 'none'; form-action 'none'",
         scripts.join(" ")
     );
-    let style = format!("{}{STYLE}", reports::page::STYLE);
+    let [light, dark] = reports::page::figure_styles();
+    let dark = format!("@media screen and (prefers-color-scheme: dark){{{dark}}}");
+    let style = format!("{}{light}{dark}{STYLE}", reports::page::STYLE);
     let formats = ExportFormat::value_variants().iter().filter_map(ValueEnum::to_possible_value);
     let formats: String = formats.map(|format| format!("<option>{}</option>", format.get_name())).collect();
     let parts = [
         ("POLICY", policy.as_str()),
         ("STYLE", &style),
         ("FORMATS", &formats),
+        ("IMAGE", image.unwrap_or("")),
         ("WORKER", WORKER),
         ("PROGRAM", program.unwrap_or("")),
         ("SCRIPT", SCRIPT),

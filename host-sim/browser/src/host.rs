@@ -1,6 +1,6 @@
-//! What the page is told while a function runs.
+//! Messages to the page while a function runs.
 
-/// What is done now.
+/// Task under way.
 #[derive(Debug, Clone, Copy)]
 #[repr(u32)]
 pub(crate) enum Task {

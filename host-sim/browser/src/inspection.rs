@@ -1,9 +1,9 @@
-//! What is in a recording, as HTML: the table of `imunoise inspect`, and a form with what it proposes, for each sensor.
+//! Content of a recording as HTML: the table of `imunoise inspect`, and a form with what it proposes, for each sensor.
 
 use crate::analysis::Recorded;
-use crate::recording_options::RecordingOptions;
 use anyhow::Result;
 use maud::{Markup, html};
+use measurement::profile_file;
 use recordings::file_format::{RecordedFormat, TopicDescription};
 use recordings::inspection::{ColumnGuess, InspectedColumn, InspectedTable, Proposal};
 use recordings::time_base::TimeRange;
@@ -52,7 +52,7 @@ pub(crate) fn html(recorded: &Recorded<'_>) -> Result<String> {
 fn columns(table: &InspectedTable) -> Markup {
     let InspectedTable { topic, kind, rows, is_cut, columns, rate, stated_rate_hz, duration_s, missing, gaps, .. } =
         table;
-    // Of a wide table, such as of messages with covariances.
+    // A wide table is one of messages with covariances.
     let is_constant = |column: &InspectedColumn| {
         columns.len() > WIDE && column.noise == 0.0 && column.guess.is_none() && !column.mean.is_nan()
     };
@@ -150,7 +150,7 @@ fn form(proposal: &Proposal, needs_topic: bool) -> Markup {
                     (input("to", "to, s", time(|part| part.to_s), "the end"))
                     label { "sensor" select name="sensor" {
                         option value="" { "by the file" }
-                        @for name in RecordingOptions::sensors() { option selected[*sensor == Some(name)] { (name) } }
+                        @for name in profile_file::sensor_names() { option selected[*sensor == Some(name)] { (name) } }
                     } }
                     label { "range of an ADIS16405, °/s" select name="range" {
                         @for (value, text) in [("", "300"), ("150", "150"), ("75", "75")] { option value=(value) { (text) } }

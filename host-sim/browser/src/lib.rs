@@ -5,12 +5,14 @@
 //! asked for, and 1 where it is the sentence of an error. On the way it calls the imported function `progress`.
 
 mod analysis;
+mod connection;
 mod host;
 mod inspection;
 mod recording_options;
 
 use analysis::Recorded;
 use anyhow::{Context, Result};
+use connection::{Connection, ReceiveRequest};
 use measurement::Measurement;
 use noise_analysis::report::several;
 use recording_options::RecordingOptions;
@@ -22,13 +24,15 @@ use simulation::Simulation;
 use std::cell::RefCell;
 use std::sync::Arc;
 
-/// What the page has given, and what it is given.
+/// Requests of the page, and answers to it.
 #[derive(Default)]
 struct Exchange {
     request: Vec<u8>,
     file: Option<Arc<[u8]>>,
     /// Recordings whose noise is to be compared.
     measured: Vec<Measurement>,
+    /// The device.
+    connection: Option<Connection>,
     answer: Vec<u8>,
 }
 
@@ -61,7 +65,7 @@ pub extern "C" fn reserve_file(bytes: usize) -> *mut u8 {
     })
 }
 
-/// Where the answer begins.
+/// First byte of the answer.
 #[unsafe(no_mangle)]
 pub extern "C" fn answer_pointer() -> *const u8 {
     with(|exchange| exchange.answer.as_ptr())
@@ -77,7 +81,7 @@ pub extern "C" fn answer_length() -> usize {
 #[derive(Deserialize)]
 struct RecordingRequest {
     name: String,
-    /// Whether it is the first of those to be compared.
+    /// True for the first of those to be compared.
     #[serde(default, rename = "isFirst")]
     is_first: bool,
     #[serde(flatten)]
@@ -91,7 +95,7 @@ impl RecordingRequest {
     }
 }
 
-/// What is in a recording: HTML with a form for each sensor.
+/// Content of a recording: HTML with a form for each sensor.
 #[unsafe(no_mangle)]
 pub extern "C" fn inspect() -> u32 {
     answer(|request: RecordingRequest| inspection::html(&request.recorded()?))
@@ -137,7 +141,7 @@ pub extern "C" fn keep() -> u32 {
     })
 }
 
-/// Whether the recordings that were kept have the same noise.
+/// Compares the noise of the recordings that were kept.
 #[unsafe(no_mangle)]
 pub extern "C" fn compare() -> u32 {
     answer(|(): ()| {
@@ -169,6 +173,44 @@ pub extern "C" fn export() -> u32 {
         let report = SavedReport::from_json(&report)?;
         Ok(reports::export::export(&report, named::<ExportFormat>(&format)?, named::<AxisChoice>(&axis)?)?.text)
     })
+}
+
+/// Begins a connection to a device; the request is the name of its port.
+#[unsafe(no_mangle)]
+pub extern "C" fn connect_device() -> u32 {
+    answer(|name: String| {
+        with(|exchange| exchange.connection = Some(Connection::new(name)));
+        Ok(String::new())
+    })
+}
+
+/// Takes bytes of the device as [`reserve_file`] has them: the live view and the lines.
+#[unsafe(no_mangle)]
+pub extern "C" fn receive_bytes() -> u32 {
+    answer(|request: ReceiveRequest| {
+        with(|exchange| {
+            let bytes = exchange.file.take();
+            connected(exchange)?.receive(bytes.as_deref().unwrap_or_default(), &request)
+        })
+    })
+}
+
+/// Begins the next step of the bench, the first one where the request is true: its command, or the table.
+#[unsafe(no_mangle)]
+pub extern "C" fn bench_step() -> u32 {
+    answer(|is_first: bool| {
+        with(|exchange| {
+            let connection = connected(exchange)?;
+            if is_first {
+                connection.begin_bench();
+            }
+            connection.step()
+        })
+    })
+}
+
+fn connected(exchange: &mut Exchange) -> Result<&mut Connection> {
+    exchange.connection.as_mut().context("no device")
 }
 
 /// Serves the request that the page has written.

@@ -2,15 +2,11 @@
 
 use adis16405_driver::GyroRange;
 use anyhow::{Context, Result, bail};
-use measurement::{SensorProfile, adis16405, profile_file};
+use measurement::{SensorProfile, profile_file};
 use recordings::Printable;
 use recordings::time_base::TimeRange;
 use reports::reading::ReadingOptions;
 use serde::Deserialize;
-
-/// Name of the sensor whose register counts need no profile, and that of a sensor without a data sheet.
-const ADIS16405: &str = "adis16405";
-const GENERIC: &str = "generic";
 
 /// The options; what is not said is left out.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -42,8 +38,7 @@ impl RecordingOptions {
 
     /// The part of the recording that is read; `None` for all of it.
     pub(crate) fn time_range(&self) -> Option<TimeRange> {
-        let is_part = self.from.is_some() || self.to.is_some();
-        is_part.then(|| TimeRange { from_s: self.from.unwrap_or(0.0), to_s: self.to.unwrap_or(f64::INFINITY) })
+        TimeRange::between(self.from, self.to)
     }
 
     /// The range of the gyros of an ADIS16405.
@@ -65,15 +60,7 @@ impl RecordingOptions {
     /// There is no such profile.
     pub(crate) fn profile(&self) -> Result<Option<SensorProfile>> {
         let Some(sensor) = &self.sensor else { return Ok(None) };
-        Ok(Some(match sensor.to_lowercase().as_str() {
-            ADIS16405 => adis16405::profile(self.gyro_range()?.lsb()),
-            GENERIC => SensorProfile::generic(),
-            name => profile_file::included(name).with_context(|| format!("sensor {}: not known", Printable(name)))?,
-        }))
-    }
-
-    /// Names of sensors whose profile is included.
-    pub(crate) fn sensors() -> impl Iterator<Item = &'static str> {
-        [ADIS16405].into_iter().chain(profile_file::included_names()).chain([GENERIC])
+        let profile = profile_file::by_name(sensor, self.gyro_range()?.lsb());
+        Ok(Some(profile.with_context(|| format!("sensor {}: not known", Printable(sensor)))?))
     }
 }

@@ -7,18 +7,17 @@ const path = require("node:path");
 /** Longest time for what a page does, ms: a fault ends a test by it, and nothing else depends on it. */
 const PATIENCE_MS = 300_000;
 
-/** Opens the page at `url`, lets `act` use it, and closes it; downloads go into `folder`. */
-exports.withPage = async (program, url, folder, act) => {
+/** Opens the page at `url`, lets `act` use it, and closes it; downloads and the profile of the browser go into `folder`; `script` runs before those of the page. */
+exports.withPage = async (program, url, folder, act, script) => {
   const profile = fs.mkdtempSync(path.join(folder, "profile-"));
   const options = ["--headless=new", "--no-sandbox", "--disable-gpu", "--remote-debugging-pipe", `--user-data-dir=${profile}`,
     "--no-first-run", "--disable-background-networking", "--disable-component-update", "--window-size=1280,900", "about:blank"];
   const browser = spawn(program, options, { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"] });
   try {
-    return await act(await Page.open(browser, url, folder));
+    return await act(await Page.open(browser, url, folder, script));
   } finally {
     browser.kill("SIGKILL");
     await new Promise((resolve) => { browser.on("exit", resolve); if (browser.exitCode !== null || browser.signalCode) resolve(); });
-    fs.rmSync(profile, { recursive: true, force: true, maxRetries: 5 });
   }
 };
 
@@ -32,7 +31,7 @@ class Page {
   #next = 1;
   #session;
 
-  static async open(browser, url, folder) {
+  static async open(browser, url, folder, script) {
     const page = new Page();
     page.#browser = browser;
     let rest = "";
@@ -45,6 +44,7 @@ class Page {
     page.#session = (await page.send("Target.attachToTarget", { targetId, flatten: true })).sessionId;
     await page.send("Browser.setDownloadBehavior", { behavior: "allow", downloadPath: folder, eventsEnabled: true });
     for (const domain of ["Page", "Runtime", "Network", "Log", "DOM"]) await page.send(`${domain}.enable`);
+    if (script) await page.send("Page.addScriptToEvaluateOnNewDocument", { source: script });
     const loaded = page.event("Page.loadEventFired");
     await page.send("Page.navigate", { url });
     await loaded;
@@ -54,7 +54,7 @@ class Page {
   send(method, params = {}) {
     const id = this.#next++;
     const message = { id, method, params };
-    // Of the browser, not of the page.
+    // The browser is asked, not the page.
     if (this.#session && !/^(Target|Browser|SystemInfo)\./.test(method)) message.sessionId = this.#session;
     this.#browser.stdio[3].write(`${JSON.stringify(message)}\0`);
     return new Promise((resolve, reject) => this.#calls.set(id, { resolve, reject, method }));

@@ -12,21 +12,26 @@ fn runs(program: &str) -> bool {
     Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success())
 }
 
-/// The folder of the page, that which `BROWSER_PAGE` names, or built.
+/// In the place of an image of the Pico.
+pub(crate) const IMAGE: &[u8] = b"the bytes of an image";
+
+/// The folder of the page, built in a folder of its own with [`IMAGE`]; `BROWSER_PAGE` names one that was built before.
 fn page() -> PathBuf {
     if let Some(folder) = std::env::var_os("BROWSER_PAGE") {
         return folder.into();
     }
-    let folder = target_folder().join("browser");
+    let folder = target_folder().join("browser-test");
     let _building = one_at_a_time(&folder.with_extension("lock"));
-    let status =
-        Command::new(env!("CARGO_BIN_EXE_build-page")).arg("--quick").arg(&folder).stdout(Stdio::null()).status();
+    let image = folder.with_extension("uf2");
+    std::fs::write(&image, IMAGE).expect("room");
+    let mut build = Command::new(env!("CARGO_BIN_EXE_build-page"));
+    let status = build.arg("--quick").args([&folder, &image]).stdout(Stdio::null()).status();
     assert!(status.expect("the program starts").success(), "the page does not build");
     folder
 }
 
 /// Runs `script` of this folder with Chromium, the page's address and a folder for what it saves, and `input` on its standard input.
-/// Whether it ran: false, with a note, without Chromium or Node.js.
+/// False, with a note, without Chromium or Node.js.
 pub(crate) fn drive(test: &str, script: &str, page_file: &str, folder: &Path, input: &str) -> bool {
     let chromium = CHROMIUM.into_iter().find(|name| runs(name)).filter(|_| runs("node"));
     let Some(chromium) = chromium else {

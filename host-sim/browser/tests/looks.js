@@ -1,4 +1,4 @@
-// What a page looks like: nothing is wider than the window, and text has its contrast.
+// Looks of a page: nothing is wider than the window, and text has its contrast.
 "use strict";
 const assert = require("node:assert");
 const path = require("node:path");

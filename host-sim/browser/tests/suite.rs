@@ -2,5 +2,6 @@
 //! tests are reported as skipped.
 
 mod harness;
+mod live;
 mod same_report;
 mod use_of_the_page;

@@ -15,7 +15,7 @@ const text = (id) => `document.getElementById("${id}").innerText`;
 const isShown = (id) => `!document.getElementById("${id}").hidden`;
 const simulate = (seconds) => `document.querySelector("#simulate [name=seconds]").value = ${seconds};
   document.getElementById("simulate").requestSubmit()`;
-// What of the page's policy refuses a request.
+// The directive of the page's policy that refuses a request.
 const refused = (act) => `new Promise((resolve) => {
   document.addEventListener("securitypolicyviolation", (event) => resolve(event.effectiveDirective), { once: true });
   ${act};
@@ -109,6 +109,8 @@ const fromServer = async (page, address) => {
   await page.idle();
   quiet(page);
   assert.equal(await page.value(refused('fetch("index.html").catch(() => {})')), "connect-src");
+  const image = await page.download(() => page.click("#image-save"));
+  assert.equal(fs.readFileSync(path.join(folder, image), "utf8"), "the bytes of an image");
 };
 
 (async () => {

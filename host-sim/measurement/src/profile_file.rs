@@ -1,5 +1,6 @@
 //! Sensor profiles from TOML files, included ones and others.
 
+use crate::adis16405;
 use crate::profile::{ChannelProfile, DataSheetNoise, DataSheetSensitivities, Quantity, SensorProfile};
 use serde::Deserialize;
 use std::collections::BTreeSet;
@@ -11,6 +12,10 @@ const INCLUDED: [(&str, &str); 3] = [
     ("bmi088", include_str!("../profiles/bmi088.toml")),
     ("mpu6050", include_str!("../profiles/mpu6050.toml")),
 ];
+
+/// Name of the sensor whose register counts need no profile, and that of a sensor without a data sheet.
+const ADIS16405: &str = "adis16405";
+const GENERIC: &str = "generic";
 
 /// Why a profile cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -69,9 +74,19 @@ struct ChannelGroup {
     specific_force_sensitivity: Option<f64>,
 }
 
-/// Names of the included profiles.
-pub fn included_names() -> impl Iterator<Item = &'static str> {
-    INCLUDED.iter().map(|(name, _)| *name)
+/// Names by which a sensor is asked for.
+pub fn sensor_names() -> impl Iterator<Item = &'static str> {
+    [ADIS16405].into_iter().chain(INCLUDED.iter().map(|(name, _)| *name)).chain([GENERIC])
+}
+
+/// The profile of the sensor `name`, in any case; the gyros of an ADIS16405 have counts of `gyro_lsb` deg/s. `None` for other names.
+#[must_use]
+pub fn by_name(name: &str, gyro_lsb: f64) -> Option<SensorProfile> {
+    match name.to_lowercase().as_str() {
+        ADIS16405 => Some(adis16405::profile(gyro_lsb)),
+        GENERIC => Some(SensorProfile::generic()),
+        name => included(name),
+    }
 }
 
 /// The included profile `name`; `None` for other names.
@@ -181,7 +196,7 @@ fn intern(text: &str) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use super::{included, included_names, parse};
+    use super::{by_name, included, parse, sensor_names};
 
     /// ADIS16470 0.34 °/√h, 8 °/h, 100 µg/√Hz; BMI088 0.014 °/s/√Hz, 160 and 190 µg/√Hz; MPU-6050 0.005 °/s/√Hz, 400
     /// µg/√Hz. N is 1/√2 of a one-sided density.
@@ -210,7 +225,8 @@ mod tests {
         }
         let gyro = included("ADIS16470").expect("a name in capitals").channel("gyro_x").expect("gyro");
         assert!((gyro.data_sheet.in_run_bias_stability.expect("stated") * 3600.0 - 8.0).abs() < 0.01);
-        assert_eq!(included_names().count(), 3);
+        assert!(sensor_names().all(|name| by_name(name, 0.05).is_some()));
+        assert_eq!(sensor_names().filter(|name| included(name).is_some()).count(), 3);
         assert!(included("adis16405").is_none());
     }
 

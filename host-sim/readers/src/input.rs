@@ -10,4 +10,5 @@ pub(crate) mod read_ahead;
 pub(crate) mod read_monitor;
 pub(crate) mod stream_error;
 pub(crate) mod threads;
+pub(crate) mod utf16_reader;
 pub(crate) mod zstd_frames;

@@ -106,9 +106,8 @@ impl RecordedInput {
         if let [only] = files.as_mut_slice()
             && serial::is_capture(&only.head(HEAD_BYTES).map_err(fail)?)
         {
-            let log = NamedTempFile::new().map_err(fail)?;
-            serial::log_of_capture(BufReader::new(only.open().map_err(fail)?), log.path()).map_err(fail)?;
-            capture = Some(std::mem::replace(only, FileBytes::in_temporary_file(name, log)));
+            let log = log_of_capture(name, only).map_err(fail)?;
+            capture = Some(std::mem::replace(only, log));
         }
         let file = InputFile::recognised(name, files, monitor)?;
         let format = match file.format() {
@@ -192,6 +191,19 @@ impl Deref for RecordedInput {
     fn deref(&self) -> &InputFile {
         &self.file
     }
+}
+
+/// Frame log of a raw stream, in a temporary file where the system has files.
+fn log_of_capture(name: &Path, capture: &FileBytes) -> io::Result<FileBytes> {
+    let capture = BufReader::new(capture.open()?);
+    if cfg!(target_family = "wasm") {
+        let mut log = Vec::new();
+        serial::log_of_capture(capture, &mut log)?;
+        return Ok(FileBytes::in_memory(name, log));
+    }
+    let mut log = NamedTempFile::new()?;
+    serial::log_of_capture(capture, log.as_file_mut())?;
+    Ok(FileBytes::in_temporary_file(name, log))
 }
 
 pub(crate) fn rows<'a>(

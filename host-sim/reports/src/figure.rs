@@ -5,7 +5,8 @@ mod channel;
 mod evidence;
 mod plot;
 
-use crate::finding_text::channel_name;
+use crate::finding_text::{channel_list, channel_name};
+use crate::live::LiveCurve;
 use crate::summary;
 use axis::{Axis, has_logarithm};
 pub(crate) use channel::bias_plot;
@@ -14,6 +15,30 @@ pub(crate) use evidence::evidence;
 use noise_analysis::report::{ChannelReport, DataSheetReport, Report};
 pub(crate) use plot::Plot;
 use plot::{LEFT, Line, Look, Panel, RIGHT, frames, heights, places};
+
+/// Growing curves of the channels with `prefix`; `None` without a point.
+pub(crate) fn live(curves: &[LiveCurve], prefix: &str) -> Option<Plot> {
+    let is_shown = |&(tau, deviation): &(f64, f64)| has_logarithm(tau) && has_logarithm(deviation);
+    let shown = curves.iter().filter(|curve| curve.channel.starts_with(prefix) && curve.points.iter().any(is_shown));
+    let curves: Vec<&LiveCurve> = shown.collect();
+    let first = curves.first()?;
+    let looks = [Look::Measured, Look::SecondAxis, Look::ThirdAxis].into_iter().cycle();
+    let line = |(curve, look): (&&LiveCurve, Look)| {
+        let name = channel_list(std::slice::from_ref(&curve.channel));
+        Line::new(name, look, curve.points.iter().copied().filter(is_shown).collect()).with_dots()
+    };
+    let lines: Vec<Line> = curves.iter().zip(looks).map(line).collect();
+    let [frame] = frames([330.0]);
+    let across = Axis::logarithmic("averaging time τ, s", lines.iter().flat_map(places), [LEFT, RIGHT]);
+    let label = format!("Allan deviation σ(τ), {}", crate::rounding::unit(&first.unit));
+    let up = Axis::logarithmic(&label, lines.iter().flat_map(heights), frame);
+    Some(Plot {
+        id: format!("{prefix}live"),
+        title: "Allan deviation, while the record grows".to_owned(),
+        description: String::new(),
+        panels: vec![Panel::new(across, up, lines)],
+    })
+}
 
 /// Colours of a class on light and dark ground: contrast of at least 4.5:1.
 const COLOURS: [(&str, &str, &str); 8] = [

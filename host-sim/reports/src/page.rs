@@ -11,6 +11,7 @@ use crate::formatting::{
     capital, count, filter_consistency, interval, missing_samples, number, parameter_name, recording_advice, words,
     worst_deviations,
 };
+use crate::live::LiveView;
 use crate::reading::ReadingRecord;
 use crate::rounding::{bounded_quantity, p_value, unit};
 use crate::summary;
@@ -51,6 +52,36 @@ pub fn first_screen(report: &Report, source: Option<&str>, reading: Option<&Read
 enum Extent {
     Whole,
     FirstScreen,
+}
+
+/// A growing record as a part of a page: verdict, curves, findings and health, as on a terminal's screen.
+#[must_use]
+pub fn live(view: &LiveView) -> String {
+    let LiveView { headline, sentences, tables, curves, findings, unexplained, advice, health, status } = view;
+    html! {
+        h3 { (headline) }
+        p { (sentences) }
+        (tables::coefficients(tables, false))
+        div.curves {
+            @for plot in ["gyro_", "accl_"].iter().filter_map(|prefix| figure::live(curves, prefix)) {
+                figure id=(plot.id) { figcaption { (plot.title) } (plot.key()) div.drawing { (plot.drawing()) } }
+            }
+        }
+        @if !findings.is_empty() {
+            h3 { "What was found" }
+            ol { @for text in findings { li { b { (text.channels) } ": " (text.physics) } } }
+        }
+        @for text in unexplained.iter().chain(advice) { p { (text) } }
+        p.faint { (health) }
+        p.faint { (status) }
+    }
+    .into_string()
+}
+
+/// The style sheet of the figures, and what changes in it on dark ground.
+#[must_use]
+pub fn figure_styles() -> [String; 2] {
+    figure::style()
 }
 
 /// The page could not be written.

@@ -17,6 +17,7 @@ use noise_analysis::report::{
 };
 use noise_analysis::report::{DataSheetReport, TermReport};
 use noise_analysis::units::conversions;
+use time_base::TimeRange;
 
 /// Deviance per point on the unseen half above which a model is marked; a true model has about 1.
 pub(crate) const HIGH_DEVIANCE: f64 = 3.0;
@@ -514,9 +515,8 @@ pub fn longest_at_rest(report: &Report) -> Option<Stretch> {
 /// Options for a part of a recording, in tenths of a second inside of it.
 #[must_use]
 pub fn time_options(from_s: f64, to_s: f64) -> String {
-    const ROUNDING: f64 = 1e-6;
-    let (from, to) = ((10.0 * from_s - ROUNDING).ceil() / 10.0 + 0.0, (10.0 * to_s + ROUNDING).floor() / 10.0);
-    format!("--from {from} --to {to}")
+    let TimeRange { from_s, to_s } = TimeRange { from_s, to_s }.whole_tenths();
+    format!("--from {from_s} --to {to_s}")
 }
 
 /// Least over the channels, s; `None` without any.

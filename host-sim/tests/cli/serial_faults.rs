@@ -87,7 +87,8 @@ fn an_interrupted_recording_is_finished_and_the_device_is_told() {
         assert!(output.status.success() && errors.contains("interrupted"), "{errors}");
         assert!(commands.ends_with("w 0\r"), "{commands:?}");
         // 5 s at 204.8 samples per second, less what the terminal holds, 4 KiB of some 40 bytes a sample.
-        assert!((900..=1030).contains(&samples(&log)), "{}", samples(&log));
+        let samples = samples(&log);
+        assert!((900..=1030).contains(&samples), "{samples}");
     }
 }
 

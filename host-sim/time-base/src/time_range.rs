@@ -8,6 +8,13 @@ pub struct TimeRange {
 }
 
 impl TimeRange {
+    /// Between two stated times; `None` where neither is.
+    #[must_use]
+    pub fn between(from_s: Option<f64>, to_s: Option<f64>) -> Option<Self> {
+        let is_part = from_s.is_some() || to_s.is_some();
+        is_part.then(|| Self { from_s: from_s.unwrap_or(0.0), to_s: to_s.unwrap_or(f64::INFINITY) })
+    }
+
     /// Tenths of a second inside of it.
     #[must_use]
     pub fn whole_tenths(self) -> Self {

@@ -7,7 +7,7 @@ use crate::input::input_error::{InputError, Reason};
 use crate::input::read_ahead::ReadAhead;
 use crate::input::read_monitor::{Counted, ReadMonitor};
 use crate::input::threads::may_begin_threads;
-use encoding_rs_io::DecodeReaderBytes;
+use crate::input::utf16_reader::Utf16Reader;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::PathBuf;
 
@@ -64,7 +64,7 @@ impl Lines {
             }
         } else if is_utf16 {
             // In Windows programs.
-            Box::new(DecodeReaderBytes::new(whole))
+            Box::new(Utf16Reader::new(whole).map_err(|e| fail(Reason::Io(e)))?)
         } else {
             Box::new(whole)
         };

@@ -115,19 +115,26 @@ pub(crate) fn bytes(text: &str) -> Result<Vec<u8>, Reason> {
 
 /// A log being written, gzip for a name in `.gz`; complete up to the last second without [`finish`](Self::finish).
 #[derive(Debug)]
-pub struct FrameLogWriter {
-    file: File,
+pub struct FrameLogWriter<W = File> {
+    out: W,
     is_gzip: bool,
     text: String,
-    written: Instant,
+    /// `None` where there is no clock.
+    written: Option<Instant>,
 }
 
 impl FrameLogWriter {
     /// Creates `file` and writes the header.
     pub fn create(file: &Path) -> io::Result<Self> {
         let is_gzip = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gz"));
-        let text = format!("{HEADER}\n");
-        Ok(Self { file: File::create(file)?, is_gzip, text, written: Instant::now() })
+        Ok(Self { is_gzip, written: Some(Instant::now()), ..FrameLogWriter::new(File::create(file)?) })
+    }
+}
+
+impl<W: Write> FrameLogWriter<W> {
+    /// Writes the header into `out`, and frames as they are buffered.
+    pub fn new(out: W) -> Self {
+        Self { out, is_gzip: false, text: format!("{HEADER}\n"), written: None }
     }
 
     /// Adds one frame.
@@ -143,14 +150,16 @@ impl FrameLogWriter {
         }
         text.push('\n');
         let looks = before / CLOCK_BYTES != self.text.len() / CLOCK_BYTES;
-        if self.text.len() >= MAX_BUFFERED || looks && self.written.elapsed() >= MAX_DELAY {
+        if self.text.len() >= MAX_BUFFERED
+            || looks && self.written.is_some_and(|written| written.elapsed() >= MAX_DELAY)
+        {
             self.flush()
         } else {
             Ok(())
         }
     }
 
-    /// Writes what is buffered and closes the file.
+    /// Writes what is buffered, and ends the log.
     pub fn finish(mut self) -> io::Result<()> {
         self.flush()
     }
@@ -159,12 +168,12 @@ impl FrameLogWriter {
         if self.is_gzip {
             let mut member = GzEncoder::new(Vec::new(), Compression::default());
             member.write_all(self.text.as_bytes())?;
-            self.file.write_all(&member.finish()?)?;
+            self.out.write_all(&member.finish()?)?;
         } else {
-            self.file.write_all(self.text.as_bytes())?;
+            self.out.write_all(self.text.as_bytes())?;
         }
         self.text.clear();
-        self.written = Instant::now();
+        self.written = self.written.map(|_| Instant::now());
         Ok(())
     }
 }

@@ -6,6 +6,7 @@ use link::{Decoder, DecoderCounters, Message, RawMessage, Received};
 #[cfg(feature = "serial")]
 use serial2::SerialPort;
 use std::collections::VecDeque;
+use std::fs::File;
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -218,10 +219,10 @@ pub(crate) fn is_capture(start: &[u8]) -> bool {
     start.iter().any(|&byte| matches!(decoder.push(byte), Some(Received::Message { message: Message::Raw(_), .. })))
 }
 
-/// Writes the bursts of `capture`, bytes of a raw stream, to `file` (an error of either); restarts take no time.
-pub(crate) fn log_of_capture(mut capture: impl Read, file: &Path) -> io::Result<()> {
-    let mut recorder = RawStreamRecorder::create(file)?;
-    let (mut decoder, received) = (Decoder::new(), Instant::now());
+/// Writes the bursts of `capture`, bytes of a raw stream, as a frame log to `out` (an error of either); restarts take no time.
+pub(crate) fn log_of_capture(mut capture: impl Read, out: impl Write) -> io::Result<()> {
+    let mut recorder = RawStreamRecorder::new(FrameLogWriter::new(out));
+    let mut decoder = Decoder::new();
     let mut bytes = [0; 4096];
     loop {
         let count = match capture.read(&mut bytes) {
@@ -232,7 +233,7 @@ pub(crate) fn log_of_capture(mut capture: impl Read, file: &Path) -> io::Result<
         };
         for &byte in &bytes[..count] {
             if let Some(Received::Message { message: Message::Raw(raw), .. }) = decoder.push(byte) {
-                recorder.write_received(&raw, received)?;
+                recorder.write_received(&raw, None)?;
             }
         }
     }
@@ -256,8 +257,8 @@ fn next_raw<P: Read + Write>(link: &mut SerialLink<P>, deadline: Instant) -> io:
 }
 
 /// Writes a raw stream to a frame log. After a restart, time goes on by the host's clock.
-pub struct RawStreamRecorder {
-    log: FrameLogWriter,
+pub struct RawStreamRecorder<W = File> {
+    log: FrameLogWriter<W>,
     /// SENS_AVG as last logged.
     sens_avg: Option<u16>,
     bursts: u64,
@@ -276,33 +277,30 @@ struct LastBurst {
     at_us: u64,
     /// In the log, µs.
     logged_us: u64,
-    /// By the host.
-    received: Instant,
+    /// By the host; `None` where it is not known.
+    received: Option<Instant>,
 }
 
 impl RawStreamRecorder {
     /// Creates the log.
     pub fn create(file: &Path) -> io::Result<Self> {
-        Ok(Self {
-            log: FrameLogWriter::create(file)?,
-            sens_avg: None,
-            bursts: 0,
-            missing: 0,
-            restarts: 0,
-            first_us: None,
-            last: None,
-            offset_us: 0,
-        })
+        FrameLogWriter::create(file).map(Self::new)
+    }
+}
+
+impl<W: Write> RawStreamRecorder<W> {
+    fn new(log: FrameLogWriter<W>) -> Self {
+        Self { log, sens_avg: None, bursts: 0, missing: 0, restarts: 0, first_us: None, last: None, offset_us: 0 }
     }
 
     /// Adds the bursts of a message at their data-ready times. A frame that writes SENS_AVG comes first and at changes,
     /// for the range in a replay.
     pub fn write(&mut self, raw: &RawMessage) -> io::Result<()> {
-        self.write_received(raw, Instant::now())
+        self.write_received(raw, Some(Instant::now()))
     }
 
-    /// For a message received at `received`.
-    fn write_received(&mut self, raw: &RawMessage, received: Instant) -> io::Result<()> {
+    /// For a message received at `received`, where it is known.
+    fn write_received(&mut self, raw: &RawMessage, received: Option<Instant>) -> io::Result<()> {
         if raw.bursts.is_empty() {
             return Ok(());
         }
@@ -313,7 +311,8 @@ impl RawStreamRecorder {
         }
         if let Some(last) = self.last.take_if(|last| at_us < last.at_us) {
             self.restarts += 1;
-            let passed_us = (received - last.received).as_micros().max(1) as i128;
+            let passed = received.zip(last.received).map(|(now, before)| now - before);
+            let passed_us = passed.unwrap_or_default().as_micros().max(1) as i128;
             self.offset_us = i128::from(last.logged_us) + passed_us - i128::from(at_us);
         }
         let logged = |at_us: u64, offset_us: i128| u64::try_from(i128::from(at_us) + offset_us).unwrap_or(u64::MAX);

@@ -39,7 +39,11 @@ fn table(class: &str, headings: &[Heading], rows: &Markup) -> Markup {
 
 /// In users' units, with data sheet and errors.
 pub(super) fn coefficients_of_all(report: &Report) -> Markup {
-    let groups = summary::coefficient_tables(report);
+    coefficients(&summary::coefficient_tables(report), true)
+}
+
+/// For groups of channels, each a link to its section where it has one.
+pub(super) fn coefficients(groups: &[CoefficientTable], has_sections: bool) -> Markup {
     // An accelerometer's random walks have other names.
     let headings = |group: &CoefficientTable| {
         let columns = group.names.iter().zip(["N", "B", "K"]).zip(&group.units);
@@ -55,7 +59,9 @@ pub(super) fn coefficients_of_all(report: &Report) -> Markup {
             @for row in &group.rows {
                 tr class=[row.channel.is_empty().then_some("sheet")] {
                     th scope="row" {
-                        @if row.channel.is_empty() { "sheet" } @else { a href={ "#" (row.channel) } { (row.label) } }
+                        @if row.channel.is_empty() { "sheet" }
+                        @else if has_sections { a href={ "#" (row.channel) } { (row.label) } }
+                        @else { (row.label) }
                     }
                     @for value in &row.coefficients { td.number { (broken_before_interval(value)) } }
                     td class={ "number" @if row.is_high { " warning" } } {

@@ -1,4 +1,4 @@
-//! What the answers say: a check for each figure, and the probable cause of each that fails.
+//! A check for each figure of the answers, and the probable cause of each that fails.
 
 use super::transcript::{PATTERNS, Topic, Transcript, raw_messages};
 use adis16405_driver::{Channel, GyroRange, OutputWord, Product};
@@ -9,7 +9,7 @@ use std::fmt;
 /// A figure, its limit, and the cause if it is beyond it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Check {
-    /// What is measured.
+    /// Name of the figure.
     pub name: &'static str,
     /// The figure; empty if it was not measured.
     pub measured: String,
@@ -19,7 +19,7 @@ pub struct Check {
     pub cause: Option<Cause>,
 }
 
-/// What is probably wrong.
+/// Probable cause of a failure.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Cause {
     /// Nothing was received.
@@ -222,7 +222,7 @@ fn identity(transcript: &Transcript) -> Option<u16> {
     transcript.lines(Topic::Identity).filter(|line| line.starts_with("PROD_ID")).find_map(register_value)
 }
 
-/// Whether the sensor gives no answer that the firmware takes.
+/// True if the sensor gives no answer that the firmware takes.
 pub(super) fn is_deaf(transcript: &Transcript) -> bool {
     let known = identity(transcript).and_then(Product::from_prod_id).is_some();
     !known && !transcript.hello(Topic::Report).is_some_and(|hello| hello.sampling)
@@ -253,7 +253,7 @@ fn reads(transcript: &Transcript) -> Reads {
     reads
 }
 
-/// Whether further reads would say nothing new.
+/// True if further reads would say nothing new.
 pub(super) fn reads_are_wrong(transcript: &Transcript) -> bool {
     let Reads { others, is_first_wrong, .. } = reads(transcript);
     others > 0 || is_first_wrong || is_deaf(transcript)

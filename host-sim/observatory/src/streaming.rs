@@ -1,6 +1,5 @@
 //! Recordings that are read in blocks: for the report of the curves alone, and for that of a recording that is too long to be kept.
 
-use anyhow::Result;
 use measurement::SampleBlock;
 use noise_analysis::parallel;
 use noise_analysis::quick::CurveEstimators;
@@ -14,12 +13,15 @@ use std::thread;
 const WAITING: usize = 2;
 
 /// The estimators of the curves with all samples of `stream`.
-pub(crate) fn curves(stream: &mut SampleStream) -> Result<CurveEstimators> {
+///
+/// # Errors
+/// The recording is damaged.
+pub fn curves(stream: &mut SampleStream) -> Result<CurveEstimators, StreamError> {
     read(stream, |stream| CurveEstimators::new(stream.description().clone()), CurveEstimators::push)
 }
 
 /// Condensed form of a long recording.
-pub(crate) fn long_record(stream: &mut SampleStream) -> Result<CondensedRecord<'static>> {
+pub(crate) fn long_record(stream: &mut SampleStream) -> Result<CondensedRecord<'static>, StreamError> {
     let begin = |stream: &SampleStream| LongRecordReader::new(stream.description().clone(), stream.beginning());
     Ok(read(stream, begin, LongRecordReader::push)?.finish())
 }
@@ -29,7 +31,7 @@ fn read<T: Send>(
     stream: &mut SampleStream,
     begin: impl Fn(&SampleStream) -> T,
     push: impl Fn(&mut T, &SampleBlock) + Sync,
-) -> Result<T> {
+) -> Result<T, StreamError> {
     loop {
         let mut taken = begin(stream);
         let is_complete = if parallel::threads() == 1 {

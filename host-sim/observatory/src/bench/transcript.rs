@@ -1,4 +1,4 @@
-//! What the bench asks, step by step, and what it has been answered.
+//! Steps of the bench, and the answers to them.
 
 use link::{DecoderCounters, Health, Hello, Message, RawMessage, Received};
 
@@ -23,7 +23,7 @@ impl Default for BenchPlan {
     }
 }
 
-/// What a step asks for.
+/// Subject of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Topic {
     Version,
@@ -70,7 +70,7 @@ pub struct Step {
     pub(super) needs_sensor: bool,
 }
 
-/// What has been received after a command.
+/// Messages and lines after a command.
 #[derive(Debug)]
 struct Answer {
     topic: Topic,
@@ -81,9 +81,9 @@ struct Answer {
 #[derive(Debug, Default)]
 pub struct Transcript {
     answers: Vec<Answer>,
-    /// Of the decoder of the link.
+    /// Counters of the decoder meanwhile.
     pub counters: DecoderCounters,
-    /// What came on a second port while the bursts were counted.
+    /// Messages of a second port while the bursts were counted.
     pub second_port: Option<Vec<Received>>,
 }
 
@@ -145,7 +145,13 @@ impl BenchPlan {
 }
 
 impl Step {
-    /// Whether `received` is the end of the answer.
+    /// True for the step that counts bursts, which a second port must carry too.
+    #[must_use]
+    pub fn counts_bursts(&self) -> bool {
+        self.topic == Topic::Bursts
+    }
+
+    /// True for the end of the answer.
     pub(super) fn is_answered_by(&self, received: &Received) -> bool {
         match (self.answered, received) {
             (Answered::By(starts), received) => {
@@ -163,7 +169,7 @@ impl Transcript {
         self.answers.push(Answer { topic: step.topic, received });
     }
 
-    /// Whether nothing has come.
+    /// True if nothing has come.
     pub(crate) fn is_silent(&self) -> bool {
         self.answers.iter().all(|answer| answer.received.is_empty())
     }
@@ -196,7 +202,8 @@ impl Transcript {
     }
 
     /// Commands that set rate, range, filter and reports as they were.
-    pub(super) fn settings_before(&self) -> Vec<String> {
+    #[must_use]
+    pub fn settings_before(&self) -> Vec<String> {
         let Some(hello) = self.hello(Topic::Report) else { return Vec::new() };
         vec![
             format!("g {}", hello.gyro_full_scale),

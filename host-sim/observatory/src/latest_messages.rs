@@ -1,9 +1,7 @@
-//! A device on a serial port: its reports as the live view, in the words of the host's reports.
+//! The reports of a device as the live view, in the words of the host's reports.
 
-use super::LiveSource;
-use crate::monitor;
+use crate::message_text;
 use adis16405_driver::{Channel, GyroRange};
-use anyhow::Result;
 use link::{
     ChannelMessage, Health, Hello, LearnedMessage, Message, Received, ReportedAddedTerm, ReportedParameter,
     ReportedRegressor, ReportedTerm, ValidationMessage,
@@ -18,53 +16,21 @@ use noise_analysis::effects::{
 };
 use noise_analysis::report::{Finding, Parameter, Validation};
 use recordings::Printable;
-use recordings::serial::SerialLink;
 use reports::finding_text;
 use reports::formatting::count;
 use reports::live::{LiveCurve, LiveView};
 use reports::rounding::{plain, span};
 use reports::summary::{ChannelCoefficients, tables_of_channels};
 use std::collections::BTreeMap;
-use std::io::{Read, Write};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Two lines of different channels whose frequencies differ by less than this share are one finding, as in the device's table.
 const SAME_FREQUENCY: f64 = 0.02;
 
-/// A device and the latest of each of its messages.
-pub(crate) struct DeviceSource<'a, P> {
-    cable: &'a mut SerialLink<P>,
-    messages: LatestMessages,
-    /// When something was received last.
-    received: Instant,
-}
-
-impl<'a, P: Read + Write> DeviceSource<'a, P> {
-    /// The device at the other end of `cable`, which is called `name`.
-    pub(crate) fn new(cable: &'a mut SerialLink<P>, name: String) -> Self {
-        Self { cable, messages: LatestMessages { name, ..LatestMessages::default() }, received: Instant::now() }
-    }
-}
-
-impl<P: Read + Write> LiveSource for DeviceSource<'_, P> {
-    fn advance(&mut self, deadline: Instant) -> Result<bool> {
-        while let Some(received) = self.cable.next(Some(deadline))? {
-            self.messages.take(received);
-            self.received = Instant::now();
-        }
-        Ok(!self.cable.is_disconnected())
-    }
-
-    fn view(&self) -> LiveView {
-        let mut view = self.messages.view(self.received.elapsed());
-        view.health += &format!(" Link: {}.", monitor::summary(&self.cable.counters()));
-        view
-    }
-}
-
 /// The latest messages, those on channels by the channel's position in the burst.
 #[derive(Debug, Default)]
-struct LatestMessages {
+pub struct LatestMessages {
+    /// How the port is called.
     name: String,
     hello: Option<Hello>,
     health: Option<Health>,
@@ -73,12 +39,19 @@ struct LatestMessages {
     validations: BTreeMap<u8, ValidationMessage>,
     /// The last line of text.
     text: String,
-    /// What the device says of a sensor that it does not sample.
+    /// Why the sensor is not sampled.
     trouble: Option<String>,
 }
 
 impl LatestMessages {
-    fn take(&mut self, received: Received) {
+    /// None, of the device on the port `name`.
+    #[must_use]
+    pub fn new(name: String) -> Self {
+        Self { name, ..Self::default() }
+    }
+
+    /// Takes what was received.
+    pub fn take(&mut self, received: Received) {
         let message = match received {
             Received::Text(line) => return self.take_text(&line),
             Received::Message { message, .. } => message,
@@ -108,15 +81,16 @@ impl LatestMessages {
         }
     }
 
-    /// What is shown after a time without a message.
-    fn view(&self, silence: Duration) -> LiveView {
+    /// The live view after a time without a message.
+    #[must_use]
+    pub fn view(&self, silence: Duration) -> LiveView {
         let (mut view, name) = (self.report(), &self.name);
-        if silence >= monitor::LONG_SILENCE {
+        if silence >= message_text::LONG_SILENCE {
             view.headline = format!("{name}   Nothing received for {} s", silence.as_secs());
-            view.sentences = format!("Probably {}.", monitor::SILENCE);
+            view.sentences = format!("Probably {}.", message_text::SILENCE);
         } else if let Some(trouble) = &self.trouble {
             view.headline = format!("{name}   The sensor is not sampled: {trouble}");
-            view.sentences = format!("Its wires or its supply; imunoise bench {name} says which.");
+            view.sentences = "Its wires or its supply: the bench says which.".to_owned();
         }
         view
     }
@@ -168,7 +142,7 @@ impl LatestMessages {
             health: self
                 .health
                 .as_ref()
-                .map_or_else(String::new, |health| format!("Health: {}.", monitor::health_text(health))),
+                .map_or_else(String::new, |health| format!("Health: {}.", message_text::health_text(health))),
             status: self.text.clone(),
         }
     }
@@ -197,8 +171,7 @@ impl LatestMessages {
         self.channels.values().filter_map(inertial).collect()
     }
 
-    /// What the models have beyond N, B and K of channels that are sampled every `period_s` s; what several channels share is one
-    /// finding.
+    /// Terms beyond N, B and K, of channels sampled every `period_s` s; those of several channels are one finding.
     fn findings(&self, period_s: f64) -> Vec<Finding> {
         let mut findings: Vec<Finding> = Vec::new();
         for report in self.learned.values() {
@@ -314,7 +287,7 @@ fn of_term(channel: Channel, added: &ReportedAddedTerm, period_s: f64) -> Option
     })
 }
 
-/// Whether one cause explains both: the part's filter, or lines at one frequency.
+/// True for effects of one cause: the part's filter, or lines at one frequency.
 fn is_shared(one: &Effect, other: &Effect) -> bool {
     let is_near =
         |one: BoundedEstimate, other: BoundedEstimate| (one.value - other.value).abs() <= SAME_FREQUENCY * one.value;
@@ -348,7 +321,7 @@ mod tests {
         let log = |text: &str| Received::Text(link::text_line(format_args!("{text}")));
         messages.take(log("sensor: PROD_ID answered 0 (0x0000), not 16405 or 16400; reading again"));
         let lost = shown(&messages, 1);
-        assert!(lost.contains("not sampled: PROD_ID answered 0") && lost.contains("bench /dev/ttyACM0"), "{lost}");
+        assert!(lost.contains("not sampled: PROD_ID answered 0") && lost.contains("the bench says"), "{lost}");
         messages.take(log("sensor: ADIS16405, self-test passed"));
         assert!(shown(&messages, 1).contains("has not reported yet"));
     }
