@@ -6,6 +6,7 @@
 //! effects of the first half alone ──────────────────────────────────────────┴► validation
 //! ```
 
+mod grouping;
 mod harmonic_series;
 mod line;
 mod periodic;
@@ -21,6 +22,7 @@ use crate::effects::findings::{ChannelEffect, Finding, Validation};
 use crate::report::ChannelReport;
 use crate::rivals::cause::{Cause, Shown};
 use crate::rivals::table::{CauseClaim, stands_as_cause};
+use grouping::join;
 use measurement::SensorProfile;
 use std::collections::BTreeMap;
 
@@ -79,15 +81,6 @@ fn merged(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cause> {
     });
     causes.sort_by_key(|cause| cause.shown[0].channel);
     causes
-}
-
-/// Adds `added` to the groups that have one of its like, which become one: no order of the members changes the groups.
-fn join<T>(groups: &mut Vec<Vec<T>>, is_same: impl Fn(&T) -> bool, added: T) {
-    let has_same = |group: &Vec<T>| group.iter().any(&is_same);
-    let place = groups.iter().position(has_same).unwrap_or(groups.len());
-    let (same, others): (Vec<Vec<T>>, Vec<Vec<T>>) = std::mem::take(groups).into_iter().partition(has_same);
-    *groups = others;
-    groups.insert(place, same.into_iter().flatten().chain([added]).collect());
 }
 
 /// A cause as it is reported.

@@ -1,6 +1,6 @@
 //! Lines of the spectrum that channels show, by their frequency.
 
-use super::join;
+use super::grouping::join;
 use crate::bounds::{BoundedEstimate, ChannelEstimate};
 use crate::distributions::NORMAL_975;
 use crate::effects::{Effect, LineEvidence};
