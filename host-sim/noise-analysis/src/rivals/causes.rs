@@ -65,12 +65,13 @@ fn merged(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cause> {
         channels.iter().enumerate().flat_map(|(channel, (_, effects))| effects.iter().map(move |of| (channel, of)));
     let others: Vec<(usize, &Effect)> = all.filter(|(channel, effect)| stands(effect, *channel)).collect();
     let mut groups: Vec<Vec<Shown>> = periodic.into_iter().map(|cause| cause.shown).collect();
+    let is_same = |known: &Shown, shown: &Shown| {
+        // Bands of one channel are two of them.
+        let is_other_band = known.channel == shown.channel && matches!(shown.effect, Effect::Unexplained(_));
+        let is_same_unit = channels[known.channel].0 == channels[shown.channel].0;
+        !is_other_band && known.effect.is_one_cause(&shown.effect, is_same_unit)
+    };
     for (channel, effect) in others {
-        let is_same = |known: &Shown| {
-            // Bands of one channel are two of them.
-            let is_other_band = known.channel == channel && matches!(effect, Effect::Unexplained(_));
-            !is_other_band && known.effect.is_one_cause(effect, channels[known.channel].0 == channels[channel].0)
-        };
         join(&mut groups, is_same, Shown { channel, effect: effect.clone(), parts: vec![effect.clone()] });
     }
     let mut causes: Vec<Cause> = groups.into_iter().map(|shown| Cause { shown }).collect();

@@ -73,10 +73,9 @@ impl Frequency {
             .enumerate()
             .flat_map(|(channel, (_, effects))| effects.iter().filter_map(move |effect| Line::new(channel, effect)));
         let mut groups: Vec<Vec<Line>> = Vec::new();
-        for line in lines {
-            let is_same = |known: &Line| (known.frequency - line.frequency).abs() < reach(known, &line, duration_s);
-            join(&mut groups, is_same, line.clone());
-        }
+        let is_same =
+            |known: &Line, line: &Line| (known.frequency - line.frequency).abs() < reach(known, line, duration_s);
+        lines.for_each(|line| join(&mut groups, is_same, line));
         let mut frequencies: Vec<Self> = groups.into_iter().map(|lines| Self { lines }).collect();
         frequencies.sort_by(|a, b| a.best().frequency.total_cmp(&b.best().frequency));
         frequencies
