@@ -9,14 +9,19 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 #[cfg(unix)]
 use signal_hook::iterator::Signals;
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::process;
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 #[cfg(unix)]
 use std::thread;
+use tempfile::{Builder, TempDir};
 
 /// Exit status of a program that a signal has ended, as shells have it, less the number of the signal.
 const ENDED_BY_SIGNAL: i32 = 128;
+
+/// A command makes a file or two in a folder.
+const ATTEMPTS_TO_REMOVE: usize = 8;
 
 /// Takes a signal up, or does not.
 type Action = Box<dyn FnMut() -> bool + Send>;
@@ -54,10 +59,12 @@ pub(crate) fn watch() -> Result<()> {
 fn take(signal: i32) {
     let is_taken_up = lock(&ACTION).as_mut().is_some_and(|action| action());
     if !is_taken_up {
-        lock(&INCOMPLETE).iter().for_each(|file| {
-            // The program ends: a file that cannot be removed stays.
-            let _ = fs::remove_file(file);
-        });
+        // Locked until the program has ended: no folder is made any more. In one that is being removed a file may still be made, which the
+        // next attempt removes.
+        let incomplete = lock(&INCOMPLETE);
+        for folder in incomplete.iter() {
+            let _is_removed = (0..ATTEMPTS_TO_REMOVE).any(|_| fs::remove_dir_all(folder).is_ok());
+        }
         process::exit(ENDED_BY_SIGNAL + signal);
     }
 }
@@ -75,18 +82,36 @@ pub(crate) fn on_signal(action: impl FnMut() -> bool + Send + 'static) {
     *lock(&ACTION) = Some(Box::new(action));
 }
 
-/// A file that is removed if a signal ends the program before this is dropped.
-pub(crate) struct IncompleteFile(PathBuf);
+/// A folder of files that are not complete, removed when this is dropped, or when a signal ends the program.
+pub(crate) struct IncompleteFiles {
+    // Removed before it is forgotten: a signal between the two finds it.
+    folder: TempDir,
+    _name: RemovedAtSignal,
+}
 
-impl IncompleteFile {
-    pub(crate) fn new(file: &Path) -> Self {
-        lock(&INCOMPLETE).push(file.to_owned());
-        Self(file.to_owned())
+/// The name of a folder that is removed if a signal ends the program before this is dropped.
+struct RemovedAtSignal(PathBuf);
+
+impl IncompleteFiles {
+    /// Makes the folder in `place`; a signal meanwhile waits until the folder is known.
+    ///
+    /// # Errors
+    /// The folder cannot be made.
+    pub(crate) fn in_folder(place: &Path) -> io::Result<Self> {
+        let mut incomplete = lock(&INCOMPLETE);
+        let folder = Builder::new().prefix(".").tempdir_in(place)?;
+        let name = folder.path().to_owned();
+        incomplete.push(name.clone());
+        Ok(Self { folder, _name: RemovedAtSignal(name) })
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        self.folder.path()
     }
 }
 
-impl Drop for IncompleteFile {
+impl Drop for RemovedAtSignal {
     fn drop(&mut self) {
-        lock(&INCOMPLETE).retain(|file| *file != self.0);
+        lock(&INCOMPLETE).retain(|folder| *folder != self.0);
     }
 }

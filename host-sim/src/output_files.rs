@@ -1,7 +1,7 @@
 //! The files that a command writes: none of them is a file that it reads, whatever its name; each is complete or as it was; and one that
 //! exists is overwritten where the user says so.
 
-use crate::interrupt::IncompleteFile;
+use crate::interrupt::IncompleteFiles;
 use anyhow::{Context, Result, bail};
 use recordings::file_format::files_of_bag;
 use same_file::Handle;
@@ -10,7 +10,7 @@ use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use tempfile::{NamedTempFile, PersistError};
 
-/// Longest ending of the name of a file that the one beside it keeps, bytes: writers choose the compression by it.
+/// Longest ending of the name of a file that it keeps while it is incomplete, bytes: writers choose the compression by it.
 const LONGEST_ENDING: usize = 32;
 
 /// True if `-` is given for a file: standard input or standard output.
@@ -99,7 +99,8 @@ impl OutputFiles {
                 Ok(_) => drop(OpenOptions::new().write(true).open(file)?),
                 Err(_) => {}
             }
-            file_beside(&target(file)).map(drop)
+            let target = target(file);
+            incomplete_file(&target, IncompleteFiles::in_folder(folder_of(&target))?.path()).map(drop)
         };
         check().with_context(|| file.display().to_string())
     }
@@ -126,7 +127,7 @@ impl OutputFiles {
         self.write_with(file, |file| Ok(fs::write(file, content)?))
     }
 
-    /// Writes `file` with `write`, which is given a file of the same ending beside it; that takes the name when it is complete.
+    /// Writes `file` with `write`, which is given a file of the same ending in a folder beside it; that takes the name when it is complete.
     ///
     /// # Errors
     /// The file is an input, must not be overwritten, or cannot be written; it is then as it was. The error names it.
@@ -137,28 +138,27 @@ impl OutputFiles {
                 return write(file);
             }
             let target = target(file);
-            let beside = file_beside(&target)?;
-            let incomplete = IncompleteFile::new(beside.path());
-            let written = write(beside.path())?;
-            self.persist(beside, &target)?;
-            drop(incomplete);
+            let folder = IncompleteFiles::in_folder(folder_of(&target))?;
+            let incomplete = incomplete_file(&target, folder.path())?;
+            let written = write(incomplete.path())?;
+            self.persist(incomplete, &target)?;
             Ok(written)
         };
         replace().with_context(|| file.display().to_string())
     }
 
     /// Gives a complete file its name.
-    fn persist(&self, beside: NamedTempFile, target: &Path) -> io::Result<()> {
-        let beside = if self.overwrites {
-            beside
+    fn persist(&self, complete: NamedTempFile, target: &Path) -> io::Result<()> {
+        let complete = if self.overwrites {
+            complete
         } else {
-            match beside.persist_noclobber(target) {
+            match complete.persist_noclobber(target) {
                 Err(PersistError { error, file }) if error.kind() != ErrorKind::AlreadyExists => file,
                 persisted => return persisted.map(drop).map_err(Into::into),
             }
         };
         // Not every file system can refuse to replace a file.
-        beside.persist(target).map(drop).map_err(Into::into)
+        complete.persist(target).map(drop).map_err(Into::into)
     }
 
     /// Writes `file` through a buffer.
@@ -183,19 +183,19 @@ fn target(file: &Path) -> PathBuf {
     fs::canonicalize(file).unwrap_or_else(|_| file.to_owned())
 }
 
-/// An empty file beside `file`, with its ending, and its permissions if it exists.
-fn file_beside(file: &Path) -> Result<NamedTempFile> {
+/// An empty file in `folder` that will be `file`: with its ending, and its permissions if it exists.
+fn incomplete_file(file: &Path, folder: &Path) -> Result<NamedTempFile> {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let start = (name.len().saturating_sub(LONGEST_ENDING)..=name.len()).find(|at| name.is_char_boundary(*at));
     let ending = start.map_or("", |start| &name[start..]);
-    let mut beside = tempfile::Builder::new();
-    beside.prefix(".").suffix(ending);
+    let mut incomplete = tempfile::Builder::new();
+    incomplete.suffix(ending);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
         // Those of a new file, less what the user's mask takes.
         let mode = fs::metadata(file).map_or(0o666, |metadata| metadata.permissions().mode());
-        beside.permissions(fs::Permissions::from_mode(mode));
+        incomplete.permissions(fs::Permissions::from_mode(mode));
     }
-    Ok(beside.tempfile_in(folder_of(file))?)
+    Ok(incomplete.tempfile_in(folder)?)
 }

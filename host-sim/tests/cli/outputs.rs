@@ -137,9 +137,11 @@ fn a_hang_up_that_is_ignored_ends_nothing() {
         .stderr(Stdio::null())
         .spawn()
         .expect("a shell");
+    // The log is in a folder beside its place until it is complete.
     let written = || {
-        let files = fs::read_dir(dir.path()).expect("the folder").filter_map(|file| file.ok()?.metadata().ok());
-        files.map(|file| file.len()).sum::<u64>()
+        let files = |folder: &Path| fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
+        let logs = files(dir.path()).flat_map(|folder| files(&folder.path()));
+        logs.filter_map(|log| log.metadata().ok()).map(|log| log.len()).sum::<u64>()
     };
     wait_until("a log is begun", || written() > 0);
     assert_eq!((signals(&program, "SigIgn") & 1, signals(&program, "SigCgt") & 1), (1, 0), "still ignored");
