@@ -229,7 +229,7 @@ impl DataReadyMonitor {
         self.period_q8 > 0
     }
 
-    /// Clears the suspicion at `now_us`, after a probe.
+    /// Clears the suspicion at `now_us`, after a probe or a pause of the device's own.
     pub fn restart_at(&mut self, now_us: u64) {
         self.probed_us = now_us;
         self.new_phase = true;

@@ -1,6 +1,5 @@
-//! Text for a person: lines, and answers sent line by line.
+//! Text for a person: lines, and answers of several lines, made and sent one line at a time.
 
-use crate::answer::{Answer, AnswerLine};
 use crate::bench_console::{deflection_line, dump_line, measurement_line};
 use crate::board::Board;
 use crate::command::help;
@@ -18,6 +17,30 @@ pub(crate) const SAFE_MODE: &str = "safe mode after three crashes: stored settin
 const WAITING_LINES: usize = 4;
 /// Answers that may wait, including the current one.
 const WAITING_ANSWERS: usize = 4;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(all(target_os = "none", feature = "microcontroller"), derive(defmt::Format))]
+pub(crate) enum Answer {
+    Help,
+    Table,
+    Counters,
+    Status,
+    Registers,
+    Measurement,
+    Deflections,
+}
+
+pub(crate) enum AnswerLine {
+    Text(TextLine),
+    Skip,
+    End,
+}
+
+impl From<Option<TextLine>> for AnswerLine {
+    fn from(line: Option<TextLine>) -> Self {
+        line.map_or(Self::Skip, Self::Text)
+    }
+}
 
 pub(crate) struct Console {
     lines: Deque<TextLine, WAITING_LINES>,
@@ -121,7 +144,7 @@ fn status_line(state: &DeviceState, board: &mut impl Board, index: usize) -> Ans
         }
         2 => {
             let samples = board.estimators(|estimators| estimators.channel(0).map(|estimator| estimator.len()));
-            let (epoch, length) = (state.settings.epoch, state.settings.epoch_s);
+            let (epoch, length) = (state.settings.epoch, state.settings.user.epoch_s);
             let (samples, age) = (samples.unwrap_or(0), state.epoch_age_s(now_us));
             text_line(format_args!("{samples} samples, epoch {epoch}, begun {age} s ago, length {length} s"))
         }

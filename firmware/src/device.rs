@@ -5,7 +5,7 @@ use crate::channels::{CHANNELS, ChannelSet};
 use crate::event::event;
 use crate::learner::Learner;
 use crate::recovery::{RecoveryLadder, RecoveryStep};
-use crate::retained::RetainedSettings;
+use crate::retained::{RetainedSettings, UserSettings};
 use crate::sample_intake::SensorTrouble;
 use crate::scale::ReportScale;
 use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, ProbeScope, SensorIdentity, probe, read_diagnosis};
@@ -22,14 +22,11 @@ pub const FIRST_CONFIG: Config = {
 };
 
 /// First start: a report every ten seconds, an endless epoch.
-pub(crate) const FIRST_SETTINGS: RetainedSettings = RetainedSettings {
+pub(crate) const FIRST_SETTINGS: UserSettings = UserSettings {
     smpl_prd: FIRST_CONFIG.sample_period().register(),
     sens_avg: FIRST_CONFIG.sens_avg(),
     epoch_s: 0,
-    epoch: 0,
     interval_s: 10,
-    starts: 0,
-    epoch_age_us: 0,
     prod_id: 0,
 };
 
@@ -90,18 +87,10 @@ impl DeviceState {
     }
 
     pub(crate) fn health(&self, board: &mut impl Board) -> Health {
-        let (meters, now_us) = (board.meters(), board.now_us());
-        let asleep_permille = (1000 * meters.asleep_us).checked_div(now_us).unwrap_or(0);
         let of_board = Health {
             data_ready_masked: board.sampling_activity().masked,
             usb_dropped: board.transmit_queue(|queue| queue.usb_dropped()),
-            serial_overruns: meters.serial_overruns,
-            awake_permille: 1000_u32.saturating_sub(asleep_permille as u32),
-            sampling_cycles: meters.sampling_cycles,
-            estimator_cycles: meters.estimator_cycles,
-            stack_bytes: meters.stack_bytes,
-            stack_size: meters.stack_size,
-            ..Health::default()
+            ..board.health()
         };
         board.estimators(|estimators| estimators.health()).with(&self.counters).with(&of_board)
     }
@@ -114,8 +103,8 @@ impl DeviceState {
             SensorState::Probing { .. } => {}
             SensorState::Sampled { since_us } => {
                 let (is_intact, trouble, used, settled) = board.estimators(|estimators| {
-                    let (used, settled) = (estimators.used_since_probe() > 0, estimators.is_settled());
-                    (estimators.is_intact(), estimators.trouble(now_us), used, settled)
+                    let (used, settled) = (estimators.used_since_probe > 0, estimators.is_settled());
+                    (estimators.monitor.has_period(), estimators.trouble(now_us), used, settled)
                 });
                 if !is_intact {
                     // Ends the burst: a sensor cut off within one is late to answer.
@@ -143,6 +132,15 @@ impl DeviceState {
         false
     }
 
+    /// After a pause of the device's own: samples are lost, without suspicion.
+    pub(crate) fn resume_sampling(&self, board: &mut impl Board) {
+        if self.is_sampled() {
+            let now_us = board.now_us();
+            board.estimators(|estimators| estimators.monitor.restart_at(now_us));
+            board.set_sampling(true);
+        }
+    }
+
     /// Requests a probe at `at_us`; sampling must be disabled.
     pub(crate) fn request_probe(&mut self, at_us: u64) {
         self.sensor = SensorState::Probing { at_us, step: None };
@@ -151,7 +149,7 @@ impl DeviceState {
     /// Begins the next step of recovery, at `earliest_us` or later.
     fn recover(&mut self, trouble: SensorTrouble, earliest_us: u64, board: &mut impl Board) {
         event!(warn, "sensor in trouble: {}", trouble);
-        let last_edge_us = board.estimators(|estimators| estimators.last_edge_us());
+        let last_edge_us = board.estimators(|estimators| estimators.monitor.last_edge_us());
         board.set_sampling(false);
         let (reason, cause, left_alone_us) = match trouble {
             _ if board.sampling_activity().is_masked => ("the data-ready line oscillates and is masked", "", 0),
@@ -203,7 +201,7 @@ impl DeviceState {
         }
         // Perhaps in low-power mode.
         let sck_hz = board.set_clock_limit(LOW_POWER_LIMIT_HZ);
-        let result = probe(board.sensor_bus(), self.config, sck_hz, scope, self.settings.prod_id)
+        let result = probe(board.sensor_bus(), self.config, sck_hz, scope, self.settings.user.prod_id)
             .map_err(|error| text_line(format_args!("{error}")));
         self.spi_clock_hz = board.set_clock_limit(clock_limit_hz(self.config));
         match result {
@@ -268,8 +266,8 @@ impl DeviceState {
         let now_us = board.now_us();
         let half_period_us = (5e5 / self.config.sample_period().hz()) as u64;
         let due = board.estimators(|estimators| {
-            let since_edge = estimators.last_edge_us().map(|edge_us| now_us.saturating_sub(edge_us));
-            estimators.has_error_flag() && since_edge.is_some_and(|since_us| since_us < half_period_us)
+            let since_edge = estimators.monitor.last_edge_us().map(|edge_us| now_us.saturating_sub(edge_us));
+            estimators.error_flag && since_edge.is_some_and(|since_us| since_us < half_period_us)
         });
         if !due || !self.status_flags.is_due(now_us) {
             return;
@@ -277,7 +275,7 @@ impl DeviceState {
         board.set_sampling(false);
         let diagnosis = read_diagnosis(board.sensor_bus(), self.config);
         board.set_sampling(true);
-        board.estimators(|estimators| estimators.clear_error_flag());
+        board.estimators(|estimators| estimators.error_flag = false);
         if let Some(causes) = self.status_flags.add(diagnosis, now_us, &mut self.counters) {
             event!(warn, "DIAG_STAT {}", causes);
             log(board, format_args!("sensor: DIAG_STAT {causes}"));
@@ -295,14 +293,4 @@ pub(crate) fn clock_limit_hz(config: Config) -> u32 {
 pub(crate) fn log(board: &mut impl Board, text: Arguments<'_>) {
     let line = text_line(text);
     board.transmit_queue(|queue| queue.send(MessageRef::Log(&line)));
-}
-
-pub(crate) fn config_from_registers(smpl_prd: u8, sens_avg: u16) -> Option<Config> {
-    let range = match sens_avg >> 8 {
-        0b100 => GyroRange::Dps300,
-        0b010 => GyroRange::Dps150,
-        0b001 => GyroRange::Dps75,
-        _ => return None,
-    };
-    Config::new(range, sens_avg as u8, SamplePeriod::from_register(smpl_prd)?).ok()
 }

@@ -46,7 +46,7 @@ impl DeviceState {
             uptime_us: board.now_us(),
             sampling: self.is_sampled(),
             epoch: number,
-            epoch_s: self.settings.epoch_s,
+            epoch_s: self.settings.user.epoch_s,
             boot: self.boot.clone(),
         }
     }

@@ -12,9 +12,7 @@ impl ChannelSums {
     /// For an unfitted model; `None` without comparable octaves.
     #[must_use]
     pub(crate) fn error_of(&self, model: &Model, channel: Channel, scale: ReportScale) -> Option<ReportedModelError> {
-        let mut curve = Curve::empty();
-        self.rebuild_curve(&mut curve, channel, scale);
-        model_error(model, &curve)
+        model_error(model, &self.curve(channel, scale))
     }
 
     /// The report on one channel, without losses; `unseen_error` is that of the previous epoch's model.

@@ -1,7 +1,6 @@
 //! Start of an STM32F4: cause, watchdog, brown-out level, clocks.
 
 use super::flash::Stm32Flash;
-use super::watchdog;
 use crate::board::BrownOutLevel;
 use crate::bus_frame::{MicrosecondCounter, wait_for};
 use crate::microcontroller::Microcontroller;
@@ -9,6 +8,7 @@ use crate::watchdog::Watchdog;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use cortex_m::peripheral::{NVIC, SCB};
 use link::{BootCause, ClockSource};
+use stm32f4xx_hal::gpio::{ErasedPin, Output};
 use stm32f4xx_hal::pac::{DBGMCU, FLASH, IWDG, RCC, SYSCFG, TIM2};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Enable, Rcc, Reset};
@@ -51,8 +51,10 @@ pub fn boot_cause(rcc: &RCC) -> BootCause {
 pub struct Stm32f4;
 
 impl Watchdog for Stm32f4 {
+    /// Reloads the counter (RM0090 section 21.4.1).
     fn feed() {
-        watchdog::feed();
+        // SAFETY: the key that does so, and nothing else.
+        unsafe { (*IWDG::ptr()).kr().write(|w| w.bits(0xAAAA)) };
     }
 }
 
@@ -146,6 +148,11 @@ impl MicrosecondCounter for Stm32f4 {
 
 impl Microcontroller for Stm32f4 {
     type Flash = Stm32Flash;
+    type Output = ErasedPin<Output>;
+    #[cfg(feature = "feather-usb")]
+    type Usb = super::usb::Stm32UsbPort;
+    #[cfg(not(feature = "feather-usb"))]
+    type Usb = core::convert::Infallible;
 
     fn restart() -> ! {
         SCB::sys_reset()
