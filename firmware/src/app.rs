@@ -4,7 +4,7 @@ use crate::bench_console;
 use crate::board::{Board, BrownOutLevel, BusTiming};
 use crate::command::{Command, CommandError, CommandParser};
 use crate::console::{Console, SAFE_MODE, VERSION_LINE};
-use crate::counters::CounterLog;
+use crate::counters::{CounterLog, add};
 use crate::device::{DeviceState, FIRST_CONFIG, FIRST_SETTINGS, START_UP_US, SensorRecovery, SensorState, log};
 use crate::epoch::{EpochChannel, FinishedEpoch, Regressors};
 use crate::event::event;
@@ -16,7 +16,7 @@ use crate::scale::ReportScale;
 use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, auto_null};
 use crate::settings_store::{MAX_RECORD, StoreError};
 use crate::statistics::CHANNELS;
-use crate::status_flags::{StatusFlags, count};
+use crate::status_flags::StatusFlags;
 use crate::stored_state::{self, StoredSettings};
 use crate::watchdog::TaskMonitor;
 use adis16405_driver::{Config, ConfigError, SamplePeriod};
@@ -135,12 +135,12 @@ impl App {
                 epoch_start_us: now_us as i64 - settings.epoch_age_us as i64,
                 counters: Health::default(),
                 recovery: SensorRecovery::default(),
-                status_flags: StatusFlags::new(),
+                status_flags: StatusFlags::default(),
                 report_scale: ReportScale::new(config, None),
             },
             retained,
             parsers: Default::default(),
-            console: Console::new(),
+            console: Console::default(),
             report,
             next_report_us: now_us + interval_us(settings),
             next_checkpoint_us: now_us + CHECKPOINT_US,
@@ -216,7 +216,7 @@ impl App {
             Command::ResetStatistics => {
                 self.reset_statistics(board);
                 self.state.counters = Health::default();
-                self.state.status_flags = StatusFlags::new();
+                self.state.status_flags = StatusFlags::default();
                 self.print(board, format_args!("statistics reset"));
             }
             Command::Rate(millihertz) => match SamplePeriod::nearest(f64::from(millihertz) / 1000.0) {
@@ -326,7 +326,7 @@ impl App {
     }
 
     fn reject(&mut self, error: CommandError, board: &mut impl Board) {
-        count(&mut self.state.counters.bad_commands);
+        add(&mut self.state.counters.bad_commands, 1);
         match error {
             CommandError::UnknownKey(byte) => {
                 let key = char::from(byte).escape_default();

@@ -1,7 +1,7 @@
 //! Requests of a person at a bench (registers, bus and data-ready times, self-test), during which sampling pauses.
 
+use crate::answer::AnswerLine;
 use crate::board::{Board, FrameTimes};
-use crate::console::AnswerLine;
 use crate::device::{DeviceState, clock_limit_hz};
 use crate::number_text::Decimal;
 use crate::sensor::{LOW_POWER_LIMIT_HZ, addressed};

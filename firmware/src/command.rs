@@ -1,7 +1,7 @@
 //! Commands of the serial port: keys that act at once, and lines that end with Enter.
 
+use crate::answer::Answer;
 use crate::bench_console::{hexadecimal, register};
-use crate::console::Answer;
 use crate::receive::LOST;
 use adis16405_driver::{GyroRange, Register};
 use heapless::Vec;

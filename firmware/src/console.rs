@@ -1,5 +1,6 @@
-//! Text for a person: lines, and answers of several lines, made and sent one line at a time.
+//! Text for a person: lines, and answers sent line by line.
 
+use crate::answer::{Answer, AnswerLine};
 use crate::bench_console::{deflection_line, dump_line, measurement_line};
 use crate::board::Board;
 use crate::command::help;
@@ -18,30 +19,7 @@ const WAITING_LINES: usize = 4;
 /// Answers that may wait, including the current one.
 const WAITING_ANSWERS: usize = 4;
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(all(target_os = "none", feature = "microcontroller"), derive(defmt::Format))]
-pub(crate) enum Answer {
-    Help,
-    Table,
-    Counters,
-    Status,
-    Registers,
-    Measurement,
-    Deflections,
-}
-
-pub(crate) enum AnswerLine {
-    Text(TextLine),
-    Skip,
-    End,
-}
-
-impl From<Option<TextLine>> for AnswerLine {
-    fn from(line: Option<TextLine>) -> Self {
-        line.map_or(Self::Skip, Self::Text)
-    }
-}
-
+#[derive(Default)]
 pub(crate) struct Console {
     lines: Deque<TextLine, WAITING_LINES>,
     answers: Deque<Answer, WAITING_ANSWERS>,
@@ -52,10 +30,6 @@ pub(crate) struct Console {
 }
 
 impl Console {
-    pub(crate) fn new() -> Self {
-        Self { lines: Deque::new(), answers: Deque::new(), next_line: 0, counted: Health::default() }
-    }
-
     /// Sends a line behind the waiting ones; drops the oldest of too many.
     pub(crate) fn print(&mut self, board: &mut impl Board, text: Arguments<'_>) {
         let line = text_line(text);

@@ -2,6 +2,7 @@
 
 use crate::board::{Board, BusTiming};
 use crate::channels::{CHANNELS, ChannelSet};
+use crate::counters::add;
 use crate::event::event;
 use crate::learner::Learner;
 use crate::recovery::{RecoveryLadder, RecoveryStep};
@@ -9,7 +10,7 @@ use crate::retained::{RetainedSettings, UserSettings};
 use crate::sample_intake::SensorTrouble;
 use crate::scale::ReportScale;
 use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, ProbeScope, SensorIdentity, probe, read_diagnosis};
-use crate::status_flags::{StatusFlags, count};
+use crate::status_flags::StatusFlags;
 use adis16405_driver::{ClockMode, Config, GyroRange, SamplePeriod, TimeBase, Timing};
 use core::fmt::Arguments;
 use link::{Boot, Health, MessageRef, text_line};
@@ -112,7 +113,7 @@ impl DeviceState {
                     panic!("memory is damaged: the sample period is 0");
                 }
                 if let Some(trouble) = trouble {
-                    self.counters.recoveries = self.counters.recoveries.saturating_add(u32::from(used));
+                    add(&mut self.counters.recoveries, u32::from(used));
                     self.recover(trouble, since_us + RETRY_US, board);
                 } else {
                     if settled {
@@ -180,9 +181,9 @@ impl DeviceState {
         let counters = &mut self.counters;
         match step {
             None | Some(RecoveryStep::Restart) => {}
-            Some(RecoveryStep::Reread) => count(&mut counters.rereads),
+            Some(RecoveryStep::Reread) => add(&mut counters.rereads, 1),
             Some(step @ (RecoveryStep::BusReset | RecoveryStep::SlowBus)) => {
-                count(&mut counters.bus_resets);
+                add(&mut counters.bus_resets, 1);
                 board.reset_bus();
                 if step == RecoveryStep::SlowBus {
                     board.set_bus_timing(BusTiming::SLOW);
@@ -190,12 +191,12 @@ impl DeviceState {
                 scope = ProbeScope { pulse: true, reset: false, self_test: true };
             }
             Some(RecoveryStep::ResetLine) if board.reset_sensor() => {
-                count(&mut counters.reset_lines);
+                add(&mut counters.reset_lines, 1);
                 self.recovery.tested = false;
                 return self.request_probe(board.now_us() + START_UP_US);
             }
             Some(RecoveryStep::SoftwareReset | RecoveryStep::ResetLine) => {
-                count(&mut counters.sensor_resets);
+                add(&mut counters.sensor_resets, 1);
                 scope = ProbeScope { pulse: true, reset: true, self_test: true };
             }
         }

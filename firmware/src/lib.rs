@@ -23,7 +23,7 @@
 //! | `watchdog` | proof that every task is alive and the clock runs, for the watchdog |
 //! | `report_messages`, `report_frames` | the messages of a report; the report in frames, message by message |
 //! | `report_text`, [`number_text`] | the report as a table that people read; numbers in it |
-//! | [`console`], `bench_console` | answers in text; registers, bus times and deflections for a bench |
+//! | [`console`], `answer`, `bench_console` | answers in text; registers, bus times and deflections for a bench |
 //! | `event`, `counters` | what a debug probe reads: events, and counters that have risen |
 //! | `transmit`, `receive`, [`usb_port`] | the queues to and from the serial ports, raw stream; the USB port |
 //! | [`command`], `app` | commands, main loop |
@@ -37,6 +37,7 @@
 #![deny(missing_docs)]
 
 pub mod acquisition;
+mod answer;
 mod app;
 mod bench_console;
 mod board;

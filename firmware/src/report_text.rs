@@ -1,8 +1,8 @@
 //! The running epoch as a table: 80 columns of ASCII, line by line.
 
+use crate::answer::AnswerLine;
 use crate::board::Board;
 use crate::channels::{CHANNELS, GYROS, INERTIAL, OCTAVES};
-use crate::console::AnswerLine;
 use crate::device::DeviceState;
 use crate::learner::{EpochModel, MAX_FINDINGS};
 use crate::number_text::{Count, Decimal, Estimate};

@@ -2,6 +2,7 @@
 
 use crate::acquisition::{DataReadyMonitor, DrdyEdge, TimedBurst};
 use crate::channels::ChannelSet;
+use crate::counters::add;
 use crate::gross_error_gate::{FIRST_BLOCK, GrossErrorGate};
 use crate::scale::ReportScale;
 use crate::statistics::{CHANNELS, ChannelEstimator, ChannelSums, SampleLosses, Statistics};
@@ -181,9 +182,12 @@ impl<'m> Estimators<'m> {
         self.statistics.estimators.get(index)
     }
 
-    /// Continues from sums before a restart.
+    /// Continues from sums before a restart, which those over pairs do not cover.
     pub fn restore(&mut self, index: usize, sums: &ChannelSums) {
-        self.statistics.restore(index, sums);
+        if let Some(estimator) = self.statistics.estimators.get_mut(index) {
+            sums.restore(estimator);
+            self.statistics.cross_sums.incomplete = true;
+        }
     }
 
     pub(crate) fn losses(&self, finished: bool) -> SampleLosses {
@@ -307,10 +311,6 @@ fn refused_channels(validity: Validity) -> ChannelSet {
 fn estimated_counts(burst: &Burst) -> [i32; CHANNELS.len()] {
     let counts = burst.counts();
     CHANNELS.map(|channel| i32::from(counts.get(channel)))
-}
-
-fn add(counter: &mut u32, more: u32) {
-    *counter = counter.saturating_add(more);
 }
 
 /// Processes queued bursts and sends full raw messages, at a priority between sampling and the main loop.

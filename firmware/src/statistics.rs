@@ -79,14 +79,6 @@ impl Statistics {
         }
     }
 
-    /// Sums over pairs do not cover these.
-    pub(crate) fn restore(&mut self, index: usize, sums: &ChannelSums) {
-        if let Some(estimator) = self.estimators.get_mut(index) {
-            sums.restore(estimator);
-            self.cross_sums.mark_incomplete();
-        }
-    }
-
     pub(crate) fn reset(&mut self) {
         self.estimators.iter_mut().for_each(Cascade::reset);
         self.cross_sums.reset();

@@ -6,4 +6,5 @@ pub mod port;
 pub mod start;
 #[cfg(feature = "feather-usb")]
 pub mod usb;
+mod watchdog;
 pub mod wires;

@@ -1,10 +1,9 @@
 //! The flash memory of an STM32F405 (RM0090 chapter 3), whose last sectors keep the settings; the processor waits
 //! during erasure and programming (section 3.6).
 
-use super::start::Stm32f4;
+use super::watchdog;
 use crate::bus_frame::wait_for;
 use crate::microcontroller::settings_flash::{FlashError, FlashMemory};
-use crate::watchdog::Watchdog as _;
 use stm32f4xx_hal::pac::{FLASH, flash::RegisterBlock};
 
 /// Programmed at once at 2.7 to 3.6 V (Table 7), and its PSIZE.
@@ -26,7 +25,7 @@ impl FlashMemory for Stm32Flash {
 
     fn erase(offset: u32) -> Result<(), FlashError> {
         let sector = SECTORS_BEFORE + offset as usize / Self::SECTOR;
-        Stm32f4::feed();
+        watchdog::feed();
         operate(|flash| {
             // SAFETY: a width that the supply allows, and the number of a sector.
             flash.cr().modify(|_, w| unsafe { w.psize().bits(PSIZE_32).snb().bits(sector as u8).ser().set_bit() });

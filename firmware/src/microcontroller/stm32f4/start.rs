@@ -1,6 +1,7 @@
 //! Start of an STM32F4: cause, watchdog, brown-out level, clocks.
 
 use super::flash::Stm32Flash;
+use super::watchdog;
 use crate::board::BrownOutLevel;
 use crate::bus_frame::{MicrosecondCounter, wait_for};
 use crate::microcontroller::Microcontroller;
@@ -51,10 +52,8 @@ pub fn boot_cause(rcc: &RCC) -> BootCause {
 pub struct Stm32f4;
 
 impl Watchdog for Stm32f4 {
-    /// Reloads the counter (RM0090 section 21.4.1).
     fn feed() {
-        // SAFETY: the key that does so, and nothing else.
-        unsafe { (*IWDG::ptr()).kr().write(|w| w.bits(0xAAAA)) };
+        watchdog::feed();
     }
 }
 
