@@ -103,9 +103,10 @@ impl DeviceState {
             SensorState::Probing { at_us, step } if now_us >= at_us => self.probe(step, board),
             SensorState::Probing { .. } => {}
             SensorState::Sampled { since_us } => {
-                let (is_intact, trouble, used, settled) = board.estimators(|estimators| {
+                let (is_intact, trouble, used, settled, flagged_us) = board.estimators(|estimators| {
                     let (used, settled) = (estimators.used_since_probe > 0, estimators.is_settled());
-                    (estimators.monitor.has_period(), estimators.trouble(now_us), used, settled)
+                    let flagged_us = estimators.monitor.last_edge_us().filter(|_| estimators.error_flag);
+                    (estimators.monitor.has_period(), estimators.trouble(now_us), used, settled, flagged_us)
                 });
                 if !is_intact {
                     // Ends the burst: a sensor cut off within one is late to answer.
@@ -119,7 +120,9 @@ impl DeviceState {
                     if settled {
                         self.recovery.ladder.settle();
                     }
-                    self.read_status(board);
+                    if let Some(edge_us) = flagged_us {
+                        self.read_status(edge_us, board);
+                    }
                 }
             }
             SensorState::Restarting { at_us } => {
@@ -262,15 +265,12 @@ impl DeviceState {
         Err(clock_hz)
     }
 
-    /// Reads and clears DIAG_STAT after an error flag, in the first half of a sample period, once a second at most.
-    fn read_status(&mut self, board: &mut impl Board) {
+    /// Reads and clears DIAG_STAT after an error flag, in the first half of the sample period from `edge_us` on, once a
+    /// second at most.
+    fn read_status(&mut self, edge_us: u64, board: &mut impl Board) {
         let now_us = board.now_us();
         let half_period_us = (5e5 / self.config.sample_period().hz()) as u64;
-        let due = board.estimators(|estimators| {
-            let since_edge = estimators.monitor.last_edge_us().map(|edge_us| now_us.saturating_sub(edge_us));
-            estimators.error_flag && since_edge.is_some_and(|since_us| since_us < half_period_us)
-        });
-        if !due || !self.status_flags.is_due(now_us) {
+        if !self.status_flags.is_due(now_us) || now_us.saturating_sub(edge_us) >= half_period_us {
             return;
         }
         board.set_sampling(false);

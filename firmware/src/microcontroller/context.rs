@@ -28,14 +28,14 @@ const RESET_US: u32 = 100;
 const BURST_US: u32 = 5_000;
 
 /// Shared with the two interrupts of sampling.
-pub struct Sampling<B: BoardSupport> {
+pub struct SharedSampling<B: BoardSupport> {
     uptime: Uptime,
     bus: BusOf<B>,
     sampler: Sampler<'static>,
     line: B::DataReady,
 }
 
-impl<B: BoardSupport> Sampling<B> {
+impl<B: BoardSupport> SharedSampling<B> {
     /// Bursts go to `queue`.
     pub fn new(bus: BusOf<B>, line: B::DataReady, queue: Producer<'static, TimedBurst>) -> Self {
         let uptime = Uptime::new(B::Microcontroller::counter());
@@ -68,7 +68,7 @@ impl<B: BoardSupport> Sampling<B> {
 }
 
 /// Shared with the interrupt of the estimators.
-pub struct Estimation {
+pub struct SharedEstimation {
     /// The estimators.
     pub estimators: Estimators<'static>,
     /// To the serial ports.
@@ -110,7 +110,9 @@ impl<'r, B: BoardSupport, S, E> BoardContext<'r, B, S, E> {
     }
 }
 
-impl<B: BoardSupport, S: Mutex<T = Sampling<B>>, E: Mutex<T = Estimation>> Board for BoardContext<'_, B, S, E> {
+impl<B: BoardSupport, S: Mutex<T = SharedSampling<B>>, E: Mutex<T = SharedEstimation>> Board
+    for BoardContext<'_, B, S, E>
+{
     type Bus<'a>
         = LockedBus<'a, S>
     where
@@ -260,7 +262,7 @@ impl<S> ErrorType for LockedBus<'_, S> {
     type Error = BusFault;
 }
 
-impl<B: BoardSupport, S: Mutex<T = Sampling<B>>> SpiDevice<u8> for LockedBus<'_, S> {
+impl<B: BoardSupport, S: Mutex<T = SharedSampling<B>>> SpiDevice<u8> for LockedBus<'_, S> {
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Self::Error> {
         self.0.lock(|sampling| sampling.bus.transaction(operations))
     }

@@ -84,7 +84,7 @@ macro_rules! observatory {
             use super::*;
             use $($device)::+::Interrupt;
             use heapless::spsc::Consumer;
-            use $crate::microcontroller::context::{BoardContext, Estimation, Sampling};
+            use $crate::microcontroller::context::{BoardContext, SharedEstimation, SharedSampling};
             use $crate::microcontroller::image::restore;
             use $crate::microcontroller::processor::{
                 Blinker, ESTIMATOR_CYCLES, SAMPLING_CYCLES, count_lost_bytes, measure, start_systick,
@@ -102,8 +102,8 @@ macro_rules! observatory {
 
             #[shared]
             struct Shared {
-                sampling: Sampling<$board>,
-                estimation: Estimation,
+                sampling: SharedSampling<$board>,
+                estimation: SharedEstimation,
             }
 
             #[local]
@@ -133,11 +133,11 @@ macro_rules! observatory {
                 let (usb, to_usb, from_usb) = UsbParts::split(usb);
                 start_systick(context.core.SYST, core_hz);
                 let (boot, retained) = restore(cause, clock);
-                let estimation = Estimation {
+                let estimation = SharedEstimation {
                     estimators: Estimators::new(context.local.statistics, FIRST_CONFIG),
                     transmit_queue: TransmitQueue::new(to_port).with_usb(to_usb),
                 };
-                let shared = Shared { sampling: Sampling::new(bus, data_ready, to_estimators), estimation };
+                let shared = Shared { sampling: SharedSampling::new(bus, data_ready, to_estimators), estimation };
                 let start = Some(Start { boot, retained, finished: context.local.finished });
                 let (blinker, received) = (Blinker::new(led, clock), ReceivedBytes { uart: received, usb: from_usb });
                 (shared, Local { bursts, uart, usb, reset_line, blinker, received, start })
@@ -172,7 +172,7 @@ macro_rules! observatory {
             #[task(binds = $free, priority = 2, local = [bursts], shared = [estimation])]
             fn estimators(mut context: estimators::Context) {
                 measure(&ESTIMATOR_CYCLES, || {
-                    context.shared.estimation.lock(|Estimation { estimators, transmit_queue }| {
+                    context.shared.estimation.lock(|SharedEstimation { estimators, transmit_queue }| {
                         estimate(estimators, transmit_queue, context.local.bursts);
                     });
                 });
