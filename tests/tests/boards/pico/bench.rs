@@ -245,11 +245,14 @@ fn run_image(
             continue;
         }
         part.advance_to(value as u64);
-        // Events wait for a rest of the bus, since that of the sensor is a frame too; the emulator sends `n` at least once a millisecond.
-        let has_rest = !selected && value as u64 >= deselected_at + REST_NS;
+        // Events wait for a rest of the bus, since that of the sensor is a frame too: no frame lately, and no sample now or soon. The
+        // emulator sends `n` at least once a millisecond.
+        let has_rest = !selected
+            && value as u64 >= deselected_at + REST_NS
+            && part.next_data_ready() >= value as u64 + REST_NS
+            && (edges_lost || announced == part.samples());
         if kind == b'n'
             && has_rest
-            && part.next_data_ready() >= value as u64 + REST_NS
             && let Some((_, event)) = events.pop_front_if(|&mut (at, _)| value as u64 >= at)
         {
             match event {
