@@ -1,15 +1,18 @@
 //! The arguments of the command line.
 
 use crate::bench::BenchPlan;
-use crate::tip::similar_name;
+use crate::output_files::is_standard_stream;
+use crate::output_format::{OutputFile, json_file, noise_file, output_file};
 use adis16405_driver::GyroRange;
+use clap::builder::{OsStringValueParser, TypedValueParser};
+use clap::parser::ValueSource;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use observatory::recording_report::PROGRAM;
 use recordings::file_format::RecordedInput;
 use recordings::time_base::TimeRange;
 use recordings::{InputError, MemoryTable, ReadMonitor, serial};
-use reports::export::{AxisChoice, ExportFormat};
+use reports::export::AxisChoice;
 use reports::reading::ReadingOptions;
 use simulation::Simulation;
 use std::ffi::OsString;
@@ -29,16 +32,16 @@ const OUTPUT: &str = "Output";
 /// Below the options of the program; each line is a command.
 const EXAMPLES: &str = "\
 Examples:
-  imunoise imu.bag --page report             a recording of any inertial sensor
+  imunoise imu.bag -o report.html            a recording of any inertial sensor
   imunoise demo                              an hour of the virtual sensor
   imunoise monitor /dev/ttyACM0              a device that runs the firmware";
 
 /// Below the options of `analyze`.
 const EXAMPLES_OF_ANALYZE: &str = "\
 Examples:
-  imunoise analyze flight.ulg --page report --export kalibr=imu.yaml
+  imunoise analyze flight.ulg -o report.html -o imu.yaml
   imunoise analyze imu.csv --columns gyro_x=wx,time=t --units deg/s,ms
-  imunoise analyze run1.csv.gz --rate 100 --json report.json";
+  imunoise analyze run1.csv.gz --rate 100 -o report.json";
 
 /// Below the options of `batch`.
 const EXAMPLES_OF_BATCH: &str = "\
@@ -48,11 +51,11 @@ Examples:
 
 /// Below the options of `demo`.
 const EXAMPLES_OF_DEMO: &str = "\
-The page is report/index.html, unless --page names another folder.
+The page is report.html, unless -o names another file.
 
 Examples:
   imunoise demo
-  imunoise demo --seconds 600 --plain --page hour";
+  imunoise demo --seconds 600 --plain -o hour.html";
 
 /// Below the options of `inspect`.
 const EXAMPLES_OF_INSPECT: &str = "\
@@ -71,7 +74,8 @@ Examples:
 /// Below the options of `export`.
 const EXAMPLES_OF_EXPORT: &str = "\
 Examples:
-  imunoise export report.json imu.yaml --format kalibr";
+  imunoise export report.json -o imu.yaml
+  imunoise export gyro.csv accel.csv --rate 200 -o openvins=chain.yaml";
 
 /// Below the options of `convert`.
 const EXAMPLES_OF_CONVERT: &str = "\
@@ -89,7 +93,7 @@ Examples:
 const EXAMPLES_OF_RECORD: &str = "\
 Examples:
   imunoise record cable.csv.gz --port /dev/ttyACM0 --seconds 3600
-  imunoise record night.csv.gz --port COM4 --seconds 28800 --page report";
+  imunoise record night.csv.gz --port COM4 --seconds 28800 -o report.html";
 
 /// Below the options of `bench`.
 const EXAMPLES_OF_BENCH: &str = "\
@@ -107,7 +111,7 @@ const DEFAULT_S: f64 = 60.0;
 const EXAMPLES_OF_REPLAY: &str = "\
 Examples:
   imunoise replay counts.csv.gz --rate 100
-  imunoise replay bus.csv.gz --json report.json";
+  imunoise replay bus.csv.gz -o report.json";
 
 /// Below the options of `simulate`.
 const EXAMPLES_OF_SIMULATE: &str = "\
@@ -174,7 +178,7 @@ pub(crate) enum Command {
     /// Compare recordings, or reports, or one with the data sheet
     #[command(after_help = EXAMPLES_OF_COMPARE)]
     Compare(Box<CompareArguments>),
-    /// Write the noise of a report in the format of another program
+    /// Write the noise of a report or recording for another program
     #[command(after_help = EXAMPLES_OF_EXPORT)]
     Export(ExportArguments),
     /// Write a recording as a table, a NumPy array or an SPI frame log
@@ -279,7 +283,7 @@ pub(crate) struct CompareArguments {
     pub(crate) data_sheet: bool,
     /// Where the result goes besides the terminal.
     #[command(flatten)]
-    pub(crate) output: JsonArgument,
+    pub(crate) result: JsonArgument,
 }
 
 /// Recordings that have a report each.
@@ -299,7 +303,7 @@ pub(crate) struct BatchArguments {
     pub(crate) quick: bool,
     /// Folder of the reports, which mirrors those given.
     #[arg(short, long, help_heading = OUTPUT, value_name = "DIR")]
-    pub(crate) out: PathBuf,
+    pub(crate) output: PathBuf,
     /// One JSON object a row: status, values, findings.
     #[arg(long, help_heading = OUTPUT, value_name = "OUT")]
     pub(crate) rows: Option<PathBuf>,
@@ -310,22 +314,11 @@ pub(crate) struct BatchArguments {
     #[arg(short, long, value_name = "N")]
     pub(crate) jobs: Option<NonZeroUsize>,
     /// Print nothing.
-    #[arg(long, help_heading = OUTPUT)]
+    #[arg(short, long, help_heading = OUTPUT)]
     pub(crate) quiet: bool,
     /// Overwrite files that exist.
-    #[arg(long, help_heading = OUTPUT)]
+    #[arg(short, long, help_heading = OUTPUT)]
     pub(crate) force: bool,
-}
-
-impl BatchArguments {
-    /// The recordings and folders, each with how it is read.
-    pub(crate) fn each(&self) -> impl Iterator<Item = RecordingArguments> + '_ {
-        let files = [&self.recording.input.file].into_iter().chain(&self.more);
-        files.map(|file| RecordingArguments {
-            input: InputArguments { file: file.clone(), ..self.recording.input.clone() },
-            ..self.recording.clone()
-        })
-    }
 }
 
 /// How a recording is written.
@@ -351,7 +344,7 @@ pub(crate) struct ConvertArguments {
     #[arg(long, help_heading = OUTPUT, value_name = "FORMAT", value_enum, hide_possible_values = true)]
     pub(crate) format: Option<RecordingFormat>,
     /// Overwrite files that exist.
-    #[arg(long, help_heading = OUTPUT)]
+    #[arg(short, long, help_heading = OUTPUT)]
     pub(crate) force: bool,
 }
 
@@ -364,7 +357,7 @@ pub(crate) struct SimulateArguments {
     #[arg(long, help_heading = OUTPUT, value_name = "FORMAT", value_enum, hide_possible_values = true)]
     pub(crate) format: Option<RecordingFormat>,
     /// Overwrite files that exist.
-    #[arg(long, help_heading = OUTPUT)]
+    #[arg(short, long, help_heading = OUTPUT)]
     pub(crate) force: bool,
     /// Virtual time in s [default: 3600].
     #[arg(long, allow_negative_numbers = true)]
@@ -433,21 +426,24 @@ impl SimulateArguments {
     }
 }
 
-/// A report to write in the format of another program.
+/// Reports or recordings whose noise is written in the format of another program.
 #[derive(Debug, Args)]
 pub(crate) struct ExportArguments {
-    /// The program.
-    #[arg(long, help_heading = OUTPUT, value_enum)]
-    pub(crate) format: ExportFormat,
-    /// One number for three axes: rms or worst.
-    #[arg(long, help_heading = OUTPUT, value_enum, default_value_t, hide_possible_values = true)]
+    /// The first one, and how to read it and the others.
+    #[command(flatten)]
+    pub(crate) recording: RecordingArguments,
+    /// More of one sensor: gyros in one file, accelerometers in another.
+    #[arg(value_name = "FILE")]
+    pub(crate) more: Vec<PathBuf>,
+    /// Write the noise: .yaml (Kalibr) .csv .m .py .sdf.
+    #[arg(short, long = "output", help_heading = OUTPUT, value_name = "FILE", required = true, value_parser = OsStringValueParser::new().try_map(noise_file))]
+    pub(crate) outputs: Vec<OutputFile>,
+    /// One number for three axes: rms [default] or worst.
+    #[arg(long, help_heading = OUTPUT, value_enum, default_value_t, hide_possible_values = true, hide_default_value = true)]
     pub(crate) axis: AxisChoice,
     /// Overwrite files that exist.
-    #[arg(long, help_heading = OUTPUT)]
+    #[arg(short, long, help_heading = OUTPUT)]
     pub(crate) force: bool,
-    /// Reports of `analyze --json`, and the file to write.
-    #[arg(required = true, num_args = 2.., value_names = ["REPORT", "OUT"])]
-    pub(crate) files: Vec<PathBuf>,
 }
 
 /// Options of `analyze` that a proposed command states itself, or does not need.
@@ -465,22 +461,23 @@ pub(crate) fn set_typed(words: &[OsString]) {
 
 /// The options that were typed for `analyze`, without those that a proposed command states itself.
 pub(crate) fn other_options() -> Vec<String> {
-    let typed = TYPED.get().into_iter().flatten().cloned();
-    let mut words = typed.skip(1).skip_while(|word| word.starts_with("--"));
-    if words.next().as_deref() != Some("analyze") {
-        return Vec::new();
-    }
-    let program = Cli::command();
-    let arguments = || program.find_subcommand("analyze").into_iter().flat_map(clap::Command::get_arguments);
-    let takes_value =
-        |name: &str| arguments().any(|own| own.get_long() == Some(name) && own.get_action().takes_values());
+    let mut program = Cli::command();
+    let typed = program.try_get_matches_from_mut(TYPED.get().into_iter().flatten()).ok();
+    let (Some(typed), Some(analyze)) = (&typed, program.find_subcommand("analyze")) else { return Vec::new() };
+    let Some(("analyze", typed)) = typed.subcommand() else { return Vec::new() };
     let mut options = Vec::new();
-    while let Some(word) = words.next() {
-        let Some(option) = word.strip_prefix("--") else { continue };
-        let name = option.split('=').next().unwrap_or_default();
-        let value = if option.contains('=') || !takes_value(name) { None } else { words.next() };
-        if !PROPOSED.contains(&name) {
-            options.extend([Some(word), value].into_iter().flatten());
+    for argument in analyze.get_arguments() {
+        let id = argument.get_id().as_str();
+        let Some(long) = argument.get_long().filter(|long| !PROPOSED.contains(long)) else { continue };
+        if typed.value_source(id) != Some(ValueSource::CommandLine) {
+            continue;
+        }
+        let option = argument.get_short().map_or_else(|| format!("--{long}"), |short| format!("-{short}"));
+        if argument.get_action().takes_values() {
+            let values = typed.get_raw(id).into_iter().flatten();
+            options.extend(values.flat_map(|value| [option.clone(), value.to_string_lossy().into_owned()]));
+        } else {
+            options.push(option);
         }
     }
     options
@@ -507,6 +504,11 @@ impl RecordingArguments {
     /// Of which nothing but the input is said.
     pub(crate) fn new(input: InputArguments) -> Self {
         Self { input, rate: None, from: None, to: None }
+    }
+
+    /// `file`, read in the same way.
+    pub(crate) fn of_file(&self, file: &Path) -> Self {
+        Self { input: InputArguments { file: file.to_owned(), ..self.input.clone() }, ..self.clone() }
     }
 
     /// The options that say how it is read, as they are typed.
@@ -717,67 +719,49 @@ pub(crate) struct OutputArguments {
     #[arg(long, conflicts_with = "quiet")]
     pub(crate) full: bool,
     /// Print nothing.
-    #[arg(long)]
+    #[arg(short, long)]
     pub(crate) quiet: bool,
-    /// Write every figure as SVG into this folder.
-    #[arg(long, value_name = "DIR")]
-    pub(crate) pictures: Option<PathBuf>,
-    /// Write the report as JSON; - for standard output.
-    #[arg(long, value_name = "OUT")]
-    pub(crate) json: Option<PathBuf>,
+    /// Write the report: .json .html .svg .csv .yaml .m .py .sdf.
+    #[arg(short, long = "output", value_name = "FILE", value_parser = OsStringValueParser::new().try_map(output_file))]
+    pub(crate) outputs: Vec<OutputFile>,
     /// Overwrite files that exist.
-    #[arg(long)]
+    #[arg(short, long)]
     pub(crate) force: bool,
-    /// Write the report as a web page, DIR/index.html.
-    #[arg(long, value_name = "DIR")]
-    pub(crate) page: Option<PathBuf>,
-    /// Noise for a program, as kalibr=imu.yaml; repeatable.
-    #[arg(long = "export", value_name = "FORMAT=OUT", value_parser = export_target)]
-    pub(crate) exports: Vec<ExportTarget>,
     /// One number for three axes: rms [default] or worst.
     #[arg(
         long,
         value_enum,
         default_value_t,
-        requires = "exports",
+        requires = "outputs",
         hide_possible_values = true,
         hide_default_value = true
     )]
     pub(crate) axis: AxisChoice,
 }
 
-/// A file for another program.
-#[derive(Debug, Clone)]
-pub(crate) struct ExportTarget {
-    /// Its format.
-    pub(crate) format: ExportFormat,
-    /// The file to write.
-    pub(crate) file: PathBuf,
-}
-
-fn export_target(text: &str) -> Result<ExportTarget, String> {
-    let (name, file) = text
-        .split_once('=')
-        .filter(|(_, file)| !file.is_empty())
-        .ok_or("expected FORMAT=OUT, as in kalibr=imu.yaml")?;
-    let format = ExportFormat::from_str(name, true).map_err(|_| {
-        let names = ExportFormat::value_variants().iter().filter_map(ValueEnum::to_possible_value);
-        let names: Vec<String> = names.map(|name| name.get_name().to_owned()).collect();
-        let tip = similar_name(name, &names).map_or(String::new(), |similar| format!("; did you mean {similar}?"));
-        format!("`{name}` is none of {}{tip}", names.join(", "))
-    })?;
-    Ok(ExportTarget { format, file: file.into() })
+impl OutputArguments {
+    /// Whether an output is standard output, which has nothing beside it then.
+    pub(crate) fn prints_to_standard_output(&self) -> bool {
+        self.outputs.iter().any(|output| is_standard_stream(&output.file))
+    }
 }
 
 /// Where a result goes that is no report.
 #[derive(Debug, Args)]
 pub(crate) struct JsonArgument {
-    /// Write the result as JSON.
-    #[arg(long, value_name = "OUT")]
-    pub(crate) json: Option<PathBuf>,
+    /// Write the result as JSON; - for standard output.
+    #[arg(short, long = "output", value_name = "FILE", value_parser = OsStringValueParser::new().try_map(json_file))]
+    pub(crate) output: Option<OutputFile>,
     /// Overwrite files that exist.
-    #[arg(long)]
+    #[arg(short, long)]
     pub(crate) force: bool,
+}
+
+impl JsonArgument {
+    /// The file, if one is named.
+    pub(crate) fn file(&self) -> Option<&Path> {
+        self.output.as_ref().map(|output| output.file.as_path())
+    }
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use crate::inspect::{self, Question};
 use crate::live::{self, DeviceSource, GrowingRecording};
 use crate::output::{self, Incomplete};
 use crate::output_files::OutputFiles;
+use crate::output_format::{OutputFile, OutputFormat};
 use crate::{analyze, batch, compare, convert, export, interrupt, monitor, record, simulate, tip};
 use anyhow::{Context, Result};
 use clap::{CommandFactory, Parser};
@@ -13,11 +14,10 @@ use observatory::recording_report::PROGRAM;
 use recordings::Printable;
 use std::ffi::OsString;
 use std::io::{self, Write};
-use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// Folder of the page if none is named.
-const DEFAULT_PAGE: &str = "report";
+/// What `demo` writes if nothing is named.
+const DEFAULT_PAGE: &str = "report.html";
 
 /// Exit codes.
 const SUCCESS: u8 = 0;
@@ -69,9 +69,11 @@ pub fn run(arguments: Vec<OsString>, prepare: impl FnOnce(bool)) -> u8 {
 fn run_subcommand(Cli { command }: Cli) -> Result<()> {
     match command {
         Command::Demo { simulate, mut output } => {
-            output.page.get_or_insert_with(|| PathBuf::from(DEFAULT_PAGE));
+            if output.outputs.is_empty() {
+                output.outputs.push(OutputFile { format: OutputFormat::Page, file: DEFAULT_PAGE.into() });
+            }
             let files = OutputFiles::new([], output.force);
-            output::check(&output, &files)?;
+            output::check(&output.outputs, &files)?;
             output::write_report(&record::simulate(&simulate.simulation(3600.0))?.into(), None, &output, &files)
         }
         Command::Analyze(arguments) => analyze::run(&arguments),
@@ -79,7 +81,7 @@ fn run_subcommand(Cli { command }: Cli) -> Result<()> {
         Command::Replay(arguments) => {
             let ReplayArguments { file, output, .. } = &arguments;
             let files = OutputFiles::new([file.as_path()], output.force);
-            output::check(output, &files)?;
+            output::check(&output.outputs, &files)?;
             let report = analyze::analyze_replay(&arguments)?;
             output::write_report(&report.into(), Some(&output::source_name(file)), output, &files)
         }
@@ -88,7 +90,7 @@ fn run_subcommand(Cli { command }: Cli) -> Result<()> {
             OutputFiles::new([], output.force).check(&out)?;
             // The log is read again: nothing else is written to it.
             let files = OutputFiles::new([out.as_path()], output.force);
-            output::check(&output, &files)?;
+            output::check(&output.outputs, &files)?;
             let report = record::record_device(&out, &port, baud, seconds)?;
             output::write_report(&report.into(), Some(&output::source_name(&out)), &output, &files)
         }

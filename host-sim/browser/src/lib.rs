@@ -157,7 +157,7 @@ pub extern "C" fn compare() -> u32 {
 struct ExportRequest {
     /// Its JSON.
     report: String,
-    /// As the option `--export` calls it.
+    /// As `-o FORMAT=FILE` of the command calls it.
     format: String,
     /// As the option `--axis` calls it.
     axis: String,

@@ -956,7 +956,7 @@ pub(crate) fn numbered_steps(report: &Report) -> Vec<String> {
 /// `None` without a gyro or accelerometer.
 pub(crate) fn for_filter(report: &Report) -> Option<String> {
     inertial(report).next()?;
-    let how = if is_short(report) { "record at rest for hours" } else { "add --export kalibr=imu.yaml" };
+    let how = if is_short(report) { "record at rest for hours" } else { "add -o imu.yaml" };
     Some(format!("For a filter: {how}."))
 }
 

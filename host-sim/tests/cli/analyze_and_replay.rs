@@ -53,12 +53,12 @@ fn flight_log(rows: u64) -> Vec<u8> {
 #[test]
 fn a_file_that_is_cut_is_told_everywhere() {
     let dir = tempdir().expect("a folder");
-    let (whole, page, reports) = (flight_log(5000), dir.path().join("page"), dir.path().join("reports"));
+    let (whole, page, reports) = (flight_log(5000), dir.path().join("page.html"), dir.path().join("reports"));
     let cut = write(&dir, "cut.ulg", &whole[..whole.len() - 1010]);
     let file = cut.to_str().expect("UTF-8");
     let [json, page, reports] =
         [dir.path().join("cut.json"), page, reports].map(|path| path.to_str().expect("UTF-8").to_owned());
-    let output = imunoise(&["analyze", file, "--json", &json, "--page", &page]);
+    let output = imunoise(&["analyze", file, "-o", &json, "-o", &page]);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(3), "{errors}");
     assert!(errors.contains("not read to its end"), "{errors}");
@@ -72,7 +72,7 @@ fn a_file_that_is_cut_is_told_everywhere() {
     let hash = std::process::Command::new("sha256sum").arg(&cut).output().expect("sha256sum starts").stdout;
     let hash = String::from_utf8(hash).expect("digits");
     assert_eq!(reading["sha256"].as_str(), hash.split_whitespace().next());
-    let html = std::fs::read_to_string(format!("{page}/index.html")).expect("a page");
+    let html = std::fs::read_to_string(page).expect("a page");
     assert!(html.contains("Not read to its end: truncated") && html.contains("What was read"));
     // A file of many bytes.
     let intact = write(&dir, "whole.ulg", &whole);

@@ -16,11 +16,11 @@ const ERRORS: &[Case] = &[
     (&["convert", "DIR/rows.csv", "DIR/never.h5"], &["never.h5: .h5 is not written", "--format"]),
     (&["analyze", "DIR/rows.csv", "--from", "500"], &["rows.csv: no sample from 500 to inf s"]),
     (&["analyze", "DIR/rows.csv", "--topic", "imu"], &["--topic imu: a file of text has no topics"]),
-    (&["analyze", "DIR/rows.csv", "--json", "DIR"], &["DIR"]),
+    (&["analyze", "DIR/rows.csv", "-o", "json=DIR"], &["DIR"]),
     (&["analyze", "DIR/rows.csv", "--sensor", "/dev/zero"], &["/dev/zero", "not longer than 1048576 bytes"]),
     (&["analyze", "DIR/rows.csv", "--sensor", "nowhere.toml"], &["nowhere.toml", "bmi088"]),
     (&["replay", "DIR/array.npy"], &["neither register counts nor an SPI log"]),
-    (&["compare", "DIR/rows.csv", "--data-sheet"], &["no JSON report"]),
+    (&["compare", "DIR/text.json", "--data-sheet"], &["no JSON report"]),
     // A text of 100 kB where the report has a number.
     (&["compare", "DIR/long.json", "--data-sheet"], &["long.json", " … "]),
     (&["record", "DIR/missing/log.csv", "--port", "/dev/null"], &["log.csv", "No such file"]),
@@ -44,6 +44,7 @@ fn an_error_is_one_line_and_exit_code_1() {
         ("plain.csv", "gyro_x_counts\n1\n2\n"),
         ("units.csv", "time_s,gyro_x_deg_s\n0,1\n1,2\n2,1\n3,2\n"),
         ("array.npy", "\u{93}NUMPY"),
+        ("text.json", "{"),
         ("long.json", &format!("{{\"schema\": \"{}\"}}", "x".repeat(100_000))),
     ] {
         write(&dir, name, &content.chars().map(|c| c as u8).collect::<Vec<_>>());
@@ -72,12 +73,17 @@ fn wrong_usage_has_exit_code_2() {
         (&["analyze", "x.csv", "--to", "nan"], "--to"),
         // Options of the simulation before a subcommand would be ignored.
         (&["--seed", "3", "analyze", "x.csv"], ""),
+        (&["analyze", "x.csv", "-o", "x.txt"], "its ending is none of .json, .html"),
+        (&["analyze", "x.csv", "-o", "kalibr="], "no file after the format"),
+        (&["analyze", "x.csv", "-o", "svg=-"], "figures are several files"),
+        (&["export", "report.json"], "--output"),
+        (&["export", "report.json", "-o", "report.html"], "`analyze` writes it"),
         // Options are those that a subcommand uses.
-        (&["monitor", "p", "--page", "d"], "unexpected argument"),
+        (&["monitor", "p", "-o", "x.html"], "unexpected argument"),
         (&["replay", "a", "--sensor", "generic"], "unexpected argument"),
         (&["replay", "a", "--columns", "gyro_x=0"], "unexpected argument"),
         (&["replay", "a", "--topic", "t"], "unexpected argument"),
-        (&["compare", "a", "b", "--page", "d"], "unexpected argument"),
+        (&["compare", "a", "b", "-o", "x.html"], "JSON alone"),
         (&["monitor", "still.csv", "--speed=0"], "neither a positive number nor max"),
         (&["monitor", "still.csv", "--speed=-1"], "neither a positive number nor max"),
         (&["monitor", "still.csv", "--speed=inf"], "neither a positive number nor max"),

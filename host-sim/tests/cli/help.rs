@@ -45,7 +45,7 @@ fn options_are_grouped_and_examples_follow() {
         assert!(!examples.is_empty() && examples.iter().all(|word| word == "imunoise"), "{command}: {examples:?}");
     }
     let help = help(&["analyze"]);
-    for (heading, option) in [("Input:", "--rate"), ("Sensor:", "--sensor"), ("Output:", "--page")] {
+    for (heading, option) in [("Input:", "--rate"), ("Sensor:", "--sensor"), ("Output:", "-o,")] {
         assert!(section(&help, heading).iter().any(|name| name == option), "{heading} {option}: {help}");
     }
     // An option without a group is about the help itself.
@@ -71,12 +71,12 @@ fn a_misspelt_command_option_or_file_gets_a_suggestion() {
         (vec!["analyze", &topics, "--topic", "gyros", "--to", "9"], 1, "tip: did you mean gyro?\n".to_owned()),
         (vec!["inspect", &topics, "--topic", "acel"], 1, "tip: did you mean accel?\n".to_owned()),
         (vec!["analize", "x.csv"], 2, "'analyze'".to_owned()),
-        (vec!["analyze", "--pagge", "d", "x.csv"], 2, "'--page'".to_owned()),
+        (vec!["analyze", "--outptu", "d", "x.csv"], 2, "'--output'".to_owned()),
         // Other names of what the program has.
-        (vec!["analyze", "--html", "d", "x.csv"], 2, "'--page'".to_owned()),
-        (vec!["--htlm", "d"], 2, "'--page'".to_owned()),
+        (vec!["analyze", "--html", "d", "x.csv"], 2, "'-o report.html'".to_owned()),
+        (vec!["--htlm", "d"], 2, "'-o report.html'".to_owned()),
         (vec!["explain", "report.json"], 2, "'analyze FILE --full'".to_owned()),
-        (vec!["analyze", &path, "--export", "kalib=x.yaml"], 2, "did you mean kalibr?".to_owned()),
+        (vec!["analyze", &path, "-o", "kalib=x.yaml"], 2, "did you mean kalibr?".to_owned()),
         (vec!["analyze", &path, "--sensor", "bmi08"], 1, "tip: a similar sensor exists: bmi088\n".to_owned()),
         (vec!["simulate", "x.csv", "--effect", "sinusiod:gyro_x:a=1"], 1, "tip: did you mean sinusoid?\n".to_owned()),
         (vec!["simulate", "x.csv", "--fault", "stuck_lo:from=1"], 1, "tip: did you mean stuck_low?\n".to_owned()),

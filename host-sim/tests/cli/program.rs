@@ -22,10 +22,10 @@ pub(crate) fn with_default_signals() -> Command {
     command
 }
 
-/// Runs the program with `--json` and returns the bytes of the report.
+/// Runs the program with `-o report.json` and returns the bytes of the report.
 pub(crate) fn json_of(dir: &TempDir, arguments: &[&str]) -> Vec<u8> {
     let out = dir.path().join("report.json");
-    let output = imunoise(&[arguments, &["--json", out.to_str().expect("UTF-8")]].concat());
+    let output = imunoise(&[arguments, &["-o", out.to_str().expect("UTF-8")]].concat());
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     let bytes = std::fs::read(&out).expect("a report");
     std::fs::remove_file(&out).expect("removed");

@@ -81,7 +81,7 @@ fn screen(test: &str, file: &str, options: &[&str]) -> Option<String> {
     let path = recording(test, file)?;
     let folder = tempdir().expect("a folder");
     let json = folder.path().join("report.json");
-    let arguments = [&["analyze", path.to_str()?, "--json", json.to_str()?], options].concat();
+    let arguments = [&["analyze", path.to_str()?, "-o", json.to_str()?], options].concat();
     let output = imunoise(&arguments);
     assert!(output.status.success(), "{file}: {}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).expect("UTF-8");

@@ -130,11 +130,11 @@ fn a_recording_of_a_device_and_its_replay_have_the_same_report() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("a name").to_owned();
     let (log, first, second) = (path("device.csv.gz"), path("first.json"), path("second.json"));
-    let output = with_device(&["record", &log, "--port", "PORT", "--seconds", "20", "--json", &first], &[]);
+    let output = with_device(&["record", &log, "--port", "PORT", "--seconds", "20", "-o", &first], &[]);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{errors}");
     assert!(errors.contains(" 0 missing between them") && errors.contains(" 0 missing by their numbers"), "{errors}");
-    assert!(imunoise(&["replay", &log, "--json", &second]).status.success());
+    assert!(imunoise(&["replay", &log, "-o", &second]).status.success());
     let [first, second] = [first, second].map(|file| std::fs::read_to_string(file).expect("a report"));
     assert_eq!(first, second);
     let report: serde_json::Value = serde_json::from_str(&first).expect("JSON");

@@ -71,7 +71,7 @@ fn record(log: &Path, fault: Fault) -> (Output, String) {
 
 fn samples(log: &Path) -> u64 {
     let json = log.with_extension("json");
-    let output = imunoise(&["replay", log.to_str().expect("UTF-8"), "--json", json.to_str().expect("UTF-8")]);
+    let output = imunoise(&["replay", log.to_str().expect("UTF-8"), "-o", json.to_str().expect("UTF-8")]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let report: serde_json::Value = serde_json::from_slice(&std::fs::read(json).expect("a report")).expect("JSON");
     report["samples"].as_u64().expect("a number")
