@@ -87,7 +87,7 @@ Examples:
 const EXAMPLES_OF_MONITOR: &str = "\
 Examples:
   imunoise monitor /dev/ttyACM0
-  imunoise monitor run1.csv.gz --rate 100 --speed 60";
+  imunoise monitor /dev/ttyACM0 --send \"f 819.2\" --seconds 60";
 
 /// Below the options of `record`.
 const EXAMPLES_OF_RECORD: &str = "\
@@ -184,7 +184,7 @@ pub(crate) enum Command {
     /// Write a recording as a table, a NumPy array or an SPI frame log
     #[command(after_help = EXAMPLES_OF_CONVERT)]
     Convert(ConvertArguments),
-    /// Show a device or a recording live, while its record grows
+    /// Show a device live: coefficients, curves, findings, health
     #[command(after_help = EXAMPLES_OF_MONITOR)]
     Monitor(MonitorArguments),
     /// Check a device, its wires and its sensor: what passes, what fails
@@ -620,12 +620,11 @@ pub(crate) struct BenchArguments {
     pub(crate) seconds: f64,
 }
 
-/// What to show live.
+/// A device to show live.
 #[derive(Debug, Args)]
 pub(crate) struct MonitorArguments {
-    /// A serial port such as /dev/ttyUSB0, or a recording in a file.
-    #[arg(value_name = "PORT|FILE")]
-    pub(crate) source: PathBuf,
+    /// Serial port of the device, such as /dev/ttyACM0.
+    pub(crate) port: String,
     /// Baud rate of the port.
     #[arg(long, help_heading = INPUT, default_value_t = serial::BAUD)]
     pub(crate) baud: u32,
@@ -635,33 +634,6 @@ pub(crate) struct MonitorArguments {
     /// End after so many seconds [default: at the end].
     #[arg(long)]
     pub(crate) seconds: Option<f64>,
-    /// Of a recording: times real time, or max.
-    #[arg(long, help_heading = INPUT, value_name = "TIMES|max", default_value = "1", value_parser = replay_speed)]
-    pub(crate) speed: f64,
-    /// Sample rate of a recording; overrides time stamps.
-    #[arg(long, help_heading = INPUT, value_name = "HZ", allow_negative_numbers = true)]
-    pub(crate) rate: Option<f64>,
-    /// Gyro range of a recording: 300 [default], 150 or 75 deg/s.
-    #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true, hide_default_value = true)]
-    pub(crate) range: GyroRangeArgument,
-}
-
-impl MonitorArguments {
-    /// The recording, as the other commands take it.
-    pub(crate) fn recording(&self) -> RecordingArguments {
-        let Self { source, rate, range, .. } = self;
-        let input = InputArguments { range: *range, ..InputArguments::new(source) };
-        RecordingArguments { rate: *rate, ..RecordingArguments::new(input) }
-    }
-}
-
-/// A positive number, or `max`, which is infinite.
-fn replay_speed(text: &str) -> Result<f64, String> {
-    if text == "max" {
-        return Ok(f64::INFINITY);
-    }
-    let speed = text.parse().ok().filter(|speed: &f64| speed.is_finite() && *speed > 0.0);
-    speed.ok_or_else(|| "neither a positive number nor max".to_owned())
 }
 
 /// Full scale of the gyros.

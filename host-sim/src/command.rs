@@ -2,11 +2,10 @@
 
 use crate::cli::{self, Cli, Command, MonitorArguments, ReplayArguments};
 use crate::inspect::{self, Question};
-use crate::live::{self, DeviceSource, GrowingRecording};
 use crate::output::{self, Incomplete};
 use crate::output_files::OutputFiles;
 use crate::output_format::{OutputFile, OutputFormat};
-use crate::{analyze, batch, compare, convert, export, interrupt, monitor, record, simulate, tip};
+use crate::{analyze, batch, compare, convert, export, interrupt, live, monitor, record, simulate, tip};
 use anyhow::{Context, Result};
 use clap::{CommandFactory, Parser};
 use observatory::message_text::summary;
@@ -105,47 +104,31 @@ fn run_subcommand(Cli { command }: Cli) -> Result<()> {
             clap_complete::generate(shell, &mut Cli::command(), PROGRAM, &mut script);
             output::print(|out| out.write_all(&script))
         }
-        Command::Monitor(arguments) => monitor_source(&arguments),
+        Command::Monitor(arguments) => monitor_device(&arguments),
     }
 }
 
-/// Shows a device or a recording live, or in lines where there is no terminal.
-fn monitor_source(arguments: &MonitorArguments) -> Result<()> {
-    let MonitorArguments { source, seconds, speed, .. } = arguments;
-    let deadline = seconds
-        .map(|seconds| {
-            let duration = Duration::try_from_secs_f64(seconds).ok();
-            let deadline = duration.and_then(|duration| Instant::now().checked_add(duration));
-            deadline.with_context(|| format!("a duration of {seconds} s: it must be positive and finite, and no age"))
-        })
-        .transpose()?;
-    if !source.is_file() && !source.is_dir() {
-        return monitor_device(arguments, deadline).with_context(|| source.display().to_string());
-    }
-    let name = source.file_name().unwrap_or_default().to_string_lossy();
-    let name = Printable(&name).to_string();
-    let mut recording = GrowingRecording::new(analyze::read_measurement(&arguments.recording())?, name.clone(), *speed);
-    let report = if live::has_terminal() {
-        live::show(&mut recording, deadline)?;
-        recording.into_report()
-    } else {
-        recording.write_lines(deadline, &mut io::stdout().lock())?
+/// Shows a device live, or in lines where there is no terminal.
+fn monitor_device(arguments: &MonitorArguments) -> Result<()> {
+    let MonitorArguments { port, baud, send, seconds } = arguments;
+    let deadline = |seconds: &f64| {
+        let duration = Duration::try_from_secs_f64(*seconds).ok();
+        let deadline = duration.and_then(|duration| Instant::now().checked_add(duration));
+        deadline.with_context(|| format!("a duration of {seconds} s: it must be positive and finite, and no age"))
     };
-    report.map_or(Ok(()), |report| output::show_screen(&report, Some(&name)))
-}
-
-fn monitor_device(arguments: &MonitorArguments, deadline: Option<Instant>) -> Result<()> {
-    let MonitorArguments { source, baud, send, .. } = arguments;
-    let port = source.to_str().context("a name of a port that is not UTF-8")?;
-    let mut cable = record::open_link(port, *baud)?;
-    for command in send {
-        cable.send_command(command)?;
-    }
-    if live::has_terminal() {
-        live::show(&mut DeviceSource::new(&mut cable, port.to_owned()), deadline)?;
-        return output::print(|out| writeln!(out, "{}", summary(&cable.counters())));
-    }
-    Ok(monitor::show(&mut cable, deadline, monitor::LONG_SILENCE, &mut io::stdout().lock())?)
+    let deadline = seconds.as_ref().map(deadline).transpose()?;
+    let show = || -> Result<()> {
+        let mut cable = record::open_link(port, *baud)?;
+        for command in send {
+            cable.send_command(command)?;
+        }
+        if live::has_terminal() {
+            live::show(&mut cable, port, deadline)?;
+            return output::print(|out| writeln!(out, "{}", summary(&cable.counters())));
+        }
+        Ok(monitor::show(&mut cable, deadline, monitor::LONG_SILENCE, &mut io::stdout().lock())?)
+    };
+    show().with_context(|| port.to_owned())
 }
 
 fn is_broken_pipe(error: &anyhow::Error) -> bool {
