@@ -36,6 +36,17 @@ Examples:
   imunoise demo                              an hour of the virtual sensor
   imunoise monitor /dev/ttyACM0              a device that runs the firmware";
 
+/// Below those of the long help.
+const EXIT_CODES: &str = "\
+Exit codes:
+  0  done
+  1  error, in one line on standard error
+  2  wrong usage
+  3  done, but a recording was not read to its end
+
+Colour is left out if NO_COLOR is set. `imunoise COMMAND --help` has the units
+and examples of the options; `-h` has one screen.";
+
 /// Below the options of `analyze`.
 const EXAMPLES_OF_ANALYZE: &str = "\
 Examples:
@@ -115,11 +126,8 @@ Examples:
 
 /// Below the options of `simulate`.
 const EXAMPLES_OF_SIMULATE: &str = "\
-Without --gyro and --accl the noise is that of a published part.
---effect, --environment and --fault may be given several times.
-
 Examples:
-  imunoise simulate hour.csv.gz --gyro 0.037,0.009,0.0013
+  imunoise simulate hour.csv.gz --noise gyro=0.037,0.009,0.0013
   imunoise simulate fan.csv --effect sinusoid:gyro_z:frequency=20,amplitude=0.1";
 
 /// Below the options of `completions`.
@@ -130,7 +138,7 @@ Examples:
 /// Noise analysis of inertial sensors, with a virtual ADIS16405.
 #[derive(Debug, Parser)]
 #[command(name = PROGRAM, version, arg_required_else_help = true)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, after_long_help = format!("{EXAMPLES}\n\n{EXIT_CODES}"))]
 pub(crate) struct Cli {
     /// The subcommand.
     #[command(subcommand)]
@@ -198,11 +206,13 @@ pub(crate) enum Command {
         /// Serial port of a device, such as /dev/ttyUSB0.
         #[arg(long, help_heading = INPUT)]
         port: String,
-        /// Baud rate of the port.
-        #[arg(long, help_heading = INPUT, default_value_t = serial::BAUD)]
+        /// Baud rate of the port
+        ///
+        /// A port on USB ignores it.
+        #[arg(verbatim_doc_comment, long, help_heading = INPUT, default_value_t = serial::BAUD)]
         baud: u32,
         /// Length of the recording, s.
-        #[arg(long, help_heading = INPUT, default_value_t = DEFAULT_S, allow_negative_numbers = true)]
+        #[arg(long, help_heading = INPUT, default_value_t = DEFAULT_S, allow_negative_numbers = true, value_parser = duration)]
         seconds: f64,
         /// Where the report goes besides the terminal.
         #[command(flatten)]
@@ -228,11 +238,17 @@ pub(crate) struct AnalyzeArguments {
     /// The recording, and how to read it.
     #[command(flatten)]
     pub(crate) recording: RecordingArguments,
-    /// Each sensor of the file as its own recording.
-    #[arg(long, help_heading = INPUT, conflicts_with = "topic")]
+    /// Each sensor of the file as its own recording
+    ///
+    /// For a file with several sensors or several rates. Gyros and
+    /// accelerometers apart are one sensor: -o imu.yaml has both.
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, conflicts_with = "topic")]
     pub(crate) each_sensor: bool,
-    /// Curves and models only, for records of any length.
-    #[arg(long, help_heading = OUTPUT)]
+    /// Curves and models only, for records of any length
+    ///
+    /// Allan deviations and N, B, K in one pass and in fixed memory, without
+    /// findings, for recordings of days.
+    #[arg(verbatim_doc_comment, long, help_heading = OUTPUT)]
     pub(crate) quick: bool,
     /// Where the report goes besides the terminal.
     #[command(flatten)]
@@ -255,11 +271,17 @@ pub(crate) struct InspectArguments {
 pub(crate) struct ReplayArguments {
     /// Register counts of an ADIS16405, or a log of its SPI bus.
     pub(crate) file: PathBuf,
-    /// Sample rate; overrides the time stamps.
-    #[arg(long, help_heading = INPUT, value_name = "HZ", allow_negative_numbers = true)]
+    /// Sample rate; overrides the time stamps
+    ///
+    /// In Hz. Needed if the recording has no time stamps.
+    /// Example: --rate 204.8
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate: Option<f64>,
-    /// Gyro range of counts: 300 [default], 150 or 75 deg/s.
-    #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true, hide_default_value = true)]
+    /// Gyro range of counts: 300 [default], 150 or 75 deg/s
+    ///
+    /// Full scale of the gyros in deg/s, for register counts that do not say
+    /// it: a count is 0.05, 0.025 or 0.0125 deg/s.
+    #[arg(verbatim_doc_comment, long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true, hide_default_value = true)]
     pub(crate) range: GyroRangeArgument,
     /// Where the report goes besides the terminal.
     #[command(flatten)]
@@ -272,14 +294,23 @@ pub(crate) struct CompareArguments {
     /// The first one, and how to read it and the others.
     #[command(flatten)]
     pub(crate) recording: RecordingArguments,
-    /// More recordings, or the second report.
-    #[arg(value_name = "FILE", required_unless_present_any = ["running", "data_sheet"])]
+    /// More recordings, or the second report
+    ///
+    /// A recording beside a report is analysed first.
+    #[arg(verbatim_doc_comment, value_name = "FILE", required_unless_present_any = ["running", "data_sheet"])]
     pub(crate) more: Vec<PathBuf>,
     /// Recording with motors on: how much noisier?
-    #[arg(long, help_heading = INPUT, value_name = "FILE", conflicts_with = "data_sheet")]
+    ///
+    /// For each channel and averaging time the ratio of the Allan deviations,
+    /// with 95 % bounds.
+    /// Example: imunoise compare still.csv --running hover.csv
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "FILE", conflicts_with = "data_sheet")]
     pub(crate) running: Option<PathBuf>,
-    /// Compare a report with its sensor's data sheet.
-    #[arg(long, conflicts_with = "more")]
+    /// Compare a report with its sensor's data sheet
+    ///
+    /// N, B and K of the report over those of the data sheet that --sensor
+    /// names. A recording is analysed first.
+    #[arg(verbatim_doc_comment, long, conflicts_with = "more")]
     pub(crate) data_sheet: bool,
     /// Where the result goes besides the terminal.
     #[command(flatten)]
@@ -295,29 +326,49 @@ pub(crate) struct BatchArguments {
     /// More recordings, or folders of them.
     #[arg(value_name = "FILE|DIR")]
     pub(crate) more: Vec<PathBuf>,
-    /// Each sensor of each file as its own recording.
-    #[arg(long, help_heading = INPUT, conflicts_with = "topic")]
+    /// Each sensor of each file as its own recording
+    ///
+    /// Each has a report of its own, FILE-TOPIC.json.
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, conflicts_with = "topic")]
     pub(crate) each_sensor: bool,
-    /// Curves and models only, for records of any length.
-    #[arg(long, help_heading = OUTPUT)]
+    /// Curves and models only, for records of any length
+    ///
+    /// Allan deviations and N, B, K in one pass and in fixed memory, without
+    /// findings, for recordings of days.
+    #[arg(verbatim_doc_comment, long, help_heading = OUTPUT)]
     pub(crate) quick: bool,
-    /// Folder of the reports, which mirrors those given.
-    #[arg(short, long, help_heading = OUTPUT, value_name = "DIR")]
+    /// Folder of the reports, which mirrors those given
+    ///
+    /// Each recording has a report FILE.json in it. Of a folder that is given
+    /// those below it are mirrored.
+    #[arg(verbatim_doc_comment, short, long, help_heading = OUTPUT, value_name = "DIR")]
     pub(crate) output: PathBuf,
-    /// One JSON object a row: status, values, findings.
-    #[arg(long, help_heading = OUTPUT, value_name = "OUT")]
+    /// One JSON object a row: status, values, findings
+    ///
+    /// A table as lines of JSON, written as recordings are finished: a row of
+    /// status, reason and notes for each, and its coefficients and findings.
+    /// docs/fleet.md has the columns.
+    /// Example: --rows rows.ndjson
+    #[arg(verbatim_doc_comment, long, help_heading = OUTPUT, value_name = "OUT")]
     pub(crate) rows: Option<PathBuf>,
-    /// Leave out what has a report of the same bytes.
-    #[arg(long, help_heading = OUTPUT)]
+    /// Leave out what has a report of the same bytes
+    ///
+    /// Made with the same options and version. An interrupted run goes on.
+    #[arg(verbatim_doc_comment, long, help_heading = OUTPUT)]
     pub(crate) resume: bool,
-    /// Recordings at a time [default: one a core].
-    #[arg(short, long, value_name = "N")]
+    /// Recordings at a time [default: one a core]
+    ///
+    /// Each is analysed by one thread.
+    /// Example: -j 4
+    #[arg(verbatim_doc_comment, short, long, value_name = "N")]
     pub(crate) jobs: Option<NonZeroUsize>,
     /// Print nothing.
     #[arg(short, long, help_heading = OUTPUT)]
     pub(crate) quiet: bool,
-    /// Overwrite files that exist.
-    #[arg(short, long, help_heading = OUTPUT)]
+    /// Overwrite files that exist
+    ///
+    /// Without it they are kept, and the command ends with exit code 1.
+    #[arg(verbatim_doc_comment, short, long, help_heading = OUTPUT)]
     pub(crate) force: bool,
 }
 
@@ -340,11 +391,18 @@ pub(crate) struct ConvertArguments {
     pub(crate) recording: RecordingArguments,
     /// The file to write.
     pub(crate) out: PathBuf,
-    /// Format: table, frames or npy [default: by OUT's name].
-    #[arg(long, help_heading = OUTPUT, value_name = "FORMAT", value_enum, hide_possible_values = true)]
+    /// Format: table, frames or npy [default: by OUT's name]
+    ///
+    ///   table   CSV: counts of an ADIS16405, or channels with their units
+    ///   frames  CSV: transactions of the SPI bus of an ADIS16405
+    ///   npy     NumPy array of doubles: s, rad/s, m/s^2
+    /// .csv and .txt, also with .gz, are tables, .npy is an array.
+    #[arg(verbatim_doc_comment, long, help_heading = OUTPUT, value_name = "FORMAT", value_enum, hide_possible_values = true)]
     pub(crate) format: Option<RecordingFormat>,
-    /// Overwrite files that exist.
-    #[arg(short, long, help_heading = OUTPUT)]
+    /// Overwrite files that exist
+    ///
+    /// Without it they are kept, and the command ends with exit code 1.
+    #[arg(verbatim_doc_comment, short, long, help_heading = OUTPUT)]
     pub(crate) force: bool,
 }
 
@@ -353,14 +411,23 @@ pub(crate) struct ConvertArguments {
 pub(crate) struct SimulateArguments {
     /// The file to write.
     pub(crate) out: PathBuf,
-    /// Format: table, frames or npy [default: by OUT's name].
-    #[arg(long, help_heading = OUTPUT, value_name = "FORMAT", value_enum, hide_possible_values = true)]
+    /// Format: table, frames or npy [default: by OUT's name]
+    ///
+    ///   table   CSV: counts of an ADIS16405, or channels with their units
+    ///   frames  CSV: transactions of the SPI bus of an ADIS16405
+    ///   npy     NumPy array of doubles: s, rad/s, m/s^2
+    /// .csv and .txt, also with .gz, are tables, .npy is an array.
+    #[arg(verbatim_doc_comment, long, help_heading = OUTPUT, value_name = "FORMAT", value_enum, hide_possible_values = true)]
     pub(crate) format: Option<RecordingFormat>,
-    /// Overwrite files that exist.
-    #[arg(short, long, help_heading = OUTPUT)]
+    /// Overwrite files that exist
+    ///
+    /// Without it they are kept, and the command ends with exit code 1.
+    #[arg(verbatim_doc_comment, short, long, help_heading = OUTPUT)]
     pub(crate) force: bool,
-    /// Virtual time in s [default: 3600].
-    #[arg(long, allow_negative_numbers = true)]
+    /// Virtual time in s [default: 3600]
+    ///
+    /// An hour takes some seconds.
+    #[arg(verbatim_doc_comment, long, allow_negative_numbers = true, value_parser = duration)]
     pub(crate) seconds: Option<f64>,
     /// Seed of all random numbers.
     #[arg(long, default_value_t = 1)]
@@ -371,59 +438,62 @@ pub(crate) struct SimulateArguments {
     /// Range of the gyros, deg/s: 300, 150 or 75.
     #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true)]
     pub(crate) range: GyroRangeArgument,
-    /// Taps per filter stage, 1 to 64 [default: by the range].
-    #[arg(long, help_heading = SENSOR)]
+    /// Taps per filter stage, 1 to 64 [default: by the range]
+    ///
+    /// A power of two: the Bartlett filter of the part, which averages twice.
+    #[arg(verbatim_doc_comment, long, help_heading = SENSOR)]
     pub(crate) taps: Option<u32>,
-    /// All gyros: deg/√s, deg/s, deg/s/√s.
-    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
-    gyro: Option<String>,
-    /// Gyro x.
-    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
-    gyro_x: Option<String>,
-    /// Gyro y.
-    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
-    gyro_y: Option<String>,
-    /// Gyro z.
-    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
-    gyro_z: Option<String>,
-    /// All accelerometers: g/√Hz, g, g/√s.
-    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
-    accl: Option<String>,
-    /// Accelerometer x.
-    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
-    accl_x: Option<String>,
-    /// Accelerometer y.
-    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
-    accl_y: Option<String>,
-    /// Accelerometer z.
-    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
-    accl_z: Option<String>,
-    /// As in markov:gyro_x:time_constant=9,deviation=1.
-    #[arg(long, help_heading = NOISE, value_name = "EFFECT")]
+    /// N,B,K of channels [default: those of a published part]
+    ///
+    /// Of one channel (gyro_x), or of all three of a kind (gyro, accl), which
+    /// those of one channel override; may be given several times. In deg/√s,
+    /// deg/s, deg/s/√s, and in g/√Hz, g, g/√s.
+    /// Example: --noise gyro=0.037,0.009,0.0013 --noise gyro_z=0.05,0.01,0
+    #[arg(verbatim_doc_comment, long, help_heading = NOISE, value_name = "CHANNEL=N,B,K", value_parser = channel_noise)]
+    pub(crate) noise: Vec<ChannelNoise>,
+    /// As in markov:gyro_x:time_constant=9,deviation=1
+    ///
+    /// May be given several times. Kinds: sinusoid, resonance, markov,
+    /// telegraph, quantization, rate_ramp, temperature, supply, acceleration,
+    /// common_mode, spikes, bias_step, dropped_samples, repeated_samples,
+    /// sample_clock; docs/several-recordings.md has their keys. Sizes are in
+    /// deg/s or g, frequencies in Hz, times in s.
+    /// Example: --effect sinusoid:gyro_z:frequency=20.5,amplitude=0.2
+    #[arg(verbatim_doc_comment, long, help_heading = NOISE, value_name = "EFFECT")]
     pub(crate) effect: Vec<String>,
-    /// As in temperature:rise=8,time_constant=900.
-    #[arg(long, help_heading = NOISE, value_name = "PROFILE")]
+    /// As in temperature:rise=8,time_constant=900
+    ///
+    /// May be given several times. temperature has rise and cycle in °C,
+    /// time_constant and period in s; supply has load and cycle in V; motion
+    /// has deviation in g.
+    #[arg(verbatim_doc_comment, long, help_heading = NOISE, value_name = "PROFILE")]
     pub(crate) environment: Vec<String>,
-    /// Of the bus, as in stuck_low:from=10,bursts=5.
-    #[arg(long, help_heading = NOISE, value_name = "FAULT")]
+    /// Of the bus, as in stuck_low:from=10,bursts=5
+    ///
+    /// May be given several times; `from` is in s. Kinds: impossible_rate,
+    /// shifted, stuck_low, stuck_high, frozen, stale, low_supply.
+    #[arg(verbatim_doc_comment, long, help_heading = NOISE, value_name = "FAULT")]
     pub(crate) fault: Vec<String>,
 }
 
-impl SimulateArguments {
-    /// Beginnings of the names of channels, and their coefficients; those of one axis come after those of all.
-    pub(crate) fn coefficients(&self) -> impl Iterator<Item = (&'static str, &str)> {
-        let all = [
-            ("gyro_", &self.gyro),
-            ("accl_", &self.accl),
-            ("gyro_x", &self.gyro_x),
-            ("gyro_y", &self.gyro_y),
-            ("gyro_z", &self.gyro_z),
-            ("accl_x", &self.accl_x),
-            ("accl_y", &self.accl_y),
-            ("accl_z", &self.accl_z),
-        ];
-        all.into_iter().filter_map(|(prefix, text)| Some((prefix, text.as_deref()?)))
+/// Noise of a channel, or of the three of a kind.
+#[derive(Debug, Clone)]
+pub(crate) struct ChannelNoise {
+    /// Such as `gyro_z`, or `gyro_`.
+    pub(crate) prefix: String,
+    /// N, B, K.
+    pub(crate) coefficients: String,
+}
+
+fn channel_noise(text: &str) -> Result<ChannelNoise, String> {
+    let (name, coefficients) = text.split_once('=').ok_or("expected CHANNEL=N,B,K, as in gyro_z=0.05,0.01,0")?;
+    let kinds = ["gyro", "accl"];
+    let known = kinds.iter().flat_map(|kind| ["", "_x", "_y", "_z"].map(|axis| format!("{kind}{axis}")));
+    if !known.clone().any(|known| known == name) {
+        return Err(format!("`{name}` is none of {}", known.collect::<Vec<_>>().join(", ")));
     }
+    let prefix = if kinds.contains(&name) { format!("{name}_") } else { name.to_owned() };
+    Ok(ChannelNoise { prefix, coefficients: coefficients.to_owned() })
 }
 
 /// Reports or recordings whose noise is written in the format of another program.
@@ -432,23 +502,40 @@ pub(crate) struct ExportArguments {
     /// The first one, and how to read it and the others.
     #[command(flatten)]
     pub(crate) recording: RecordingArguments,
-    /// More of one sensor: gyros in one file, accelerometers in another.
-    #[arg(value_name = "FILE")]
+    /// More of one sensor: gyros in one file, accelerometers in another
+    ///
+    /// They are written as one sensor. Reports and recordings may be mixed.
+    #[arg(verbatim_doc_comment, value_name = "FILE")]
     pub(crate) more: Vec<PathBuf>,
-    /// Write the noise: .yaml (Kalibr) .csv .m .py .sdf.
-    #[arg(short, long = "output", help_heading = OUTPUT, value_name = "FILE", required = true, value_parser = OsStringValueParser::new().try_map(noise_file))]
+    /// Write the noise: .yaml (Kalibr) .csv .m .py .sdf
+    ///
+    /// May be given several times. The ending of FILE chooses the program:
+    ///   .yaml  Kalibr, in rad/s and m/s^2
+    ///   .csv   every parameter of every channel with 95 % bounds
+    ///   .m     MATLAB's imuSensor
+    ///   .py    GTSAM
+    ///   .sdf   Gazebo
+    /// FORMAT=FILE chooses others: openvins, vins, orbslam3, kf-gins, basalt.
+    /// FORMAT=- is standard output.
+    /// Example: -o imu.yaml -o openvins=chain.yaml
+    #[arg(verbatim_doc_comment, short, long = "output", help_heading = OUTPUT, value_name = "FILE", required = true, value_parser = OsStringValueParser::new().try_map(noise_file))]
     pub(crate) outputs: Vec<OutputFile>,
-    /// One number for three axes: rms [default] or worst.
-    #[arg(long, help_heading = OUTPUT, value_enum, default_value_t, hide_possible_values = true, hide_default_value = true)]
+    /// One number for three axes: rms [default] or worst
+    ///
+    /// For formats that have one number for x, y and z: their root mean
+    /// square, or the largest.
+    #[arg(verbatim_doc_comment, long = "combine-axes", value_name = "HOW", help_heading = OUTPUT, value_enum, default_value_t, hide_possible_values = true, hide_default_value = true)]
     pub(crate) axis: AxisChoice,
-    /// Overwrite files that exist.
-    #[arg(short, long, help_heading = OUTPUT)]
+    /// Overwrite files that exist
+    ///
+    /// Without it they are kept, and the command ends with exit code 1.
+    #[arg(verbatim_doc_comment, short, long, help_heading = OUTPUT)]
     pub(crate) force: bool,
 }
 
 /// Options of `analyze` that a proposed command states itself, or does not need.
 const PROPOSED: [&str; 10] =
-    ["topic", "columns", "units", "rate", "sensor", "range", "from", "to", "yes", "each-sensor"];
+    ["topic", "columns", "units", "rate", "sensor", "range", "from", "to", "accept-guess", "each-sensor"];
 
 /// The words that were typed, the name of the program first.
 static TYPED: OnceLock<Vec<String>> = OnceLock::new();
@@ -489,14 +576,21 @@ pub(crate) struct RecordingArguments {
     /// The recording.
     #[command(flatten)]
     pub(crate) input: InputArguments,
-    /// Sample rate; overrides the time stamps.
-    #[arg(long, help_heading = INPUT, value_name = "HZ", allow_negative_numbers = true)]
+    /// Sample rate; overrides the time stamps
+    ///
+    /// In Hz. Needed if the recording has no time stamps.
+    /// Example: --rate 204.8
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate: Option<f64>,
-    /// Begin here, s from the first sample.
-    #[arg(long, help_heading = INPUT, value_name = "S", value_parser = time_in_recording)]
+    /// Begin here, s from the first sample
+    ///
+    /// Example: --from 8.2 --to 60
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "S", value_parser = time_in_recording)]
     pub(crate) from: Option<f64>,
-    /// End before this, s from the first sample.
-    #[arg(long, help_heading = INPUT, value_name = "S", value_parser = time_in_recording)]
+    /// End before this, s from the first sample
+    ///
+    /// In s from the first sample of the file, not from --from.
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "S", value_parser = time_in_recording)]
     pub(crate) to: Option<f64>,
 }
 
@@ -533,25 +627,57 @@ impl RecordingArguments {
 /// A recording.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct InputArguments {
-    /// The recording, of any format; - for standard input.
+    /// The recording, of any format; - for standard input
+    ///
+    /// A text table, NumPy, MATLAB, HDF5, a ROS 1 or ROS 2 bag, ULog,
+    /// ArduPilot, or an export of a logic analyser, also with .gz or .zst.
+    /// The content tells the format, not the name.
+    #[arg(verbatim_doc_comment)]
     pub(crate) file: PathBuf,
-    /// As in gyro_x=wx,gyro_y=1 [default: by name].
-    #[arg(long, help_heading = INPUT, value_name = "CHANNEL=COLUMN", value_delimiter = ',')]
+    /// As in gyro_x=wx,gyro_y=1 [default: by name]
+    ///
+    /// Which column is which channel, by its name or by its number from 0.
+    /// Channels are gyro_x to gyro_z, accl_x to accl_z, magn_x to magn_z,
+    /// temp, supply, and time or sample (an index).
+    /// Example: --columns time=t,gyro_x=wx,gyro_y=wy,gyro_z=wz
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "CHANNEL=COLUMN", value_delimiter = ',')]
     pub(crate) columns: Vec<String>,
-    /// Per quantity, as deg/s,g,us [default: by name].
-    #[arg(long, help_heading = INPUT, value_name = "UNIT", value_delimiter = ',')]
+    /// Per quantity, as deg/s,g,us [default: by name]
+    ///
+    /// Units of the columns, one a quantity, in any order, each with a factor
+    /// if need be. Without a unit in the heading or here a rate or a specific
+    /// force is refused.
+    /// Example: --units rad/s,m/s^2,degC,ns
+    /// Example: --units deg/s/131,g/16384
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "UNIT", value_delimiter = ',')]
     pub(crate) units: Vec<String>,
-    /// Topic, message or array of a file with several.
-    #[arg(long, help_heading = INPUT)]
+    /// Topic, message or array of a file with several
+    ///
+    /// One of the names that `imunoise inspect FILE` shows.
+    /// Example: --topic /imu0
+    /// Example: --topic sensor_gyro:1
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT)]
     pub(crate) topic: Option<String>,
-    /// Accept a guess if no other is plausible.
-    #[arg(long, help_heading = INPUT)]
-    pub(crate) yes: bool,
-    /// Gyros of an ADIS16405: 300 [default], 150, 75 deg/s.
-    #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true, hide_default_value = true)]
+    /// Accept a guess if no other is plausible
+    ///
+    /// Takes the columns and units that `imunoise inspect` proposes if
+    /// nothing about them is in doubt, and says so. A rate in Hz is never
+    /// guessed.
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT)]
+    pub(crate) accept_guess: bool,
+    /// Gyros of an ADIS16405: 300 [default], 150, 75 deg/s
+    ///
+    /// Full scale of the gyros in deg/s, for register counts that do not say
+    /// it: a count is 0.05, 0.025 or 0.0125 deg/s.
+    #[arg(verbatim_doc_comment, long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true, hide_default_value = true)]
     pub(crate) range: GyroRangeArgument,
-    /// adis16405, adis16470, bmi088, mpu6050 or a TOML file.
-    #[arg(long, help_heading = SENSOR, value_name = "NAME|FILE")]
+    /// adis16405, adis16470, bmi088, mpu6050 or a TOML file
+    ///
+    /// The data sheet: ranges, counts and the values to compare with.
+    /// Default: adis16405 for its own counts, generic for all others.
+    /// Example: --sensor bmi088
+    /// Example: --sensor my-part.toml
+    #[arg(verbatim_doc_comment, long, help_heading = SENSOR, value_name = "NAME|FILE")]
     pub(crate) sensor: Option<String>,
     /// What is in memory, in the place of the file.
     #[arg(skip)]
@@ -577,7 +703,7 @@ impl InputArguments {
             columns: Vec::new(),
             units: Vec::new(),
             topic: None,
-            yes: false,
+            accept_guess: false,
             memory: None,
         }
     }
@@ -601,22 +727,32 @@ fn time_in_recording(text: &str) -> Result<f64, String> {
     time.ok_or_else(|| "not a time of at least 0 s".to_owned())
 }
 
+/// A finite time above 0 s.
+fn duration(text: &str) -> Result<f64, String> {
+    time_in_recording(text).ok().filter(|time| *time > 0.0).ok_or_else(|| "not a time above 0 s".to_owned())
+}
+
 /// A device to check.
 #[derive(Debug, Args)]
 pub(crate) struct BenchArguments {
     /// Serial port of the device, such as /dev/ttyACM0.
     pub(crate) port: String,
-    /// Baud rate of the port.
-    #[arg(long, help_heading = INPUT, default_value_t = serial::BAUD)]
+    /// Baud rate of the port
+    ///
+    /// A port on USB ignores it.
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, default_value_t = serial::BAUD)]
     pub(crate) baud: u32,
-    /// Its other port, which must carry the same bursts.
-    #[arg(long, help_heading = INPUT, value_name = "PORT")]
+    /// Its other port, which must carry the same bursts
+    ///
+    /// The USB port and the serial adapter of one device.
+    /// Example: imunoise bench /dev/ttyACM0 --second /dev/ttyUSB0
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "PORT")]
     pub(crate) second: Option<String>,
     /// Reads of PROD_ID.
     #[arg(long, default_value_t = BenchPlan::default().reads)]
     pub(crate) reads: u32,
     /// Time for which bursts are counted, s.
-    #[arg(long, default_value_t = BenchPlan::default().bursts_s, value_parser = time_in_recording)]
+    #[arg(long, default_value_t = BenchPlan::default().bursts_s, value_parser = duration)]
     pub(crate) seconds: f64,
 }
 
@@ -625,14 +761,22 @@ pub(crate) struct BenchArguments {
 pub(crate) struct MonitorArguments {
     /// Serial port of the device, such as /dev/ttyACM0.
     pub(crate) port: String,
-    /// Baud rate of the port.
-    #[arg(long, help_heading = INPUT, default_value_t = serial::BAUD)]
+    /// Baud rate of the port
+    ///
+    /// A port on USB ignores it.
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, default_value_t = serial::BAUD)]
     pub(crate) baud: u32,
-    /// Command for the device, such as "f 819.2"; repeatable.
-    #[arg(long, help_heading = INPUT, value_name = "COMMAND")]
+    /// Command for the device, such as "f 819.2"; repeatable
+    ///
+    /// What the device's command line takes; `?` lists the commands.
+    /// The sample rate in Hz:
+    /// Example: --send "f 819.2"
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "COMMAND")]
     pub(crate) send: Vec<String>,
-    /// End after so many seconds [default: at the end].
-    #[arg(long)]
+    /// End after so many seconds [default: at the end]
+    ///
+    /// Without it: when q is pressed, at Ctrl-C, or if the device hangs up.
+    #[arg(verbatim_doc_comment, long, value_name = "S", value_parser = duration)]
     pub(crate) seconds: Option<f64>,
 }
 
@@ -664,14 +808,19 @@ impl From<GyroRangeArgument> for GyroRange {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Virtual sensor")]
 pub(crate) struct SimulationArguments {
-    /// Virtual time, s [default: 3600].
-    #[arg(long, allow_negative_numbers = true)]
+    /// Virtual time, s [default: 3600]
+    ///
+    /// An hour takes some seconds.
+    #[arg(verbatim_doc_comment, long, allow_negative_numbers = true, value_parser = duration)]
     pub(crate) seconds: Option<f64>,
     /// Seed of the noise.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// N, B and K alone: no line, no effect of temperature.
-    #[arg(long)]
+    /// N, B and K alone: no line, no effect of temperature
+    ///
+    /// Without it gyro z has a line of 0.2 deg/s at 20.5 Hz, and gyro x
+    /// follows the temperature with 0.05 deg/s/°C.
+    #[arg(verbatim_doc_comment, long)]
     pub(crate) plain: bool,
 }
 
@@ -687,21 +836,44 @@ impl SimulationArguments {
 #[derive(Debug, Args)]
 #[command(next_help_heading = OUTPUT)]
 pub(crate) struct OutputArguments {
-    /// Print every sentence and table of every channel.
-    #[arg(long, conflicts_with = "quiet")]
+    /// Print every sentence and table of every channel
+    ///
+    /// Instead of one screen.
+    #[arg(verbatim_doc_comment, long, conflicts_with = "quiet")]
     pub(crate) full: bool,
     /// Print nothing.
     #[arg(short, long)]
     pub(crate) quiet: bool,
-    /// Write the report: .json .html .svg .csv .yaml .m .py .sdf.
-    #[arg(short, long = "output", value_name = "FILE", value_parser = OsStringValueParser::new().try_map(output_file))]
+    /// Report as .html, .json, .svg, .yaml and others
+    ///
+    /// May be given several times. The ending of FILE chooses the format:
+    ///   .json  the whole report, for programs and `imunoise compare`
+    ///   .html  the whole report as one page with every figure
+    ///   .svg   every figure, as FILE-gyro_x-allan.svg and so on
+    ///   .csv   every parameter of every channel with 95 % bounds
+    ///   .yaml  noise for Kalibr, in rad/s and m/s^2
+    ///   .m     noise for MATLAB's imuSensor
+    ///   .py    noise for GTSAM
+    ///   .sdf   an IMU for Gazebo
+    /// FORMAT=FILE chooses it by name: openvins, vins, orbslam3, kf-gins,
+    /// basalt, or json, html, svg, csv, kalibr, matlab, gtsam, gazebo.
+    /// The name - is JSON on standard output, FORMAT=- another format.
+    /// Example: -o report.html -o imu.yaml -o openvins=chain.yaml
+    #[arg(verbatim_doc_comment, short, long = "output", value_name = "FILE", value_parser = OsStringValueParser::new().try_map(output_file))]
     pub(crate) outputs: Vec<OutputFile>,
-    /// Overwrite files that exist.
-    #[arg(short, long)]
+    /// Overwrite files that exist
+    ///
+    /// Without it they are kept, and the command ends with exit code 1.
+    #[arg(verbatim_doc_comment, short, long)]
     pub(crate) force: bool,
-    /// One number for three axes: rms [default] or worst.
+    /// One number for three axes: rms [default] or worst
+    ///
+    /// For formats that have one number for x, y and z: their root mean
+    /// square, or the largest.
     #[arg(
-        long,
+        verbatim_doc_comment,
+        long = "combine-axes",
+        value_name = "HOW",
         value_enum,
         default_value_t,
         requires = "outputs",
@@ -721,11 +893,15 @@ impl OutputArguments {
 /// Where a result goes that is no report.
 #[derive(Debug, Args)]
 pub(crate) struct JsonArgument {
-    /// Write the result as JSON; - for standard output.
-    #[arg(short, long = "output", value_name = "FILE", value_parser = OsStringValueParser::new().try_map(json_file))]
+    /// Write the result as JSON; - for standard output
+    ///
+    /// Example: -o result.json
+    #[arg(verbatim_doc_comment, short, long = "output", value_name = "FILE", value_parser = OsStringValueParser::new().try_map(json_file))]
     pub(crate) output: Option<OutputFile>,
-    /// Overwrite files that exist.
-    #[arg(short, long)]
+    /// Overwrite files that exist
+    ///
+    /// Without it they are kept, and the command ends with exit code 1.
+    #[arg(verbatim_doc_comment, short, long)]
     pub(crate) force: bool,
 }
 
@@ -740,21 +916,43 @@ impl JsonArgument {
 mod tests {
     use super::{Cli, with_subcommand};
     use clap::{CommandFactory, Parser};
-    use std::ffi::OsString;
+
+    /// The words of a line of a shell, in which quotation marks may hold blanks.
+    fn words(line: &str) -> Vec<String> {
+        let parts = line.split('"').enumerate();
+        let words = |(at, part): (usize, &str)| -> Vec<String> {
+            if at % 2 == 1 { vec![part.to_owned()] } else { part.split_whitespace().map(str::to_owned).collect() }
+        };
+        parts.flat_map(words).collect()
+    }
+
+    fn is_taken(words: &[String]) -> bool {
+        Cli::try_parse_from(with_subcommand(words.iter().map(Into::into).collect())).is_ok()
+    }
 
     #[test]
-    fn every_command_has_examples_that_the_program_takes() {
+    fn every_command_and_option_has_examples_that_the_program_takes() {
         Cli::command().debug_assert();
         let program = Cli::command();
+        let mut of_options = 0;
         for command in std::iter::once(&program).chain(program.get_subcommands()) {
             let text = command.get_after_help().map(ToString::to_string).unwrap_or_default();
             let lines = text.lines().filter(|line| line.starts_with("  imunoise"));
-            let examples: Vec<&str> = lines.filter_map(|line| line.trim_start().split("   ").next()).collect();
+            let examples: Vec<_> = lines.filter_map(|line| line.trim_start().split("   ").next()).map(words).collect();
             assert!(!examples.is_empty(), "{}", command.get_name());
-            for example in examples {
-                let words = with_subcommand(example.split_whitespace().map(OsString::from).collect());
-                assert!(Cli::try_parse_from(words).is_ok(), "{example}");
+            for example in &examples {
+                assert!(is_taken(example), "{example:?}");
+            }
+            // The options of an example go with one of the command.
+            let texts = command.get_arguments().filter_map(|argument| argument.get_long_help());
+            for line in texts.flat_map(|text| text.to_string().lines().map(str::to_owned).collect::<Vec<_>>()) {
+                let Some(options) = line.strip_prefix("Example: ").map(words) else { continue };
+                let is_whole = options[0] == "imunoise";
+                let in_one = examples.iter().any(|example| is_taken(&[example.as_slice(), &options].concat()));
+                assert!(if is_whole { is_taken(&options) } else { in_one }, "{}: {line}", command.get_name());
+                of_options += 1;
             }
         }
+        assert!(of_options > 30, "{of_options}");
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::cli::{self, Cli, Command, MonitorArguments, ReplayArguments};
 use crate::inspect::{self, Question};
-use crate::output::{self, Incomplete};
+use crate::output::{self, Incomplete, Misuse};
 use crate::output_files::OutputFiles;
 use crate::output_format::{OutputFile, OutputFormat};
 use crate::{analyze, batch, compare, convert, export, interrupt, live, monitor, record, simulate, tip};
@@ -21,6 +21,7 @@ const DEFAULT_PAGE: &str = "report.html";
 /// Exit codes.
 const SUCCESS: u8 = 0;
 const FAILURE: u8 = 1;
+const WRONG_USAGE: u8 = 2;
 /// Exit code of a result of a recording that was not read to its end.
 const INCOMPLETE: u8 = 3;
 
@@ -60,7 +61,7 @@ pub fn run(arguments: Vec<OsString>, prepare: impl FnOnce(bool)) -> u8 {
             if let Some(question) = error.downcast_ref::<Question>() {
                 let _ = write!(io::stderr(), "{}{}", question.text, question.hint);
             }
-            FAILURE
+            if error.chain().any(|cause| cause.is::<Misuse>()) { WRONG_USAGE } else { FAILURE }
         }
     }
 }
@@ -111,12 +112,9 @@ fn run_subcommand(Cli { command }: Cli) -> Result<()> {
 /// Shows a device live, or in lines where there is no terminal.
 fn monitor_device(arguments: &MonitorArguments) -> Result<()> {
     let MonitorArguments { port, baud, send, seconds } = arguments;
-    let deadline = |seconds: &f64| {
-        let duration = Duration::try_from_secs_f64(*seconds).ok();
-        let deadline = duration.and_then(|duration| Instant::now().checked_add(duration));
-        deadline.with_context(|| format!("a duration of {seconds} s: it must be positive and finite, and no age"))
-    };
-    let deadline = seconds.as_ref().map(deadline).transpose()?;
+    // No end is later than that of the clock.
+    let end = |seconds: f64| Instant::now().checked_add(Duration::try_from_secs_f64(seconds).ok()?);
+    let deadline = seconds.and_then(end);
     let show = || -> Result<()> {
         let mut cable = record::open_link(port, *baud)?;
         for command in send {

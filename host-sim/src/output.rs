@@ -70,6 +70,11 @@ impl Analysed {
 #[error("{0}")]
 pub(crate) struct Incomplete(pub(crate) String);
 
+/// Wrong usage that the parser of the arguments does not see.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct Misuse(pub(crate) String);
+
 impl Incomplete {
     /// An error if the recording was not read to its end.
     pub(crate) fn check(is_complete: bool) -> Result<()> {

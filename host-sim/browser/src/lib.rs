@@ -159,7 +159,7 @@ struct ExportRequest {
     report: String,
     /// As `-o FORMAT=FILE` of the command calls it.
     format: String,
-    /// As the option `--axis` calls it.
+    /// As the option `--combine-axes` calls it.
     axis: String,
 }
 

@@ -1,6 +1,6 @@
 //! A recording gives the same report whether its counts are read or its bursts are replayed over the emulated bus.
 
-use crate::program::{analysis_of, counts, imunoise, json_of, write};
+use crate::program::{analysis_of, counts, flight_log, imunoise, json_of, write};
 use serde_json::Value;
 use tempfile::tempdir;
 
@@ -33,20 +33,6 @@ fn a_recorded_simulation_replays_to_the_same_report() {
         assert!((rate - 204.8).abs() < 1e-6, "{rate}");
         assert_eq!(std::fs::read(log).expect("a log")[0] == 0x1f, name.ends_with(".gz"));
     }
-}
-
-/// A log of PX4 whose rows are a gyroscope at 250 Hz.
-fn flight_log(rows: u64) -> Vec<u8> {
-    let record =
-        |kind: u8, body: &[u8]| [&u16::try_from(body.len()).expect("short").to_le_bytes()[..], &[kind], body].concat();
-    let mut log = [&b"ULog\x01\x12\x35\x01"[..], &[0; 8]].concat();
-    log.extend(record(b'F', b"sensor_gyro:uint64_t timestamp;float x;float y;float z;"));
-    log.extend(record(b'A', &[&[0, 0, 0][..], b"sensor_gyro"].concat()));
-    for row in 0..rows {
-        let axes = [0u64, 1, 2].map(|axis| ((row + axis) * 7919 % 1009) as f32 * 1e-5 - 5e-3).map(f32::to_le_bytes);
-        log.extend(record(b'D', &[&[0, 0][..], &(row * 4000).to_le_bytes(), &axes.concat()].concat()));
-    }
-    log
 }
 
 /// In the JSON, on the screen, on the page and by the exit code; in a report of many as in that of one.

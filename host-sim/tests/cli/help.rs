@@ -3,18 +3,22 @@
 use crate::program::{imunoise, write};
 use std::process::Output;
 
-/// Lines and columns of a terminal window in which a help is read without scrolling.
-const SCREEN: (usize, usize) = (45, 80);
+/// Lines and columns of a terminal window in which the short help is read without scrolling.
+const SCREEN: (usize, usize) = (40, 80);
 
 fn text(bytes: Vec<u8>) -> String {
     String::from_utf8(bytes).expect("UTF-8")
 }
 
-/// The help of a command; of the program if `command` is empty.
-fn help(command: &[&str]) -> String {
-    let Output { status, stdout, .. } = imunoise(&[command, &["--help"]].concat());
+/// The help of a command by `-h` or `--help`; of the program if `command` is empty.
+fn help_by(option: &str, command: &[&str]) -> String {
+    let Output { status, stdout, .. } = imunoise(&[command, &[option]].concat());
     assert!(status.success(), "{command:?}");
     text(stdout)
+}
+
+fn help(command: &[&str]) -> String {
+    help_by("-h", command)
 }
 
 /// The first words of the lines of a section.
@@ -24,17 +28,23 @@ fn section(help: &str, heading: &str) -> Vec<String> {
 }
 
 #[test]
-fn the_help_of_every_command_fits_one_screen() {
+fn the_short_help_of_every_command_fits_one_screen_and_the_long_one_has_more() {
     let program = help(&[]);
     let commands = section(&program, "Commands:");
     assert!(commands.len() >= 10 && commands[0] == "analyze", "{commands:?}");
     for command in commands.iter().filter(|name| *name != "help").map(|name| vec![name.as_str()]).chain([Vec::new()]) {
-        let help = help(&command);
-        assert!(help.lines().count() <= SCREEN.0, "{} lines: {help}", help.lines().count());
-        for line in help.lines() {
+        let (short, long) = (help(&command), help_by("--help", &command));
+        assert!(short.lines().count() <= SCREEN.0, "{} lines: {short}", short.lines().count());
+        assert!(long.lines().count() > short.lines().count() || command == ["completions"], "{command:?}: {long}");
+        for line in short.lines().chain(long.lines()) {
             assert!(line.chars().count() <= SCREEN.1, "{command:?}: {line}");
         }
     }
+    let long = help_by("--help", &["analyze"]);
+    for words in ["Example: --rate 204.8", "In Hz.", "-o report.html -o imu.yaml -o openvins=chain.yaml"] {
+        assert!(long.contains(words), "{words}: {long}");
+    }
+    assert!(help_by("--help", &[]).contains("3  done, but a recording was not read to its end"));
 }
 
 #[test]
