@@ -98,19 +98,20 @@ impl Quantizer {
     #[must_use]
     pub fn for_samples(samples: impl IntoIterator<Item = f64>) -> Option<Self> {
         let (mut origin, mut previous) = (None, f64::NAN);
-        let (mut sum, mut count) = (0.0, 0_u64);
+        // Four sums in turn: each addition waits for the one before to the same sum.
+        let (mut sums, mut count) = ([0.0; 4], 0_u64);
         for value in samples {
-            if is_finite(value) {
-                origin.get_or_insert(value);
+            if origin.is_none() && is_finite(value) {
+                origin = Some(value);
             }
             let difference = value - previous;
             previous = value;
             if is_finite(difference) {
-                sum += difference * difference / 2.0;
+                sums[(count % 4) as usize] += difference * difference;
                 count += 1;
             }
         }
-        let finest = sqrt(sum / count as f64) * (1.0 / STEPS);
+        let finest = sqrt(sums.iter().sum::<f64>() / (2.0 * count as f64)) * (1.0 / STEPS);
         // Without its fraction a normal number is a power of two.
         let lsb = f64::from_bits(finest.to_bits() >> 52 << 52);
         if finest.is_normal() { Self::new(origin?, lsb) } else { None }

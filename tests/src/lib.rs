@@ -4,6 +4,7 @@
 //! The tests of the noise observatory as a whole live in `tests/`.
 
 mod generated;
+pub mod stm32f4;
 
 /// Compiles the example with both libraries.
 #[cfg(doctest)]
@@ -86,6 +87,16 @@ pub struct Image<'a> {
 }
 
 impl Image<'_> {
+    /// Builds the image `observatory-{board}` as it is flashed, with further features, and returns the path of its ELF.
+    pub fn of_board(board: &str, target: &str, further: &[&str]) -> PathBuf {
+        let (feature, program) = (format!("board-{board}"), format!("observatory-{board}"));
+        let copy = [&[program.as_str()], further].concat().join("-");
+        let features = [&[feature.as_str()], further].concat().join(",");
+        let arguments = &["--features", &features];
+        Image { package: "firmware", program: &program, target, profile: "image", arguments, variable: None }
+            .build(&copy)
+    }
+
     /// Builds the program and returns the path of a copy of its ELF with the name `copy`: cargo overwrites a program when it builds it
     /// with other features.
     pub fn build(self, copy: &str) -> PathBuf {

@@ -8,7 +8,7 @@ const { withPage } = require("./chromium.js");
 const { looks } = require("./looks.js");
 
 const [program, url, folder] = process.argv.slice(2);
-const { answers, table, finding, image } = JSON.parse(fs.readFileSync(0));
+const { answers, points: expected, table, finding, image } = JSON.parse(fs.readFileSync(0));
 // A port whose device answers a command with what was recorded, at once. Pauses of the page end when the test asks for it, one after the
 // other, and its clock shows the time of the last one: what happens does not depend on the time that it takes.
 const PORT = `(() => {
@@ -57,7 +57,7 @@ const NO_SERIAL = 'Object.defineProperty(navigator, "serial", { value: undefined
 const text = (id) => `document.getElementById("${id}").innerText`;
 const isShown = (id) => `!document.getElementById("${id}").hidden`;
 const send = (command) => `document.querySelector("#command input").value = "${command}"; document.getElementById("command").requestSubmit()`;
-const POINTS = 'document.querySelectorAll("#live .drawing circle").length';
+const POINTS = 'document.querySelectorAll("#live .drawing [data-line] circle").length';
 
 const withDevice = async (page) => {
   const until = (expression) => page.value(`fake.until(() => ${expression})`);
@@ -66,7 +66,7 @@ const withDevice = async (page) => {
   const live = await page.value(text("live"));
   for (const part of ["gyro x", "accel z", "Health:", "bursts used", "Link:", "angle random walk"]) assert.ok(live.includes(part), `${part}: ${live}`);
   const points = await page.value(POINTS);
-  assert.ok(points > 60, `${points} points of six curves`);
+  assert.equal(points, expected);
   await looks(page, "live");
 
   // Noise on the line, and an overrun: the next report is taken all the same, and its curves are longer.

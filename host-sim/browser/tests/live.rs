@@ -1,80 +1,85 @@
-//! The page with a device, whose port plays what the firmware sends on the virtual sensor.
+//! The page with a device, whose port plays what the firmware's image sends in the emulator.
 
 use crate::harness::{IMAGE, drive};
 use crate::same_report::{TOLERANCE_OF_SIMULATION, differences_from_command};
-use link::Decoder;
-use observatory::bench::{BenchPlan, BenchRun, checks, write_table};
-use serde_json::{Value, json};
-use simulation::Device;
-use virtual_sensor::{NoiseModel, VirtualAdis16405};
+use emulation::{Outcome, Scenario, Sensor};
+use link::{Decoder, Message, Received};
+use observatory::bench::{BenchPlan, BenchRun, Step, checks, write_table};
+use serde_json::json;
+use system_tests::stm32f4::{Typed, answer_time, h405_image, run};
 
-/// Time of the device between two looks at what it has sent, µs.
-const STEP_US: u64 = 20_000;
 /// One message of each kind, the terms and regressors of a channel among them.
 const KEPT: &[u8] = include_bytes!("../../../firmware/link/tests/kept_stream/version-4-mixed-alarm.bin");
+/// Time for a report, s.
+const REPORT_S: f64 = 3.0;
+/// The emulated board is asked for less than the page asks for. A step that is repeated has its answer again, and the pauses of the page
+/// are no time of the board.
+const SHORT: BenchPlan = BenchPlan { reads: 10_000, noise_s: 1.5, bursts_s: 2.0 };
 
-/// A device in its own time, and its answers to commands, one after the other.
-struct Player {
-    device: Device,
-    now_us: u64,
-    /// Each with the command and the bytes that the device sent after it.
-    answers: Vec<Value>,
+/// The answers of the emulated Olimex STM32-H405 to two requests for a report, to the start and the end of a recording, and to the steps of
+/// [`SHORT`], each with its command.
+fn answers() -> Vec<(String, Vec<u8>)> {
+    // The first report follows after four seconds of samples, the second after seven; the recording lasts six.
+    let before = [("i 0", 4.0), ("r", REPORT_S), ("r", REPORT_S), ("w 1", 6.0), ("w 0", 0.2)];
+    let bench = SHORT.steps().into_iter().map(|Step { command, seconds, .. }| {
+        let seconds = answer_time(&command, seconds, REPORT_S);
+        (command, seconds)
+    });
+    let typed = Typed::new(before.map(|(command, seconds)| (command.to_owned(), seconds)).into_iter().chain(bench));
+    let keys = typed.keys().map(|(at_s, text)| (at_s, text.into_bytes())).collect();
+    let (sensor, seconds) = (Some(Sensor::Published(41)), typed.end_s);
+    let Outcome { received, sensor, .. } = run(h405_image(), Scenario { sensor, keys, seconds, ..Scenario::default() });
+    assert_eq!(sensor.expect("a sensor").violations, [""; 0]);
+    let answers = typed.answers(&received).into_iter().map(|(command, bytes)| (command.to_owned(), bytes));
+    // The page does not turn the reports off that the device sends by itself.
+    answers.skip(1).collect()
 }
 
-impl Player {
-    /// A device that has probed its sensor.
-    fn new() -> Self {
-        let part = VirtualAdis16405::new(NoiseModel::paper(), 5);
-        let mut device = Device::new(part, Device::blank_memory()).with_restarts();
-        device.run_until(500_000);
-        Self { device, now_us: 500_000, answers: Vec::new() }
-    }
-
-    /// Sends a command, and keeps what comes until `is_answered` says so of some bytes, or for a time.
-    fn ask(&mut self, command: &str, seconds: f64, mut is_answered: impl FnMut(&[u8]) -> bool) {
-        self.device.press(format!("{command}\r").as_bytes());
-        let (end_us, mut answer) = (self.now_us + (1e6 * seconds) as u64, Vec::new());
-        while self.now_us < end_us {
-            self.now_us += STEP_US;
-            let sent = self.device.run_until(self.now_us);
-            let is_whole = is_answered(&sent);
-            answer.extend(sent);
-            if is_whole {
-                break;
-            }
-        }
-        self.answers.push(json!({ "command": command, "bytes": answer }));
-    }
-}
-
-/// `live.js` says what is looked at. The table of the bench and the report of a recording are those of the command.
+/// `live.js` says what is looked at. The table of the bench, of which every check passes, and the report of a recording are those of the
+/// command.
 #[test]
 fn a_device_is_shown_recorded_and_checked() {
     const TEST: &str = "live::a_device_is_shown_recorded_and_checked";
-    let mut player = Player::new();
-    player.ask("r", 30.0, |_| false);
-    player.ask("r", 60.0, |_| false);
-    player.ask("w 1", 20.0, |_| false);
+    let mut answers = answers();
+    let mut short_bench = answers.split_off(4).into_iter().peekable();
     // The page asks again when the stream ends.
-    player.answers.push(json!({ "command": "w 1", "bytes": [] }));
-    player.ask("w 0", 1.0, |_| false);
+    answers.insert(3, ("w 1".to_owned(), Vec::new()));
     let (mut decoder, plan) = (Decoder::new(), BenchPlan::default());
-    let mut bench = BenchRun::new(&plan, decoder.counters());
-    while let Some((_, step)) = bench.begin_step() {
-        player.ask(&step.command, step.seconds, |bytes| {
-            // All of them belong to this step, also those behind its end.
-            let mut is_whole = false;
-            for received in bytes.iter().filter_map(|byte| decoder.push(*byte)) {
-                is_whole |= bench.take(received);
+    // Points of the curves of gyros and accelerometers in each report.
+    let mut points = Vec::new();
+    for (_, bytes) in &answers {
+        let mut octaves = 0;
+        for received in bytes.iter().filter_map(|byte| decoder.push(*byte)) {
+            if let Received::Message { message: Message::Channel(report), .. } = received {
+                octaves += if report.channel < 6 { report.octaves.len() } else { 0 };
             }
-            is_whole
-        });
+        }
+        points.push(octaves);
     }
+    assert!(0 < points[0] && points[0] < points[1], "{points:?}");
+    let mut bench = BenchRun::new(&plan, decoder.counters());
+    let mut answered = (String::new(), Vec::new());
+    while let Some((_, step)) = bench.begin_step() {
+        answered = short_bench.next_if(|(command, _)| *command == step.command).unwrap_or(answered);
+        assert_eq!(answered.0, step.command);
+        for received in answered.1.iter().filter_map(|byte| decoder.push(*byte)) {
+            bench.take(received);
+        }
+        answers.push(answered.clone());
+    }
+    assert_eq!(short_bench.next(), None, "every step has its answer");
+    let checks = checks(&bench.finish(decoder.counters()));
+    for check in &checks {
+        // One port, and so no second one.
+        assert!(check.cause.is_none() && (!check.measured.is_empty() || check.name == "second port"), "{check:?}");
+    }
+    assert!(checks.len() >= 20, "{}", checks.len());
     let mut table = Vec::new();
-    write_table(&checks(&bench.finish(decoder.counters())), &mut table).expect("memory");
+    write_table(&checks, &mut table).expect("memory");
     let table = String::from_utf8(table).expect("text");
-    assert!(!table.contains("FAIL"), "{table}");
-    let input = json!({ "answers": player.answers, "table": table, "finding": KEPT, "image": IMAGE });
+    let answers: Vec<_> =
+        answers.into_iter().map(|(command, bytes)| json!({ "command": command, "bytes": bytes })).collect();
+    let input = json!({ "answers": answers, "points": points[0], "table": table, "finding": KEPT, "image": IMAGE });
     let folder = tempfile::tempdir().expect("a folder");
     if !drive(TEST, "live.js", "observatory.html", folder.path(), &input.to_string()) {
         return;

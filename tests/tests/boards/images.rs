@@ -3,14 +3,6 @@
 use std::path::{Path, PathBuf};
 use system_tests::{Image, image_folder};
 
-/// Builds the image `observatory-{board}` for a target, with further features, and returns the path of its ELF.
-pub(crate) fn build(board: &str, target: &str, further: &[&str]) -> PathBuf {
-    let (feature, program) = (format!("board-{board}"), format!("observatory-{board}"));
-    let copy = [&[program.as_str()], further].concat().join("-");
-    let features = [&[feature.as_str()], further].concat().join(",");
-    build_package(("firmware", &program), target, &["--features", &features], &copy)
-}
-
 /// Builds the program of a package for a target, with further arguments of cargo, and returns the path of a copy of its ELF with the
 /// name `copy`.
 pub(crate) fn build_package((package, program): (&str, &str), target: &str, arguments: &[&str], copy: &str) -> PathBuf {

@@ -1,11 +1,11 @@
 //! The sampling path of each image: the machine code that the two sampling interrupts and that of the estimators reach.
 
 use super::bench::{TARGET, feather_image, image};
-use super::images;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::Path;
 use std::process::Command;
+use system_tests::Image;
 
 /// The target of the Pico.
 const PICO: &str = "thumbv6m-none-eabi";
@@ -120,8 +120,8 @@ fn the_sampling_path_of_each_image_has_no_panic() {
     let images = [
         (image(), h405),
         (feather_image(), feather),
-        (&images::build("feather", TARGET, &["feather-usb"]), feather),
-        (&images::build("pico", PICO, &[]), pico),
+        (&Image::of_board("feather", TARGET, &["feather-usb"]), feather),
+        (&Image::of_board("pico", PICO, &[]), pico),
     ];
     let left: BTreeSet<&str> =
         images.into_iter().flat_map(|(image, interrupts)| assert_no_panic(image, interrupts)).collect();
@@ -145,7 +145,7 @@ const FLASH: Range<u32> = 0x1000_0000..0x1100_0000;
 /// address, and know no address there. They call the boot ROM and the copy of the second stage through pointers.
 #[test]
 fn what_runs_while_the_flash_is_busy_does_not_use_it() {
-    let image = images::build("pico", PICO, &[]);
+    let image = Image::of_board("pico", PICO, &[]);
     let output = Command::new("arm-none-eabi-objdump")
         .args(["--disassemble-all", "--section=.data", "--demangle", "--no-show-raw-insn"])
         .arg(&image)

@@ -11,6 +11,7 @@ use emulation::{
 use link::{BootCause, ClockSource};
 use std::collections::BTreeMap;
 use std::path::Path;
+use system_tests::Image;
 
 /// The registers, after a run, that the documents of a board and of its microcontroller demand.
 pub(crate) fn assert_set_up(wiring: Wiring, registers: &BTreeMap<u64, u64>) {
@@ -224,7 +225,7 @@ fn the_h405_is_within_its_budget_and_gives_up_an_epoch_whose_fit_crashes() {
 #[ignore = "long: the same microcontroller on other boards; run with --long"]
 fn the_feather_is_within_its_budget() {
     assert_board_within_budget("Feather STM32F405", feather_image(), FEATHER);
-    let usb = images::build("feather", TARGET, &["feather-usb"]);
+    let usb = Image::of_board("feather", TARGET, &["feather-usb"]);
     assert_board_within_budget("Feather STM32F405, USB", &usb, FEATHER);
 }
 

@@ -8,7 +8,7 @@ use std::io::{Read, Write};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
-use system_tests::{image_folder, workspace};
+use system_tests::{Image, image_folder, workspace};
 use virtual_sensor::VirtualAdis16405;
 
 /// Paths of rp2040js and of the image, as ELF and as UF2.
@@ -33,7 +33,7 @@ impl Bench {
 fn bench() -> &'static Bench {
     static BENCH: OnceLock<Bench> = OnceLock::new();
     BENCH.get_or_init(|| {
-        let build = || images::build("pico", TARGET, &[]);
+        let build = || Image::of_board("pico", TARGET, &[]);
         Bench::new(std::env::var_os("OBSERVATORY_PICO_IMAGE").map_or_else(build, PathBuf::from))
     })
 }

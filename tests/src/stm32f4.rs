@@ -1,0 +1,85 @@
+//! The images for an STM32F405, run in the emulator of it, a program of `tests/tools`.
+
+use crate::{Image, tool};
+use emulation::{Outcome, Scenario};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::OnceLock;
+
+/// Rust's name of a Cortex-M4F.
+pub const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// The image for the Olimex STM32-H405, built at most once a run; `OBSERVATORY_IMAGE` names another.
+pub fn h405_image() -> &'static Path {
+    static IMAGE: OnceLock<PathBuf> = OnceLock::new();
+    let build = || Image::of_board("h405", TARGET, &[]);
+    IMAGE.get_or_init(|| std::env::var_os("OBSERVATORY_IMAGE").map_or_else(build, PathBuf::from))
+}
+
+/// Boots the image and runs it.
+pub fn run(image: &Path, scenario: Scenario) -> Outcome {
+    let mut emulator = Command::new(tool("stm32f4-emulator"))
+        .arg(image)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the emulator starts");
+    emulator.stdin.take().expect("a pipe").write_all(&scenario.to_bytes()).expect("the emulator reads");
+    let output = emulator.wait_with_output().expect("the emulator ends");
+    assert!(output.status.success(), "the emulator ends with {}", output.status);
+    Outcome::from_bytes(&output.stdout).expect("the results of the run")
+}
+
+/// Commands that are typed one after the other on the console of an emulated board.
+#[derive(Debug)]
+pub struct Typed {
+    /// Each with its time in s.
+    commands: Vec<(f64, String)>,
+    /// Time after the answer to the last one, s.
+    pub end_s: f64,
+}
+
+impl Typed {
+    /// The commands, each with the time for its answer in s, from the time at which a board has probed its sensor: it is left alone for its
+    /// start-up.
+    pub fn new(commands: impl IntoIterator<Item = (String, f64)>) -> Self {
+        let mut typed = Self { commands: Vec::new(), end_s: 0.8 };
+        for (command, seconds) in commands {
+            typed.commands.push((typed.end_s, command));
+            typed.end_s += seconds;
+        }
+        typed
+    }
+
+    /// The times, in s, and the keys.
+    pub fn keys(&self) -> impl Iterator<Item = (f64, String)> {
+        self.commands.iter().map(|(at_s, command)| (*at_s, format!("{command}\r")))
+    }
+
+    /// The commands, each with the bytes up to the next one of what a port has sent, each byte with its time in ns.
+    pub fn answers(&self, received: &[(u64, u8)]) -> Vec<(&str, Vec<u8>)> {
+        let ends = self.commands.iter().skip(1).map(|(at_s, _)| at_s * 1e9).chain([f64::INFINITY]);
+        let mut bytes = received.iter().peekable();
+        let mut until = |end_ns: f64| -> Vec<u8> {
+            std::iter::from_fn(|| bytes.next_if(|(at, _)| (*at as f64) < end_ns)).map(|&(_, byte)| byte).collect()
+        };
+        let mut answers = Vec::new();
+        for ((_, command), end_ns) in self.commands.iter().zip(ends) {
+            answers.push((command.as_str(), until(end_ns)));
+        }
+        answers
+    }
+}
+
+/// Time in s that is enough for the answer to a step of the bench by an emulated board whose report takes `report_s`; the step itself
+/// allows `longest_s`.
+pub fn answer_time(command: &str, longest_s: f64, report_s: f64) -> f64 {
+    match command.split(' ').next().unwrap_or_default() {
+        "w" if command == "w 1" => longest_s,
+        "r" => report_s,
+        "compare" | "check" | "measure" | "deflect" => 0.8,
+        "g" | "n" | "f" => 0.6,
+        _ => 0.15,
+    }
+}
