@@ -258,11 +258,18 @@ pub(crate) struct AnalyzeArguments {
 /// Files to inspect.
 #[derive(Debug, Args)]
 pub(crate) struct InspectArguments {
-    /// The files, of any format.
-    #[arg(value_name = "FILE", required = true)]
+    /// The files, of any format
+    ///
+    /// Shows for each column its unit, first values, mean, noise and step,
+    /// and what it is taken for; the rate in Hz, lost samples, the part at
+    /// rest, and the command that analyses the file.
+    #[arg(verbatim_doc_comment, value_name = "FILE", required = true)]
     pub(crate) files: Vec<PathBuf>,
-    /// Topic, message or array [default: every inertial sensor].
-    #[arg(long, help_heading = INPUT)]
+    /// Topic, message or array [default: every inertial sensor]
+    ///
+    /// Also one that is no inertial sensor.
+    /// Example: --topic sensor_baro
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT)]
     pub(crate) topic: Option<String>,
 }
 
@@ -443,11 +450,12 @@ pub(crate) struct SimulateArguments {
     /// A power of two: the Bartlett filter of the part, which averages twice.
     #[arg(verbatim_doc_comment, long, help_heading = SENSOR)]
     pub(crate) taps: Option<u32>,
-    /// N,B,K of channels [default: those of a published part]
+    /// As in gyro=0.037,0.009,0.0013; see --help
     ///
     /// Of one channel (gyro_x), or of all three of a kind (gyro, accl), which
     /// those of one channel override; may be given several times. In deg/√s,
-    /// deg/s, deg/s/√s, and in g/√Hz, g, g/√s.
+    /// deg/s, deg/s/√s, and in g/√Hz, g, g/√s. Default: those of a published
+    /// part.
     /// Example: --noise gyro=0.037,0.009,0.0013 --noise gyro_z=0.05,0.01,0
     #[arg(verbatim_doc_comment, long, help_heading = NOISE, value_name = "CHANNEL=N,B,K", value_parser = channel_noise)]
     pub(crate) noise: Vec<ChannelNoise>,
