@@ -3,7 +3,6 @@
 use super::LiveSource;
 use anyhow::Result;
 use observatory::latest_messages::LatestMessages;
-use observatory::message_text::summary;
 use recordings::serial::SerialLink;
 use reports::live::LiveView;
 use std::io::{Read, Write};
@@ -34,8 +33,6 @@ impl<P: Read + Write> LiveSource for DeviceSource<'_, P> {
     }
 
     fn view(&self) -> LiveView {
-        let mut view = self.messages.view(self.received.elapsed());
-        view.health += &format!(" Link: {}.", summary(&self.cable.counters()));
-        view
+        self.messages.view(self.received.elapsed(), &self.cable.counters())
     }
 }
