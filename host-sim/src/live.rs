@@ -3,7 +3,6 @@
 use crate::interrupt;
 use anyhow::{Context, Result};
 use observatory::latest_messages::LatestMessages;
-use observatory::message_text::summary;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
 use recordings::serial::SerialLink;
@@ -57,8 +56,7 @@ fn draw_until_end<P: Read + Write>(
     let mut group = CurveGroup::default();
     let (mut messages, mut last_received) = (LatestMessages::new(port.to_owned()), Instant::now());
     loop {
-        let mut view = messages.view(last_received.elapsed());
-        view.health += &format!(" Link: {}.", summary(&cable.counters()));
+        let view = messages.view(last_received.elapsed(), &cable.counters());
         // A changed size of the terminal is taken up here.
         terminal.draw(|frame| view.draw(frame, group, in_colour))?;
         if interrupted.load(Relaxed) || until.is_some_and(|until| Instant::now() >= until) {

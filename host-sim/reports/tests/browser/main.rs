@@ -57,6 +57,7 @@ fn report() -> Report {
         clearest: 0,
         validated: Validation::Yes,
         share_percent: [("gyro_z".to_owned(), 40.0)].into(),
+        minute_percent: Default::default(),
     };
     let line = SinusoidalLine {
         frequency_hz: of(0.7),

@@ -170,6 +170,7 @@ fn every_report_tells_how_the_noise_changes() {
         clearest: 0,
         validated: Validation::Yes,
         share_percent: Default::default(),
+        minute_percent: Default::default(),
     };
     // The followed line is at 21.1 Hz.
     report.findings = vec![line(20.7), line(40.0)];
