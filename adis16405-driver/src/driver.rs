@@ -136,8 +136,10 @@ impl<SPI, D, MODE> Adis16405<SPI, D, MODE> {
 /// The methods that run a procedure of [`Protocol`](crate::protocol::Protocol) of the same name; `$make_methods` makes
 /// each of them. `stimulating` methods switch the stimulus off after an error; others are `plain`.
 macro_rules! procedures {
-    ($make_methods:ident) => {
+    ($make_methods:ident, $front:tt) => {
         $make_methods! {
+            $front
+
             /// Reads which part is connected.
             ///
             /// # Errors

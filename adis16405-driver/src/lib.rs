@@ -77,6 +77,7 @@ mod config;
 mod delay;
 mod driver;
 mod error;
+mod fronts;
 mod pins;
 mod protocol;
 mod register;

@@ -142,7 +142,7 @@ pub enum DrdyEdge {
 }
 
 /// Monitors the data-ready edges of a sensor with one programmed sample period.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct DataReadyMonitor {
     /// Programmed period in 1/256 µs; above 0.
     period_q8: u64,
@@ -161,18 +161,8 @@ pub struct DataReadyMonitor {
 impl DataReadyMonitor {
     /// A monitor for edges at multiples of `period`, each within a quarter of it.
     #[must_use]
-    pub const fn new(period: SamplePeriod) -> Self {
-        let period_q8 = period.ticks() as u64 * TICK_Q8;
-        Self {
-            period_q8,
-            last_us: None,
-            probed_us: 0,
-            periods: 0,
-            elapsed_us: 0,
-            suspicion: 0,
-            silent: false,
-            new_phase: false,
-        }
+    pub fn new(period: SamplePeriod) -> Self {
+        Self { period_q8: u64::from(period.ticks()) * TICK_Q8, ..Self::default() }
     }
 
     /// Takes the time of an edge in microseconds; times must not decrease.
@@ -229,7 +219,7 @@ impl DataReadyMonitor {
         self.period_q8 > 0
     }
 
-    /// Clears the suspicion at `now_us`, after a probe.
+    /// Clears the suspicion at `now_us`, after a probe or a pause of the device's own.
     pub fn restart_at(&mut self, now_us: u64) {
         self.probed_us = now_us;
         self.new_phase = true;

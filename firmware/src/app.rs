@@ -4,11 +4,9 @@ use crate::bench_console;
 use crate::board::{Board, BrownOutLevel, BusTiming};
 use crate::command::{Command, CommandError, CommandParser};
 use crate::console::{Console, SAFE_MODE, VERSION_LINE};
-use crate::counters::CounterLog;
-use crate::device::{
-    DeviceState, FIRST_CONFIG, FIRST_SETTINGS, START_UP_US, SensorRecovery, SensorState, config_from_registers, log,
-};
-use crate::epoch::{FinishedEpoch, Regressors, estimate_regressors};
+use crate::counters::{CounterLog, add};
+use crate::device::{DeviceState, FIRST_CONFIG, FIRST_SETTINGS, START_UP_US, SensorRecovery, SensorState, log};
+use crate::epoch::{EpochChannel, FinishedEpoch, Regressors};
 use crate::event::event;
 use crate::learner::{EpochFit, Learner};
 use crate::receive::HostPort;
@@ -18,7 +16,7 @@ use crate::scale::ReportScale;
 use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, auto_null};
 use crate::settings_store::{MAX_RECORD, StoreError};
 use crate::statistics::CHANNELS;
-use crate::status_flags::{StatusFlags, count};
+use crate::status_flags::StatusFlags;
 use crate::stored_state::{self, StoredSettings};
 use crate::watchdog::TaskMonitor;
 use adis16405_driver::{Config, ConfigError, SamplePeriod};
@@ -72,7 +70,7 @@ pub fn run(mut board: impl Board, start: Start) -> ! {
 }
 
 fn interval_us(settings: RetainedSettings) -> u64 {
-    u64::from(settings.interval_s) * 1_000_000
+    u64::from(settings.user.interval_s) * 1_000_000
 }
 
 impl App {
@@ -88,17 +86,14 @@ impl App {
             event!(error, "safe mode");
             log(board, format_args!("{SAFE_MODE}"));
         }
-        let restored = retained
-            .settings()
-            .and_then(|settings| Some((settings, config_from_registers(settings.smpl_prd, settings.sens_avg)?)));
+        let with_config = |settings: RetainedSettings| Some((settings, settings.user.config()?));
+        let restored = retained.settings().and_then(with_config);
         let first = restored.is_none();
         let mut learner = Learner::new(finished);
         let stored = if boot.safe_mode { None } else { read_stored(board, &mut learner) };
-        let kept = || {
-            let settings = stored?.apply_to(FIRST_SETTINGS);
-            Some((settings, config_from_registers(settings.smpl_prd, settings.sens_avg)?))
-        };
-        let (mut settings, config) = restored.or_else(kept).unwrap_or((FIRST_SETTINGS, FIRST_CONFIG));
+        let fresh = |user| RetainedSettings { user, ..RetainedSettings::default() };
+        let kept = || with_config(fresh(stored?.user));
+        let (mut settings, config) = restored.or_else(kept).unwrap_or((fresh(FIRST_SETTINGS), FIRST_CONFIG));
         settings.starts = starts.saturating_add(1);
         boot.starts = settings.starts;
         board.estimators(|estimators| estimators.restart(config));
@@ -115,7 +110,7 @@ impl App {
                 retained.restore_epoch(finished) && finished.number.wrapping_add(1) == settings.epoch
             });
         match stored {
-            Some(stored) if stored.have_sensor_of(settings) => {
+            Some(stored) if stored.user.of_sensor() == settings.user.of_sensor() => {
                 board.estimators(|estimators| estimators.set_raw_stream(first && stored.raw_stream));
             }
             _ => learner.reset(),
@@ -140,12 +135,12 @@ impl App {
                 epoch_start_us: now_us as i64 - settings.epoch_age_us as i64,
                 counters: Health::default(),
                 recovery: SensorRecovery::default(),
-                status_flags: StatusFlags::new(),
+                status_flags: StatusFlags::default(),
                 report_scale: ReportScale::new(config, None),
             },
             retained,
             parsers: Default::default(),
-            console: Console::new(),
+            console: Console::default(),
             report,
             next_report_us: now_us + interval_us(settings),
             next_checkpoint_us: now_us + CHECKPOINT_US,
@@ -221,7 +216,7 @@ impl App {
             Command::ResetStatistics => {
                 self.reset_statistics(board);
                 self.state.counters = Health::default();
-                self.state.status_flags = StatusFlags::new();
+                self.state.status_flags = StatusFlags::default();
                 self.print(board, format_args!("statistics reset"));
             }
             Command::Rate(millihertz) => match SamplePeriod::nearest(f64::from(millihertz) / 1000.0) {
@@ -233,13 +228,13 @@ impl App {
             }
             Command::Filter(taps) => self.configure(board, Config::new(range, taps, period)),
             Command::Epoch(seconds) => {
-                self.state.settings.epoch_s = seconds;
+                self.state.settings.user.epoch_s = seconds;
                 self.retained.write_settings(self.state.settings, false);
                 let age_s = self.state.epoch_age_s(now_us);
                 self.print(board, format_args!("epoch of {seconds} s; this one began {age_s} s ago"));
             }
             Command::Interval(seconds) => {
-                self.state.settings.interval_s = seconds;
+                self.state.settings.user.interval_s = seconds;
                 self.next_report_us = now_us + interval_us(self.state.settings);
                 self.retained.write_settings(self.state.settings, false);
                 self.print(board, format_args!("reports every {seconds} s"));
@@ -250,7 +245,7 @@ impl App {
             }
             Command::SelfTest => self.state.request_check(now_us, board),
             Command::ProductId(prod_id) => {
-                self.state.settings.prod_id = prod_id;
+                self.state.settings.user.prod_id = prod_id;
                 self.retained.write_settings(self.state.settings, false);
                 match prod_id {
                     0 => self.print(board, format_args!("parts with the PROD_ID of their type")),
@@ -293,13 +288,11 @@ impl App {
             }
             Command::SlowBus(is_slow) => {
                 board.set_sampling(false);
-                let set = board.set_bus_timing(if is_slow { BusTiming::SLOW } else { BusTiming::USUAL });
+                board.set_bus_timing(if is_slow { BusTiming::SLOW } else { BusTiming::USUAL });
                 self.state.request_probe(now_us);
-                match (set, is_slow) {
-                    (true, true) => self.print(board, format_args!("slow timing of the bus, until a restart")),
-                    (true, false) => self.print(board, format_args!("usual timing of the bus")),
-                    (false, _) => self.print(board, format_args!("this board has one timing of its bus")),
-                }
+                let timing =
+                    if is_slow { "slow timing of the bus, until a restart" } else { "usual timing of the bus" };
+                self.print(board, format_args!("{timing}"));
             }
             Command::Persist => {
                 let written = self.persist(board);
@@ -333,7 +326,7 @@ impl App {
     }
 
     fn reject(&mut self, error: CommandError, board: &mut impl Board) {
-        count(&mut self.state.counters.bad_commands);
+        add(&mut self.state.counters.bad_commands, 1);
         match error {
             CommandError::UnknownKey(byte) => {
                 let key = char::from(byte).escape_default();
@@ -359,8 +352,8 @@ impl App {
             );
         }
         self.state.config = config;
-        self.state.settings.smpl_prd = config.sample_period().register();
-        self.state.settings.sens_avg = config.sens_avg();
+        self.state.settings.user.smpl_prd = config.sample_period().register();
+        self.state.settings.user.sens_avg = config.sens_avg();
         self.reset_statistics(board);
         board.estimators(|estimators| estimators.restart(config));
         self.state.request_probe(board.now_us());
@@ -400,9 +393,9 @@ impl App {
     /// Keeps settings and models without power; returns the pause of sampling in µs.
     #[inline(never)]
     fn persist(&mut self, board: &mut impl Board) -> Result<u64, StoreError> {
-        let raw_stream = board.estimators(|estimators| estimators.has_raw_stream());
+        let raw_stream = board.estimators(|estimators| estimators.raw_stream.is_on());
         let mut record = [0; MAX_RECORD];
-        let settings = StoredSettings::new(self.state.settings, raw_stream);
+        let settings = StoredSettings { user: self.state.settings.user, raw_stream };
         let record =
             stored_state::encode(&settings, &self.state.learner.models, &mut record).ok_or(StoreError::TooLong)?;
         self.write_record(record, board)
@@ -429,12 +422,9 @@ impl App {
         let began_us = board.now_us();
         board.set_sampling(false);
         let written = board.write_record(record);
-        let now_us = board.now_us();
-        if self.state.is_sampled() {
-            board.estimators(|estimators| estimators.restart_rate_check(now_us));
-            board.set_sampling(true);
-        }
-        written.map(|()| now_us - began_us)
+        let pause_us = board.now_us() - began_us;
+        self.state.resume_sampling(board);
+        written.map(|()| pause_us)
     }
 
     fn tell_written(&mut self, written: Result<u64, StoreError>, done: &str, board: &mut impl Board) {
@@ -470,7 +460,7 @@ impl App {
     }
 
     fn checkpoint_channel(&mut self, board: &mut impl Board, index: usize) {
-        self.retained.checkpoint(index, &running_sums(board, index));
+        self.retained.checkpoint(index, &mut running_sums(board, index));
     }
 
     fn check_timers(&mut self, board: &mut impl Board) {
@@ -478,7 +468,7 @@ impl App {
         if self.counter_log.is_due(now_us) {
             self.counter_log.compare(&self.state.health(board), now_us);
         }
-        let epoch_us = u64::from(self.state.settings.epoch_s) * 1_000_000;
+        let epoch_us = u64::from(self.state.settings.user.epoch_s) * 1_000_000;
         if epoch_us > 0 && self.state.epoch_age_us(now_us) >= epoch_us {
             self.finish_epoch(board);
         }
@@ -540,21 +530,19 @@ impl App {
     /// Fits a channel's model to the finished epoch, servicing everything else meanwhile, and sends it.
     fn learn(&mut self, board: &mut impl Board, index: usize) {
         let Some(epoch) = self.state.learner.finished.take() else { return };
-        let scale = epoch.scale(self.state.config);
-        if let Some(regressors) = estimate_regressors(epoch, index, scale, &mut || self.service_during_fit(board)) {
-            self.fit_model(board, epoch, index, regressors);
+        let channel = EpochChannel { epoch, index, scale: epoch.scale(self.state.config) };
+        if let Some(regressors) = channel.estimate_regressors(&mut || self.service_during_fit(board)) {
+            self.fit_model(board, channel, regressors);
         }
         self.state.learner.finished = Some(epoch);
     }
 
-    fn fit_model(&mut self, board: &mut impl Board, epoch: &FinishedEpoch, index: usize, regressors: Regressors) {
-        let scale = epoch.scale(self.state.config);
+    fn fit_model(&mut self, board: &mut impl Board, channel: EpochChannel<'_>, regressors: Regressors) {
         let mut fit = EpochFit::new(regressors);
-        if !fit.run(epoch, index, scale, &mut || self.service_during_fit(board)) {
-            return;
+        if fit.run(channel, &mut || self.service_during_fit(board)) {
+            self.state.learner.learn(&fit, channel.epoch, channel.index);
+            send_learned(board, &fit, channel.index, channel.epoch.number);
         }
-        self.state.learner.learn(&fit, epoch, index);
-        send_learned(board, &fit, index, epoch.number);
     }
 
     /// All but reports and tables; false cancels the fit, after a reset of the statistics.

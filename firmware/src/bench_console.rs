@@ -74,16 +74,8 @@ fn ask(request: Request, state: &DeviceState, board: &mut impl Board) -> Result<
         answer.map_err(|error| text_line(format_args!("{error}")))
     };
     board.set_clock_limit(clock_limit_hz(state.config));
-    resume(state, board);
+    state.resume_sampling(board);
     answer
-}
-
-fn resume(state: &DeviceState, board: &mut impl Board) {
-    if state.is_sampled() {
-        let now_us = board.now_us();
-        board.estimators(|estimators| estimators.restart_rate_check(now_us));
-        board.set_sampling(true);
-    }
 }
 
 fn line(register: Register, state: &DeviceState, board: &mut impl Board) -> TextLine {
@@ -149,7 +141,7 @@ pub(crate) fn measurement_line(state: &DeviceState, board: &mut impl Board, inde
     let hz = |hz: f64| Decimal::significant(hz, 5);
     AnswerLine::Text(match index {
         0 => {
-            let burst_us = board.frame_times().map_or(0, |times| times.low_us);
+            let burst_us = board.frame_times().low_us;
             let bits = 8 * BURST_BYTES as u32;
             match (state.is_sampled(), burst_us) {
                 (true, 1..) => text_line(format_args!(
@@ -161,10 +153,10 @@ pub(crate) fn measurement_line(state: &DeviceState, board: &mut impl Board, inde
             }
         }
         1 => match register_frames(state, board) {
-            Some(FrameTimes { shortest_high_us, shortest_period_us, .. }) => text_line(format_args!(
+            Ok(FrameTimes { shortest_high_us, shortest_period_us, .. }) => text_line(format_args!(
                 "stall: CS high for {shortest_high_us} us or more; read rate: {shortest_period_us} us or more a frame"
             )),
-            None => text_line(format_args!("stall: not measured on this board")),
+            Err(error) => text_line(format_args!("stall: {error}")),
         },
         2 => {
             let measured = board.estimators(|estimators| estimators.measured_hz());
@@ -185,7 +177,7 @@ pub(crate) fn measurement_line(state: &DeviceState, board: &mut impl Board, inde
             board.set_sampling(false);
             let limit_us = PULSE_US.max((1e6 * PULSE_PERIODS / state.config.sample_period().hz()) as u32);
             let width = board.data_ready_width_us(limit_us);
-            resume(state, board);
+            state.resume_sampling(board);
             match width {
                 Some(us) => text_line(format_args!("DRDY: high for {us} us, within some us")),
                 None => text_line(format_args!("DRDY: no pulse in {} ms", limit_us / 1000)),
@@ -195,10 +187,11 @@ pub(crate) fn measurement_line(state: &DeviceState, board: &mut impl Board, inde
     })
 }
 
-fn register_frames(state: &DeviceState, board: &mut impl Board) -> Option<FrameTimes> {
-    board.frame_times()?;
-    ask(Request::Read(Register::ProdId), state, board).ok()?;
-    board.frame_times()
+#[allow(clippy::result_large_err, reason = "as for `ask`")]
+fn register_frames(state: &DeviceState, board: &mut impl Board) -> Result<FrameTimes, TextLine> {
+    board.frame_times();
+    ask(Request::Read(Register::ProdId), state, board)?;
+    Ok(board.frame_times())
 }
 
 /// Deflections of gyros x, y, z and accelerometers x, y, z, counts.

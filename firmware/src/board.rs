@@ -7,6 +7,7 @@ use crate::settings_store::StoreError;
 use crate::transmit::TransmitQueue;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::SpiDevice;
+use link::Health;
 
 /// Times of chip select between two frames in one power mode, ns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,18 +63,6 @@ impl FrameTimes {
     pub const NONE: Self = Self { low_us: 0, shortest_high_us: u32::MAX, shortest_period_us: u32::MAX };
 }
 
-/// The sensor's bus, whose serial clock can be changed between two frames.
-pub trait SensorBus: SpiDevice<u8> {
-    /// Sets the fastest serial clock of at most `limit_hz`, or the slowest one if none is slow enough; returns it in Hz.
-    fn set_clock_limit(&mut self, limit_hz: u32) -> u32;
-    /// Drops what was received, and disables and enables the peripheral.
-    fn reset(&mut self);
-    /// Keeps other times from the next frame on.
-    fn set_timing(&mut self, timing: BusTiming);
-    /// The times of the frames since they were taken last.
-    fn take_frame_times(&mut self) -> FrameTimes;
-}
-
 /// The application's view of a board: its microcontroller, or a virtual sensor on the host.
 pub trait Board {
     /// The sensor's bus, for registers.
@@ -100,18 +89,12 @@ pub trait Board {
     fn sampling_activity(&mut self) -> SamplingActivity;
     /// Resets the microcontroller's side of the bus; only while sampling is disabled.
     fn reset_bus(&mut self);
-    /// Sets other bus times, only while sampling is disabled; false if the board cannot.
-    fn set_bus_timing(&mut self, _timing: BusTiming) -> bool {
-        false
-    }
-    /// Frame times since the last call; `None` if unknown.
-    fn frame_times(&mut self) -> Option<FrameTimes> {
-        None
-    }
+    /// Sets other bus times; only while sampling is disabled.
+    fn set_bus_timing(&mut self, timing: BusTiming);
+    /// Frame times since the last call.
+    fn frame_times(&mut self) -> FrameTimes;
     /// Width of the next data-ready pulse in µs, while sampling is disabled; `None` if none ends within `limit_us`.
-    fn data_ready_width_us(&mut self, _limit_us: u32) -> Option<u32> {
-        None
-    }
+    fn data_ready_width_us(&mut self, limit_us: u32) -> Option<u32>;
     /// Pulses the sensor's RST line; false if not connected.
     fn reset_sensor(&mut self) -> bool {
         false
@@ -122,8 +105,8 @@ pub trait Board {
     fn transmit_queue<R>(&mut self, access: impl FnOnce(&mut TransmitQueue<'static>) -> R) -> R;
     /// The next received byte, and the port that has received it.
     fn receive(&mut self) -> Option<(HostPort, u8)>;
-    /// Load figures of the board.
-    fn meters(&mut self) -> BoardMeters;
+    /// Load figures of the board since it started, and the bytes that its ports have lost; the others are 0.
+    fn health(&mut self) -> Health;
     /// Feeds the watchdog.
     fn feed_watchdog(&mut self);
     /// Restarts the microcontroller; retained RAM keeps its content.
@@ -167,23 +150,6 @@ pub enum BrownOutLevel {
     Failed,
 }
 
-/// Load figures of a board since it started.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct BoardMeters {
-    /// Time that the processor slept, in microseconds.
-    pub asleep_us: u64,
-    /// Received bytes lost because they came faster than they were read.
-    pub serial_overruns: u32,
-    /// Longest sampling interrupt in processor cycles.
-    pub sampling_cycles: u32,
-    /// Longest run of the estimators in processor cycles, preemption included.
-    pub estimator_cycles: u32,
-    /// Largest stack depth in bytes.
-    pub stack_bytes: u32,
-    /// Size of the stack in bytes.
-    pub stack_size: u32,
-}
-
 /// Microseconds since the start, from a microsecond counter of 32 bits.
 #[derive(Debug, Clone, Copy)]
 pub struct Uptime {
@@ -204,14 +170,6 @@ impl Uptime {
         self.last = counter;
         self.total_us
     }
-}
-
-/// The data-ready line, whose edges raise an interrupt.
-pub trait DataReadyLine {
-    /// Masks edges, or takes them again without those in between.
-    fn set_masked(&mut self, masked: bool);
-    /// The level of the line.
-    fn is_active(&mut self) -> bool;
 }
 
 #[cfg(test)]

@@ -19,6 +19,7 @@ const WAITING_LINES: usize = 4;
 /// Answers that may wait, including the current one.
 const WAITING_ANSWERS: usize = 4;
 
+#[derive(Default)]
 pub(crate) struct Console {
     lines: Deque<TextLine, WAITING_LINES>,
     answers: Deque<Answer, WAITING_ANSWERS>,
@@ -29,10 +30,6 @@ pub(crate) struct Console {
 }
 
 impl Console {
-    pub(crate) fn new() -> Self {
-        Self { lines: Deque::new(), answers: Deque::new(), next_line: 0, counted: Health::default() }
-    }
-
     /// Sends a line behind the waiting ones; drops the oldest of too many.
     pub(crate) fn print(&mut self, board: &mut impl Board, text: Arguments<'_>) {
         let line = text_line(text);
@@ -121,7 +118,7 @@ fn status_line(state: &DeviceState, board: &mut impl Board, index: usize) -> Ans
         }
         2 => {
             let samples = board.estimators(|estimators| estimators.channel(0).map(|estimator| estimator.len()));
-            let (epoch, length) = (state.settings.epoch, state.settings.epoch_s);
+            let (epoch, length) = (state.settings.epoch, state.settings.user.epoch_s);
             let (samples, age) = (samples.unwrap_or(0), state.epoch_age_s(now_us));
             text_line(format_args!("{samples} samples, epoch {epoch}, begun {age} s ago, length {length} s"))
         }

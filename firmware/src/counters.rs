@@ -1,7 +1,12 @@
-//! Counters that have risen since the last log to the debug probe.
+//! Counters: counting, and those that have risen since the last log to the debug probe.
 
 use crate::event::event;
 use link::{Counter, Health};
+
+/// Counters saturate.
+pub(crate) fn add(counter: &mut u32, more: u32) {
+    *counter = counter.saturating_add(more);
+}
 
 /// Time between two comparisons, in µs.
 const COMPARE_US: u64 = 1_000_000;

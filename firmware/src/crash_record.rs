@@ -23,17 +23,22 @@ impl CrashRecord {
     pub fn write(&self, text: fmt::Arguments<'_>) {
         if self.0.read(KEY).is_none() {
             let line = text_line(text);
-            let mut bytes = line.bytes();
-            let word = |_| u32::from_le_bytes(core::array::from_fn(|_| bytes.next().unwrap_or(0)));
-            self.0.write(KEY, [line.len() as u32].into_iter().chain((0..TEXT_WORDS).map(word)));
+            self.0.write(KEY, |words| {
+                words.word(&mut (line.len() as u32));
+                let mut bytes = line.bytes();
+                (0..TEXT_WORDS).for_each(|_| {
+                    words.word(&mut u32::from_le_bytes(core::array::from_fn(|_| bytes.next().unwrap_or(0))));
+                });
+            });
         }
     }
 
     /// Returns the text and erases it; empty if there was none or it was damaged.
     pub fn take(&self) -> TextLine {
         let Some(mut words) = self.0.read(KEY) else { return TextLine::new() };
-        let length = words.word() as usize;
-        let text: Vec<u8, { 4 * TEXT_WORDS }> = words.0.flat_map(u32::to_le_bytes).take(length).collect();
+        let [length] = words.read();
+        let text = words.read::<TEXT_WORDS>().into_iter().flat_map(u32::to_le_bytes).take(length as usize);
+        let text: Vec<u8, { 4 * TEXT_WORDS }> = text.collect();
         self.0.clear();
         core::str::from_utf8(&text).ok().and_then(|text| TextLine::try_from(text).ok()).unwrap_or_default()
     }

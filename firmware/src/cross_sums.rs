@@ -35,7 +35,7 @@ pub(crate) struct CrossSums {
     samples: u64,
     refused_counts: [u64; CHANNELS.len()],
     /// Samples before a restart are missing.
-    incomplete: bool,
+    pub(crate) incomplete: bool,
 }
 
 impl CrossSums {
@@ -58,10 +58,6 @@ impl CrossSums {
         self.counts.fill([0; PAIRS.len()]);
         (self.totals, self.samples, self.refused_counts) = ([0; CHANNELS.len()], 0, [0; CHANNELS.len()]);
         self.incomplete = false;
-    }
-
-    pub(crate) fn mark_incomplete(&mut self) {
-        self.incomplete = true;
     }
 
     /// Adds counts of all but the `refused` channels, and completed second differences.

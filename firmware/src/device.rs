@@ -2,14 +2,15 @@
 
 use crate::board::{Board, BusTiming};
 use crate::channels::{CHANNELS, ChannelSet};
+use crate::counters::add;
 use crate::event::event;
 use crate::learner::Learner;
 use crate::recovery::{RecoveryLadder, RecoveryStep};
-use crate::retained::RetainedSettings;
+use crate::retained::{RetainedSettings, UserSettings};
 use crate::sample_intake::SensorTrouble;
 use crate::scale::ReportScale;
 use crate::sensor::{BURST_LIMIT_HZ, LOW_POWER_LIMIT_HZ, ProbeScope, SensorIdentity, probe, read_diagnosis};
-use crate::status_flags::{StatusFlags, count};
+use crate::status_flags::StatusFlags;
 use adis16405_driver::{ClockMode, Config, GyroRange, SamplePeriod, TimeBase, Timing};
 use core::fmt::Arguments;
 use link::{Boot, Health, MessageRef, text_line};
@@ -22,14 +23,11 @@ pub const FIRST_CONFIG: Config = {
 };
 
 /// First start: a report every ten seconds, an endless epoch.
-pub(crate) const FIRST_SETTINGS: RetainedSettings = RetainedSettings {
+pub(crate) const FIRST_SETTINGS: UserSettings = UserSettings {
     smpl_prd: FIRST_CONFIG.sample_period().register(),
     sens_avg: FIRST_CONFIG.sens_avg(),
     epoch_s: 0,
-    epoch: 0,
     interval_s: 10,
-    starts: 0,
-    epoch_age_us: 0,
     prod_id: 0,
 };
 
@@ -90,18 +88,10 @@ impl DeviceState {
     }
 
     pub(crate) fn health(&self, board: &mut impl Board) -> Health {
-        let (meters, now_us) = (board.meters(), board.now_us());
-        let asleep_permille = (1000 * meters.asleep_us).checked_div(now_us).unwrap_or(0);
         let of_board = Health {
             data_ready_masked: board.sampling_activity().masked,
             usb_dropped: board.transmit_queue(|queue| queue.usb_dropped()),
-            serial_overruns: meters.serial_overruns,
-            awake_permille: 1000_u32.saturating_sub(asleep_permille as u32),
-            sampling_cycles: meters.sampling_cycles,
-            estimator_cycles: meters.estimator_cycles,
-            stack_bytes: meters.stack_bytes,
-            stack_size: meters.stack_size,
-            ..Health::default()
+            ..board.health()
         };
         board.estimators(|estimators| estimators.health()).with(&self.counters).with(&of_board)
     }
@@ -113,9 +103,10 @@ impl DeviceState {
             SensorState::Probing { at_us, step } if now_us >= at_us => self.probe(step, board),
             SensorState::Probing { .. } => {}
             SensorState::Sampled { since_us } => {
-                let (is_intact, trouble, used, settled) = board.estimators(|estimators| {
-                    let (used, settled) = (estimators.used_since_probe() > 0, estimators.is_settled());
-                    (estimators.is_intact(), estimators.trouble(now_us), used, settled)
+                let (is_intact, trouble, used, settled, flagged_us) = board.estimators(|estimators| {
+                    let (used, settled) = (estimators.used_since_probe > 0, estimators.is_settled());
+                    let flagged_us = estimators.monitor.last_edge_us().filter(|_| estimators.error_flag);
+                    (estimators.monitor.has_period(), estimators.trouble(now_us), used, settled, flagged_us)
                 });
                 if !is_intact {
                     // Ends the burst: a sensor cut off within one is late to answer.
@@ -123,13 +114,15 @@ impl DeviceState {
                     panic!("memory is damaged: the sample period is 0");
                 }
                 if let Some(trouble) = trouble {
-                    self.counters.recoveries = self.counters.recoveries.saturating_add(u32::from(used));
+                    add(&mut self.counters.recoveries, u32::from(used));
                     self.recover(trouble, since_us + RETRY_US, board);
                 } else {
                     if settled {
                         self.recovery.ladder.settle();
                     }
-                    self.read_status(board);
+                    if let Some(edge_us) = flagged_us {
+                        self.read_status(edge_us, board);
+                    }
                 }
             }
             SensorState::Restarting { at_us } => {
@@ -143,6 +136,15 @@ impl DeviceState {
         false
     }
 
+    /// After a pause of the device's own: samples are lost, without suspicion.
+    pub(crate) fn resume_sampling(&self, board: &mut impl Board) {
+        if self.is_sampled() {
+            let now_us = board.now_us();
+            board.estimators(|estimators| estimators.monitor.restart_at(now_us));
+            board.set_sampling(true);
+        }
+    }
+
     /// Requests a probe at `at_us`; sampling must be disabled.
     pub(crate) fn request_probe(&mut self, at_us: u64) {
         self.sensor = SensorState::Probing { at_us, step: None };
@@ -151,7 +153,7 @@ impl DeviceState {
     /// Begins the next step of recovery, at `earliest_us` or later.
     fn recover(&mut self, trouble: SensorTrouble, earliest_us: u64, board: &mut impl Board) {
         event!(warn, "sensor in trouble: {}", trouble);
-        let last_edge_us = board.estimators(|estimators| estimators.last_edge_us());
+        let last_edge_us = board.estimators(|estimators| estimators.monitor.last_edge_us());
         board.set_sampling(false);
         let (reason, cause, left_alone_us) = match trouble {
             _ if board.sampling_activity().is_masked => ("the data-ready line oscillates and is masked", "", 0),
@@ -182,9 +184,9 @@ impl DeviceState {
         let counters = &mut self.counters;
         match step {
             None | Some(RecoveryStep::Restart) => {}
-            Some(RecoveryStep::Reread) => count(&mut counters.rereads),
+            Some(RecoveryStep::Reread) => add(&mut counters.rereads, 1),
             Some(step @ (RecoveryStep::BusReset | RecoveryStep::SlowBus)) => {
-                count(&mut counters.bus_resets);
+                add(&mut counters.bus_resets, 1);
                 board.reset_bus();
                 if step == RecoveryStep::SlowBus {
                     board.set_bus_timing(BusTiming::SLOW);
@@ -192,18 +194,18 @@ impl DeviceState {
                 scope = ProbeScope { pulse: true, reset: false, self_test: true };
             }
             Some(RecoveryStep::ResetLine) if board.reset_sensor() => {
-                count(&mut counters.reset_lines);
+                add(&mut counters.reset_lines, 1);
                 self.recovery.tested = false;
                 return self.request_probe(board.now_us() + START_UP_US);
             }
             Some(RecoveryStep::SoftwareReset | RecoveryStep::ResetLine) => {
-                count(&mut counters.sensor_resets);
+                add(&mut counters.sensor_resets, 1);
                 scope = ProbeScope { pulse: true, reset: true, self_test: true };
             }
         }
         // Perhaps in low-power mode.
         let sck_hz = board.set_clock_limit(LOW_POWER_LIMIT_HZ);
-        let result = probe(board.sensor_bus(), self.config, sck_hz, scope, self.settings.prod_id)
+        let result = probe(board.sensor_bus(), self.config, sck_hz, scope, self.settings.user.prod_id)
             .map_err(|error| text_line(format_args!("{error}")));
         self.spi_clock_hz = board.set_clock_limit(clock_limit_hz(self.config));
         match result {
@@ -263,21 +265,18 @@ impl DeviceState {
         Err(clock_hz)
     }
 
-    /// Reads and clears DIAG_STAT after an error flag, in the first half of a sample period, once a second at most.
-    fn read_status(&mut self, board: &mut impl Board) {
+    /// Reads and clears DIAG_STAT after an error flag, in the first half of the sample period from `edge_us` on, once a
+    /// second at most.
+    fn read_status(&mut self, edge_us: u64, board: &mut impl Board) {
         let now_us = board.now_us();
         let half_period_us = (5e5 / self.config.sample_period().hz()) as u64;
-        let due = board.estimators(|estimators| {
-            let since_edge = estimators.last_edge_us().map(|edge_us| now_us.saturating_sub(edge_us));
-            estimators.has_error_flag() && since_edge.is_some_and(|since_us| since_us < half_period_us)
-        });
-        if !due || !self.status_flags.is_due(now_us) {
+        if !self.status_flags.is_due(now_us) || now_us.saturating_sub(edge_us) >= half_period_us {
             return;
         }
         board.set_sampling(false);
         let diagnosis = read_diagnosis(board.sensor_bus(), self.config);
         board.set_sampling(true);
-        board.estimators(|estimators| estimators.clear_error_flag());
+        board.estimators(|estimators| estimators.error_flag = false);
         if let Some(causes) = self.status_flags.add(diagnosis, now_us, &mut self.counters) {
             event!(warn, "DIAG_STAT {}", causes);
             log(board, format_args!("sensor: DIAG_STAT {causes}"));
@@ -295,14 +294,4 @@ pub(crate) fn clock_limit_hz(config: Config) -> u32 {
 pub(crate) fn log(board: &mut impl Board, text: Arguments<'_>) {
     let line = text_line(text);
     board.transmit_queue(|queue| queue.send(MessageRef::Log(&line)));
-}
-
-pub(crate) fn config_from_registers(smpl_prd: u8, sens_avg: u16) -> Option<Config> {
-    let range = match sens_avg >> 8 {
-        0b100 => GyroRange::Dps300,
-        0b010 => GyroRange::Dps150,
-        0b001 => GyroRange::Dps75,
-        _ => return None,
-    };
-    Config::new(range, sens_avg as u8, SamplePeriod::from_register(smpl_prd)?).ok()
 }

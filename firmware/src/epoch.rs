@@ -59,11 +59,6 @@ impl FinishedEpoch {
         self.sums.get(index)
     }
 
-    /// Rebuilds the Allan variance curve of [`CHANNELS`]`[index]` in its unit.
-    pub fn rebuild_curve(&self, curve: &mut Curve<OCTAVES>, index: usize, scale: ReportScale) {
-        self.sums[index].rebuild_curve(curve, CHANNELS[index], scale);
-    }
-
     /// `None` if samples are missing in them, as after a restart.
     #[must_use]
     pub fn covariances(&self) -> Option<&AllanCovariances> {
@@ -89,104 +84,149 @@ pub type Regressors = Vec<Regressor, MAX_COVARIATES>;
 
 type Candidates = Vec<usize, MAX_COVARIATES>;
 
-/// Estimates significant sensitivities of [`CHANNELS`]`[index]`, none without
-/// [covariances](FinishedEpoch::covariances); `None` if `keep_on`, called before every fit, returned false.
-#[must_use]
-pub fn estimate_regressors(
-    epoch: &FinishedEpoch,
-    index: usize,
-    scale: ReportScale,
-    keep_on: &mut dyn FnMut() -> bool,
-) -> Option<Regressors> {
-    let Some(covariances) = epoch.covariances() else { return Some(Regressors::new()) };
-    let mut candidates: Candidates = candidates(index).collect();
-    let mut channel = Curve::empty();
-    epoch.rebuild_curve(&mut channel, index, scale);
-    let mut covariates: Vec<Covariate<CROSS_OCTAVES>, MAX_COVARIATES> = Vec::new();
-    for &candidate in &candidates {
-        if !keep_on() {
-            return None;
+/// A channel of a finished epoch.
+#[derive(Debug, Clone, Copy)]
+pub struct EpochChannel<'e> {
+    /// The epoch.
+    pub epoch: &'e FinishedEpoch,
+    /// Its index in [`CHANNELS`].
+    pub index: usize,
+    /// The [scale](FinishedEpoch::scale) of the epoch.
+    pub scale: ReportScale,
+}
+
+impl EpochChannel<'_> {
+    fn other(self, index: usize) -> Self {
+        Self { index, ..self }
+    }
+
+    fn lsb(self) -> f64 {
+        self.scale.lsb(CHANNELS[self.index])
+    }
+
+    /// The Allan variance curve in its unit.
+    pub(crate) fn curve(self) -> Curve<OCTAVES> {
+        self.epoch.sums[self.index].curve(CHANNELS[self.index], self.scale)
+    }
+
+    /// With another channel, in the product of both units.
+    fn covariance(self, other: usize, n: u64) -> Option<f64> {
+        let covariance = self.epoch.covariances()?.covariance(self.index, other, n)?;
+        Some(covariance * self.lsb() * self.other(other).lsb())
+    }
+
+    /// Of the channel, or a candidate, with a candidate.
+    fn covariance_of(self, candidates: &[usize], with: Option<usize>, covariate: usize, n: u64) -> Option<f64> {
+        self.other(with.map_or(self.index, |other| candidates[other])).covariance(candidates[covariate], n)
+    }
+
+    /// A covariate at the octaves of the cross sums, its own noise modelled (estimate) or measured (subtraction).
+    fn covariate(self, index: usize, modelled: bool) -> Covariate<CROSS_OCTAVES> {
+        let covariate = self.other(index);
+        if modelled {
+            Covariate::new(&covariate.curve(), covariate.lsb(), 1 << FIRST_CROSS_OCTAVE)
+        } else {
+            Covariate::as_measured(&covariate.curve(), 1 << FIRST_CROSS_OCTAVE)
         }
-        // There is room for all candidates.
-        let _ = covariates.push(covariate(epoch, candidate, scale, true));
     }
-    let sensitivities = loop {
-        let covariance = |with: Option<usize>, covariate: usize, n: u64| {
-            scaled_covariance(
-                covariances,
-                (with.map_or(index, |other| candidates[other]), candidates[covariate]),
-                n,
-                scale,
-            )
+
+    /// Estimates significant sensitivities, none without [covariances](FinishedEpoch::covariances); `None` if `keep_on`,
+    /// called before every fit, returned false.
+    #[must_use]
+    pub fn estimate_regressors(self, keep_on: &mut dyn FnMut() -> bool) -> Option<Regressors> {
+        let Some(AllanCovariances { means, .. }) = self.epoch.covariances() else { return Some(Regressors::new()) };
+        let mut candidates: Candidates = candidates(self.index).collect();
+        let channel = self.curve();
+        let mut covariates: Vec<Covariate<CROSS_OCTAVES>, MAX_COVARIATES> = Vec::new();
+        for &candidate in &candidates {
+            if !keep_on() {
+                return None;
+            }
+            // There is room for all candidates.
+            let _ = covariates.push(self.covariate(candidate, true));
+        }
+        let sensitivities = loop {
+            let covariance = |with, covariate, n| self.covariance_of(&candidates, with, covariate, n);
+            let regression =
+                CovariateRegression { channel: &channel, covariates: &covariates, covariance: &covariance };
+            let sensitivities = regression.sensitivities_while(keep_on)?;
+            let degrades = || self.degrades(&candidates, &sensitivities, &regression);
+            // By falling significance: the last is the weakest.
+            let Some(weakest) = sensitivities.last().filter(|_| degrades()) else { break sensitivities };
+            candidates.remove(weakest.covariate);
+            covariates.remove(weakest.covariate);
         };
-        let regression = CovariateRegression { channel: &channel, covariates: &covariates, covariance: &covariance };
-        let sensitivities = regression.sensitivities_while(keep_on)?;
-        let degrades = || degrades(epoch, &candidates, scale, &sensitivities, &regression);
-        // By falling significance: the last is the weakest.
-        let Some(weakest) = sensitivities.last().filter(|_| degrades()) else { break sensitivities };
-        candidates.remove(weakest.covariate);
-        covariates.remove(weakest.covariate);
-    };
-    let with_reference = |sensitivity: &Sensitivity| {
-        let covariate = candidates[sensitivity.covariate];
-        let reference = covariances.means[covariate] * lsb(covariate, scale) + CHANNELS[covariate].offset();
-        Regressor { covariate, value: sensitivity.value, error: sensitivity.error, reference }
-    };
-    Some(sensitivities.iter().map(with_reference).take(MAX_COVARIATES).collect())
-}
-
-/// Rebuilds the compensated curve of [`CHANNELS`]`[index]`, the stream's own below 2⁸ samples. `None`, and the stream's
-/// own curve, without [covariances](FinishedEpoch::covariances).
-pub(crate) fn rebuild_compensated_curve(
-    curve: &mut Curve<OCTAVES>,
-    epoch: &FinishedEpoch,
-    index: usize,
-    scale: ReportScale,
-    regressors: &[Regressor],
-) -> Option<()> {
-    epoch.rebuild_curve(curve, index, scale);
-    if regressors.is_empty() { Some(()) } else { subtract(curve, epoch, index, scale, regressors) }
-}
-
-/// `None` without covariances.
-fn subtract(
-    curve: &mut Curve<OCTAVES>,
-    epoch: &FinishedEpoch,
-    index: usize,
-    scale: ReportScale,
-    regressors: &[Regressor],
-) -> Option<()> {
-    let covariances = epoch.covariances()?;
-    let candidates: Candidates = regressors.iter().map(|regressor| regressor.covariate).collect();
-    let mut covariates: Vec<Covariate<CROSS_OCTAVES>, MAX_COVARIATES> = Vec::new();
-    for &candidate in &candidates {
-        let _ = covariates.push(covariate(epoch, candidate, scale, false));
+        let with_reference = |sensitivity: &Sensitivity| {
+            let covariate = candidates[sensitivity.covariate];
+            let reference = means[covariate] * self.other(covariate).lsb() + CHANNELS[covariate].offset();
+            Regressor { covariate, value: sensitivity.value, error: sensitivity.error, reference }
+        };
+        Some(sensitivities.iter().map(with_reference).take(MAX_COVARIATES).collect())
     }
-    let exact = |(covariate, regressor): (usize, &Regressor)| Sensitivity::exact(covariate, regressor.value);
-    let sensitivities: Vec<Sensitivity, MAX_COVARIATES> = regressors.iter().enumerate().map(exact).collect();
-    let covariance = |with: Option<usize>, covariate: usize, n: u64| {
-        scaled_covariance(covariances, (with.map_or(index, |other| candidates[other]), candidates[covariate]), n, scale)
-    };
-    let channel = &curve.clone();
-    CovariateRegression { channel, covariates: &covariates, covariance: &covariance }
-        .subtract_from(curve, &sensitivities);
-    Some(())
-}
 
-/// Change of the mean of stream and compensated stream since the epoch `before` (counts), in the channel's unit.
-#[must_use]
-pub(crate) fn mean_shift(
-    epoch: &FinishedEpoch,
-    index: usize,
-    scale: ReportScale,
-    regressors: &[Regressor],
-    before: &ChannelMeans,
-) -> Option<ReportedShift> {
-    let means = &epoch.covariances()?.means;
-    let change = |index: usize| (means[index] - before[index]) * scale.lsb(CHANNELS[index]);
-    let raw = change(index);
-    let correction = regressors.iter().map(|regressor| regressor.value * change(regressor.covariate)).sum::<f64>();
-    Some(ReportedShift { raw, compensated: raw - correction })
+    /// Compensates the channel's `curve` from 2⁸ samples on; `None`, and nothing is changed, without
+    /// [covariances](FinishedEpoch::covariances).
+    pub(crate) fn compensate(self, curve: &mut Curve<OCTAVES>, regressors: &[Regressor]) -> Option<()> {
+        if regressors.is_empty() {
+            return Some(());
+        }
+        self.epoch.covariances()?;
+        let candidates: Candidates = regressors.iter().map(|regressor| regressor.covariate).collect();
+        let mut covariates: Vec<Covariate<CROSS_OCTAVES>, MAX_COVARIATES> = Vec::new();
+        for &candidate in &candidates {
+            let _ = covariates.push(self.covariate(candidate, false));
+        }
+        let exact = |(covariate, regressor): (usize, &Regressor)| Sensitivity::exact(covariate, regressor.value);
+        let sensitivities: Vec<Sensitivity, MAX_COVARIATES> = regressors.iter().enumerate().map(exact).collect();
+        let covariance = |with, covariate, n| self.covariance_of(&candidates, with, covariate, n);
+        let (channel, covariance) = (&curve.clone(), &covariance);
+        CovariateRegression { channel, covariates: &covariates, covariance }.subtract_from(curve, &sensitivities);
+        Some(())
+    }
+
+    /// Change of the mean of stream and compensated stream since the epoch `before` (counts), in the channel's unit.
+    #[must_use]
+    pub(crate) fn mean_shift(self, regressors: &[Regressor], before: &ChannelMeans) -> Option<ReportedShift> {
+        let means = &self.epoch.covariances()?.means;
+        let change = |index: usize| (means[index] - before[index]) * self.other(index).lsb();
+        let raw = change(self.index);
+        let correction = regressors.iter().map(|regressor| regressor.value * change(regressor.covariate)).sum::<f64>();
+        Some(ReportedShift { raw, compensated: raw - correction })
+    }
+
+    /// True if the subtraction raises the Allan variance of any octave by more than twice the standard error of the
+    /// rise. For `s = Σ βᵢ·cᵢ` and `u = y − s/2` the rise is `−2·cov(u, s)`, with the variance `4·σ²(u)·σ²(s)/edf`.
+    fn degrades(
+        self,
+        candidates: &Candidates,
+        sensitivities: &[Sensitivity],
+        regression: &CovariateRegression<'_, OCTAVES, CROSS_OCTAVES>,
+    ) -> bool {
+        let mut added = [0.0; OCTAVES];
+        for sensitivity in sensitivities {
+            let covariate = self.other(candidates[sensitivity.covariate]).curve();
+            for (added, point) in added.iter_mut().zip(covariate.points()).take(FIRST_CROSS_OCTAVE) {
+                *added += sensitivity.value * sensitivity.value * point.avar;
+            }
+        }
+        let of_covariates = |with: Option<usize>, covariate: usize, n: u64| match with {
+            Some(_) => (regression.covariance)(with, covariate, n),
+            None => Some(0.0),
+        };
+        let share = CovariateRegression { covariance: &of_covariates, ..*regression };
+        let worse = |(raw, added): (&AllanPoint, f64)| {
+            let mut without = *raw;
+            without.avar = 0.0;
+            let (Some(subtracted), Some(share)) =
+                (regression.subtracted_at(raw, sensitivities), share.subtracted_at(&without, sensitivities))
+            else {
+                return added > raw.avar * 2.0 * libm::sqrt(2.0 / raw.edf);
+            };
+            let halfway = ((raw.avar + subtracted) / 2.0 - share / 4.0).max(0.0);
+            subtracted - raw.avar > 2.0 * 2.0 * libm::sqrt(halfway * share / raw.edf)
+        };
+        regression.channel.points().iter().zip(added).any(worse)
+    }
 }
 
 /// Temperature and supply; accelerations for a gyro.
@@ -195,65 +235,4 @@ fn candidates(index: usize) -> impl Iterator<Item = usize> {
     let environment = [Channel::Temp, Channel::Supply].into_iter();
     let motion = [Channel::AcclX, Channel::AcclY, Channel::AcclZ].into_iter().filter(move |_| index < GYROS);
     environment.chain(motion).filter_map(position)
-}
-
-/// In the product of both units.
-fn scaled_covariance(
-    covariances: &AllanCovariances,
-    (a, b): (usize, usize),
-    n: u64,
-    scale: ReportScale,
-) -> Option<f64> {
-    Some(covariances.covariance(a, b, n)? * lsb(a, scale) * lsb(b, scale))
-}
-
-/// The covariate at the octaves of the cross sums, its own noise modelled (estimate) or measured (subtraction).
-fn covariate(epoch: &FinishedEpoch, index: usize, scale: ReportScale, modelled: bool) -> Covariate<CROSS_OCTAVES> {
-    let mut curve = Curve::empty();
-    epoch.rebuild_curve(&mut curve, index, scale);
-    if modelled {
-        Covariate::new(&curve, lsb(index, scale), 1 << FIRST_CROSS_OCTAVE)
-    } else {
-        Covariate::as_measured(&curve, 1 << FIRST_CROSS_OCTAVE)
-    }
-}
-
-fn lsb(index: usize, scale: ReportScale) -> f64 {
-    scale.lsb(CHANNELS[index])
-}
-
-/// True if the subtraction raises the Allan variance of any octave by more than twice the standard error of the rise.
-/// For `s = Σ βᵢ·cᵢ` and `u = y − s/2` the rise is `−2·cov(u, s)`, with the variance `4·σ²(u)·σ²(s)/edf`.
-fn degrades(
-    epoch: &FinishedEpoch,
-    candidates: &Candidates,
-    scale: ReportScale,
-    sensitivities: &[Sensitivity],
-    regression: &CovariateRegression<'_, OCTAVES, CROSS_OCTAVES>,
-) -> bool {
-    let mut added = [0.0; OCTAVES];
-    let mut covariate = Curve::empty();
-    for sensitivity in sensitivities {
-        epoch.rebuild_curve(&mut covariate, candidates[sensitivity.covariate], scale);
-        for (added, point) in added.iter_mut().zip(covariate.points()).take(FIRST_CROSS_OCTAVE) {
-            *added += sensitivity.value * sensitivity.value * point.avar;
-        }
-    }
-    let of_covariates = |with: Option<usize>, covariate: usize, n: u64| match with {
-        Some(_) => (regression.covariance)(with, covariate, n),
-        None => Some(0.0),
-    };
-    let share = CovariateRegression { covariance: &of_covariates, ..*regression };
-    let worse = |(raw, added): (&AllanPoint, f64)| {
-        let mut without = *raw;
-        without.avar = 0.0;
-        let (Some(subtracted), Some(share)) =
-            (regression.subtracted_at(raw, sensitivities), share.subtracted_at(&without, sensitivities))
-        else {
-            return added > raw.avar * 2.0 * libm::sqrt(2.0 / raw.edf);
-        };
-        let halfway = ((raw.avar + subtracted) / 2.0 - share / 4.0).max(0.0);
-        subtracted - raw.avar > 2.0 * 2.0 * libm::sqrt(halfway * share / raw.edf)
-    };
-    regression.channel.points().iter().zip(added).any(worse)
 }

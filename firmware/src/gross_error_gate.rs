@@ -21,7 +21,7 @@ const AGREEING: u32 = 2;
 const SPACING: u64 = 16;
 const REFUSALS: u64 = 8;
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct ChannelGate {
     last: i32,
     limit: i32,
@@ -48,18 +48,8 @@ pub(crate) struct GrossErrorGate<const W: u32 = WIDTH> {
 
 impl<const W: u32> GrossErrorGate<W> {
     /// Knows no noise: it [learns](Self::is_learning) first.
-    pub(crate) const fn new() -> Self {
-        let channel = ChannelGate {
-            last: 0,
-            limit: 0,
-            sum: 0,
-            noise: 0,
-            beyond: (0, 0),
-            agreeing: 0,
-            full_at: 0,
-            left_out: [0; LEFT_OUT],
-        };
-        Self { channels: [channel; CHANNELS.len()], samples: 0, block: FIRST_BLOCK, left: FIRST_BLOCK }
+    pub(crate) fn new() -> Self {
+        Self { channels: Default::default(), samples: 0, block: FIRST_BLOCK, left: FIRST_BLOCK }
     }
 
     /// True in the first block, which is never refused.

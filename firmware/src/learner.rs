@@ -1,6 +1,6 @@
 //! Learning: each inertial channel's model is fitted to an epoch and validated on the next.
 
-use crate::epoch::{FinishedEpoch, Regressor, Regressors, mean_shift, rebuild_compensated_curve};
+use crate::epoch::{EpochChannel, FinishedEpoch, Regressor, Regressors};
 use crate::report_messages::{model_error, reported_term};
 use crate::scale::ReportScale;
 use crate::statistics::{CHANNELS, ChannelMeans, FIRST_CROSS_OCTAVE, INERTIAL};
@@ -10,7 +10,7 @@ use allan_core::fit::fit;
 use allan_core::model::{FittedTerm, MAX_TERMS};
 use allan_core::term::MovingAverageFilter;
 use allan_core::trace::{AddedTerm, LineCandidates, MAX_ADDED, Trace, trace_while};
-use allan_core::{Curve, Model, NoiseTerm};
+use allan_core::{Model, NoiseTerm};
 use heapless::Vec;
 use link::{
     LearnedMessage, MAX_COVARIATES, MAX_DEVIATIONS, ReportedAddedTerm, ReportedCoefficient, ReportedDeviations,
@@ -89,41 +89,29 @@ pub struct EpochFit {
 }
 
 impl EpochFit {
-    /// With [regressors](crate::epoch::estimate_regressors), before its [run](Self::run).
+    /// With [regressors](EpochChannel::estimate_regressors), before its [run](Self::run).
     #[must_use]
     pub fn new(regressors: Regressors) -> Self {
         Self { baseline: None, regressors, trace: Trace::empty() }
     }
 
-    /// Fits the model of [`CHANNELS`]`[index]` to an epoch, for seconds; false if `keep_on`, called at every step, was.
+    /// Fits the model of a channel to an epoch, for seconds; false if `keep_on`, called at every step, was.
     #[must_use]
-    pub fn run(
-        &mut self,
-        epoch: &FinishedEpoch,
-        index: usize,
-        scale: ReportScale,
-        keep_on: &mut dyn FnMut() -> bool,
-    ) -> bool {
-        let done = self.search(epoch, index, scale, keep_on);
+    pub fn run(&mut self, channel: EpochChannel<'_>, keep_on: &mut dyn FnMut() -> bool) -> bool {
+        let done = self.search(channel, keep_on);
         self.baseline = if self.regressors.is_empty() {
             baseline_coefficients(&self.trace.before)
         } else {
-            refit_baseline(epoch, index, scale)
+            baseline_coefficients(&fit(&channel.curve(), &NoiseTerm::BASELINE))
         };
         done
     }
 
     /// Traces further terms; false if cancelled.
-    fn search(
-        &mut self,
-        epoch: &FinishedEpoch,
-        index: usize,
-        scale: ReportScale,
-        keep_on: &mut dyn FnMut() -> bool,
-    ) -> bool {
-        let mut curve = Curve::empty();
+    fn search(&mut self, channel: EpochChannel<'_>, keep_on: &mut dyn FnMut() -> bool) -> bool {
+        let mut curve = channel.curve();
         // Without covariances it is the stream's own curve.
-        let _ = rebuild_compensated_curve(&mut curve, epoch, index, scale, &self.regressors);
+        let _ = channel.compensate(&mut curve, &self.regressors);
         self.trace.fit_baseline(&curve);
         let sufficient = self.trace.before_goodness.p_value > P_VALUE_SUFFICIENT;
         sufficient || trace_while(&mut self.trace, &curve, LineCandidates::Curve, &FILTERS, keep_on)
@@ -151,62 +139,35 @@ impl EpochFit {
     }
 }
 
-fn refit_baseline(epoch: &FinishedEpoch, index: usize, scale: ReportScale) -> Option<BaselineCoefficients> {
-    let mut curve = Curve::empty();
-    epoch.rebuild_curve(&mut curve, index, scale);
-    baseline_coefficients(&fit(&curve, &NoiseTerm::BASELINE))
-}
-
-/// Validates the model of [`CHANNELS`]`[index]` on an epoch; `means` are those of the epoch before. `None` before the
-/// first fit, or without covariances.
+/// Validates the model of a channel on an epoch; `means` are those of the epoch before. `None` before the first fit, or
+/// without covariances.
 #[must_use]
 pub fn validate(
     model: &EpochModel,
     means: Option<&ChannelMeans>,
-    epoch: &FinishedEpoch,
-    index: usize,
-    scale: ReportScale,
+    channel: EpochChannel<'_>,
 ) -> Option<ValidationMessage> {
     let mut message = ValidationMessage {
-        channel: CHANNELS[index] as u8,
-        epoch: epoch.number,
-        before: baseline_error(model, epoch, index, scale)?,
+        channel: CHANNELS[channel.index] as u8,
+        epoch: channel.epoch.number,
+        before: model_error(&model.baseline(channel.scale)?, &channel.curve()),
         after: None,
-        shift: means.and_then(|means| mean_shift(epoch, index, scale, &model.regressors, means)),
+        shift: means.and_then(|means| channel.mean_shift(&model.regressors, means)),
         drift: Vec::new(),
     };
-    fill_compensated(model, epoch, index, scale, &mut message)?;
+    fill_compensated(model, channel, &mut message)?;
     Some(message)
 }
 
-/// The outer `None` is before the first fit.
-fn baseline_error(
-    model: &EpochModel,
-    epoch: &FinishedEpoch,
-    index: usize,
-    scale: ReportScale,
-) -> Option<Option<ReportedModelError>> {
-    let mut curve = Curve::empty();
-    epoch.rebuild_curve(&mut curve, index, scale);
-    Some(model_error(&model.baseline(scale)?, &curve))
-}
-
 /// Error of the full model, and both streams' Allan deviations.
-fn fill_compensated(
-    model: &EpochModel,
-    epoch: &FinishedEpoch,
-    index: usize,
-    scale: ReportScale,
-    message: &mut ValidationMessage,
-) -> Option<()> {
-    let mut curve = Curve::empty();
-    epoch.rebuild_curve(&mut curve, index, scale);
+fn fill_compensated(model: &EpochModel, channel: EpochChannel<'_>, message: &mut ValidationMessage) -> Option<()> {
+    let mut curve = channel.curve();
     let slow = curve.points().iter().filter(|point| point.n >= 1 << FIRST_CROSS_OCTAVE).take(MAX_DEVIATIONS);
     message.drift.extend(slow.map(|raw| ReportedDeviations { n: raw.n, raw: libm::sqrt(raw.avar), compensated: 0.0 }));
-    rebuild_compensated_curve(&mut curve, epoch, index, scale, &model.regressors)?;
+    channel.compensate(&mut curve, &model.regressors)?;
     let slow = curve.points().iter().filter(|point| point.n >= 1 << FIRST_CROSS_OCTAVE);
     message.drift.iter_mut().zip(slow).for_each(|(drift, point)| drift.compensated = libm::sqrt(point.avar));
-    message.after = model_error(&model.full(scale)?, &curve);
+    message.after = model_error(&model.full(channel.scale)?, &curve);
     Some(())
 }
 
@@ -267,8 +228,8 @@ impl Learner {
 
     pub(crate) fn validate(&mut self, index: usize, config: Config) -> Option<ValidationMessage> {
         let epoch = self.finished.as_deref()?;
-        let scale = epoch.scale(config);
-        let message = validate(&self.models[index], self.means.as_ref(), epoch, index, scale);
+        let channel = EpochChannel { epoch, index, scale: epoch.scale(config) };
+        let message = validate(&self.models[index], self.means.as_ref(), channel);
         let deviance = |error: Option<ReportedModelError>| Some(error?.deviance_per_point);
         self.errors[index] =
             message.as_ref().and_then(|message| Some((deviance(message.before)?, deviance(message.after)?)));

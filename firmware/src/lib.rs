@@ -13,7 +13,6 @@
 //! | [`acquisition`] | bursts at data-ready edges, data-ready monitor |
 //! | [`sensor`] | serial clock, probing, auto-null |
 //! | `sample_intake` | the path of every sample into the statistics, health counters |
-//! | `channel_validity` | which channels of a burst are refused, by its faults |
 //! | `channels`, `statistics`, `cross_sums` | exact sums of a channel and of pairs of channels; curve and baseline model made of them |
 //! | `gross_error_gate` | single samples that noise does not explain |
 //! | `scale` | the unit of a count and the measured time between two samples |
@@ -47,7 +46,6 @@ mod board;
     allow(dead_code, reason = "the images use all of it, and its tests what they test")
 )]
 mod bus_frame;
-mod channel_validity;
 mod channels;
 pub mod command;
 pub mod console;
@@ -88,14 +86,12 @@ mod watchdog;
 
 pub use acquisition::{BurstQueue, EdgeAction, Sampler, SamplingActivity, TimedBurst};
 pub use app::{App, Start, run};
-pub use board::{
-    Board, BoardMeters, BrownOutLevel, BusTiming, DataReadyLine, FrameTimes, SelectTiming, SensorBus, Uptime,
-};
+pub use board::{Board, BrownOutLevel, BusTiming, FrameTimes, SelectTiming, Uptime};
 pub use bus_frame::{BusFault, ByteExchange, MicrosecondCounter};
 pub use crash_record::CrashRecord;
 pub use device::FIRST_CONFIG;
 pub use epoch::FinishedEpoch;
-pub use receive::{HostPort, ReceiveBuffer, ReceivedBytes, Receiver};
+pub use receive::{HostPort, ReceiveBuffer, ReceivedBytes, Receiver, ServedPort};
 pub use retained::RetainedRam;
 pub use sample_intake::{Estimators, estimate};
 pub use scale::ReportScale;

@@ -11,12 +11,11 @@ pub mod settings_flash;
 #[cfg(feature = "stm32f4")]
 pub mod stm32f4;
 
-use crate::board::{BrownOutLevel, DataReadyLine, SensorBus};
-use crate::receive::{ReceiveBuffer, Receiver};
+use crate::board::BrownOutLevel;
+use crate::receive::{ReceiveBuffer, Receiver, ServedPort};
 use crate::transmit::TransmitBuffer;
-use crate::usb_port::{UsbIdentity, UsbPort};
+use crate::usb_port::UsbPort;
 use crate::watchdog::{Watchdog, WatchdogExtension};
-use adis16405_driver::BURST_BYTES;
 use core::convert::Infallible;
 use core::fmt::Write;
 use defmt_rtt as _;
@@ -24,8 +23,10 @@ use embedded_hal::digital::OutputPin;
 use heapless::String;
 use heapless::spsc::{Consumer, Producer};
 use link::{BootCause, ClockSource};
+use sensor_spi::{SensorSpi, SpiPeripheral};
 use settings_flash::FlashMemory;
 use usb_device::bus::{UsbBus, UsbBusAllocator};
+use usb_device::device::UsbVidPid;
 
 /// The UART's ends of the queues to and from the application.
 pub struct UartQueues {
@@ -46,12 +47,12 @@ pub struct UsbParts<U> {
 }
 
 impl<B: UsbBus> UsbParts<UsbPort<'static, B>> {
-    /// Starts the port of a `vendor`'s `product`, with the board's number (at most twelve bytes) in hexadecimal.
+    /// Starts the port of a product, with the board's number (at most twelve bytes) in hexadecimal.
     /// `reconnect` resets the controller off the bus (false) and starts it again (true). Once; `None` afterwards, or
     /// with too few endpoints.
     pub fn start(
         bus: &'static UsbBusAllocator<B>,
-        (vendor, product): (u16, u16),
+        product: UsbVidPid,
         board_number: impl IntoIterator<Item = u8>,
         reconnect: fn(bool),
     ) -> Option<Self> {
@@ -62,19 +63,8 @@ impl<B: UsbBus> UsbParts<UsbPort<'static, B>> {
         let to_port = cortex_m::singleton!(USB_TRANSMIT: TransmitBuffer = TransmitBuffer::new())?;
         let from_port = cortex_m::singleton!(USB_RECEIVE: ReceiveBuffer = ReceiveBuffer::new())?;
         let ((transmit, to_port), (from_port, receive)) = (to_port.split(), from_port.split());
-        let port = UsbPort::new(
-            bus,
-            UsbIdentity { vendor, product, serial_number },
-            (to_port, Receiver::new(from_port)),
-            reconnect,
-        )?;
+        let port = UsbPort::new(bus, product, serial_number, (to_port, Receiver::new(from_port)), reconnect)?;
         Some(Self { port, transmit, receive })
-    }
-}
-
-impl<B: UsbBus> ServedPort for UsbPort<'static, B> {
-    fn serve(&mut self, now_us: u32) -> u32 {
-        UsbPort::serve(self, now_us)
     }
 }
 
@@ -86,24 +76,8 @@ impl<U> UsbParts<U> {
     }
 }
 
-/// Stands for an absent part: no value exists.
-pub enum NotConnected {}
-
-impl embedded_hal::digital::ErrorType for NotConnected {
-    type Error = Infallible;
-}
-
-impl OutputPin for NotConnected {
-    fn set_low(&mut self) -> Result<(), Infallible> {
-        match *self {}
-    }
-
-    fn set_high(&mut self) -> Result<(), Infallible> {
-        match *self {}
-    }
-}
-
-impl ServedPort for NotConnected {
+/// Of a microcontroller without USB.
+impl ServedPort for Infallible {
     fn serve(&mut self, _now_us: u32) -> u32 {
         match *self {}
     }
@@ -117,20 +91,23 @@ pub trait BoardSupport: Sized {
     type Microcontroller: Microcontroller;
     /// The pin at DIO1 of the sensor.
     type DataReady: DataReadyPin;
-    /// SPI with chip select.
-    type Bus: BurstBus;
+    /// SPI of the sensor.
+    type Spi: SpiPeripheral;
+    /// Its chip select.
+    type Select: OutputPin<Error = Infallible>;
     /// The serial port to the host on pins.
     type Uart: ServedPort;
-    /// The serial port to the host on USB, or [`NotConnected`].
-    type Usb: ServedPort;
-    /// An LED.
-    type Led: OutputPin;
-    /// The pin at RST of the sensor, low for a reset, or [`NotConnected`].
-    type ResetLine: OutputPin;
 
     /// Starts clocks, watchdog and pins.
     fn start(device: Self::Device, queues: UartQueues) -> BoardParts<Self>;
 }
+
+/// The bus of a board's sensor.
+pub type BusOf<B> = SensorSpi<<B as BoardSupport>::Spi, <B as BoardSupport>::Select>;
+/// The serial port to the host on USB of a board.
+pub type UsbOf<B> = <<B as BoardSupport>::Microcontroller as Microcontroller>::Usb;
+/// An output of a board.
+pub type OutputOf<B> = <<B as BoardSupport>::Microcontroller as Microcontroller>::Output;
 
 /// The parts of a board after its start.
 pub struct BoardParts<B: BoardSupport> {
@@ -143,21 +120,25 @@ pub struct BoardParts<B: BoardSupport> {
     /// The data-ready pin.
     pub data_ready: B::DataReady,
     /// The sensor's bus.
-    pub bus: B::Bus,
+    pub bus: BusOf<B>,
     /// The serial port to the host on pins.
     pub uart: B::Uart,
     /// The serial port to the host on USB.
-    pub usb: Option<UsbParts<B::Usb>>,
+    pub usb: Option<UsbParts<UsbOf<B>>>,
     /// The LED.
-    pub led: B::Led,
-    /// The reset pin of the sensor, high.
-    pub reset_line: Option<B::ResetLine>,
+    pub led: OutputOf<B>,
+    /// The pin at RST of the sensor, if connected; high, low for a reset.
+    pub reset_line: Option<OutputOf<B>>,
 }
 
 /// Clock, watchdog and restart of a microcontroller.
 pub trait Microcontroller: Watchdog {
     /// The flash memory, of which the memory map leaves a part for the settings.
     type Flash: FlashMemory;
+    /// An output pin of any number.
+    type Output: OutputPin;
+    /// The serial port to the host on USB; [`Infallible`] if it has none.
+    type Usb: ServedPort;
 
     /// Restarts processor and peripherals; the RAM keeps its content.
     fn restart() -> !;
@@ -173,31 +154,11 @@ pub trait Microcontroller: Watchdog {
 }
 
 /// The data-ready pin, which raises an interrupt at rising edges.
-pub trait DataReadyPin: DataReadyLine {
+pub trait DataReadyPin {
     /// Clears the pending interrupt.
     fn clear(&mut self);
-}
-
-/// The sensor's bus, with bursts by DMA.
-pub trait BurstBus: SensorBus {
-    /// Selects the sensor and starts a burst; an interrupt follows at its end, or at that of a part.
-    fn start_burst(&mut self);
-    /// To be called in that interrupt.
-    fn end_burst(&mut self) -> BurstEnd<'_>;
-}
-
-/// How a transfer has ended.
-pub enum BurstEnd<'a> {
-    /// A word was transferred, and the next one has been started.
-    MoreWords,
-    /// The sensor is deselected; these bytes were received.
-    Complete(&'a [u8; BURST_BYTES]),
-    /// The sensor is deselected after a failure; the bus is ready.
-    Failed,
-}
-
-/// A serial port to the host, served in its interrupt.
-pub trait ServedPort {
-    /// Moves bytes as far as possible at `now_us`, µs; returns how many received ones were lost.
-    fn serve(&mut self, now_us: u32) -> u32;
+    /// Masks edges, or takes them again without those in between.
+    fn set_masked(&mut self, masked: bool);
+    /// The level of the line.
+    fn is_active(&mut self) -> bool;
 }

@@ -33,6 +33,12 @@ impl<'q> Receiver<'q> {
     }
 }
 
+/// A serial port to the host, served in its interrupt.
+pub trait ServedPort {
+    /// Moves bytes as far as possible at `now_us`, µs; returns how many received ones were lost.
+    fn serve(&mut self, now_us: u32) -> u32;
+}
+
 /// A serial port to the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HostPort {

@@ -2,11 +2,11 @@
 
 use crate::board::Board;
 use crate::device::DeviceState;
-use crate::learner::EpochModel;
+use crate::report_messages::model_error;
 use crate::scale::ReportScale;
 use crate::statistics::{CHANNELS, ChannelSums, INERTIAL};
-use adis16405_driver::{Channel, GyroRange};
-use link::{Hello, MessageRef, ReportedModelError};
+use adis16405_driver::GyroRange;
+use link::{Hello, MessageRef};
 
 const VERSION: (u8, u8, u8) = (
     decimal(env!("CARGO_PKG_VERSION_MAJOR")),
@@ -46,7 +46,7 @@ impl DeviceState {
             uptime_us: board.now_us(),
             sampling: self.is_sampled(),
             epoch: number,
-            epoch_s: self.settings.epoch_s,
+            epoch_s: self.settings.user.epoch_s,
             boot: self.boot.clone(),
         }
     }
@@ -64,7 +64,8 @@ impl DeviceState {
     pub(crate) fn send_channel(&self, index: usize, ends_epoch: bool, board: &mut impl Board) {
         let (channel, sums) = (CHANNELS[index], &self.reported_sums(index, ends_epoch, board));
         let model = self.learner.models.get(index);
-        let unseen_error = model.and_then(|model| self.unseen_error(model, channel, sums));
+        let learned = model.and_then(|model| model.baseline(self.report_scale));
+        let unseen_error = learned.and_then(|model| model_error(&model, &sums.curve(channel, self.report_scale)));
         let baseline = model.map(|_| sums.fit_baseline(channel, self.report_scale));
         let losses = board.estimators(|estimators| estimators.losses(ends_epoch));
         let mut report = sums.report(channel, baseline.as_ref(), unseen_error);
@@ -78,11 +79,6 @@ impl DeviceState {
             Some(epoch) => epoch.sums(index).cloned().unwrap_or(ChannelSums::EMPTY),
             None => running_sums(board, index),
         }
-    }
-
-    /// Previous epoch's N, B and K on the sums.
-    fn unseen_error(&self, model: &EpochModel, channel: Channel, sums: &ChannelSums) -> Option<ReportedModelError> {
-        sums.error_of(&model.baseline(self.report_scale)?, channel, self.report_scale)
     }
 
     pub(crate) fn send_validation(&mut self, index: usize, board: &mut impl Board) {

@@ -1,7 +1,6 @@
 //! Report messages of one channel's sums, and a model's error.
 
 use crate::channels::{ChannelEstimator, OCTAVES};
-use crate::scale::ReportScale;
 use crate::statistics::ChannelSums;
 use adis16405_driver::Channel;
 use allan_core::{Curve, Model, NoiseTerm, model};
@@ -9,14 +8,6 @@ use heapless::Vec;
 use link::{ChannelMessage, ReportedCoefficient, ReportedModelError, ReportedOctave, ReportedTerm};
 
 impl ChannelSums {
-    /// For an unfitted model; `None` without comparable octaves.
-    #[must_use]
-    pub(crate) fn error_of(&self, model: &Model, channel: Channel, scale: ReportScale) -> Option<ReportedModelError> {
-        let mut curve = Curve::empty();
-        self.rebuild_curve(&mut curve, channel, scale);
-        model_error(model, &curve)
-    }
-
     /// The report on one channel, without losses; `unseen_error` is that of the previous epoch's model.
     #[must_use]
     pub fn report(

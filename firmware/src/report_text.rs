@@ -12,50 +12,33 @@ use allan_core::NoiseTerm;
 use allan_core::confidence::NORMAL_975;
 use link::{TextLine, text_line};
 
-#[derive(Debug, Clone, Copy)]
-enum Section {
-    Headline,
-    Record,
-    Text(&'static str),
-    Cells([&'static str; 5]),
-    Coefficients(usize),
-    Found,
-    Curve,
-}
+type Line<B> = fn(&DeviceState, &mut B, usize) -> Option<TextLine>;
 
-const SECTIONS: [(Section, usize); 12] = [
-    (Section::Headline, 1),
-    (Section::Record, 1),
-    (Section::Text(""), 1),
-    (Section::Cells(["gyro", "angle random walk", "bias instability", "rate random walk", "error on"]), 1),
-    (Section::Cells(["", "deg/sqrt(s)", "mdeg/s", "mdeg/s/sqrt(s)", "unseen epoch"]), 1),
-    (Section::Coefficients(0), GYROS),
-    (Section::Cells(["accel", "ug/sqrt(Hz)", "ug", "ug/sqrt(s)", ""]), 1),
-    (Section::Coefficients(GYROS), INERTIAL - GYROS),
-    (Section::Text("95 % bounds by octaves: 2 to 9 % wider than those of all samples, on a host."), 1),
-    (Section::Text(""), 1),
-    (Section::Found, INERTIAL * MAX_FINDINGS),
-    (Section::Curve, OCTAVES + 2),
-];
-
-pub(crate) fn line(state: &DeviceState, board: &mut impl Board, mut index: usize) -> AnswerLine {
-    for (section, lines) in SECTIONS {
+pub(crate) fn line<B: Board>(state: &DeviceState, board: &mut B, mut index: usize) -> AnswerLine {
+    let sections: [(Line<B>, usize); 12] = [
+        (|state, board, _| Some(headline(state, board)), 1),
+        (|state, board, _| Some(record(state, board)), 1),
+        (|_, _, _| Some(TextLine::new()), 1),
+        (|_, _, _| Some(row(["gyro", "angle random walk", "bias instability", "rate random walk", "error on"])), 1),
+        (|_, _, _| Some(row(["", "deg/sqrt(s)", "mdeg/s", "mdeg/s/sqrt(s)", "unseen epoch"])), 1),
+        (|state, board, index| Some(coefficients(state, board, index)), GYROS),
+        (|_, _, _| Some(row(["accel", "ug/sqrt(Hz)", "ug", "ug/sqrt(s)", ""])), 1),
+        (|state, board, index| Some(coefficients(state, board, GYROS + index)), INERTIAL - GYROS),
+        (|_, _, _| Some(text_line(format_args!("{BOUNDS}"))), 1),
+        (|_, _, _| Some(TextLine::new()), 1),
+        (|state, _, index| found(&state.learner.models, index), INERTIAL * MAX_FINDINGS),
+        (|_, board, index| curve(board, index), OCTAVES + 2),
+    ];
+    for (line, lines) in sections {
         if index < lines {
-            return match section {
-                Section::Headline => Some(headline(state, board)),
-                Section::Record => Some(record(state, board)),
-                Section::Text(text) => Some(text_line(format_args!("{text}"))),
-                Section::Cells(cells) => Some(row(cells)),
-                Section::Coefficients(first) => Some(coefficients(state, board, first + index)),
-                Section::Found => found(&state.learner.models, index),
-                Section::Curve => curve(board, index),
-            }
-            .into();
+            return line(state, board, index).into();
         }
         index -= lines;
     }
     AnswerLine::End
 }
+
+const BOUNDS: &str = "95 % bounds by octaves: 2 to 9 % wider than those of all samples, on a host.";
 
 /// 8, 20, 19, 19 and 13 columns.
 fn row([label, n, b, k, error]: [&str; 5]) -> TextLine {
@@ -82,7 +65,7 @@ fn record(state: &DeviceState, board: &mut impl Board) -> TextLine {
     let refused = losses.refused[..INERTIAL].iter().copied().max().unwrap_or(0);
     let lost = text_line(format_args!("{} lost, {} refused at most", Count(losses.lost), Count(refused)));
     let age = state.epoch_age_s(board.now_us());
-    match u64::from(state.settings.epoch_s) {
+    match u64::from(state.settings.user.epoch_s) {
         0 => text_line(format_args!("{lost}; the epoch has no end")),
         length => text_line(format_args!("{lost}; the epoch ends in {} s", Count(length.saturating_sub(age)))),
     }

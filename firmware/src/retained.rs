@@ -4,9 +4,11 @@
 
 use crate::channels::CHANNELS;
 use crate::epoch::FinishedEpoch;
-use crate::epoch_record::{EPOCH_WORDS, SUMS_WORDS, epoch_from_words, epoch_words, sums_from_words, sums_words};
-use crate::slot::{Slot, halves};
+use crate::epoch_record::{EPOCH_WORDS, SUMS_WORDS, visit_epoch, visit_sums};
+use crate::slot::{Slot, Words};
 use crate::statistics::ChannelSums;
+use adis16405_driver::{Config, GyroRange, SamplePeriod};
+use serde::{Deserialize, Serialize};
 
 /// Kind, version, generation, sensor settings.
 const HEAD: usize = 4;
@@ -35,31 +37,61 @@ pub const fn blank_memory() -> RetainedMemory {
     RetainedMemory { records, epoch: Slot::blank(), crashes: Slot::blank() }
 }
 
-/// The settings of the application.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RetainedSettings {
+/// A person's settings, in the order of their bytes in flash.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct UserSettings {
     /// Value of SMPL_PRD.
     pub smpl_prd: u8,
     /// Value of SENS_AVG.
     pub sens_avg: u16,
     /// Length of an epoch in s, 0 for an epoch without end.
     pub epoch_s: u32,
-    /// Number of epochs finished.
-    pub epoch: u32,
     /// Seconds between reports, 0 for none.
     pub interval_s: u32,
-    /// Starts since power-on.
-    pub starts: u32,
-    /// At the last checkpoint, µs.
-    pub epoch_age_us: u64,
     /// Accepted for an ADIS16405; 0 for none.
     pub prod_id: u16,
 }
 
-impl RetainedSettings {
+impl UserSettings {
     /// Scale, rate and filter of samples.
-    fn of_sensor(&self) -> u32 {
+    pub(crate) fn of_sensor(self) -> u32 {
         u32::from(self.smpl_prd) << 16 | u32::from(self.sens_avg)
+    }
+
+    pub(crate) fn config(self) -> Option<Config> {
+        let range = match self.sens_avg >> 8 {
+            0b100 => GyroRange::Dps300,
+            0b010 => GyroRange::Dps150,
+            0b001 => GyroRange::Dps75,
+            _ => return None,
+        };
+        Config::new(range, self.sens_avg as u8, SamplePeriod::from_register(self.smpl_prd)?).ok()
+    }
+}
+
+/// The settings of the application.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct RetainedSettings {
+    /// Also kept in flash.
+    pub user: UserSettings,
+    /// Number of epochs finished.
+    pub epoch: u32,
+    /// Starts since power-on.
+    pub starts: u32,
+    /// At the last checkpoint, µs.
+    pub epoch_age_us: u64,
+}
+
+impl RetainedSettings {
+    fn visit(&mut self, words: &mut Words<'_>) {
+        let UserSettings { smpl_prd, sens_avg, epoch_s, interval_s, prod_id } = &mut self.user;
+        words.short(smpl_prd);
+        words.short(sens_avg);
+        words.short(prod_id);
+        for word in [epoch_s, interval_s, &mut self.epoch, &mut self.starts] {
+            words.word(word);
+        }
+        words.wide(&mut self.epoch_age_us);
     }
 }
 
@@ -73,6 +105,10 @@ struct Crashes {
 
 impl Crashes {
     const NONE: Self = Self { ages_s: [u32::MAX; 2], of_epoch: 0 };
+
+    fn visit(&mut self, words: &mut Words<'_>) {
+        self.ages_s.iter_mut().chain([&mut self.of_epoch]).for_each(|word| words.word(word));
+    }
 }
 
 /// The records in a [`RetainedMemory`].
@@ -94,17 +130,16 @@ impl RetainedRam {
     }
 
     fn open_by(build: u32, memory: &'static RetainedMemory) -> Self {
-        let crashes = memory
-            .crashes
-            .read(build)
-            .map(|mut words| Crashes { ages_s: [words.word(), words.word()], of_epoch: words.word() });
-        let crashes = crashes.unwrap_or(Crashes::NONE);
+        let mut crashes = Crashes::NONE;
+        if let Some(mut words) = memory.crashes.read(build) {
+            crashes.visit(&mut words);
+        }
         let mut retained =
             Self { memory, build, generation: 0, version: 0, newest: [None; KINDS], settings: None, crashes };
         for (index, slot) in memory.records.iter().enumerate() {
             let Some(mut words) = slot.read(build) else { continue };
-            let (kind, version) = (words.word() as usize, words.word());
-            if let Some(newest) = retained.newest.get_mut(kind)
+            let [kind, version] = words.read();
+            if let Some(newest) = retained.newest.get_mut(kind as usize)
                 && newest.is_none_or(|(_, other)| other < version)
             {
                 *newest = Some((index, version));
@@ -112,19 +147,10 @@ impl RetainedRam {
             }
         }
         if let Some((index, _)) = retained.newest[SETTINGS] {
-            let mut words = memory.records[index].words();
-            let [_kind, _version, generation, _of_sensor] = core::array::from_fn(|_| words.word());
-            retained.generation = generation;
-            retained.settings = Some(RetainedSettings {
-                smpl_prd: words.word() as u8,
-                sens_avg: words.word() as u16,
-                epoch_s: words.word(),
-                epoch: words.word(),
-                interval_s: words.word(),
-                starts: words.word(),
-                epoch_age_us: words.wide(),
-                prod_id: words.word() as u16,
-            });
+            let (mut words, mut settings) = (memory.records[index].words(), RetainedSettings::default());
+            [_, _, retained.generation, _] = words.read::<HEAD>();
+            settings.visit(&mut words);
+            retained.settings = Some(settings);
         }
         retained
     }
@@ -158,8 +184,7 @@ impl RetainedRam {
 
     fn write_crashes(&mut self, crashes: Crashes) {
         self.crashes = crashes;
-        let [last, before] = crashes.ages_s;
-        self.memory.crashes.write(self.build, [last, before, crashes.of_epoch]);
+        self.memory.crashes.write(self.build, |words| self.crashes.visit(words));
     }
 
     /// The settings that were written last.
@@ -172,22 +197,23 @@ impl RetainedRam {
     #[must_use]
     pub fn restore(&self, index: usize) -> Option<ChannelSums> {
         let (slot, _) = self.newest.get(1 + index).copied()??;
-        let mut words = self.memory.records[slot].words();
-        let [_kind, _version, generation, of_sensor] = core::array::from_fn(|_| words.word());
-        (generation == self.generation && of_sensor == self.of_sensor()).then(|| sums_from_words(&mut words))
+        let (mut words, mut sums) = (self.memory.records[slot].words(), ChannelSums::EMPTY);
+        let [_kind, _version, generation, of_sensor] = words.read::<HEAD>();
+        visit_sums(&mut sums, &mut words);
+        (generation == self.generation && of_sensor == self.of_sensor()).then_some(sums)
     }
 
     /// Replaces the finished epoch; a reset during the write loses it.
-    pub fn write_epoch(&mut self, epoch: &FinishedEpoch) {
+    pub fn write_epoch(&mut self, epoch: &mut FinishedEpoch) {
         self.write_crashes(Crashes { of_epoch: 0, ..self.crashes });
-        self.memory.epoch.write(self.epoch_key(), epoch_words(epoch));
+        self.memory.epoch.write(self.epoch_key(), |words| visit_epoch(epoch, words));
     }
 
     /// Restores into `epoch`; false without one, or after two crashes before it was learned from.
     #[must_use]
     pub fn restore_epoch(&self, epoch: &mut FinishedEpoch) -> bool {
         let words = self.memory.epoch.read(self.epoch_key()).filter(|_| self.crashes.of_epoch < CRASHES_OF_EPOCH);
-        words.map(|mut words| epoch_from_words(epoch, &mut words)).is_some()
+        words.map(|mut words| visit_epoch(epoch, &mut words)).is_some()
     }
 
     /// After learning.
@@ -201,35 +227,33 @@ impl RetainedRam {
     }
 
     /// `new_generation` outdates the channel records.
-    pub fn write_settings(&mut self, settings: RetainedSettings, new_generation: bool) {
+    pub fn write_settings(&mut self, mut settings: RetainedSettings, new_generation: bool) {
         self.generation = self.generation.wrapping_add(u32::from(new_generation));
         self.settings = Some(settings);
-        let RetainedSettings { smpl_prd, sens_avg, epoch_s, epoch, interval_s, starts, epoch_age_us, prod_id } =
-            settings;
-        let [age, age_high] = halves(epoch_age_us);
-        let sensor = [u32::from(smpl_prd), u32::from(sens_avg)];
-        let words = sensor.into_iter().chain([epoch_s, epoch, interval_s, starts, age, age_high, u32::from(prod_id)]);
-        self.write(SETTINGS, words);
+        self.write(SETTINGS, |words| settings.visit(words));
     }
 
     /// Writes the sums of [`CHANNELS`]`[index]`.
-    pub fn checkpoint(&mut self, index: usize, sums: &ChannelSums) {
+    pub fn checkpoint(&mut self, index: usize, sums: &mut ChannelSums) {
         if index < CHANNELS.len() {
-            self.write(1 + index, sums_words(sums));
+            self.write(1 + index, |words| visit_sums(sums, words));
         }
     }
 
     fn of_sensor(&self) -> u32 {
-        self.settings.as_ref().map_or(0, RetainedSettings::of_sensor)
+        self.settings.map_or(0, |settings| settings.user.of_sensor())
     }
 
-    fn write(&mut self, kind: usize, words: impl IntoIterator<Item = u32>) {
+    fn write(&mut self, kind: usize, visit: impl FnOnce(&mut Words<'_>)) {
         // One slot is always spare.
         let is_newest = |index| self.newest.iter().flatten().any(|(newest, _)| *newest == index);
         let Some(free) = (0..=KINDS).find(|&index| !is_newest(index)) else { return };
         self.version = self.version.wrapping_add(1);
-        let head = [kind as u32, self.version, self.generation, self.of_sensor()];
-        self.memory.records[free].write(self.build, head.into_iter().chain(words));
+        let mut head = [kind as u32, self.version, self.generation, self.of_sensor()];
+        self.memory.records[free].write(self.build, |words| {
+            head.iter_mut().for_each(|word| words.word(word));
+            visit(words);
+        });
         self.newest[kind] = Some((free, self.version));
     }
 }
@@ -240,20 +264,14 @@ mod tests {
 
     use super::*;
     use crate::channels::{ChannelEstimator, OCTAVES};
-    use crate::epoch_record::MAX_SUM;
+    use crate::slot::MAX_SUM;
     use allan_core::Interpolation;
     use std::boxed::Box;
 
-    const SETTINGS_WRITTEN: RetainedSettings = RetainedSettings {
-        smpl_prd: 7,
-        sens_avg: 0x0400,
-        epoch_s: 3600,
-        epoch: 2,
-        interval_s: 10,
-        starts: 3,
-        epoch_age_us: 3 << 32 | 7,
-        prod_id: 3,
-    };
+    const USER: UserSettings =
+        UserSettings { smpl_prd: 7, sens_avg: 0x0400, epoch_s: 3600, interval_s: 10, prod_id: 3 };
+    const SETTINGS_WRITTEN: RetainedSettings =
+        RetainedSettings { user: USER, epoch: 2, starts: 3, epoch_age_us: 3 << 32 | 7 };
 
     fn memory() -> &'static RetainedMemory {
         Box::leak(Box::new(blank_memory()))
@@ -274,7 +292,7 @@ mod tests {
         assert!(before.restore(0).is_none());
         before.write_settings(SETTINGS_WRITTEN, true);
         for round in 1..4 {
-            (0..CHANNELS.len()).for_each(|index| before.checkpoint(index, &sums(100 * round + index as i32)));
+            (0..CHANNELS.len()).for_each(|index| before.checkpoint(index, &mut sums(100 * round + index as i32)));
         }
         let after = RetainedRam::open(memory);
         assert_eq!(after.settings(), Some(SETTINGS_WRITTEN));
@@ -291,10 +309,10 @@ mod tests {
         retained.write_settings(SETTINGS_WRITTEN, true);
         let octaves = core::array::from_fn(|octave| (MAX_SUM - octave as u128, u64::MAX - octave as u64));
         let gaps = core::array::from_fn(|octave| Interpolation::new(u32::MAX - octave as u32, octave as u32, MAX_SUM));
-        let wide = ChannelSums { samples: u64::MAX, missing: 1 << 33, octaves, gaps };
-        retained.checkpoint(3, &wide);
+        let mut wide = ChannelSums { samples: u64::MAX, missing: 1 << 33, octaves, gaps };
+        retained.checkpoint(3, &mut wide);
         assert_eq!(RetainedRam::open(memory).restore(3).unwrap(), wide);
-        retained.checkpoint(3, &ChannelSums { octaves: [(u128::MAX, 1); OCTAVES], ..wide.clone() });
+        retained.checkpoint(3, &mut ChannelSums { octaves: [(u128::MAX, 1); OCTAVES], ..wide.clone() });
         assert_eq!(retained.restore(3).unwrap(), ChannelSums { octaves: [(MAX_SUM, 1); OCTAVES], ..wide });
     }
 
@@ -303,8 +321,9 @@ mod tests {
         let memory = memory();
         let mut retained = RetainedRam::open(memory);
         retained.write_settings(SETTINGS_WRITTEN, true);
-        retained.checkpoint(1, &sums(50));
-        retained.write_settings(RetainedSettings { epoch_s: 60, ..SETTINGS_WRITTEN }, false);
+        retained.checkpoint(1, &mut sums(50));
+        retained
+            .write_settings(RetainedSettings { user: UserSettings { epoch_s: 60, ..USER }, ..SETTINGS_WRITTEN }, false);
         assert!(RetainedRam::open(memory).restore(1).is_some());
         retained.write_settings(SETTINGS_WRITTEN, true);
         assert!(RetainedRam::open(memory).restore(1).is_none());
@@ -314,15 +333,13 @@ mod tests {
 
     #[test]
     fn statistics_of_another_range_or_rate_are_not_restored() {
-        for other in [
-            RetainedSettings { sens_avg: 0x0401, ..SETTINGS_WRITTEN },
-            RetainedSettings { smpl_prd: 1, ..SETTINGS_WRITTEN },
-        ] {
+        for other in [UserSettings { sens_avg: 0x0401, ..USER }, UserSettings { smpl_prd: 1, ..USER }] {
+            let other = RetainedSettings { user: other, ..SETTINGS_WRITTEN };
             let memory = memory();
             let mut retained = RetainedRam::open(memory);
             retained.write_settings(SETTINGS_WRITTEN, true);
-            retained.checkpoint(1, &sums(50));
-            retained.write_epoch(&FinishedEpoch::EMPTY);
+            retained.checkpoint(1, &mut sums(50));
+            retained.write_epoch(&mut FinishedEpoch::EMPTY.clone());
             retained.write_settings(other, false);
             let mut epoch = FinishedEpoch::EMPTY;
             let opened = RetainedRam::open(memory);
@@ -338,8 +355,8 @@ mod tests {
         let memory = memory();
         let mut retained = RetainedRam::open_by(1, memory);
         retained.write_settings(SETTINGS_WRITTEN, true);
-        retained.checkpoint(1, &sums(50));
-        retained.write_epoch(&FinishedEpoch::EMPTY);
+        retained.checkpoint(1, &mut sums(50));
+        retained.write_epoch(&mut FinishedEpoch::EMPTY.clone());
         let (same, other) = (RetainedRam::open_by(1, memory), RetainedRam::open_by(2, memory));
         let mut epoch = FinishedEpoch::EMPTY;
         assert!(same.settings().is_some() && same.restore(1).is_some() && same.restore_epoch(&mut epoch));
@@ -353,8 +370,8 @@ mod tests {
             let memory = memory();
             let mut retained = RetainedRam::open(memory);
             retained.write_settings(SETTINGS_WRITTEN, true);
-            retained.checkpoint(2, &sums(100));
-            retained.checkpoint(2, &sums(200));
+            retained.checkpoint(2, &mut sums(100));
+            retained.checkpoint(2, &mut sums(200));
             let (slot, _) = retained.newest[3].unwrap();
             memory.records[slot].flip(word, 4);
             assert_eq!(RetainedRam::open(memory).restore(2).map(|sums| sums.samples), Some(100), "word {word}");
@@ -366,8 +383,8 @@ mod tests {
         let memory = memory();
         let mut retained = RetainedRam::open(memory);
         retained.write_settings(SETTINGS_WRITTEN, true);
-        retained.checkpoint(0, &sums(100));
-        retained.checkpoint(0, &sums(200));
+        retained.checkpoint(0, &mut sums(100));
+        retained.checkpoint(0, &mut sums(200));
         let is_newest = |index| retained.newest.iter().flatten().any(|(newest, _)| *newest == index);
         let free = (0..=KINDS).find(|&index| !is_newest(index)).unwrap();
         for written in 0..=HEAD + SUMS_WORDS {
@@ -381,14 +398,14 @@ mod tests {
         let memory = memory();
         let mut retained = RetainedRam::open(memory);
         retained.write_settings(SETTINGS_WRITTEN, true);
-        retained.write_epoch(&FinishedEpoch::EMPTY);
+        retained.write_epoch(&mut FinishedEpoch::EMPTY.clone());
         let restored = || RetainedRam::open(memory).restore_epoch(&mut FinishedEpoch::EMPTY.clone());
         assert!(restored());
         retained.note_crash();
         assert!(restored(), "after one crash");
         retained.note_crash();
         assert!(!restored(), "after two");
-        retained.write_epoch(&FinishedEpoch::EMPTY);
+        retained.write_epoch(&mut FinishedEpoch::EMPTY.clone());
         assert!(restored(), "the next epoch");
     }
 

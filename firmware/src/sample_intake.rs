@@ -1,13 +1,13 @@
 //! The path of samples: data-ready monitor, validation, statistics, counters.
 
 use crate::acquisition::{DataReadyMonitor, DrdyEdge, TimedBurst};
-use crate::channel_validity::{is_frame_sound, is_marked, refused_channels};
 use crate::channels::ChannelSet;
+use crate::counters::add;
 use crate::gross_error_gate::{FIRST_BLOCK, GrossErrorGate};
 use crate::scale::ReportScale;
 use crate::statistics::{CHANNELS, ChannelEstimator, ChannelSums, SampleLosses, Statistics};
 use crate::transmit::{RawStream, TransmitQueue};
-use adis16405_driver::{Burst, BurstValidator, ChannelMask, Config, Faults};
+use adis16405_driver::{Burst, BurstValidator, ChannelMask, Config, Faults, Validity};
 use heapless::spsc;
 use link::{Health, MessageRef};
 
@@ -46,7 +46,7 @@ pub struct Estimators<'m> {
     finished_losses: SampleLosses,
     validator: BurstValidator,
     gate: GrossErrorGate,
-    monitor: DataReadyMonitor,
+    pub(crate) monitor: DataReadyMonitor,
     /// The validator's are added on reading.
     health: Health,
     /// +2 per unusable, −1 per usable burst.
@@ -56,11 +56,11 @@ pub struct Estimators<'m> {
     /// Bursts until the filter has settled.
     settling: u32,
     learning: u32,
-    used_since_probe: u32,
-    error_flag: bool,
+    pub(crate) used_since_probe: u32,
+    pub(crate) error_flag: bool,
     processed: u32,
     next_sample: u64,
-    raw_stream: RawStream,
+    pub(crate) raw_stream: RawStream,
 }
 
 impl<'m> Estimators<'m> {
@@ -113,11 +113,6 @@ impl<'m> Estimators<'m> {
         self.monitor.is_suspect() || self.unusable >= 2 * UNUSABLE_BURSTS
     }
 
-    /// False for damaged memory.
-    pub(crate) fn is_intact(&self) -> bool {
-        self.monitor.has_period()
-    }
-
     /// Reason for a probe at `now_us`.
     pub(crate) fn trouble(&self, now_us: u64) -> Option<SensorTrouble> {
         if self.monitor.is_silent_at(now_us) {
@@ -127,22 +122,6 @@ impl<'m> Estimators<'m> {
         } else {
             self.is_suspect().then_some(SensorTrouble::Unusable(self.unusable_cause))
         }
-    }
-
-    pub(crate) fn last_edge_us(&self) -> Option<u64> {
-        self.monitor.last_edge_us()
-    }
-
-    pub(crate) fn has_error_flag(&self) -> bool {
-        self.error_flag
-    }
-
-    pub(crate) fn clear_error_flag(&mut self) {
-        self.error_flag = false;
-    }
-
-    pub(crate) fn used_since_probe(&self) -> u32 {
-        self.used_since_probe
     }
 
     pub(crate) fn is_settled(&self) -> bool {
@@ -163,11 +142,6 @@ impl<'m> Estimators<'m> {
         self.learning = if self.gate.is_learning() { FIRST_BLOCK } else { 0 };
         self.used_since_probe = 0;
         self.error_flag = false;
-    }
-
-    /// After the device's own pause: samples are lost, without suspicion.
-    pub(crate) fn restart_rate_check(&mut self, now_us: u64) {
-        self.monitor.restart_at(now_us);
     }
 
     /// Starts again for `config`; the raw stream stays as it is.
@@ -202,19 +176,18 @@ impl<'m> Estimators<'m> {
         self.raw_stream.set(on, self.config.sens_avg());
     }
 
-    pub(crate) fn has_raw_stream(&self) -> bool {
-        self.raw_stream.is_on()
-    }
-
     /// The estimator of [`CHANNELS`]`[index]`.
     #[must_use]
     pub fn channel(&self, index: usize) -> Option<&ChannelEstimator> {
         self.statistics.estimators.get(index)
     }
 
-    /// Continues from sums before a restart.
+    /// Continues from sums before a restart, which those over pairs do not cover.
     pub fn restore(&mut self, index: usize, sums: &ChannelSums) {
-        self.statistics.restore(index, sums);
+        if let Some(estimator) = self.statistics.estimators.get_mut(index) {
+            sums.restore(estimator);
+            self.statistics.cross_sums.incomplete = true;
+        }
     }
 
     pub(crate) fn losses(&self, finished: bool) -> SampleLosses {
@@ -242,23 +215,14 @@ impl<'m> Estimators<'m> {
     /// The counters of sampling and estimating; those of the application and the board are 0.
     #[must_use]
     pub fn health(&self) -> Health {
-        let counters = self.validator.counters();
-        Health {
-            bursts: counters.bursts,
-            no_new_data: counters.get(Faults::NO_NEW_DATA),
-            error_alarm: counters.get(Faults::ERROR_ALARM),
-            supply: counters.get(Faults::SUPPLY),
-            stuck_low: counters.get(Faults::STUCK_LOW),
-            stuck_high: counters.get(Faults::STUCK_HIGH),
-            shifted: counters.get(Faults::SHIFTED),
-            frozen: counters.get(Faults::FROZEN).saturating_add(self.health.frozen),
-            impossible_rate: counters.get(Faults::IMPOSSIBLE_RATE),
-            x_sign: counters.get(Faults::X_SIGN),
-            repeated: counters.get(Faults::REPEATED),
-            implausible_supply: counters.get(Faults::IMPLAUSIBLE_SUPPLY),
-            mixed_alarm: counters.get(Faults::MIXED_ALARM),
-            ..self.health
+        let (counters, mut health) = (self.validator.counters(), self.health);
+        health.bursts = counters.bursts;
+        for (fault, name) in Faults::CAUSES {
+            if let Some(counter) = health.counter_mut(name) {
+                add(counter, counters.get(fault));
+            }
         }
+        health
     }
 
     fn add_burst(&mut self, burst: Option<&Burst>) {
@@ -297,7 +261,7 @@ impl<'m> Estimators<'m> {
         add(&mut health.used, 1);
         add(&mut health.gross_errors, u32::from(!gross.is_empty()));
         add(&mut health.partly_used, u32::from(!refused.union(gross).is_empty()));
-        add(&mut health.marked, u32::from(is_marked(faults)));
+        add(&mut health.marked, u32::from(faults.intersects(Faults::SUPPLY | Faults::ERROR_ALARM)));
     }
 
     /// An unused burst; rare, so not inlined.
@@ -329,13 +293,24 @@ impl<'m> Estimators<'m> {
     }
 }
 
+/// True unless a fault concerns the whole burst.
+fn is_frame_sound(burst: &Burst) -> bool {
+    (Faults::WARNINGS | Faults::OF_CHANNELS).contains(burst.faults())
+}
+
+fn refused_channels(validity: Validity) -> ChannelSet {
+    let mut refused = ChannelSet::EMPTY;
+    if !validity.is_usable() {
+        for (index, channel) in CHANNELS.into_iter().enumerate() {
+            refused.insert_if(index, validity.refused.contains(channel));
+        }
+    }
+    refused
+}
+
 fn estimated_counts(burst: &Burst) -> [i32; CHANNELS.len()] {
     let counts = burst.counts();
     CHANNELS.map(|channel| i32::from(counts.get(channel)))
-}
-
-fn add(counter: &mut u32, more: u32) {
-    *counter = counter.saturating_add(more);
 }
 
 /// Processes queued bursts and sends full raw messages, at a priority between sampling and the main loop.

@@ -118,11 +118,6 @@ impl<F: NorFlash> SettingsStore<F> {
     fn erase(&mut self) -> Result<(), StoreError> {
         complete(self.map.erase_all()).and_then(Result::ok).ok_or(StoreError::Flash)
     }
-
-    /// Gives the flash back.
-    pub fn into_flash(self) -> F {
-        self.map.destroy().0
-    }
 }
 
 /// `None` if the future waits.

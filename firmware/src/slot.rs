@@ -1,9 +1,11 @@
 //! Words with a checksum and key that a warm reset keeps; atomic, so any content is valid.
 
-use core::iter::repeat;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
+/// Largest sum that a record keeps.
+pub(crate) const MAX_SUM: u128 = (1 << 96) - 1;
 
 pub(crate) struct Slot<const WORDS: usize> {
     /// Checked first: checksums take milliseconds on a Cortex-M0+.
@@ -17,22 +19,20 @@ impl<const WORDS: usize> Slot<WORDS> {
         Self { key: AtomicU32::new(0), words: [const { AtomicU32::new(0) }; WORDS], checksum: AtomicU32::new(0) }
     }
 
-    /// Missing words are 0, which no key is.
-    pub(crate) fn write(&self, key: u32, words: impl IntoIterator<Item = u32>) {
+    /// Key 0 is none. Words that `visit` does not write stay as they are.
+    pub(crate) fn write(&self, key: u32, visit: impl FnOnce(&mut Words<'_>)) {
         self.key.store(key, Relaxed);
-        for (cell, word) in self.words.iter().zip(words.into_iter().chain(repeat(0))) {
-            cell.store(word, Relaxed);
-        }
+        visit(&mut Words { is_writing: true, ..self.words() });
         self.checksum.store(self.checksum_with(key), Relaxed);
     }
 
-    pub(crate) fn read(&self, key: u32) -> Option<Words<impl Iterator<Item = u32>>> {
+    pub(crate) fn read(&self, key: u32) -> Option<Words<'_>> {
         let is_intact = self.key.load(Relaxed) == key && self.checksum.load(Relaxed) == self.checksum_with(key);
         is_intact.then(|| self.words())
     }
 
-    pub(crate) fn words(&self) -> Words<impl Iterator<Item = u32>> {
-        Words(self.words.iter().map(|cell| cell.load(Relaxed)))
+    pub(crate) fn words(&self) -> Words<'_> {
+        Words { cells: self.words.iter(), is_writing: false }
     }
 
     pub(crate) fn clear(&self) {
@@ -58,29 +58,54 @@ impl<const WORDS: usize> Slot<WORDS> {
     }
 }
 
-/// Missing ones are 0.
-pub(crate) struct Words<I>(pub(crate) I);
-
-impl<I: Iterator<Item = u32>> Words<I> {
-    pub(crate) fn word(&mut self) -> u32 {
-        self.0.next().unwrap_or(0)
-    }
-
-    pub(crate) fn wide(&mut self) -> u64 {
-        u64::from(self.word()) | u64::from(self.word()) << 32
-    }
-
-    pub(crate) fn sum(&mut self) -> u128 {
-        u128::from(self.wide()) | u128::from(self.word()) << 64
-    }
-
-    pub(crate) fn float(&mut self) -> f64 {
-        f64::from_bits(self.wide())
-    }
+/// Writes numbers to a slot, or reads them from it in the same order; beyond its end they stay as they are.
+pub(crate) struct Words<'s> {
+    cells: core::slice::Iter<'s, AtomicU32>,
+    is_writing: bool,
 }
 
-pub(crate) fn halves(wide: u64) -> [u32; 2] {
-    [wide as u32, (wide >> 32) as u32]
+impl Words<'_> {
+    pub(crate) fn word(&mut self, word: &mut u32) {
+        match self.cells.next() {
+            Some(cell) if self.is_writing => cell.store(*word, Relaxed),
+            Some(cell) => *word = cell.load(Relaxed),
+            None => {}
+        }
+    }
+
+    pub(crate) fn short<T: Copy + Into<u32> + TryFrom<u32>>(&mut self, number: &mut T) {
+        let mut word = (*number).into();
+        self.word(&mut word);
+        *number = word.try_into().unwrap_or(*number);
+    }
+
+    pub(crate) fn wide(&mut self, wide: &mut u64) {
+        let (mut low, mut high) = (*wide as u32, (*wide >> 32) as u32);
+        self.word(&mut low);
+        self.word(&mut high);
+        *wide = u64::from(low) | u64::from(high) << 32;
+    }
+
+    /// At most [`MAX_SUM`].
+    pub(crate) fn sum(&mut self, sum: &mut u128) {
+        let capped = (*sum).min(MAX_SUM);
+        let (mut low, mut high) = (capped as u64, (capped >> 64) as u32);
+        self.wide(&mut low);
+        self.word(&mut high);
+        *sum = u128::from(low) | u128::from(high) << 64;
+    }
+
+    pub(crate) fn float(&mut self, value: &mut f64) {
+        let mut bits = value.to_bits();
+        self.wide(&mut bits);
+        *value = f64::from_bits(bits);
+    }
+
+    pub(crate) fn read<const N: usize>(&mut self) -> [u32; N] {
+        let mut words = [0; N];
+        words.iter_mut().for_each(|word| self.word(word));
+        words
+    }
 }
 
 #[cfg(test)]
@@ -90,9 +115,9 @@ mod tests {
     #[test]
     fn a_record_is_read_with_its_key_until_it_is_cleared_or_damaged() {
         let slot = Slot::<4>::blank();
-        let read = |key| slot.read(key).map(|mut words| [words.word(), words.word(), words.word(), words.word()]);
+        let read = |key| slot.read(key).map(|mut words| words.read::<4>());
         assert_eq!(read(7), None, "zeros are no record");
-        slot.write(7, [1, 2, 3]);
+        slot.write(7, |words| [1, 2, 3].iter_mut().for_each(|word| words.word(word)));
         assert_eq!((read(7), read(8)), (Some([1, 2, 3, 0]), None));
         for word in 0..5 {
             slot.flip(word, 19);

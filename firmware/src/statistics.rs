@@ -79,14 +79,6 @@ impl Statistics {
         }
     }
 
-    /// Sums over pairs do not cover these.
-    pub(crate) fn restore(&mut self, index: usize, sums: &ChannelSums) {
-        if let Some(estimator) = self.estimators.get_mut(index) {
-            sums.restore(estimator);
-            self.cross_sums.mark_incomplete();
-        }
-    }
-
     pub(crate) fn reset(&mut self) {
         self.estimators.iter_mut().for_each(Cascade::reset);
         self.cross_sums.reset();
@@ -134,18 +126,19 @@ impl ChannelSums {
         estimator.restore(self.samples, self.missing, |octave| self.octave(octave));
     }
 
-    /// Rebuilds the Allan variance curve of a channel in its unit.
-    pub fn rebuild_curve(&self, curve: &mut Curve<OCTAVES>, channel: Channel, scale: ReportScale) {
-        ChannelEstimator::rebuild_curve(curve, scale.period_s(), self.samples, |octave| self.octave(octave));
+    /// The Allan variance curve of a channel in its unit.
+    #[must_use]
+    pub fn curve(&self, channel: Channel, scale: ReportScale) -> Curve<OCTAVES> {
+        let mut curve = Curve::empty();
+        ChannelEstimator::rebuild_curve(&mut curve, scale.period_s(), self.samples, |octave| self.octave(octave));
         curve.scale(scale.lsb(channel));
+        curve
     }
 
     /// Fits the baseline model (N, B and K) to the curve of a channel, in its unit.
     #[must_use]
     pub fn fit_baseline(&self, channel: Channel, scale: ReportScale) -> Model {
-        let mut curve = Curve::empty();
-        self.rebuild_curve(&mut curve, channel, scale);
-        fit(&curve, &NoiseTerm::BASELINE)
+        fit(&self.curve(channel, scale), &NoiseTerm::BASELINE)
     }
 
     pub(crate) fn octave(&self, octave: usize) -> OctaveSums {

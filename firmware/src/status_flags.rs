@@ -1,5 +1,6 @@
 //! The sensor's status register, whose flags stay set until a read: reading while sampling, counts of causes.
 
+use crate::counters::add;
 use adis16405_driver::Diagnosis;
 use core::fmt;
 use link::Health;
@@ -22,7 +23,7 @@ const CAUSES: [(Diagnosis, &str, CounterOf); 8] = [
     (Diagnosis::ALARM_1.union(Diagnosis::ALARM_2), "alarm", |health| &mut health.diag_alarm),
 ];
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct StatusFlags {
     next_read_us: u64,
     /// Since [`LOG_US`] before `forget_us`.
@@ -31,10 +32,6 @@ pub(crate) struct StatusFlags {
 }
 
 impl StatusFlags {
-    pub(crate) const fn new() -> Self {
-        Self { next_read_us: 0, logged: Diagnosis::empty(), forget_us: 0 }
-    }
-
     pub(crate) const fn is_due(&self, now_us: u64) -> bool {
         now_us >= self.next_read_us
     }
@@ -48,9 +45,9 @@ impl StatusFlags {
     ) -> Option<CauseList> {
         self.next_read_us = now_us + READ_US;
         let diagnosis = diagnosis?;
-        count(&mut counters.diag_reads);
+        add(&mut counters.diag_reads, 1);
         for (_, _, counter) in CAUSES.iter().filter(|(cause, ..)| diagnosis.intersects(*cause)) {
-            count(counter(counters));
+            add(counter(counters), 1);
         }
         if now_us >= self.forget_us {
             (self.logged, self.forget_us) = (Diagnosis::empty(), now_us + LOG_US);
@@ -59,10 +56,6 @@ impl StatusFlags {
         self.logged |= diagnosis;
         news.then_some(CauseList(diagnosis))
     }
-}
-
-pub(crate) fn count(counter: &mut u32) {
-    *counter = counter.saturating_add(1);
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -99,7 +92,7 @@ mod tests {
 
     #[test]
     fn every_cause_is_counted_apart() {
-        let (mut flags, mut health) = (StatusFlags::new(), Health::default());
+        let (mut flags, mut health) = (StatusFlags::default(), Health::default());
         for bit in 0..16 {
             flags.add(Some(Diagnosis::from_bits_truncate(1 << bit)), 0, &mut health);
         }
@@ -111,7 +104,7 @@ mod tests {
 
     #[test]
     fn the_register_is_read_once_a_second_and_a_cause_is_logged_once_in_ten_minutes() {
-        let (mut flags, mut health) = (StatusFlags::new(), Health::default());
+        let (mut flags, mut health) = (StatusFlags::default(), Health::default());
         assert!(flags.is_due(0));
         let mut add = |flags: &mut StatusFlags, diagnosis, now_us| {
             flags.add(diagnosis, now_us, &mut health).map(|causes| causes.to_string())

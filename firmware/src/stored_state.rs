@@ -3,7 +3,7 @@
 use crate::channels::CHANNELS;
 use crate::epoch::Regressor;
 use crate::learner::EpochModel;
-use crate::retained::RetainedSettings;
+use crate::retained::UserSettings;
 use crate::statistics::INERTIAL;
 use serde::{Deserialize, Serialize};
 
@@ -12,29 +12,8 @@ const FORMAT: u8 = 1;
 /// In the order of the bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct StoredSettings {
-    pub(crate) smpl_prd: u8,
-    pub(crate) sens_avg: u16,
-    pub(crate) epoch_s: u32,
-    pub(crate) interval_s: u32,
-    pub(crate) prod_id: u16,
+    pub(crate) user: UserSettings,
     pub(crate) raw_stream: bool,
-}
-
-impl StoredSettings {
-    pub(crate) fn new(settings: RetainedSettings, raw_stream: bool) -> Self {
-        let RetainedSettings { smpl_prd, sens_avg, epoch_s, interval_s, prod_id, .. } = settings;
-        Self { smpl_prd, sens_avg, epoch_s, interval_s, prod_id, raw_stream }
-    }
-
-    /// Replaces settings of `others`.
-    pub(crate) fn apply_to(self, others: RetainedSettings) -> RetainedSettings {
-        let Self { smpl_prd, sens_avg, epoch_s, interval_s, prod_id, raw_stream: _ } = self;
-        RetainedSettings { smpl_prd, sens_avg, epoch_s, interval_s, prod_id, ..others }
-    }
-
-    pub(crate) fn have_sensor_of(self, others: RetainedSettings) -> bool {
-        (self.smpl_prd, self.sens_avg) == (others.smpl_prd, others.sens_avg)
-    }
 }
 
 type Models = [EpochModel; INERTIAL];
@@ -82,11 +61,7 @@ mod tests {
     use std::vec::Vec;
 
     const SETTINGS: StoredSettings = StoredSettings {
-        smpl_prd: 0x81,
-        sens_avg: 0x0402,
-        epoch_s: 3_600,
-        interval_s: 60,
-        prod_id: 16_400,
+        user: UserSettings { smpl_prd: 0x81, sens_avg: 0x0402, epoch_s: 3_600, interval_s: 60, prod_id: 16_400 },
         raw_stream: true,
     };
 

@@ -1,7 +1,7 @@
 //! The USB serial port (CDC-ACM) over any [`UsbBus`]; an absent host's bytes stay queued, then are [dropped and
 //! counted](crate::TransmitQueue).
 
-use crate::receive::Receiver;
+use crate::receive::{Receiver, ServedPort};
 use heapless::Vec;
 use heapless::spsc::Consumer;
 use usb_device::bus::{UsbBus, UsbBusAllocator};
@@ -22,17 +22,6 @@ const STALL_US: u32 = 30_000_000;
 /// Off the bus afterwards, µs.
 const OFF_US: u32 = 500_000;
 
-/// Who makes the board, and which one it is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct UsbIdentity<'a> {
-    /// Vendor.
-    pub vendor: u16,
-    /// Product, among those of the vendor.
-    pub product: u16,
-    /// Serial number, different for every board.
-    pub serial_number: &'a str,
-}
-
 /// A USB serial port between a transmit and a receive queue.
 pub struct UsbPort<'a, B: UsbBus> {
     device: UsbDevice<'a, B>,
@@ -49,21 +38,19 @@ pub struct UsbPort<'a, B: UsbBus> {
 }
 
 impl<'a, B: UsbBus> UsbPort<'a, B> {
-    /// Connects; `reconnect` takes the controller off the bus (false), or on again (true). `None` with too few
-    /// endpoints.
+    /// Connects; every board has its own `serial_number`. `reconnect` takes the controller off the bus (false), or on
+    /// again (true). `None` with too few endpoints.
     pub fn new(
         bus: &'a UsbBusAllocator<B>,
-        identity: UsbIdentity<'a>,
+        product: UsbVidPid,
+        serial_number: &'a str,
         (transmit, receive): (Consumer<'a, u8>, Receiver<'a>),
         reconnect: fn(bool),
     ) -> Option<Self> {
         let serial = SerialPort::new(bus);
-        let strings = StringDescriptors::default()
-            .manufacturer(MANUFACTURER)
-            .product(PRODUCT)
-            .serial_number(identity.serial_number);
-        let device = UsbDeviceBuilder::new(bus, UsbVidPid(identity.vendor, identity.product))
-            .strings(&[strings])
+        let names = StringDescriptors::default().manufacturer(MANUFACTURER).product(PRODUCT);
+        let device = UsbDeviceBuilder::new(bus, product)
+            .strings(&[names.serial_number(serial_number)])
             .ok()?
             .max_packet_size_0(PACKET as u8)
             .ok()?
@@ -73,35 +60,6 @@ impl<'a, B: UsbBus> UsbPort<'a, B> {
             .build();
         let waiting = Vec::new();
         Some(Self { device, serial, transmit, receive, waiting, is_open: false, reconnect, moved_us: 0, is_off: false })
-    }
-
-    /// Answers the host and moves bytes; returns how many received ones were lost. For bus interrupts, queued bytes,
-    /// and at least every second.
-    pub fn serve(&mut self, now_us: u32) -> u32 {
-        if self.is_off && now_us.wrapping_sub(self.moved_us) < OFF_US {
-            return 0;
-        }
-        if core::mem::take(&mut self.is_off) {
-            (self.reconnect)(true);
-            self.moved_us = now_us;
-        }
-        self.device.poll(&mut [&mut self.serial]);
-        let lost = self.receive();
-        let was_open = core::mem::replace(&mut self.is_open, self.serial.dtr());
-        // Old lines would mislead a new terminal.
-        let is_absent = matches!(self.device.state(), UsbDeviceState::Default | UsbDeviceState::Addressed);
-        if is_absent || self.is_open && !was_open {
-            self.waiting.clear();
-            while self.transmit.dequeue().is_some() {}
-        }
-        let is_connected = self.device.state() == UsbDeviceState::Configured;
-        if !is_connected || self.transmit() || !self.is_open {
-            self.moved_us = now_us;
-        } else if now_us.wrapping_sub(self.moved_us) > STALL_US {
-            (self.reconnect)(false);
-            (self.is_off, self.moved_us) = (true, now_us);
-        }
-        lost
     }
 
     fn receive(&mut self) -> u32 {
@@ -132,5 +90,35 @@ impl<'a, B: UsbBus> UsbPort<'a, B> {
             self.waiting.copy_within(taken.., 0);
             self.waiting.truncate(self.waiting.len() - taken);
         }
+    }
+}
+
+impl<B: UsbBus> ServedPort for UsbPort<'_, B> {
+    /// For bus interrupts, queued bytes, and at least every second.
+    fn serve(&mut self, now_us: u32) -> u32 {
+        if self.is_off && now_us.wrapping_sub(self.moved_us) < OFF_US {
+            return 0;
+        }
+        if core::mem::take(&mut self.is_off) {
+            (self.reconnect)(true);
+            self.moved_us = now_us;
+        }
+        self.device.poll(&mut [&mut self.serial]);
+        let lost = self.receive();
+        let was_open = core::mem::replace(&mut self.is_open, self.serial.dtr());
+        // Old lines would mislead a new terminal.
+        let is_absent = matches!(self.device.state(), UsbDeviceState::Default | UsbDeviceState::Addressed);
+        if is_absent || self.is_open && !was_open {
+            self.waiting.clear();
+            while self.transmit.dequeue().is_some() {}
+        }
+        let is_connected = self.device.state() == UsbDeviceState::Configured;
+        if !is_connected || self.transmit() || !self.is_open {
+            self.moved_us = now_us;
+        } else if now_us.wrapping_sub(self.moved_us) > STALL_US {
+            (self.reconnect)(false);
+            (self.is_off, self.moved_us) = (true, now_us);
+        }
+        lost
     }
 }

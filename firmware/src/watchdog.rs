@@ -22,7 +22,7 @@ enum StoppedTask {
 }
 
 /// Compares task counters between passes; missing edges concern the sensor.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct TaskMonitor {
     activity: SamplingActivity,
     reading_since_us: Option<u64>,
@@ -36,16 +36,8 @@ pub(crate) struct TaskMonitor {
 }
 
 impl TaskMonitor {
-    pub(crate) const fn new(now_us: u64) -> Self {
-        Self {
-            activity: SamplingActivity { started: 0, ended: 0, masked: 0, is_masked: false },
-            reading_since_us: None,
-            processed: 0,
-            ended_then: 0,
-            behind_since_us: None,
-            transmitted_us: now_us,
-            stopped: None,
-        }
+    pub(crate) fn new(now_us: u64) -> Self {
+        Self { transmitted_us: now_us, ..Self::default() }
     }
 
     pub(crate) fn mark_transmitted(&mut self, now_us: u64) {

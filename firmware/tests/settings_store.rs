@@ -49,7 +49,7 @@ impl<const PAGE: usize, const PAGES: usize> MockFlash<PAGE, PAGES> {
         Ok(())
     }
 
-    fn store(self) -> SettingsStore<Self> {
+    fn store(&mut self) -> SettingsStore<&mut Self> {
         SettingsStore::new(self, 0..(PAGES * PAGE) as u32).expect("whole pages")
     }
 
@@ -62,9 +62,9 @@ impl<const PAGE: usize, const PAGES: usize> MockFlash<PAGE, PAGES> {
 
     /// Writes a record and returns the flash afterwards, and whether the store says that it is written.
     fn write_record(&self, record: &[u8]) -> (Self, bool) {
-        let mut store = self.clone().store();
-        let done = store.replace(record).is_ok();
-        (store.into_flash(), done)
+        let mut flash = self.clone();
+        let done = flash.store().replace(record).is_ok();
+        (flash, done)
     }
 }
 
@@ -169,12 +169,11 @@ fn foreign_contents_are_no_record() {
     let mut flash = SmallFlash::new();
     flash.bytes.iter_mut().enumerate().for_each(|(index, byte)| *byte = (index * index % 253) as u8);
     assert_eq!(flash.read_record(), None);
-    let (flash, done) = flash.write_record(&record(1));
+    let (mut flash, done) = flash.write_record(&record(1));
     assert!(done);
     assert_eq!(flash.read_record(), Some(record(1)));
-    let mut store = flash.store();
-    store.replace(&[]).expect("erased");
-    assert_eq!(store.into_flash().read_record(), None);
+    flash.store().replace(&[]).expect("erased");
+    assert_eq!(flash.read_record(), None);
 }
 
 /// Pages that are taken for a ring, in which nothing that is written is found again.

@@ -7,7 +7,7 @@
 use firmware::microcontroller::rp2040::start::Rp2040;
 use firmware::microcontroller::rp2040::wires;
 use firmware::microcontroller::{BoardParts, BoardSupport, UartQueues};
-use rp2040_hal::{gpio, pac};
+use rp2040_hal::pac;
 
 /// The second stage of the boot loader, for the Pico's flash.
 #[unsafe(link_section = ".boot2")]
@@ -22,15 +22,12 @@ impl BoardSupport for ExampleBoard {
     type Device = pac::Peripherals;
     type Microcontroller = Rp2040;
     type DataReady = wires::DataReady;
-    type Bus = wires::Spi0Bus;
+    type Spi = wires::SensorSpi0;
+    type Select = wires::Select;
     type Uart = wires::Uart;
-    type Usb = wires::Usb;
-    type Led = wires::Led;
-    type ResetLine = wires::ResetLine;
 
     fn start(device: pac::Peripherals, queues: UartQueues) -> BoardParts<Self> {
-        let high = gpio::PinState::High;
-        wires::start(device, queues, true, |pin| Some(pin.into_push_pull_output_in_state(high)))
+        wires::start(device, queues, true, true)
     }
 }
 

@@ -386,6 +386,14 @@ macro_rules! health {
                 [$(Counter { name: stringify!($name), value: self.$name, counts_events: health!($kind) }),*]
             }
 
+            /// The counter with this name.
+            pub fn counter_mut(&mut self, name: &str) -> Option<&mut u32> {
+                match name {
+                    $(stringify!($name) => Some(&mut self.$name),)*
+                    _ => None,
+                }
+            }
+
             /// The sums of all counters, of which each is counted in one place: the others have 0.
             #[must_use]
             pub fn with(&self, others: &Self) -> Self {

@@ -15,14 +15,14 @@
 #![no_std]
 #![no_main]
 
-use firmware::microcontroller::stm32f4::bus::Spi1Bus;
+use firmware::microcontroller::stm32f4::bus::Spi1;
 use firmware::microcontroller::stm32f4::port::UsartPort;
 use firmware::microcontroller::stm32f4::start::Stm32f4;
 #[cfg(feature = "feather-usb")]
-use firmware::microcontroller::stm32f4::usb::{Stm32UsbPort, usb_port};
+use firmware::microcontroller::stm32f4::usb::usb_port;
 use firmware::microcontroller::stm32f4::wires::SensorWires;
-use firmware::microcontroller::{BoardParts, BoardSupport, NotConnected, UartQueues};
-use stm32f4xx_hal::gpio::{Input, Output, PC1, PC4};
+use firmware::microcontroller::{BoardParts, BoardSupport, UartQueues};
+use stm32f4xx_hal::gpio::{Input, Output, PA4, PC4};
 use stm32f4xx_hal::pac::{self, USART3};
 use stm32f4xx_hal::prelude::*;
 
@@ -35,14 +35,9 @@ impl BoardSupport for Feather {
     type Device = pac::Peripherals;
     type Microcontroller = Stm32f4;
     type DataReady = PC4<Input>;
-    type Bus = Spi1Bus;
+    type Spi = Spi1;
+    type Select = PA4<Output>;
     type Uart = UsartPort<USART3>;
-    #[cfg(feature = "feather-usb")]
-    type Usb = Stm32UsbPort;
-    #[cfg(not(feature = "feather-usb"))]
-    type Usb = NotConnected;
-    type Led = PC1<Output>;
-    type ResetLine = NotConnected;
 
     fn start(device: pac::Peripherals, queues: UartQueues) -> BoardParts<Self> {
         let mut started = Stm32f4::start((device.RCC, device.FLASH, device.TIM2, device.IWDG), CRYSTAL_HZ);
@@ -62,7 +57,7 @@ impl BoardSupport for Feather {
             data_ready: c.pc4,
             edges: (device.EXTI, device.SYSCFG),
         };
-        started.board(sensor, uart, usb, c.pc1.into_push_pull_output())
+        started.board(sensor, uart, usb, c.pc1.into_push_pull_output().erase())
     }
 }
 

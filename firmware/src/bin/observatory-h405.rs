@@ -12,12 +12,12 @@
 #![no_std]
 #![no_main]
 
-use firmware::microcontroller::stm32f4::bus::Spi1Bus;
+use firmware::microcontroller::stm32f4::bus::Spi1;
 use firmware::microcontroller::stm32f4::port::UsartPort;
 use firmware::microcontroller::stm32f4::start::Stm32f4;
 use firmware::microcontroller::stm32f4::wires::SensorWires;
-use firmware::microcontroller::{BoardParts, BoardSupport, NotConnected, UartQueues};
-use stm32f4xx_hal::gpio::{Input, Output, PB0, PC12};
+use firmware::microcontroller::{BoardParts, BoardSupport, UartQueues};
+use stm32f4xx_hal::gpio::{Input, Output, PA4, PB0};
 use stm32f4xx_hal::pac::{self, USART2};
 use stm32f4xx_hal::prelude::*;
 
@@ -30,11 +30,9 @@ impl BoardSupport for H405 {
     type Device = pac::Peripherals;
     type Microcontroller = Stm32f4;
     type DataReady = PB0<Input>;
-    type Bus = Spi1Bus;
+    type Spi = Spi1;
+    type Select = PA4<Output>;
     type Uart = UsartPort<USART2>;
-    type Usb = NotConnected;
-    type Led = PC12<Output>;
-    type ResetLine = NotConnected;
 
     fn start(device: pac::Peripherals, queues: UartQueues) -> BoardParts<Self> {
         let mut started = Stm32f4::start((device.RCC, device.FLASH, device.TIM2, device.IWDG), CRYSTAL_HZ);
@@ -47,7 +45,7 @@ impl BoardSupport for H405 {
             data_ready: b.pb0,
             edges: (device.EXTI, device.SYSCFG),
         };
-        started.board(sensor, uart, None, c.pc12.into_push_pull_output())
+        started.board(sensor, uart, None, c.pc12.into_push_pull_output().erase())
     }
 }
 

@@ -4,7 +4,7 @@
 
 use firmware::microcontroller::rp2040::start::Rp2040;
 use firmware::microcontroller::rp2040::wires;
-use firmware::microcontroller::{BoardParts, BoardSupport, NotConnected, UartQueues};
+use firmware::microcontroller::{BoardParts, BoardSupport, UartQueues};
 use rp2040_hal::pac;
 
 /// The second stage of the boot loader, for the Pico's flash.
@@ -20,14 +20,12 @@ impl BoardSupport for Pico {
     type Device = pac::Peripherals;
     type Microcontroller = Rp2040;
     type DataReady = wires::DataReady;
-    type Bus = wires::Spi0Bus;
+    type Spi = wires::SensorSpi0;
+    type Select = wires::Select;
     type Uart = wires::Uart;
-    type Usb = wires::Usb;
-    type Led = wires::Led;
-    type ResetLine = NotConnected;
 
     fn start(device: pac::Peripherals, queues: UartQueues) -> BoardParts<Self> {
-        wires::start(device, queues, cfg!(feature = "pico-usb"), |_| None)
+        wires::start(device, queues, cfg!(feature = "pico-usb"), false)
     }
 }
 

@@ -1,12 +1,12 @@
 //! The [`Board`] that the main loop has, over what it shares with the interrupts.
 
 use super::processor::{ESTIMATOR_CYCLES, LOST_BYTES, SAMPLING_CYCLES, stack};
+use super::sensor_spi::BurstEnd;
 use super::settings_flash::SettingsFlash;
-use super::{BoardSupport, Microcontroller};
-use crate::acquisition::{Sampler, SamplingActivity};
-use crate::board::{
-    Board, BoardMeters, BrownOutLevel, BusTiming, DataReadyLine as _, FrameTimes, SensorBus as _, Uptime,
-};
+use super::{BoardSupport, BusOf, DataReadyPin as _, Microcontroller, OutputOf};
+use crate::acquisition::{EdgeAction, Sampler, SamplingActivity, TimedBurst};
+use crate::board::{Board, BrownOutLevel, BusTiming, FrameTimes, Uptime};
+use crate::bus_frame::{BusFault, MicrosecondCounter as _};
 use crate::receive::{HostPort, ReceivedBytes};
 use crate::sample_intake::Estimators;
 use crate::settings_store::{SettingsStore, StoreError};
@@ -16,6 +16,9 @@ use core::sync::atomic::Ordering::Relaxed;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::OutputPin;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
+use heapless::spsc::Producer;
+use link::Health;
+use rtic::Mutex;
 
 /// Before the first frame after a burst, µs: the stall of low-power mode.
 const STALL_US: u32 = 75;
@@ -24,71 +27,103 @@ const RESET_US: u32 = 100;
 /// Abandons a burst, µs; the longest takes 1.5 ms (164 kHz, gaps of 16 µs).
 const BURST_US: u32 = 5_000;
 
-/// Resources of main loop and interrupts; access disables only the interrupts that share them.
-pub trait SharedResources {
-    /// The board.
-    type Board: BoardSupport;
-    /// Shared with sampling.
-    fn uptime<R>(&mut self, access: impl FnOnce(&mut Uptime) -> R) -> R;
-    /// The sensor's bus, shared with sampling.
-    fn bus<R>(&mut self, access: impl FnOnce(&mut BusOf<Self>) -> R) -> R;
-    /// Shared with sampling.
-    fn sampler<R>(&mut self, access: impl FnOnce(&mut Sampler<'static>) -> R) -> R;
-    /// The data-ready line, shared with sampling.
-    fn line<R>(&mut self, access: impl FnOnce(&mut <Self::Board as BoardSupport>::DataReady) -> R) -> R;
-    /// Shared with their interrupt.
-    fn estimators<R>(&mut self, access: impl FnOnce(&mut Estimators<'static>) -> R) -> R;
-    /// Shared with the interrupt of the estimators.
-    fn transmit_queue<R>(&mut self, access: impl FnOnce(&mut TransmitQueue<'static>) -> R) -> R;
-    /// Requests the interrupts of the serial ports, which transmit what is queued.
-    fn request_transmission();
-    /// Requests the interrupt of the end of a burst, which fails if it is still being transferred.
-    fn abandon_burst();
+/// Shared with the two interrupts of sampling.
+pub struct SharedSampling<B: BoardSupport> {
+    uptime: Uptime,
+    bus: BusOf<B>,
+    sampler: Sampler<'static>,
+    line: B::DataReady,
 }
 
-type BusOf<S> = <<S as SharedResources>::Board as BoardSupport>::Bus;
-type MicrocontrollerOf<S> = <<S as SharedResources>::Board as BoardSupport>::Microcontroller;
+impl<B: BoardSupport> SharedSampling<B> {
+    /// Bursts go to `queue`.
+    pub fn new(bus: BusOf<B>, line: B::DataReady, queue: Producer<'static, TimedBurst>) -> Self {
+        let uptime = Uptime::new(B::Microcontroller::counter());
+        Self { uptime, bus, sampler: Sampler::new(queue), line }
+    }
 
-/// A [`Board`] made of what it shares with its interrupts.
-pub struct BoardContext<'r, S: SharedResources> {
-    shared: S,
-    reset_line: &'r mut Option<<S::Board as BoardSupport>::ResetLine>,
+    fn now_us(&mut self) -> u64 {
+        self.uptime.at(B::Microcontroller::counter())
+    }
+
+    /// A new sample: starts the transfer of a burst by DMA.
+    pub fn data_ready(&mut self) {
+        self.line.clear();
+        let now_us = self.now_us();
+        match self.sampler.data_ready(now_us) {
+            EdgeAction::StartBurst => self.bus.start_burst(),
+            EdgeAction::Mask => self.line.set_masked(true),
+            EdgeAction::Ignore => {}
+        }
+    }
+
+    /// The end of the transfer: queues the burst.
+    pub fn transfer_ended(&mut self) {
+        match self.bus.end_burst() {
+            BurstEnd::MoreWords => {}
+            BurstEnd::Complete(received) => self.sampler.transfer_ended(Some(received)),
+            BurstEnd::Failed => self.sampler.transfer_ended(None),
+        }
+    }
+}
+
+/// Shared with the interrupt of the estimators.
+pub struct SharedEstimation {
+    /// The estimators.
+    pub estimators: Estimators<'static>,
+    /// To the serial ports.
+    pub transmit_queue: TransmitQueue<'static>,
+}
+
+/// A [`Board`] made of what it shares with its interrupts; access disables only those.
+pub struct BoardContext<'r, B: BoardSupport, S, E> {
+    sampling: S,
+    estimation: E,
+    reset_line: &'r mut Option<OutputOf<B>>,
     received: &'r mut ReceivedBytes<'static>,
+    request_transmission: fn(),
+    abandon_burst: fn(),
     asleep_us: u64,
-    watchdog: Feeder<MicrocontrollerOf<S>>,
+    watchdog: Feeder<B::Microcontroller>,
 }
 
-impl<'r, S: SharedResources> BoardContext<'r, S> {
-    /// `received` has the bytes from the serial ports.
+impl<'r, B: BoardSupport, S, E> BoardContext<'r, B, S, E> {
+    /// `received` has the bytes from the serial ports, whose interrupts `request_transmission` requests; `abandon_burst`
+    /// requests that of the end of a burst, which fails if it is still being transferred.
     pub fn new(
-        shared: S,
-        reset_line: &'r mut Option<<S::Board as BoardSupport>::ResetLine>,
+        (sampling, estimation): (S, E),
+        reset_line: &'r mut Option<OutputOf<B>>,
         received: &'r mut ReceivedBytes<'static>,
+        request_transmission: fn(),
+        abandon_burst: fn(),
     ) -> Self {
-        Self { shared, reset_line, received, asleep_us: 0, watchdog: Feeder::default() }
+        let watchdog = Feeder::default();
+        Self { sampling, estimation, reset_line, received, request_transmission, abandon_burst, asleep_us: 0, watchdog }
     }
 
     fn counter() -> u32 {
-        <MicrocontrollerOf<S> as crate::bus_frame::MicrosecondCounter>::counter()
+        B::Microcontroller::counter()
     }
 
-    fn store() -> Option<SettingsStore<SettingsFlash<<MicrocontrollerOf<S> as Microcontroller>::Flash>>> {
+    fn store() -> Option<SettingsStore<SettingsFlash<<B::Microcontroller as Microcontroller>::Flash>>> {
         SettingsFlash::store()
     }
 }
 
-impl<S: SharedResources> Board for BoardContext<'_, S> {
+impl<B: BoardSupport, S: Mutex<T = SharedSampling<B>>, E: Mutex<T = SharedEstimation>> Board
+    for BoardContext<'_, B, S, E>
+{
     type Bus<'a>
         = LockedBus<'a, S>
     where
         Self: 'a;
     type Delay<'a>
-        = FeedingDelay<'a, MicrocontrollerOf<S>>
+        = FeedingDelay<'a, B::Microcontroller>
     where
         Self: 'a;
 
     fn now_us(&mut self) -> u64 {
-        self.shared.uptime(|uptime| uptime.at(Self::counter()))
+        self.sampling.lock(|sampling| sampling.now_us())
     }
 
     /// Returns before the waking interrupt is served.
@@ -101,15 +136,15 @@ impl<S: SharedResources> Board for BoardContext<'_, S> {
     }
 
     fn sensor_bus(&mut self) -> (Self::Bus<'_>, Self::Delay<'_>) {
-        (LockedBus(&mut self.shared), FeedingDelay(&mut self.watchdog))
+        (LockedBus(&mut self.sampling), FeedingDelay(&mut self.watchdog))
     }
 
     fn set_clock_limit(&mut self, limit_hz: u32) -> u32 {
-        self.shared.bus(|bus| bus.set_clock_limit(limit_hz))
+        self.sampling.lock(|sampling| sampling.bus.set_clock_limit(limit_hz))
     }
 
     fn reset_bus(&mut self) {
-        self.shared.bus(|bus| bus.reset());
+        self.sampling.lock(|sampling| sampling.bus.reset());
     }
 
     fn reset_sensor(&mut self) -> bool {
@@ -119,20 +154,19 @@ impl<S: SharedResources> Board for BoardContext<'_, S> {
         line.set_high().is_ok() && is_low
     }
 
-    fn set_bus_timing(&mut self, timing: BusTiming) -> bool {
-        self.shared.bus(|bus| bus.set_timing(timing));
-        true
+    fn set_bus_timing(&mut self, timing: BusTiming) {
+        self.sampling.lock(|sampling| sampling.bus.set_timing(timing));
     }
 
-    fn frame_times(&mut self) -> Option<FrameTimes> {
-        Some(self.shared.bus(|bus| bus.take_frame_times()))
+    fn frame_times(&mut self) -> FrameTimes {
+        self.sampling.lock(|sampling| sampling.bus.take_frame_times())
     }
 
     fn data_ready_width_us(&mut self, limit_us: u32) -> Option<u32> {
         let start = Self::counter();
         let mut edge = |active: bool| loop {
             let now = Self::counter();
-            if self.shared.line(|line| line.is_active()) == active {
+            if self.sampling.lock(|sampling| sampling.line.is_active()) == active {
                 return Some(now);
             }
             if now.wrapping_sub(start) > limit_us {
@@ -146,14 +180,14 @@ impl<S: SharedResources> Board for BoardContext<'_, S> {
     }
 
     fn set_sampling(&mut self, enabled: bool) {
-        self.shared.sampler(|sampler| sampler.set_enabled(enabled));
+        self.sampling.lock(|sampling| sampling.sampler.set_enabled(enabled));
         if enabled {
-            self.shared.line(|line| line.set_masked(false));
+            self.sampling.lock(|sampling| sampling.line.set_masked(false));
         } else {
             let start = Self::counter();
-            while self.shared.sampler(|sampler| sampler.is_reading()) {
+            while self.sampling.lock(|sampling| sampling.sampler.is_reading()) {
                 if Self::counter().wrapping_sub(start) > BURST_US {
-                    S::abandon_burst();
+                    (self.abandon_burst)();
                 }
             }
             FeedingDelay(&mut self.watchdog).delay_us(STALL_US);
@@ -161,16 +195,16 @@ impl<S: SharedResources> Board for BoardContext<'_, S> {
     }
 
     fn sampling_activity(&mut self) -> SamplingActivity {
-        self.shared.sampler(|sampler| sampler.activity())
+        self.sampling.lock(|sampling| sampling.sampler.activity())
     }
 
     fn estimators<R>(&mut self, access: impl FnOnce(&mut Estimators<'static>) -> R) -> R {
-        self.shared.estimators(access)
+        self.estimation.lock(|estimation| access(&mut estimation.estimators))
     }
 
     fn transmit_queue<R>(&mut self, access: impl FnOnce(&mut TransmitQueue<'static>) -> R) -> R {
-        let result = self.shared.transmit_queue(access);
-        S::request_transmission();
+        let result = self.estimation.lock(|estimation| access(&mut estimation.transmit_queue));
+        (self.request_transmission)();
         result
     }
 
@@ -178,15 +212,17 @@ impl<S: SharedResources> Board for BoardContext<'_, S> {
         self.received.next()
     }
 
-    fn meters(&mut self) -> BoardMeters {
+    fn health(&mut self) -> Health {
         let (stack_bytes, stack_size) = stack();
-        BoardMeters {
-            asleep_us: self.asleep_us,
+        let asleep_permille = (1000 * self.asleep_us).checked_div(self.now_us()).unwrap_or(0);
+        Health {
             serial_overruns: LOST_BYTES.iter().map(|lost| lost.load(Relaxed)).fold(0, u32::saturating_add),
+            awake_permille: 1000_u32.saturating_sub(asleep_permille as u32),
             sampling_cycles: SAMPLING_CYCLES.load(Relaxed),
             estimator_cycles: ESTIMATOR_CYCLES.load(Relaxed),
             stack_bytes,
             stack_size,
+            ..Health::default()
         }
     }
 
@@ -195,11 +231,11 @@ impl<S: SharedResources> Board for BoardContext<'_, S> {
     }
 
     fn restart(&mut self) {
-        MicrocontrollerOf::<S>::restart()
+        B::Microcontroller::restart()
     }
 
     fn program_brown_out(&mut self) -> BrownOutLevel {
-        MicrocontrollerOf::<S>::program_brown_out()
+        B::Microcontroller::program_brown_out()
     }
 
     fn keeps_record(&mut self) -> bool {
@@ -215,19 +251,19 @@ impl<S: SharedResources> Board for BoardContext<'_, S> {
     }
 
     fn start_boot_loader(&mut self) -> bool {
-        MicrocontrollerOf::<S>::start_boot_loader()
+        B::Microcontroller::start_boot_loader()
     }
 }
 
 /// Locked for one transaction at a time.
 pub struct LockedBus<'a, S>(&'a mut S);
 
-impl<S: SharedResources> ErrorType for LockedBus<'_, S> {
-    type Error = <BusOf<S> as ErrorType>::Error;
+impl<S> ErrorType for LockedBus<'_, S> {
+    type Error = BusFault;
 }
 
-impl<S: SharedResources> SpiDevice<u8> for LockedBus<'_, S> {
+impl<B: BoardSupport, S: Mutex<T = SharedSampling<B>>> SpiDevice<u8> for LockedBus<'_, S> {
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Self::Error> {
-        self.0.bus(|bus| bus.transaction(operations))
+        self.0.lock(|sampling| sampling.bus.transaction(operations))
     }
 }

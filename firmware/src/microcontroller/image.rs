@@ -55,21 +55,6 @@ pub fn record_fault(frame: Option<&ExceptionFrame>) {
     }
 }
 
-/// Access to each resource, and interrupt requests.
-#[doc(hidden)]
-#[macro_export]
-macro_rules! shared_resources {
-    ($board:ty, $($resource:ident: $kind:ty),*; { $($request:tt)* }) => {
-        impl SharedResources for idle::SharedResources<'_> {
-            type Board = $board;
-            $(fn $resource<R>(&mut self, access: impl FnOnce(&mut $kind) -> R) -> R {
-                rtic::Mutex::lock(&mut self.$resource, access)
-            })*
-            $($request)*
-        }
-    };
-}
-
 /// Defines the image of a board: start-up, interrupts and main loop.
 ///
 /// `board` implements [`BoardSupport`](crate::microcontroller::BoardSupport) for the peripherals of `device`.
@@ -99,39 +84,35 @@ macro_rules! observatory {
             use super::*;
             use $($device)::+::Interrupt;
             use heapless::spsc::Consumer;
-            use $crate::microcontroller::context::{BoardContext, SharedResources};
+            use $crate::microcontroller::context::{BoardContext, SharedEstimation, SharedSampling};
             use $crate::microcontroller::image::restore;
             use $crate::microcontroller::processor::{
                 Blinker, ESTIMATOR_CYCLES, SAMPLING_CYCLES, count_lost_bytes, measure, start_systick,
             };
             use $crate::microcontroller::{
-                BoardParts, BoardSupport, BurstBus as _, BurstEnd, DataReadyPin as _, Microcontroller, ServedPort as _,
-                UartQueues, UsbParts,
+                BoardParts, BoardSupport, Microcontroller, OutputOf, UartQueues, UsbOf, UsbParts,
             };
             use $crate::{
-                BurstQueue, DataReadyLine as _, EdgeAction, Estimators, FIRST_CONFIG, FinishedEpoch, HostPort, MicrosecondCounter as _, ReceiveBuffer, ReceivedBytes, Receiver, Sampler, Start,
-                Statistics, TimedBurst, TransmitBuffer, TransmitQueue, Uptime, WatchdogExtension, estimate, run,
+                BurstQueue, Estimators, FIRST_CONFIG, FinishedEpoch, HostPort, MicrosecondCounter as _, ReceiveBuffer,
+                ReceivedBytes, Receiver, ServedPort as _, Start, Statistics, TimedBurst, TransmitBuffer, TransmitQueue,
+                WatchdogExtension, estimate, run,
             };
 
             type Mcu = <$board as BoardSupport>::Microcontroller;
 
             #[shared]
             struct Shared {
-                uptime: Uptime,
-                bus: <$board as BoardSupport>::Bus,
-                sampler: Sampler<'static>,
-                line: <$board as BoardSupport>::DataReady,
-                estimators: Estimators<'static>,
-                transmit_queue: TransmitQueue<'static>,
+                sampling: SharedSampling<$board>,
+                estimation: SharedEstimation,
             }
 
             #[local]
             struct Local {
                 bursts: Consumer<'static, TimedBurst>,
                 uart: <$board as BoardSupport>::Uart,
-                usb: Option<<$board as BoardSupport>::Usb>,
-                reset_line: Option<<$board as BoardSupport>::ResetLine>,
-                blinker: Blinker<<$board as BoardSupport>::Led>,
+                usb: Option<UsbOf<$board>>,
+                reset_line: Option<OutputOf<$board>>,
+                blinker: Blinker<OutputOf<$board>>,
                 received: ReceivedBytes<'static>,
                 start: Option<Start>,
             }
@@ -152,81 +133,50 @@ macro_rules! observatory {
                 let (usb, to_usb, from_usb) = UsbParts::split(usb);
                 start_systick(context.core.SYST, core_hz);
                 let (boot, retained) = restore(cause, clock);
-                let shared = Shared {
-                    uptime: Uptime::new(Mcu::counter()),
-                    bus,
-                    sampler: Sampler::new(to_estimators),
-                    line: data_ready,
+                let estimation = SharedEstimation {
                     estimators: Estimators::new(context.local.statistics, FIRST_CONFIG),
                     transmit_queue: TransmitQueue::new(to_port).with_usb(to_usb),
                 };
+                let shared = Shared { sampling: SharedSampling::new(bus, data_ready, to_estimators), estimation };
                 let start = Some(Start { boot, retained, finished: context.local.finished });
                 let (blinker, received) = (Blinker::new(led, clock), ReceivedBytes { uart: received, usb: from_usb });
                 (shared, Local { bursts, uart, usb, reset_line, blinker, received, start })
             }
 
-            #[idle(local = [reset_line, received, start], shared = [uptime, bus, sampler, line, estimators, transmit_queue])]
+            fn request_transmission() {
+                rtic::pend(Interrupt::$serial);
+                $(rtic::pend(Interrupt::$usb_interrupt);)?
+            }
+
+            #[idle(local = [reset_line, received, start], shared = [sampling, estimation])]
             fn idle(context: idle::Context) -> ! {
-                let start = context.local.start.take().expect("the main loop starts once");
-                run(BoardContext::new(context.shared, context.local.reset_line, context.local.received), start)
+                let idle::LocalResources { reset_line, received, start, .. } = context.local;
+                let idle::SharedResources { sampling, estimation, .. } = context.shared;
+                let (shared, abandon_burst) = ((sampling, estimation), || rtic::pend(Interrupt::$burst_end));
+                let board =
+                    BoardContext::<$board, _, _>::new(shared, reset_line, received, request_transmission, abandon_burst);
+                run(board, start.take().expect("the main loop starts once"))
             }
 
-            $crate::shared_resources! {
-                $board, uptime: Uptime, bus: <$board as BoardSupport>::Bus, sampler: Sampler<'static>,
-                line: <$board as BoardSupport>::DataReady, estimators: Estimators<'static>,
-                transmit_queue: TransmitQueue<'static>;
-                {
-                    fn request_transmission() {
-                        rtic::pend(Interrupt::$serial);
-                        $(rtic::pend(Interrupt::$usb_interrupt);)?
-                    }
-
-                    fn abandon_burst() {
-                        rtic::pend(Interrupt::$burst_end);
-                    }
-                }
+            #[task(binds = $edge, priority = 3, shared = [sampling])]
+            fn data_ready(mut context: data_ready::Context) {
+                measure(&SAMPLING_CYCLES, || context.shared.sampling.lock(|sampling| sampling.data_ready()));
             }
 
-            /// A new sample: starts the transfer of a burst by DMA.
-            #[task(binds = $edge, priority = 3, shared = [uptime, bus, sampler, line])]
-            fn data_ready(context: data_ready::Context) {
-                measure(&SAMPLING_CYCLES, || {
-                    let data_ready::SharedResources { uptime, bus, sampler, line, .. } = context.shared;
-                    (uptime, bus, sampler, line).lock(|uptime, bus, sampler, line| {
-                        line.clear();
-                        match sampler.data_ready(uptime.at(Mcu::counter())) {
-                            EdgeAction::StartBurst => bus.start_burst(),
-                            EdgeAction::Mask => line.set_masked(true),
-                            EdgeAction::Ignore => {}
-                        }
-                    });
-                });
-            }
-
-            /// The end of the transfer: queues the burst and requests the estimators.
-            #[task(binds = $burst_end, priority = 3, shared = [bus, sampler])]
-            fn transfer_ended(context: transfer_ended::Context) {
-                measure(&SAMPLING_CYCLES, || {
-                    let transfer_ended::SharedResources { bus, sampler, .. } = context.shared;
-                    (bus, sampler).lock(|bus, sampler| match bus.end_burst() {
-                        BurstEnd::MoreWords => {}
-                        BurstEnd::Complete(received) => sampler.transfer_ended(Some(received)),
-                        BurstEnd::Failed => sampler.transfer_ended(None),
-                    });
-                });
+            #[task(binds = $burst_end, priority = 3, shared = [sampling])]
+            fn transfer_ended(mut context: transfer_ended::Context) {
+                measure(&SAMPLING_CYCLES, || context.shared.sampling.lock(|sampling| sampling.transfer_ended()));
                 rtic::pend(Interrupt::$free);
             }
 
-            #[task(binds = $free, priority = 2, local = [bursts], shared = [estimators, transmit_queue])]
-            fn estimators(context: estimators::Context) {
+            #[task(binds = $free, priority = 2, local = [bursts], shared = [estimation])]
+            fn estimators(mut context: estimators::Context) {
                 measure(&ESTIMATOR_CYCLES, || {
-                    let estimators::SharedResources { estimators, transmit_queue, .. } = context.shared;
-                    (estimators, transmit_queue).lock(|estimators, transmit_queue| {
+                    context.shared.estimation.lock(|SharedEstimation { estimators, transmit_queue }| {
                         estimate(estimators, transmit_queue, context.local.bursts);
                     });
                 });
-                rtic::pend(Interrupt::$serial);
-                $(rtic::pend(Interrupt::$usb_interrupt);)?
+                request_transmission();
             }
 
             #[task(binds = $serial, priority = 4, local = [uart])]

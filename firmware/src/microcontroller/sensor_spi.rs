@@ -1,7 +1,6 @@
 //! The sensor's bus: registers by byte, bursts by DMA, times of chip select.
 
-use super::{BurstBus, BurstEnd};
-use crate::board::{BusTiming, FrameTimes, SensorBus};
+use crate::board::{BusTiming, FrameTimes};
 use crate::bus_frame::{BusFault, ByteExchange, ChipSelect, MicrosecondCounter, transfer, wait_ns};
 use adis16405_driver::{BURST_BYTES, BURST_REQUEST};
 use core::convert::Infallible;
@@ -27,6 +26,16 @@ pub trait SpiPeripheral: ByteExchange {
     fn start(&mut self, request: &'static [u8], received: &mut [u8]);
     /// Stops both channels; true if all bytes were received without an error.
     fn stop(&mut self) -> bool;
+}
+
+/// How a transfer has ended.
+pub enum BurstEnd<'a> {
+    /// A word was transferred, and the next one has been started.
+    MoreWords,
+    /// The sensor is deselected; these bytes were received.
+    Complete(&'a [u8; BURST_BYTES]),
+    /// The sensor is deselected after a failure; the bus is ready.
+    Failed,
 }
 
 /// The sensor on an SPI peripheral, with its chip select.
@@ -56,37 +65,39 @@ impl<P: SpiPeripheral, S: OutputPin<Error = Infallible>> SensorSpi<P, S> {
             self.peripheral.start(request, received);
         }
     }
-}
 
-impl<P: SpiPeripheral, S: OutputPin<Error = Infallible>> SensorBus for SensorSpi<P, S> {
-    fn set_clock_limit(&mut self, limit_hz: u32) -> u32 {
+    /// Sets the fastest serial clock of at most `limit_hz`, or the slowest one if none is slow enough; returns it in Hz.
+    pub fn set_clock_limit(&mut self, limit_hz: u32) -> u32 {
         self.select.set_clock_limit(limit_hz);
         self.peripheral.drain();
         self.peripheral.set_clock_limit(limit_hz)
     }
 
-    fn set_timing(&mut self, timing: BusTiming) {
+    /// Keeps other times from the next frame on.
+    pub fn set_timing(&mut self, timing: BusTiming) {
         self.select.timing = timing;
     }
 
-    fn take_frame_times(&mut self) -> FrameTimes {
+    /// The times of the frames since they were taken last.
+    pub fn take_frame_times(&mut self) -> FrameTimes {
         self.select.take_times()
     }
 
-    fn reset(&mut self) {
+    /// Drops what was received, and resets the peripheral.
+    pub fn reset(&mut self) {
         self.peripheral.drain();
         self.peripheral.reset();
     }
-}
 
-impl<P: SpiPeripheral, S: OutputPin<Error = Infallible>> BurstBus for SensorSpi<P, S> {
-    fn start_burst(&mut self) {
+    /// Selects the sensor and starts a burst; an interrupt follows at its end, or at that of a part.
+    pub fn start_burst(&mut self) {
         self.select.select::<P::Clock>();
         self.started = 0;
         self.start_bytes();
     }
 
-    fn end_burst(&mut self) -> BurstEnd<'_> {
+    /// To be called in that interrupt.
+    pub fn end_burst(&mut self) -> BurstEnd<'_> {
         let complete = self.peripheral.stop();
         compiler_fence(Ordering::SeqCst);
         if complete && self.started < BURST_BYTES {

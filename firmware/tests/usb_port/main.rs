@@ -3,16 +3,17 @@
 
 mod host;
 
-use firmware::usb_port::{MANUFACTURER, PRODUCT, UsbIdentity, UsbPort};
-use firmware::{ReceiveBuffer, Receiver, TransmitBuffer, TransmitQueue};
+use firmware::usb_port::{MANUFACTURER, PRODUCT, UsbPort};
+use firmware::{ReceiveBuffer, Receiver, ServedPort as _, TransmitBuffer, TransmitQueue};
 use heapless::spsc::Consumer;
 use host::MockBus;
 use link::{Decoder, MessageRef, Received, text_line};
 use std::cell::RefCell;
 use usb_device::bus::UsbBusAllocator;
+use usb_device::device::UsbVidPid;
 
-const IDENTITY: UsbIdentity<'static> =
-    UsbIdentity { vendor: 0x2E8A, product: 0x000A, serial_number: "E66058388309A1B2" };
+const PRODUCT_ID: UsbVidPid = UsbVidPid(0x2E8A, 0x000A);
+const SERIAL_NUMBER: &str = "E66058388309A1B2";
 
 // Requests of USB 2.0, section 9.4, and of the class for communication devices (PSTN 1.2, sections 6.3.10 to 6.3.12).
 const SET_ADDRESS: [u8; 8] = [0x00, 5, 7, 0, 0, 0, 0, 0];
@@ -56,7 +57,7 @@ impl Bench {
         let (receive, received) = leak(ReceiveBuffer::new()).split();
         let reconnect = |connected| RECONNECTED.with_borrow_mut(|calls| calls.push(connected));
         let ends = (usb, Receiver::new(receive));
-        let port = UsbPort::new(allocator, IDENTITY, ends, reconnect).expect("enough endpoints");
+        let port = UsbPort::new(allocator, PRODUCT_ID, SERIAL_NUMBER, ends, reconnect).expect("enough endpoints");
         let queue = TransmitQueue::new(to_uart).with_usb(Some(to_usb));
         Self { bus, port, queue, uart, received, now_us: u32::MAX - 5_000_000 }
     }
@@ -141,7 +142,7 @@ fn the_host_finds_a_serial_port_with_a_name_and_a_number() {
     assert_eq!((device[0], device[1], device[4]), (18, 1, 2));
     assert_eq!(device[8..12], [0x8A, 0x2E, 0x0A, 0x00]);
     let strings = [14, 15, 16].map(|field| bench.string(device[field]));
-    assert_eq!(strings, [MANUFACTURER, PRODUCT, IDENTITY.serial_number]);
+    assert_eq!(strings, [MANUFACTURER, PRODUCT, SERIAL_NUMBER]);
 }
 
 /// The baud rate has no meaning on USB; a terminal that sets it must get it back.

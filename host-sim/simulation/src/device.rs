@@ -7,12 +7,11 @@ use embedded_hal::spi::SpiDevice;
 use firmware::retained::{RetainedMemory, blank_memory};
 use firmware::settings_store::StoreError;
 use firmware::{
-    App, Board, BoardMeters, BurstQueue, BusTiming, EdgeAction, Estimators, FIRST_CONFIG, FinishedEpoch, FrameTimes,
-    HostPort, RetainedRam, Sampler, SamplingActivity, Start, Statistics, TimedBurst, TransmitBuffer, TransmitQueue,
-    estimate,
+    App, Board, BurstQueue, BusTiming, EdgeAction, Estimators, FIRST_CONFIG, FinishedEpoch, FrameTimes, HostPort,
+    RetainedRam, Sampler, SamplingActivity, Start, Statistics, TimedBurst, TransmitBuffer, TransmitQueue, estimate,
 };
 use heapless::spsc::Consumer;
-use link::{Boot, BootCause};
+use link::{Boot, BootCause, Health};
 use std::cell::RefMut;
 use std::collections::VecDeque;
 use virtual_sensor::{EmulatedBus, VirtualAdis16405, VirtualDelay};
@@ -348,16 +347,15 @@ impl Board for SimulatedBoard {
         self.reset_line
     }
 
-    fn set_bus_timing(&mut self, timing: BusTiming) -> bool {
+    fn set_bus_timing(&mut self, timing: BusTiming) {
         if timing == BusTiming::SLOW {
             let mut faults = self.bus.faults().borrow_mut();
             faults.frames = faults.frames.filter(|(_, end)| *end != FaultEnd::SlowBus);
         }
-        true
     }
 
-    fn frame_times(&mut self) -> Option<FrameTimes> {
-        Some(self.bus.take_frame_times())
+    fn frame_times(&mut self) -> FrameTimes {
+        self.bus.take_frame_times()
     }
 
     fn data_ready_width_us(&mut self, limit_us: u32) -> Option<u32> {
@@ -389,9 +387,9 @@ impl Board for SimulatedBoard {
         self.received.pop_front().map(|byte| (HostPort::Uart, byte))
     }
 
-    fn meters(&mut self) -> BoardMeters {
+    fn health(&mut self) -> Health {
         self.meter_readings += 1;
-        BoardMeters::default()
+        Health::default()
     }
 
     fn feed_watchdog(&mut self) {

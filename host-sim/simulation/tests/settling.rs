@@ -58,9 +58,7 @@ fn with_all_samples(raws: &[RawMessage], scale: ReportScale) -> Curve<OCTAVES> {
             next = Some(at + 1);
         }
     }
-    let mut curve = Curve::empty();
-    ChannelSums::from_estimator(&estimator).rebuild_curve(&mut curve, Channel::GyroX, scale);
-    curve
+    ChannelSums::from_estimator(&estimator).curve(Channel::GyroX, scale)
 }
 
 /// Allan deviations of a report at averaging factor `n`, and how many differences it has.

@@ -2,7 +2,7 @@
 
 use adis16405_driver::{BURST_BYTES, Burst, SamplePeriod};
 use emulation::RATE_HZ;
-use firmware::epoch::estimate_regressors;
+use firmware::epoch::EpochChannel;
 use firmware::learner::{EpochFit, validate};
 use firmware::{CHANNELS, Estimators, FIRST_CONFIG, FinishedEpoch, Statistics, TimedBurst};
 use link::{LearnedMessage, Message, ValidationMessage};
@@ -66,16 +66,14 @@ pub(crate) fn learned_on_host(
     }
     let (first, second) = (&epochs[0], epochs.get(1));
     let means = first.covariances().expect("no restart").means;
-    let scale = first.scale(FIRST_CONFIG);
+    let channel = |epoch, index| EpochChannel { epoch, index, scale: FinishedEpoch::scale(epoch, FIRST_CONFIG) };
     let fit = |index: usize| {
-        let mut fit = EpochFit::new(estimate_regressors(first, index, scale, &mut || true)?);
-        fit.run(first, index, scale, &mut || true).then_some(fit)
+        let channel = channel(first, index);
+        let mut fit = EpochFit::new(channel.estimate_regressors(&mut || true)?);
+        fit.run(channel, &mut || true).then_some(fit)
     };
     let fits: Vec<EpochFit> = (0..6).map(|index| fit(index).expect("a fit that is not cancelled")).collect();
-    let validation = |index: usize| {
-        let second = second?;
-        validate(&fits[index].model(), Some(&means), second, index, second.scale(FIRST_CONFIG))
-    };
+    let validation = |index: usize| validate(&fits[index].model(), Some(&means), channel(second?, index));
     let learned = fits.iter().enumerate().map(|(index, fit)| fit.message(index, first.number)).collect();
     (learned, (0..6).filter_map(validation).collect())
 }

@@ -1,6 +1,7 @@
 //! The serial port to the host on UART0.
 
-use crate::microcontroller::{ServedPort, UartQueues};
+use crate::microcontroller::UartQueues;
+use crate::receive::ServedPort;
 use rp2040_hal::pac::UART0;
 use rp2040_hal::uart::{self, UartPeripheral, ValidUartPinout};
 

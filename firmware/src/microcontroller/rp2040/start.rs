@@ -1,7 +1,7 @@
 //! Start of an RP2040: cause, watchdog, brown-out level, crystal, clocks; and the data-ready input.
 
 use super::flash::Rp2040Flash;
-use crate::board::DataReadyLine;
+use super::usb::Rp2040UsbPort;
 use crate::bus_frame::MicrosecondCounter;
 use crate::microcontroller::processor::WAKE_HZ;
 use crate::microcontroller::{DataReadyPin, Microcontroller};
@@ -12,7 +12,7 @@ use link::BootCause;
 use rp2040_hal::Timer;
 use rp2040_hal::clocks::{ClocksManager, InitError, init_clocks_and_plls};
 use rp2040_hal::fugit::ExtU32;
-use rp2040_hal::gpio::{FunctionSioInput, Interrupt, Pin, PinId, PullDown};
+use rp2040_hal::gpio::{DynPinId, FunctionSioInput, FunctionSioOutput, Interrupt, Pin, PinId, PullDown};
 use rp2040_hal::pac::{CLOCKS, PLL_SYS, PLL_USB, RESETS, TIMER, VREG_AND_CHIP_RESET, WATCHDOG, XOSC};
 
 const CRYSTAL_HZ: u32 = 12_000_000;
@@ -127,6 +127,8 @@ fn reload_watchdog() {
 
 impl Microcontroller for Rp2040 {
     type Flash = Rp2040Flash;
+    type Output = Pin<DynPinId, FunctionSioOutput, PullDown>;
+    type Usb = Rp2040UsbPort;
 
     fn extend_watchdog(extension: &mut WatchdogExtension) {
         if extension.tick(FEEDINGS.load(Relaxed), EXTENSION_S * WAKE_HZ) {
@@ -155,9 +157,7 @@ impl<I: PinId> DataReadyPin for Pin<I, FunctionSioInput, PullDown> {
     fn clear(&mut self) {
         self.clear_interrupt(Interrupt::EdgeHigh);
     }
-}
 
-impl<I: PinId> DataReadyLine for Pin<I, FunctionSioInput, PullDown> {
     fn set_masked(&mut self, masked: bool) {
         if self.is_interrupt_enabled(Interrupt::EdgeHigh) == masked {
             self.clear_interrupt(Interrupt::EdgeHigh);

@@ -8,9 +8,10 @@ use rp2040_hal::clocks::UsbClock;
 use rp2040_hal::pac::{RESETS, USBCTRL_DPRAM, USBCTRL_REGS};
 use rp2040_hal::usb::UsbBus;
 use usb_device::bus::UsbBusAllocator;
+use usb_device::device::UsbVidPid;
 
 /// Raspberry Pi Pico SDK CDC UART (github.com/raspberrypi/usb-pid).
-const PRODUCT_ID: (u16, u16) = (0x2E8A, 0x000A);
+const PRODUCT_ID: UsbVidPid = UsbVidPid(0x2E8A, 0x000A);
 
 /// The USB port, served in the interrupt USBCTRL_IRQ.
 pub type Rp2040UsbPort = UsbPort<'static, UsbBus>;

@@ -17,47 +17,34 @@
 use super::bus::Spi0;
 use super::port::Uart0Port;
 use super::start::{ClockParts, Rp2040, boot_cause};
-use super::usb::{Rp2040UsbPort, usb_port};
+use super::usb::usb_port;
 use crate::microcontroller::sensor_spi::SensorSpi;
 use crate::microcontroller::{BoardParts, BoardSupport, UartQueues};
 use crate::sensor::BURST_LIMIT_HZ;
 use link::ClockSource;
 use rp2040_hal::clocks::Clock;
 use rp2040_hal::fugit::RateExtU32;
-use rp2040_hal::gpio::bank0::{Gpio0, Gpio1, Gpio16, Gpio17, Gpio18, Gpio19, Gpio20, Gpio21, Gpio25};
-use rp2040_hal::gpio::{
-    self, FunctionNull, FunctionSioInput, FunctionSioOutput, FunctionSpi, FunctionUart, PullDown, PullUp,
-};
+use rp2040_hal::gpio::bank0::{Gpio0, Gpio1, Gpio16, Gpio17, Gpio18, Gpio19, Gpio20};
+use rp2040_hal::gpio::{self, FunctionSioInput, FunctionSioOutput, FunctionSpi, FunctionUart, PullDown, PullUp};
 use rp2040_hal::{Sio, Spi, pac, spi, uart};
 
 const BAUD: u32 = 460_800;
 
 type Pin<I, F, P = PullDown> = gpio::Pin<I, F, P>;
 type SpiPins = (Pin<Gpio19, FunctionSpi>, Pin<Gpio16, FunctionSpi>, Pin<Gpio18, FunctionSpi>);
-/// The sensor's bus.
-pub type Spi0Bus = SensorSpi<Spi0<SpiPins>, Pin<Gpio17, FunctionSioOutput>>;
+/// SPI of the sensor.
+pub type SensorSpi0 = Spi0<SpiPins>;
+/// Its chip select.
+pub type Select = Pin<Gpio17, FunctionSioOutput>;
 /// The data-ready input.
 pub type DataReady = Pin<Gpio20, FunctionSioInput>;
 /// The serial port on pins.
 pub type Uart = Uart0Port<(Pin<Gpio0, FunctionUart>, Pin<Gpio1, FunctionUart, PullUp>)>;
-/// The serial port on USB.
-pub type Usb = Rp2040UsbPort;
-/// The LED.
-pub type Led = Pin<Gpio25, FunctionSioOutput>;
-/// The pin at RST of the sensor, as it is after a reset.
-pub type ResetPin = Pin<Gpio21, FunctionNull>;
-/// The same, driven.
-pub type ResetLine = Pin<Gpio21, FunctionSioOutput>;
 
-/// Starts a board; `has_usb` starts USB, `reset_line` drives RST high.
-pub fn start<B>(
-    device: pac::Peripherals,
-    queues: UartQueues,
-    has_usb: bool,
-    reset_line: impl FnOnce(ResetPin) -> Option<B::ResetLine>,
-) -> BoardParts<B>
+/// Starts a board; `has_usb` starts USB, `has_reset_line` drives RST high.
+pub fn start<B>(device: pac::Peripherals, queues: UartQueues, has_usb: bool, has_reset_line: bool) -> BoardParts<B>
 where
-    B: BoardSupport<Microcontroller = Rp2040, DataReady = DataReady, Bus = Spi0Bus, Uart = Uart, Usb = Usb, Led = Led>,
+    B: BoardSupport<Microcontroller = Rp2040, DataReady = DataReady, Spi = SensorSpi0, Select = Select, Uart = Uart>,
 {
     let cause = boot_cause(&device.VREG_AND_CHIP_RESET, &device.WATCHDOG);
     let mut resets = device.RESETS;
@@ -65,8 +52,9 @@ where
     let pins = gpio::Pins::new(device.IO_BANK0, device.PADS_BANK0, sio.gpio_bank0, &mut resets);
     // Before SCK rises, which the sensor would take for an edge.
     let select = pins.gpio17.into_push_pull_output_in_state(gpio::PinState::High);
-    let reset_line = reset_line(pins.gpio21);
-    let mut led = pins.gpio25.into_push_pull_output();
+    let reset = pins.gpio21;
+    let reset_line = has_reset_line.then(|| reset.into_push_pull_output_in_state(gpio::PinState::High).into_dyn_pin());
+    let mut led = pins.gpio25.into_push_pull_output().into_dyn_pin();
     let parts = ClockParts {
         crystal: device.XOSC,
         clocks: device.CLOCKS,

@@ -16,9 +16,6 @@ const TX: usize = 3;
 const CHANNEL: u8 = 3;
 const STALE_BYTES: u32 = 2;
 
-/// The sensor on SPI1.
-pub type Spi1Bus = SensorSpi<Spi1, PA4<Output>>;
-
 /// SPI1 and the two DMA streams that serve it.
 pub struct Spi1 {
     bus_hz: u32,
@@ -31,7 +28,7 @@ pub(super) fn spi1_bus(
     (spi, dma): (SPI1, DMA2),
     (select, sck, miso, mosi): (PA4, PA5, PA6, PA7),
     rcc: &mut Rcc,
-) -> Spi1Bus {
+) -> SensorSpi<Spi1, PA4<Output>> {
     let select = select.into_push_pull_output_in_state(PinState::High);
     let bus_hz = rcc.clocks.pclk2().raw();
     let (_field, request) = prescaled_clock(bus_hz, BURST_LIMIT_HZ);

@@ -1,6 +1,7 @@
 //! The serial port to the host on a USART.
 
-use crate::microcontroller::{ServedPort, UartQueues};
+use crate::microcontroller::UartQueues;
+use crate::receive::ServedPort;
 use stm32f4xx_hal::gpio::PushPull;
 use stm32f4xx_hal::nb;
 use stm32f4xx_hal::prelude::*;

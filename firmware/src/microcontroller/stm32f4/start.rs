@@ -9,6 +9,7 @@ use crate::watchdog::Watchdog;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use cortex_m::peripheral::{NVIC, SCB};
 use link::{BootCause, ClockSource};
+use stm32f4xx_hal::gpio::{ErasedPin, Output};
 use stm32f4xx_hal::pac::{DBGMCU, FLASH, IWDG, RCC, SYSCFG, TIM2};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Enable, Rcc, Reset};
@@ -146,6 +147,11 @@ impl MicrosecondCounter for Stm32f4 {
 
 impl Microcontroller for Stm32f4 {
     type Flash = Stm32Flash;
+    type Output = ErasedPin<Output>;
+    #[cfg(feature = "feather-usb")]
+    type Usb = super::usb::Stm32UsbPort;
+    #[cfg(not(feature = "feather-usb"))]
+    type Usb = core::convert::Infallible;
 
     fn restart() -> ! {
         SCB::sys_reset()

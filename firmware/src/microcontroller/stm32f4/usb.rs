@@ -7,9 +7,10 @@ use stm32f4xx_hal::otg_fs::{USB, UsbBus};
 use stm32f4xx_hal::pac::{OTG_FS_DEVICE, OTG_FS_GLOBAL, OTG_FS_PWRCLK};
 use stm32f4xx_hal::rcc::Clocks;
 use usb_device::bus::UsbBusAllocator;
+use usb_device::device::UsbVidPid;
 
 /// STMicroelectronics' virtual COM port.
-const PRODUCT_ID: (u16, u16) = (0x0483, 0x5740);
+const PRODUCT_ID: UsbVidPid = UsbVidPid(0x0483, 0x5740);
 /// Words (RM0090 section 39.1).
 const UNIQUE_ID: *const [u32; 3] = 0x1FFF_7A10 as *const [u32; 3];
 /// A packet of 64 bytes for each of two receiving endpoints.

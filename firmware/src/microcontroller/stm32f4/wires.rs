@@ -1,10 +1,9 @@
 //! The sensor's wires to an STM32F4: bus and data-ready input.
 
-use super::bus::{Spi1Bus, spi1_bus};
+use super::bus::{Spi1, spi1_bus};
 use super::start::{Started, Stm32f4};
-use crate::board::DataReadyLine;
-use crate::microcontroller::{BoardParts, BoardSupport, DataReadyPin, UsbParts};
-use stm32f4xx_hal::gpio::{Edge, ExtiPin, Input, PA4, PA5, PA6, PA7, Pin};
+use crate::microcontroller::{BoardParts, BoardSupport, DataReadyPin, UsbOf, UsbParts};
+use stm32f4xx_hal::gpio::{Edge, ErasedPin, ExtiPin, Input, Output, PA4, PA5, PA6, PA7, Pin};
 use stm32f4xx_hal::pac::{DMA2, EXTI, SPI1, SYSCFG};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
@@ -27,12 +26,12 @@ impl Started {
         self,
         sensor: SensorWires<P, N>,
         uart: B::Uart,
-        usb: Option<UsbParts<B::Usb>>,
-        led: B::Led,
+        usb: Option<UsbParts<UsbOf<B>>>,
+        led: ErasedPin<Output>,
     ) -> BoardParts<B>
     where
         Pin<P, N, Input>: ExtiPin,
-        B: BoardSupport<Microcontroller = Stm32f4, DataReady = Pin<P, N, Input>, Bus = Spi1Bus>,
+        B: BoardSupport<Microcontroller = Stm32f4, DataReady = Pin<P, N, Input>, Spi = Spi1, Select = PA4<Output>>,
     {
         let Self { cause, clock, mut rcc } = self;
         let bus = spi1_bus(sensor.spi, sensor.pins, &mut rcc);
@@ -62,9 +61,7 @@ impl<const P: char, const N: u8> DataReadyPin for Pin<P, N, Input> {
     fn clear(&mut self) {
         self.clear_interrupt_pending_bit();
     }
-}
 
-impl<const P: char, const N: u8> DataReadyLine for Pin<P, N, Input> {
     fn set_masked(&mut self, masked: bool) {
         // SAFETY: the line of this pin in a register that the interrupt of the pin alone uses too, which waits meanwhile.
         let mask = unsafe { (*EXTI::ptr()).imr() };

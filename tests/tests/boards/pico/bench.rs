@@ -19,6 +19,8 @@ struct Bench {
 }
 
 const TARGET: &str = "thumbv6m-none-eabi";
+/// Longer than the stall of the sensor in either power mode (data sheet Rev. B, Table 2).
+const REST_NS: u64 = 100_000;
 
 impl Bench {
     fn new(elf: PathBuf) -> Self {
@@ -217,7 +219,7 @@ fn run_image(
     let mut resets = 0;
     let (mut instructions, mut led_changes, mut longest_unfed_s) = (0, 0, 0.0);
     let (mut registers, mut sck_hz, mut selected_at, mut shortest_slow_read_ns) = (Vec::new(), 0.0, 0, u64::MAX);
-    let mut question = [0; 9];
+    let (mut deselected_at, mut question) = (0, [0; 9]);
     while questions.read_exact(&mut question).is_ok() {
         let [kind, value @ ..] = question;
         let value = f64::from_le_bytes(value);
@@ -243,9 +245,11 @@ fn run_image(
             continue;
         }
         part.advance_to(value as u64);
-        // Events wait for the end of a frame; the emulator sends `n` at least once a millisecond.
+        // Events wait for a rest of the bus, since that of the sensor is a frame too; the emulator sends `n` at least once a millisecond.
+        let has_rest = !selected && value as u64 >= deselected_at + REST_NS;
         if kind == b'n'
-            && !selected
+            && has_rest
+            && part.next_data_ready() >= value as u64 + REST_NS
             && let Some((_, event)) = events.pop_front_if(|&mut (at, _)| value as u64 >= at)
         {
             match event {
@@ -274,7 +278,7 @@ fn run_image(
                 resets += 1;
             }
             b'd' => {
-                selected = false;
+                (selected, deselected_at) = (false, value as u64);
                 part.deselect();
                 let requested = frame.first().is_some_and(|&(mosi, _)| mosi == 0x3E);
                 let sent: Vec<u8> = frame.drain(..).map(|(_, miso)| miso).collect();
