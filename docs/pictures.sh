@@ -1,5 +1,5 @@
 #!/bin/sh
-# Draws the pictures of the documentation anew, as --pictures draws them:
+# Draws the pictures of the documentation anew, as `-o NAME.svg` draws them:
 #
 #     docs/pictures.sh
 #
@@ -11,12 +11,12 @@ cd "$(dirname "$0")/.."
 drawn=$(mktemp -d)
 trap 'rm -rf "$drawn"' EXIT
 
-cargo run --release -- demo --quiet --page "$drawn/page" --pictures "$drawn/simulated"
-cp "$drawn/simulated/gyro_x-allan.svg" docs/report.svg
+cargo run --release -- demo --quiet -o "$drawn/simulated.svg"
+cp "$drawn/simulated-gyro_x-allan.svg" docs/report.svg
 
 if [ -n "${ADIS_RECORDINGS:-}" ]; then
-    cargo run --release -- analyze "$ADIS_RECORDINGS/adis16405-static/run1.csv.gz" --rate 100 --quiet --pictures "$drawn/run1"
-    cp "$drawn/run1/gyro_z-allan.svg" docs/run1-gyro_z.svg
+    cargo run --release -- analyze "$ADIS_RECORDINGS/adis16405-static/run1.csv.gz" --rate 100 --quiet -o "$drawn/run1.svg"
+    cp "$drawn/run1-gyro_z-allan.svg" docs/run1-gyro_z.svg
 else
     echo "docs/run1-gyro_z.svg is left as it was: ADIS_RECORDINGS names no folder" >&2
 fi

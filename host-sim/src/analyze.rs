@@ -1,11 +1,10 @@
 //! `analyze` and `replay`: the report of a recording in a file, or of each of its sensors.
 
-use crate::cli::{
-    AnalyzeArguments, ExportTarget, InputArguments, OutputArguments, RecordingArguments, ReplayArguments,
-};
+use crate::cli::{AnalyzeArguments, InputArguments, OutputArguments, RecordingArguments, ReplayArguments};
 use crate::inspect::{self, read_or_ask};
-use crate::output::{self, Analysed, Incomplete, note};
+use crate::output::{self, Analysed, Incomplete, note, write_noise};
 use crate::output_files::OutputFiles;
+use crate::output_format::{OutputFile, OutputFormat};
 use crate::progress::{self, Progress};
 use crate::several_recordings::write_several;
 use crate::tip::UnknownSensor;
@@ -23,11 +22,12 @@ use recordings::file_format::RecordedInput;
 use recordings::recording::Recording;
 use recordings::sample_stream::{KeptInMemory, Reading, SampleStream, part_of};
 use recordings::{ColumnSelection, FileHash, Printable, ReadMonitor, count_table};
+use reports::export::ExportFormat;
 use reports::reading::ReadingRecord;
 use reports::saved_report::SavedReport;
 use std::fs::File;
 use std::io::{ErrorKind, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Rows that a quick report keeps in memory at most; they tell the clock of the time stamps.
 const QUICK_ROWS: u64 = 1 << 17;
@@ -39,22 +39,18 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
     let AnalyzeArguments { recording, each_sensor, quick, output } = arguments;
     let sensor = recording.input.sensor.as_deref().map(Path::new);
     let outputs = OutputFiles::new([recording.input.file.as_path()].into_iter().chain(sensor), output.force);
-    output::check(output, &outputs)?;
+    output::check(&output.outputs, &outputs)?;
     let sensors = if *each_sensor { inspect::each_sensor(recording)? } else { vec![recording.clone()] };
     if let [recording] = sensors.as_slice() {
         let source = output::source_name(&recording.input.file);
         let report = read_or_ask(recording, |recording| watched_report(recording, *quick))?;
         return output::write_report(&report, Some(&source), output, &outputs);
     }
-    let refused = [
-        ("--quick", *quick),
-        ("--page", output.page.is_some()),
-        ("--pictures", output.pictures.is_some()),
-        ("--full", output.full),
-    ];
-    let refused: Vec<&str> = refused.into_iter().filter(|(_, is_given)| *is_given).map(|(option, _)| option).collect();
-    if !refused.is_empty() {
-        bail!("several sensors have a summary and no report: leave out {}, or use `batch`", refused.join(", "));
+    let is_of_one = |output: &&OutputFile| matches!(output.format, OutputFormat::Page | OutputFormat::Figures);
+    if *quick || output.full || output.outputs.iter().any(|output| is_of_one(&output)) {
+        bail!(
+            "several sensors have a summary and no report: leave out --quick, --full, .html and .svg, or use `batch`"
+        );
     }
     let names: Vec<String> = sensors.iter().map(sensor_name).collect();
     let mut reading = SeveralReadings::default();
@@ -62,10 +58,15 @@ pub(crate) fn run(arguments: &AnalyzeArguments) -> Result<()> {
     note(format_args!("recordings: {}", Printable(&names.join(", "))));
     if are_parts(&still) {
         write_parts(still, &names, output, &outputs)?;
-    } else if output.exports.is_empty() {
-        write_several(&still, None, output.json.as_deref(), output.quiet, &outputs)?;
     } else {
-        bail!("--export: these sensors have the same channels; export one of them, with --topic or --columns");
+        let json = match output.outputs.as_slice() {
+            [] => None,
+            [OutputFile { format: OutputFormat::Json, file }] => Some(file.as_path()),
+            _ => bail!(
+                "these sensors have the same channels: one .json is written, or one of them, by --topic or --columns"
+            ),
+        };
+        write_several(&still, None, json, output.quiet, &outputs)?;
     }
     Incomplete::check(reading.are_complete())
 }
@@ -105,20 +106,22 @@ fn write_parts(
     output: &OutputArguments,
     outputs: &OutputFiles,
 ) -> Result<()> {
-    if output.json.is_some() {
-        bail!("--json: the parts of a sensor have a report each; `batch --each-sensor` writes them");
-    }
+    let targets = |target: &OutputFile| match target.format {
+        OutputFormat::Noise(format) => Ok((format, target.file.clone())),
+        _ => bail!(".json: the parts of a sensor have a report each; `batch --each-sensor` writes them"),
+    };
+    let targets: Vec<(ExportFormat, PathBuf)> = output.outputs.iter().map(targets).collect::<Result<_>>()?;
     let mut saved = Vec::new();
     for (part, name) in parts.into_iter().zip(names) {
         let report = progress::analysing(|watch| analyze_and_release(part, watch));
-        if !output.quiet {
+        if !output.quiet && !output.prints_to_standard_output() {
             output::show_screen(&report, Some(name))?;
         }
         saved.push(SavedReport::from(&report));
     }
     let Some(joined) = SavedReport::joined(saved)? else { return Ok(()) };
-    let write = |target: &ExportTarget| output::write_export(&joined, target, output.axis, outputs);
-    output.exports.iter().map(write).fold(Ok(()), Result::and)
+    let write = |(format, file): (ExportFormat, PathBuf)| write_noise(&joined, format, &file, output.axis, outputs);
+    targets.into_iter().map(write).fold(Ok(()), Result::and)
 }
 
 /// What tells a sensor from the others of its file: its topic, or its columns.
@@ -131,7 +134,7 @@ fn sensor_name(recording: &RecordingArguments) -> String {
 type EndReading<'a> = dyn FnMut(&SampleStream, &[String]) + 'a;
 
 /// The report of a recording. Shows how far the reading is, and makes the report of what was read if that is interrupted.
-fn watched_report(recording: &RecordingArguments, is_quick: bool) -> Result<Analysed> {
+pub(crate) fn watched_report(recording: &RecordingArguments, is_quick: bool) -> Result<Analysed> {
     let mut progress = Progress::reading(&recording.input.file);
     let monitor = progress.monitor().clone();
     let mut end_reading = |stream: &SampleStream, notes: &[String]| {

@@ -1,7 +1,7 @@
 //! `batch`: one report a recording, of many files or of the folders that hold them, as many at a time as there are cores.
 
 use crate::analyze::report;
-use crate::cli::{BatchArguments, InputArguments, RecordingArguments};
+use crate::cli::{BatchArguments, RecordingArguments};
 use crate::inspect::{self, read_or_ask};
 use crate::output::{self, Analysed, Incomplete, brief, note, progress_bar};
 use crate::output_files::OutputFiles;
@@ -41,23 +41,19 @@ enum Outcome {
 /// # Errors
 /// Two would have one report, a file cannot be written, or a recording could not be analysed.
 pub(crate) fn run(arguments: &BatchArguments) -> Result<()> {
-    let BatchArguments { recording: _, more: _, each_sensor, quick, out, resume, rows: of_rows, jobs, quiet, force } =
+    let BatchArguments { recording, more, each_sensor, quick, output, resume, rows: of_rows, jobs, quiet, force } =
         arguments;
     let mut given = Vec::new();
-    for recording in arguments.each() {
-        let folder = recording.input.file.clone();
-        let is_folder = folder.is_dir() && files_of_bag(&folder).unwrap_or_default().is_empty();
-        let files = if is_folder { files_below(&folder)? } else { vec![folder.clone()] };
+    for folder in [&recording.input.file].into_iter().chain(more) {
+        let is_folder = folder.is_dir() && files_of_bag(folder).unwrap_or_default().is_empty();
+        let files = if is_folder { files_below(folder)? } else { vec![folder.clone()] };
         ensure!(!files.is_empty(), "{}: no file in it", folder.display());
         for file in files {
             // The folders of the reports are those of the recordings.
-            let below = file.strip_prefix(&folder).ok().filter(|_| is_folder).and_then(Path::parent);
-            let of_file = RecordingArguments {
-                input: InputArguments { file: file.clone(), ..recording.input.clone() },
-                ..recording.clone()
-            };
+            let below = file.strip_prefix(folder).ok().filter(|_| is_folder).and_then(Path::parent);
+            let of_file = recording.of_file(&file);
             let sensors = if *each_sensor { inspect::each_sensor(&of_file)? } else { vec![of_file] };
-            given.extend(sensors.into_iter().map(|sensor| (sensor, out.join(below.unwrap_or(Path::new(""))))));
+            given.extend(sensors.into_iter().map(|sensor| (sensor, output.join(below.unwrap_or(Path::new(""))))));
         }
     }
     let inputs = given.iter().map(|(recording, _)| recording.input.file.as_path());
@@ -83,7 +79,7 @@ pub(crate) fn run(arguments: &BatchArguments) -> Result<()> {
     let outcomes = jobs.map_or_else(each, |jobs| on_at_most(jobs.get(), each));
     bar.finish_and_clear();
     let outcomes: Vec<Outcome> = outcomes.into_iter().collect::<Result<_>>()?;
-    conclude(&all, &outcomes, out, *quiet)
+    conclude(&all, &outcomes, output, *quiet)
 }
 
 /// Says what has no report, and what was not read to its end.

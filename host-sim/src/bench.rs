@@ -1,7 +1,7 @@
 //! The bench on serial ports.
 
 use link::{DecoderCounters, Received};
-use observatory::bench::BenchRun;
+use observatory::bench::{BenchRun, SETTING_S};
 use recordings::serial::SerialLink;
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
@@ -111,8 +111,7 @@ pub fn run(
     let transcript = bench.finish(console.counters());
     for command in transcript.settings_before() {
         console.send(&command)?;
-        // The device takes some bytes at a time.
-        let until_s = console.now_s() + 0.5;
+        let until_s = console.now_s() + SETTING_S;
         while console.next(until_s)?.is_some() {}
     }
     Ok(transcript)

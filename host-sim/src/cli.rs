@@ -1,15 +1,18 @@
 //! The arguments of the command line.
 
 use crate::bench::BenchPlan;
-use crate::tip::similar_name;
+use crate::output_files::is_standard_stream;
+use crate::output_format::{OutputFile, json_file, noise_file, output_file};
 use adis16405_driver::GyroRange;
+use clap::builder::{OsStringValueParser, TypedValueParser};
+use clap::parser::ValueSource;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use observatory::recording_report::PROGRAM;
 use recordings::file_format::RecordedInput;
 use recordings::time_base::TimeRange;
 use recordings::{InputError, MemoryTable, ReadMonitor, serial};
-use reports::export::{AxisChoice, ExportFormat};
+use reports::export::AxisChoice;
 use reports::reading::ReadingOptions;
 use simulation::Simulation;
 use std::ffi::OsString;
@@ -29,16 +32,27 @@ const OUTPUT: &str = "Output";
 /// Below the options of the program; each line is a command.
 const EXAMPLES: &str = "\
 Examples:
-  imunoise imu.bag --page report             a recording of any inertial sensor
+  imunoise imu.bag -o report.html            a recording of any inertial sensor
   imunoise demo                              an hour of the virtual sensor
   imunoise monitor /dev/ttyACM0              a device that runs the firmware";
+
+/// Below those of the long help.
+const EXIT_CODES: &str = "\
+Exit codes:
+  0  done
+  1  error, in one line on standard error
+  2  wrong usage
+  3  done, but a recording was not read to its end
+
+Colour is left out if NO_COLOR is set. `imunoise COMMAND --help` has the units
+and examples of the options; `-h` has one screen.";
 
 /// Below the options of `analyze`.
 const EXAMPLES_OF_ANALYZE: &str = "\
 Examples:
-  imunoise analyze flight.ulg --page report --export kalibr=imu.yaml
+  imunoise analyze flight.ulg -o report.html -o imu.yaml
   imunoise analyze imu.csv --columns gyro_x=wx,time=t --units deg/s,ms
-  imunoise analyze run1.csv.gz --rate 100 --json report.json";
+  imunoise analyze run1.csv.gz --rate 100 -o report.json";
 
 /// Below the options of `batch`.
 const EXAMPLES_OF_BATCH: &str = "\
@@ -48,11 +62,11 @@ Examples:
 
 /// Below the options of `demo`.
 const EXAMPLES_OF_DEMO: &str = "\
-The page is report/index.html, unless --page names another folder.
+The page is report.html, unless -o names another file.
 
 Examples:
   imunoise demo
-  imunoise demo --seconds 600 --plain --page hour";
+  imunoise demo --seconds 600 --plain -o hour.html";
 
 /// Below the options of `inspect`.
 const EXAMPLES_OF_INSPECT: &str = "\
@@ -71,7 +85,8 @@ Examples:
 /// Below the options of `export`.
 const EXAMPLES_OF_EXPORT: &str = "\
 Examples:
-  imunoise export report.json imu.yaml --format kalibr";
+  imunoise export report.json -o imu.yaml
+  imunoise export gyro.csv accel.csv --rate 200 -o openvins=chain.yaml";
 
 /// Below the options of `convert`.
 const EXAMPLES_OF_CONVERT: &str = "\
@@ -83,13 +98,13 @@ Examples:
 const EXAMPLES_OF_MONITOR: &str = "\
 Examples:
   imunoise monitor /dev/ttyACM0
-  imunoise monitor run1.csv.gz --rate 100 --speed 60";
+  imunoise monitor /dev/ttyACM0 --send \"f 819.2\" --seconds 60";
 
 /// Below the options of `record`.
 const EXAMPLES_OF_RECORD: &str = "\
 Examples:
   imunoise record cable.csv.gz --port /dev/ttyACM0 --seconds 3600
-  imunoise record night.csv.gz --port COM4 --seconds 28800 --page report";
+  imunoise record night.csv.gz --port COM4 --seconds 28800 -o report.html";
 
 /// Below the options of `bench`.
 const EXAMPLES_OF_BENCH: &str = "\
@@ -107,15 +122,12 @@ const DEFAULT_S: f64 = 60.0;
 const EXAMPLES_OF_REPLAY: &str = "\
 Examples:
   imunoise replay counts.csv.gz --rate 100
-  imunoise replay bus.csv.gz --json report.json";
+  imunoise replay bus.csv.gz -o report.json";
 
 /// Below the options of `simulate`.
 const EXAMPLES_OF_SIMULATE: &str = "\
-Without --gyro and --accl the noise is that of a published part.
---effect, --environment and --fault may be given several times.
-
 Examples:
-  imunoise simulate hour.csv.gz --gyro 0.037,0.009,0.0013
+  imunoise simulate hour.csv.gz --noise gyro=0.037,0.009,0.0013
   imunoise simulate fan.csv --effect sinusoid:gyro_z:frequency=20,amplitude=0.1";
 
 /// Below the options of `completions`.
@@ -126,7 +138,7 @@ Examples:
 /// Noise analysis of inertial sensors, with a virtual ADIS16405.
 #[derive(Debug, Parser)]
 #[command(name = PROGRAM, version, arg_required_else_help = true)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, after_long_help = format!("{EXAMPLES}\n\n{EXIT_CODES}"))]
 pub(crate) struct Cli {
     /// The subcommand.
     #[command(subcommand)]
@@ -174,13 +186,13 @@ pub(crate) enum Command {
     /// Compare recordings, or reports, or one with the data sheet
     #[command(after_help = EXAMPLES_OF_COMPARE)]
     Compare(Box<CompareArguments>),
-    /// Write the noise of a report in the format of another program
+    /// Write the noise of a report or recording for another program
     #[command(after_help = EXAMPLES_OF_EXPORT)]
     Export(ExportArguments),
     /// Write a recording as a table, a NumPy array or an SPI frame log
     #[command(after_help = EXAMPLES_OF_CONVERT)]
     Convert(ConvertArguments),
-    /// Show a device or a recording live, while its record grows
+    /// Show a device live: coefficients, curves, findings, health
     #[command(after_help = EXAMPLES_OF_MONITOR)]
     Monitor(MonitorArguments),
     /// Check a device, its wires and its sensor: what passes, what fails
@@ -194,11 +206,13 @@ pub(crate) enum Command {
         /// Serial port of a device, such as /dev/ttyUSB0.
         #[arg(long, help_heading = INPUT)]
         port: String,
-        /// Baud rate of the port.
-        #[arg(long, help_heading = INPUT, default_value_t = serial::BAUD)]
+        /// Baud rate of the port
+        ///
+        /// A port on USB ignores it.
+        #[arg(verbatim_doc_comment, long, help_heading = INPUT, default_value_t = serial::BAUD)]
         baud: u32,
         /// Length of the recording, s.
-        #[arg(long, help_heading = INPUT, default_value_t = DEFAULT_S, allow_negative_numbers = true)]
+        #[arg(long, help_heading = INPUT, default_value_t = DEFAULT_S, allow_negative_numbers = true, value_parser = duration)]
         seconds: f64,
         /// Where the report goes besides the terminal.
         #[command(flatten)]
@@ -224,11 +238,17 @@ pub(crate) struct AnalyzeArguments {
     /// The recording, and how to read it.
     #[command(flatten)]
     pub(crate) recording: RecordingArguments,
-    /// Each sensor of the file as its own recording.
-    #[arg(long, help_heading = INPUT, conflicts_with = "topic")]
+    /// Each sensor of the file as its own recording
+    ///
+    /// For a file with several sensors or several rates. Gyros and
+    /// accelerometers apart are one sensor: -o imu.yaml has both.
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, conflicts_with = "topic")]
     pub(crate) each_sensor: bool,
-    /// Curves and models only, for records of any length.
-    #[arg(long, help_heading = OUTPUT)]
+    /// Curves and models only, for records of any length
+    ///
+    /// Allan deviations and N, B, K in one pass and in fixed memory, without
+    /// findings, for recordings of days.
+    #[arg(verbatim_doc_comment, long, help_heading = OUTPUT)]
     pub(crate) quick: bool,
     /// Where the report goes besides the terminal.
     #[command(flatten)]
@@ -238,11 +258,18 @@ pub(crate) struct AnalyzeArguments {
 /// Files to inspect.
 #[derive(Debug, Args)]
 pub(crate) struct InspectArguments {
-    /// The files, of any format.
-    #[arg(value_name = "FILE", required = true)]
+    /// The files, of any format
+    ///
+    /// Shows for each column its unit, first values, mean, noise and step,
+    /// and what it is taken for; the rate in Hz, lost samples, the part at
+    /// rest, and the command that analyses the file.
+    #[arg(verbatim_doc_comment, value_name = "FILE", required = true)]
     pub(crate) files: Vec<PathBuf>,
-    /// Topic, message or array [default: every inertial sensor].
-    #[arg(long, help_heading = INPUT)]
+    /// Topic, message or array [default: every inertial sensor]
+    ///
+    /// Also one that is no inertial sensor.
+    /// Example: --topic sensor_baro
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT)]
     pub(crate) topic: Option<String>,
 }
 
@@ -251,11 +278,17 @@ pub(crate) struct InspectArguments {
 pub(crate) struct ReplayArguments {
     /// Register counts of an ADIS16405, or a log of its SPI bus.
     pub(crate) file: PathBuf,
-    /// Sample rate; overrides the time stamps.
-    #[arg(long, help_heading = INPUT, value_name = "HZ", allow_negative_numbers = true)]
+    /// Sample rate; overrides the time stamps
+    ///
+    /// In Hz. Needed if the recording has no time stamps.
+    /// Example: --rate 204.8
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate: Option<f64>,
-    /// Gyro range of counts: 300 [default], 150 or 75 deg/s.
-    #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true, hide_default_value = true)]
+    /// Gyro range of counts: 300 [default], 150 or 75 deg/s
+    ///
+    /// Full scale of the gyros in deg/s, for register counts that do not say
+    /// it: a count is 0.05, 0.025 or 0.0125 deg/s.
+    #[arg(verbatim_doc_comment, long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true, hide_default_value = true)]
     pub(crate) range: GyroRangeArgument,
     /// Where the report goes besides the terminal.
     #[command(flatten)]
@@ -268,18 +301,27 @@ pub(crate) struct CompareArguments {
     /// The first one, and how to read it and the others.
     #[command(flatten)]
     pub(crate) recording: RecordingArguments,
-    /// More recordings, or the second report.
-    #[arg(value_name = "FILE", required_unless_present_any = ["running", "data_sheet"])]
+    /// More recordings, or the second report
+    ///
+    /// A recording beside a report is analysed first.
+    #[arg(verbatim_doc_comment, value_name = "FILE", required_unless_present_any = ["running", "data_sheet"])]
     pub(crate) more: Vec<PathBuf>,
     /// Recording with motors on: how much noisier?
-    #[arg(long, help_heading = INPUT, value_name = "FILE", conflicts_with = "data_sheet")]
+    ///
+    /// For each channel and averaging time the ratio of the Allan deviations,
+    /// with 95 % bounds.
+    /// Example: imunoise compare still.csv --running hover.csv
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "FILE", conflicts_with = "data_sheet")]
     pub(crate) running: Option<PathBuf>,
-    /// Compare a report with its sensor's data sheet.
-    #[arg(long, conflicts_with = "more")]
+    /// Compare a report with its sensor's data sheet
+    ///
+    /// N, B and K of the report over those of the data sheet that --sensor
+    /// names. A recording is analysed first.
+    #[arg(verbatim_doc_comment, long, conflicts_with = "more")]
     pub(crate) data_sheet: bool,
     /// Where the result goes besides the terminal.
     #[command(flatten)]
-    pub(crate) output: JsonArgument,
+    pub(crate) result: JsonArgument,
 }
 
 /// Recordings that have a report each.
@@ -291,41 +333,50 @@ pub(crate) struct BatchArguments {
     /// More recordings, or folders of them.
     #[arg(value_name = "FILE|DIR")]
     pub(crate) more: Vec<PathBuf>,
-    /// Each sensor of each file as its own recording.
-    #[arg(long, help_heading = INPUT, conflicts_with = "topic")]
+    /// Each sensor of each file as its own recording
+    ///
+    /// Each has a report of its own, FILE-TOPIC.json.
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, conflicts_with = "topic")]
     pub(crate) each_sensor: bool,
-    /// Curves and models only, for records of any length.
-    #[arg(long, help_heading = OUTPUT)]
+    /// Curves and models only, for records of any length
+    ///
+    /// Allan deviations and N, B, K in one pass and in fixed memory, without
+    /// findings, for recordings of days.
+    #[arg(verbatim_doc_comment, long, help_heading = OUTPUT)]
     pub(crate) quick: bool,
-    /// Folder of the reports, which mirrors those given.
-    #[arg(short, long, help_heading = OUTPUT, value_name = "DIR")]
-    pub(crate) out: PathBuf,
-    /// One JSON object a row: status, values, findings.
-    #[arg(long, help_heading = OUTPUT, value_name = "OUT")]
+    /// Folder of the reports, which mirrors those given
+    ///
+    /// Each recording has a report FILE.json in it. Of a folder that is given
+    /// those below it are mirrored.
+    #[arg(verbatim_doc_comment, short, long, help_heading = OUTPUT, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    /// One JSON object a row: status, values, findings
+    ///
+    /// A table as lines of JSON, written as recordings are finished: a row of
+    /// status, reason and notes for each, and its coefficients and findings.
+    /// docs/fleet.md has the columns.
+    /// Example: --rows rows.ndjson
+    #[arg(verbatim_doc_comment, long, help_heading = OUTPUT, value_name = "OUT")]
     pub(crate) rows: Option<PathBuf>,
-    /// Leave out what has a report of the same bytes.
-    #[arg(long, help_heading = OUTPUT)]
+    /// Leave out what has a report of the same bytes
+    ///
+    /// Made with the same options and version. An interrupted run goes on.
+    #[arg(verbatim_doc_comment, long, help_heading = OUTPUT)]
     pub(crate) resume: bool,
-    /// Recordings at a time [default: one a core].
-    #[arg(short, long, value_name = "N")]
+    /// Recordings at a time [default: one a core]
+    ///
+    /// Each is analysed by one thread.
+    /// Example: -j 4
+    #[arg(verbatim_doc_comment, short, long, value_name = "N")]
     pub(crate) jobs: Option<NonZeroUsize>,
     /// Print nothing.
-    #[arg(long, help_heading = OUTPUT)]
+    #[arg(short, long, help_heading = OUTPUT)]
     pub(crate) quiet: bool,
-    /// Overwrite files that exist.
-    #[arg(long, help_heading = OUTPUT)]
+    /// Overwrite files that exist
+    ///
+    /// Without it they are kept, and the command ends with exit code 1.
+    #[arg(verbatim_doc_comment, short, long, help_heading = OUTPUT)]
     pub(crate) force: bool,
-}
-
-impl BatchArguments {
-    /// The recordings and folders, each with how it is read.
-    pub(crate) fn each(&self) -> impl Iterator<Item = RecordingArguments> + '_ {
-        let files = [&self.recording.input.file].into_iter().chain(&self.more);
-        files.map(|file| RecordingArguments {
-            input: InputArguments { file: file.clone(), ..self.recording.input.clone() },
-            ..self.recording.clone()
-        })
-    }
 }
 
 /// How a recording is written.
@@ -347,11 +398,18 @@ pub(crate) struct ConvertArguments {
     pub(crate) recording: RecordingArguments,
     /// The file to write.
     pub(crate) out: PathBuf,
-    /// Format: table, frames or npy [default: by OUT's name].
-    #[arg(long, help_heading = OUTPUT, value_name = "FORMAT", value_enum, hide_possible_values = true)]
+    /// Format: table, frames or npy [default: by OUT's name]
+    ///
+    ///   table   CSV: counts of an ADIS16405, or channels with their units
+    ///   frames  CSV: transactions of the SPI bus of an ADIS16405
+    ///   npy     NumPy array of doubles: s, rad/s, m/s^2
+    /// .csv and .txt, also with .gz, are tables, .npy is an array.
+    #[arg(verbatim_doc_comment, long, help_heading = OUTPUT, value_name = "FORMAT", value_enum, hide_possible_values = true)]
     pub(crate) format: Option<RecordingFormat>,
-    /// Overwrite files that exist.
-    #[arg(long, help_heading = OUTPUT)]
+    /// Overwrite files that exist
+    ///
+    /// Without it they are kept, and the command ends with exit code 1.
+    #[arg(verbatim_doc_comment, short, long, help_heading = OUTPUT)]
     pub(crate) force: bool,
 }
 
@@ -360,14 +418,23 @@ pub(crate) struct ConvertArguments {
 pub(crate) struct SimulateArguments {
     /// The file to write.
     pub(crate) out: PathBuf,
-    /// Format: table, frames or npy [default: by OUT's name].
-    #[arg(long, help_heading = OUTPUT, value_name = "FORMAT", value_enum, hide_possible_values = true)]
+    /// Format: table, frames or npy [default: by OUT's name]
+    ///
+    ///   table   CSV: counts of an ADIS16405, or channels with their units
+    ///   frames  CSV: transactions of the SPI bus of an ADIS16405
+    ///   npy     NumPy array of doubles: s, rad/s, m/s^2
+    /// .csv and .txt, also with .gz, are tables, .npy is an array.
+    #[arg(verbatim_doc_comment, long, help_heading = OUTPUT, value_name = "FORMAT", value_enum, hide_possible_values = true)]
     pub(crate) format: Option<RecordingFormat>,
-    /// Overwrite files that exist.
-    #[arg(long, help_heading = OUTPUT)]
+    /// Overwrite files that exist
+    ///
+    /// Without it they are kept, and the command ends with exit code 1.
+    #[arg(verbatim_doc_comment, short, long, help_heading = OUTPUT)]
     pub(crate) force: bool,
-    /// Virtual time in s [default: 3600].
-    #[arg(long, allow_negative_numbers = true)]
+    /// Virtual time in s [default: 3600]
+    ///
+    /// An hour takes some seconds.
+    #[arg(verbatim_doc_comment, long, allow_negative_numbers = true, value_parser = duration)]
     pub(crate) seconds: Option<f64>,
     /// Seed of all random numbers.
     #[arg(long, default_value_t = 1)]
@@ -378,81 +445,105 @@ pub(crate) struct SimulateArguments {
     /// Range of the gyros, deg/s: 300, 150 or 75.
     #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true)]
     pub(crate) range: GyroRangeArgument,
-    /// Taps per filter stage, 1 to 64 [default: by the range].
-    #[arg(long, help_heading = SENSOR)]
+    /// Taps per filter stage, 1 to 64 [default: by the range]
+    ///
+    /// A power of two: the Bartlett filter of the part, which averages twice.
+    #[arg(verbatim_doc_comment, long, help_heading = SENSOR)]
     pub(crate) taps: Option<u32>,
-    /// All gyros: deg/√s, deg/s, deg/s/√s.
-    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
-    gyro: Option<String>,
-    /// Gyro x.
-    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
-    gyro_x: Option<String>,
-    /// Gyro y.
-    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
-    gyro_y: Option<String>,
-    /// Gyro z.
-    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
-    gyro_z: Option<String>,
-    /// All accelerometers: g/√Hz, g, g/√s.
-    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
-    accl: Option<String>,
-    /// Accelerometer x.
-    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
-    accl_x: Option<String>,
-    /// Accelerometer y.
-    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
-    accl_y: Option<String>,
-    /// Accelerometer z.
-    #[arg(long, help_heading = NOISE, value_name = "N,B,K")]
-    accl_z: Option<String>,
-    /// As in markov:gyro_x:time_constant=9,deviation=1.
-    #[arg(long, help_heading = NOISE, value_name = "EFFECT")]
+    /// As in gyro=0.037,0.009,0.0013; see --help
+    ///
+    /// Of one channel (gyro_x), or of all three of a kind (gyro, accl), which
+    /// those of one channel override; may be given several times. In deg/√s,
+    /// deg/s, deg/s/√s, and in g/√Hz, g, g/√s. Default: those of a published
+    /// part.
+    /// Example: --noise gyro=0.037,0.009,0.0013 --noise gyro_z=0.05,0.01,0
+    #[arg(verbatim_doc_comment, long, help_heading = NOISE, value_name = "CHANNEL=N,B,K", value_parser = channel_noise)]
+    pub(crate) noise: Vec<ChannelNoise>,
+    /// As in markov:gyro_x:time_constant=9,deviation=1
+    ///
+    /// May be given several times. Kinds: sinusoid, resonance, markov,
+    /// telegraph, quantization, rate_ramp, temperature, supply, acceleration,
+    /// common_mode, spikes, bias_step, dropped_samples, repeated_samples,
+    /// sample_clock; docs/several-recordings.md has their keys. Sizes are in
+    /// deg/s or g, frequencies in Hz, times in s.
+    /// Example: --effect sinusoid:gyro_z:frequency=20.5,amplitude=0.2
+    #[arg(verbatim_doc_comment, long, help_heading = NOISE, value_name = "EFFECT")]
     pub(crate) effect: Vec<String>,
-    /// As in temperature:rise=8,time_constant=900.
-    #[arg(long, help_heading = NOISE, value_name = "PROFILE")]
+    /// As in temperature:rise=8,time_constant=900
+    ///
+    /// May be given several times. temperature has rise and cycle in °C,
+    /// time_constant and period in s; supply has load and cycle in V; motion
+    /// has deviation in g.
+    #[arg(verbatim_doc_comment, long, help_heading = NOISE, value_name = "PROFILE")]
     pub(crate) environment: Vec<String>,
-    /// Of the bus, as in stuck_low:from=10,bursts=5.
-    #[arg(long, help_heading = NOISE, value_name = "FAULT")]
+    /// Of the bus, as in stuck_low:from=10,bursts=5
+    ///
+    /// May be given several times; `from` is in s. Kinds: impossible_rate,
+    /// shifted, stuck_low, stuck_high, frozen, stale, low_supply.
+    #[arg(verbatim_doc_comment, long, help_heading = NOISE, value_name = "FAULT")]
     pub(crate) fault: Vec<String>,
 }
 
-impl SimulateArguments {
-    /// Beginnings of the names of channels, and their coefficients; those of one axis come after those of all.
-    pub(crate) fn coefficients(&self) -> impl Iterator<Item = (&'static str, &str)> {
-        let all = [
-            ("gyro_", &self.gyro),
-            ("accl_", &self.accl),
-            ("gyro_x", &self.gyro_x),
-            ("gyro_y", &self.gyro_y),
-            ("gyro_z", &self.gyro_z),
-            ("accl_x", &self.accl_x),
-            ("accl_y", &self.accl_y),
-            ("accl_z", &self.accl_z),
-        ];
-        all.into_iter().filter_map(|(prefix, text)| Some((prefix, text.as_deref()?)))
-    }
+/// Noise of a channel, or of the three of a kind.
+#[derive(Debug, Clone)]
+pub(crate) struct ChannelNoise {
+    /// Such as `gyro_z`, or `gyro_`.
+    pub(crate) prefix: String,
+    /// N, B, K.
+    pub(crate) coefficients: String,
 }
 
-/// A report to write in the format of another program.
+fn channel_noise(text: &str) -> Result<ChannelNoise, String> {
+    let (name, coefficients) = text.split_once('=').ok_or("expected CHANNEL=N,B,K, as in gyro_z=0.05,0.01,0")?;
+    let kinds = ["gyro", "accl"];
+    let known = kinds.iter().flat_map(|kind| ["", "_x", "_y", "_z"].map(|axis| format!("{kind}{axis}")));
+    if !known.clone().any(|known| known == name) {
+        return Err(format!("`{name}` is none of {}", known.collect::<Vec<_>>().join(", ")));
+    }
+    let prefix = if kinds.contains(&name) { format!("{name}_") } else { name.to_owned() };
+    Ok(ChannelNoise { prefix, coefficients: coefficients.to_owned() })
+}
+
+/// Reports or recordings whose noise is written in the format of another program.
 #[derive(Debug, Args)]
 pub(crate) struct ExportArguments {
-    /// The program.
-    #[arg(long, help_heading = OUTPUT, value_enum)]
-    pub(crate) format: ExportFormat,
-    /// One number for three axes: rms or worst.
-    #[arg(long, help_heading = OUTPUT, value_enum, default_value_t, hide_possible_values = true)]
+    /// The first one, and how to read it and the others.
+    #[command(flatten)]
+    pub(crate) recording: RecordingArguments,
+    /// More of one sensor: gyros in one file, accelerometers in another
+    ///
+    /// They are written as one sensor. Reports and recordings may be mixed.
+    #[arg(verbatim_doc_comment, value_name = "FILE")]
+    pub(crate) more: Vec<PathBuf>,
+    /// Write the noise: .yaml (Kalibr) .csv .m .py .sdf
+    ///
+    /// May be given several times. The ending of FILE chooses the program:
+    ///   .yaml  Kalibr, in rad/s and m/s^2
+    ///   .csv   every parameter of every channel with 95 % bounds
+    ///   .m     MATLAB's imuSensor
+    ///   .py    GTSAM
+    ///   .sdf   Gazebo
+    /// FORMAT=FILE chooses others: openvins, vins, orbslam3, kf-gins, basalt.
+    /// FORMAT=- is standard output.
+    /// Example: -o imu.yaml -o openvins=chain.yaml
+    #[arg(verbatim_doc_comment, short, long = "output", help_heading = OUTPUT, value_name = "FILE", required = true, value_parser = OsStringValueParser::new().try_map(noise_file))]
+    pub(crate) outputs: Vec<OutputFile>,
+    /// One number for three axes: rms [default] or worst
+    ///
+    /// For formats that have one number for x, y and z: their root mean
+    /// square, or the largest.
+    #[arg(verbatim_doc_comment, long = "combine-axes", value_name = "HOW", help_heading = OUTPUT, value_enum, default_value_t, hide_possible_values = true, hide_default_value = true)]
     pub(crate) axis: AxisChoice,
-    /// Overwrite files that exist.
-    #[arg(long, help_heading = OUTPUT)]
+    /// Overwrite files that exist
+    ///
+    /// Without it they are kept, and the command ends with exit code 1.
+    #[arg(verbatim_doc_comment, short, long, help_heading = OUTPUT)]
     pub(crate) force: bool,
-    /// Reports of `analyze --json`, and the file to write.
-    #[arg(required = true, num_args = 2.., value_names = ["REPORT", "OUT"])]
-    pub(crate) files: Vec<PathBuf>,
 }
 
 /// Options of `analyze` that a proposed command states itself, or does not need.
 const PROPOSED: [&str; 10] =
-    ["topic", "columns", "units", "rate", "sensor", "range", "from", "to", "yes", "each-sensor"];
+    ["topic", "columns", "units", "rate", "sensor", "range", "from", "to", "accept-guess", "each-sensor"];
 
 /// The words that were typed, the name of the program first.
 static TYPED: OnceLock<Vec<String>> = OnceLock::new();
@@ -465,22 +556,23 @@ pub(crate) fn set_typed(words: &[OsString]) {
 
 /// The options that were typed for `analyze`, without those that a proposed command states itself.
 pub(crate) fn other_options() -> Vec<String> {
-    let typed = TYPED.get().into_iter().flatten().cloned();
-    let mut words = typed.skip(1).skip_while(|word| word.starts_with("--"));
-    if words.next().as_deref() != Some("analyze") {
-        return Vec::new();
-    }
-    let program = Cli::command();
-    let arguments = || program.find_subcommand("analyze").into_iter().flat_map(clap::Command::get_arguments);
-    let takes_value =
-        |name: &str| arguments().any(|own| own.get_long() == Some(name) && own.get_action().takes_values());
+    let mut program = Cli::command();
+    let typed = program.try_get_matches_from_mut(TYPED.get().into_iter().flatten()).ok();
+    let (Some(typed), Some(analyze)) = (&typed, program.find_subcommand("analyze")) else { return Vec::new() };
+    let Some(("analyze", typed)) = typed.subcommand() else { return Vec::new() };
     let mut options = Vec::new();
-    while let Some(word) = words.next() {
-        let Some(option) = word.strip_prefix("--") else { continue };
-        let name = option.split('=').next().unwrap_or_default();
-        let value = if option.contains('=') || !takes_value(name) { None } else { words.next() };
-        if !PROPOSED.contains(&name) {
-            options.extend([Some(word), value].into_iter().flatten());
+    for argument in analyze.get_arguments() {
+        let id = argument.get_id().as_str();
+        let Some(long) = argument.get_long().filter(|long| !PROPOSED.contains(long)) else { continue };
+        if typed.value_source(id) != Some(ValueSource::CommandLine) {
+            continue;
+        }
+        let option = argument.get_short().map_or_else(|| format!("--{long}"), |short| format!("-{short}"));
+        if argument.get_action().takes_values() {
+            let values = typed.get_raw(id).into_iter().flatten();
+            options.extend(values.flat_map(|value| [option.clone(), value.to_string_lossy().into_owned()]));
+        } else {
+            options.push(option);
         }
     }
     options
@@ -492,14 +584,21 @@ pub(crate) struct RecordingArguments {
     /// The recording.
     #[command(flatten)]
     pub(crate) input: InputArguments,
-    /// Sample rate; overrides the time stamps.
-    #[arg(long, help_heading = INPUT, value_name = "HZ", allow_negative_numbers = true)]
+    /// Sample rate; overrides the time stamps
+    ///
+    /// In Hz. Needed if the recording has no time stamps.
+    /// Example: --rate 204.8
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate: Option<f64>,
-    /// Begin here, s from the first sample.
-    #[arg(long, help_heading = INPUT, value_name = "S", value_parser = time_in_recording)]
+    /// Begin here, s from the first sample
+    ///
+    /// Example: --from 8.2 --to 60
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "S", value_parser = time_in_recording)]
     pub(crate) from: Option<f64>,
-    /// End before this, s from the first sample.
-    #[arg(long, help_heading = INPUT, value_name = "S", value_parser = time_in_recording)]
+    /// End before this, s from the first sample
+    ///
+    /// In s from the first sample of the file, not from --from.
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "S", value_parser = time_in_recording)]
     pub(crate) to: Option<f64>,
 }
 
@@ -507,6 +606,11 @@ impl RecordingArguments {
     /// Of which nothing but the input is said.
     pub(crate) fn new(input: InputArguments) -> Self {
         Self { input, rate: None, from: None, to: None }
+    }
+
+    /// `file`, read in the same way.
+    pub(crate) fn of_file(&self, file: &Path) -> Self {
+        Self { input: InputArguments { file: file.to_owned(), ..self.input.clone() }, ..self.clone() }
     }
 
     /// The options that say how it is read, as they are typed.
@@ -531,25 +635,57 @@ impl RecordingArguments {
 /// A recording.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct InputArguments {
-    /// The recording, of any format; - for standard input.
+    /// The recording, of any format; - for standard input
+    ///
+    /// A text table, NumPy, MATLAB, HDF5, a ROS 1 or ROS 2 bag, ULog,
+    /// ArduPilot, or an export of a logic analyser, also with .gz or .zst.
+    /// The content tells the format, not the name.
+    #[arg(verbatim_doc_comment)]
     pub(crate) file: PathBuf,
-    /// As in gyro_x=wx,gyro_y=1 [default: by name].
-    #[arg(long, help_heading = INPUT, value_name = "CHANNEL=COLUMN", value_delimiter = ',')]
+    /// As in gyro_x=wx,gyro_y=1 [default: by name]
+    ///
+    /// Which column is which channel, by its name or by its number from 0.
+    /// Channels are gyro_x to gyro_z, accl_x to accl_z, magn_x to magn_z,
+    /// temp, supply, and time or sample (an index).
+    /// Example: --columns time=t,gyro_x=wx,gyro_y=wy,gyro_z=wz
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "CHANNEL=COLUMN", value_delimiter = ',')]
     pub(crate) columns: Vec<String>,
-    /// Per quantity, as deg/s,g,us [default: by name].
-    #[arg(long, help_heading = INPUT, value_name = "UNIT", value_delimiter = ',')]
+    /// Per quantity, as deg/s,g,us [default: by name]
+    ///
+    /// Units of the columns, one a quantity, in any order, each with a factor
+    /// if need be. Without a unit in the heading or here a rate or a specific
+    /// force is refused.
+    /// Example: --units rad/s,m/s^2,degC,ns
+    /// Example: --units deg/s/131,g/16384
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "UNIT", value_delimiter = ',')]
     pub(crate) units: Vec<String>,
-    /// Topic, message or array of a file with several.
-    #[arg(long, help_heading = INPUT)]
+    /// Topic, message or array of a file with several
+    ///
+    /// One of the names that `imunoise inspect FILE` shows.
+    /// Example: --topic /imu0
+    /// Example: --topic sensor_gyro:1
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT)]
     pub(crate) topic: Option<String>,
-    /// Accept a guess if no other is plausible.
-    #[arg(long, help_heading = INPUT)]
-    pub(crate) yes: bool,
-    /// Gyros of an ADIS16405: 300 [default], 150, 75 deg/s.
-    #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true, hide_default_value = true)]
+    /// Accept a guess if no other is plausible
+    ///
+    /// Takes the columns and units that `imunoise inspect` proposes if
+    /// nothing about them is in doubt, and says so. A rate in Hz is never
+    /// guessed.
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT)]
+    pub(crate) accept_guess: bool,
+    /// Gyros of an ADIS16405: 300 [default], 150, 75 deg/s
+    ///
+    /// Full scale of the gyros in deg/s, for register counts that do not say
+    /// it: a count is 0.05, 0.025 or 0.0125 deg/s.
+    #[arg(verbatim_doc_comment, long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true, hide_default_value = true)]
     pub(crate) range: GyroRangeArgument,
-    /// adis16405, adis16470, bmi088, mpu6050 or a TOML file.
-    #[arg(long, help_heading = SENSOR, value_name = "NAME|FILE")]
+    /// adis16405, adis16470, bmi088, mpu6050 or a TOML file
+    ///
+    /// The data sheet: ranges, counts and the values to compare with.
+    /// Default: adis16405 for its own counts, generic for all others.
+    /// Example: --sensor bmi088
+    /// Example: --sensor my-part.toml
+    #[arg(verbatim_doc_comment, long, help_heading = SENSOR, value_name = "NAME|FILE")]
     pub(crate) sensor: Option<String>,
     /// What is in memory, in the place of the file.
     #[arg(skip)]
@@ -575,7 +711,7 @@ impl InputArguments {
             columns: Vec::new(),
             units: Vec::new(),
             topic: None,
-            yes: false,
+            accept_guess: false,
             memory: None,
         }
     }
@@ -599,67 +735,57 @@ fn time_in_recording(text: &str) -> Result<f64, String> {
     time.ok_or_else(|| "not a time of at least 0 s".to_owned())
 }
 
+/// A finite time above 0 s.
+fn duration(text: &str) -> Result<f64, String> {
+    time_in_recording(text).ok().filter(|time| *time > 0.0).ok_or_else(|| "not a time above 0 s".to_owned())
+}
+
 /// A device to check.
 #[derive(Debug, Args)]
 pub(crate) struct BenchArguments {
     /// Serial port of the device, such as /dev/ttyACM0.
     pub(crate) port: String,
-    /// Baud rate of the port.
-    #[arg(long, help_heading = INPUT, default_value_t = serial::BAUD)]
+    /// Baud rate of the port
+    ///
+    /// A port on USB ignores it.
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, default_value_t = serial::BAUD)]
     pub(crate) baud: u32,
-    /// Its other port, which must carry the same bursts.
-    #[arg(long, help_heading = INPUT, value_name = "PORT")]
+    /// Its other port, which must carry the same bursts
+    ///
+    /// The USB port and the serial adapter of one device.
+    /// Example: imunoise bench /dev/ttyACM0 --second /dev/ttyUSB0
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "PORT")]
     pub(crate) second: Option<String>,
     /// Reads of PROD_ID.
     #[arg(long, default_value_t = BenchPlan::default().reads)]
     pub(crate) reads: u32,
     /// Time for which bursts are counted, s.
-    #[arg(long, default_value_t = BenchPlan::default().bursts_s, value_parser = time_in_recording)]
+    #[arg(long, default_value_t = BenchPlan::default().bursts_s, value_parser = duration)]
     pub(crate) seconds: f64,
 }
 
-/// What to show live.
+/// A device to show live.
 #[derive(Debug, Args)]
 pub(crate) struct MonitorArguments {
-    /// A serial port such as /dev/ttyUSB0, or a recording in a file.
-    #[arg(value_name = "PORT|FILE")]
-    pub(crate) source: PathBuf,
-    /// Baud rate of the port.
-    #[arg(long, help_heading = INPUT, default_value_t = serial::BAUD)]
+    /// Serial port of the device, such as /dev/ttyACM0.
+    pub(crate) port: String,
+    /// Baud rate of the port
+    ///
+    /// A port on USB ignores it.
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, default_value_t = serial::BAUD)]
     pub(crate) baud: u32,
-    /// Command for the device, such as "f 819.2"; repeatable.
-    #[arg(long, help_heading = INPUT, value_name = "COMMAND")]
+    /// Command for the device, such as "f 819.2"; repeatable
+    ///
+    /// What the device's command line takes; `?` lists the commands.
+    /// The sample rate in Hz:
+    /// Example: --send "f 819.2"
+    #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "COMMAND")]
     pub(crate) send: Vec<String>,
-    /// End after so many seconds [default: at the end].
-    #[arg(long)]
+    /// End after so many seconds [default: at the end]
+    ///
+    /// Without it: when q is pressed, at Ctrl-C, or if the device hangs up.
+    #[arg(verbatim_doc_comment, long, value_name = "S", value_parser = duration)]
     pub(crate) seconds: Option<f64>,
-    /// Of a recording: times real time, or max.
-    #[arg(long, help_heading = INPUT, value_name = "TIMES|max", default_value = "1", value_parser = replay_speed)]
-    pub(crate) speed: f64,
-    /// Sample rate of a recording; overrides time stamps.
-    #[arg(long, help_heading = INPUT, value_name = "HZ", allow_negative_numbers = true)]
-    pub(crate) rate: Option<f64>,
-    /// Gyro range of a recording: 300 [default], 150 or 75 deg/s.
-    #[arg(long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true, hide_default_value = true)]
-    pub(crate) range: GyroRangeArgument,
-}
-
-impl MonitorArguments {
-    /// The recording, as the other commands take it.
-    pub(crate) fn recording(&self) -> RecordingArguments {
-        let Self { source, rate, range, .. } = self;
-        let input = InputArguments { range: *range, ..InputArguments::new(source) };
-        RecordingArguments { rate: *rate, ..RecordingArguments::new(input) }
-    }
-}
-
-/// A positive number, or `max`, which is infinite.
-fn replay_speed(text: &str) -> Result<f64, String> {
-    if text == "max" {
-        return Ok(f64::INFINITY);
-    }
-    let speed = text.parse().ok().filter(|speed: &f64| speed.is_finite() && *speed > 0.0);
-    speed.ok_or_else(|| "neither a positive number nor max".to_owned())
 }
 
 /// Full scale of the gyros.
@@ -690,14 +816,19 @@ impl From<GyroRangeArgument> for GyroRange {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Virtual sensor")]
 pub(crate) struct SimulationArguments {
-    /// Virtual time, s [default: 3600].
-    #[arg(long, allow_negative_numbers = true)]
+    /// Virtual time, s [default: 3600]
+    ///
+    /// An hour takes some seconds.
+    #[arg(verbatim_doc_comment, long, allow_negative_numbers = true, value_parser = duration)]
     pub(crate) seconds: Option<f64>,
     /// Seed of the noise.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// N, B and K alone: no line, no effect of temperature.
-    #[arg(long)]
+    /// N, B and K alone: no line, no effect of temperature
+    ///
+    /// Without it gyro z has a line of 0.2 deg/s at 20.5 Hz, and gyro x
+    /// follows the temperature with 0.05 deg/s/°C.
+    #[arg(verbatim_doc_comment, long)]
     pub(crate) plain: bool,
 }
 
@@ -713,92 +844,123 @@ impl SimulationArguments {
 #[derive(Debug, Args)]
 #[command(next_help_heading = OUTPUT)]
 pub(crate) struct OutputArguments {
-    /// Print every sentence and table of every channel.
-    #[arg(long, conflicts_with = "quiet")]
+    /// Print every sentence and table of every channel
+    ///
+    /// Instead of one screen.
+    #[arg(verbatim_doc_comment, long, conflicts_with = "quiet")]
     pub(crate) full: bool,
     /// Print nothing.
-    #[arg(long)]
+    #[arg(short, long)]
     pub(crate) quiet: bool,
-    /// Write every figure as SVG into this folder.
-    #[arg(long, value_name = "DIR")]
-    pub(crate) pictures: Option<PathBuf>,
-    /// Write the report as JSON; - for standard output.
-    #[arg(long, value_name = "OUT")]
-    pub(crate) json: Option<PathBuf>,
-    /// Overwrite files that exist.
-    #[arg(long)]
+    /// Report as .html, .json, .svg, .yaml and others
+    ///
+    /// May be given several times. The ending of FILE chooses the format:
+    ///   .json  the whole report, for programs and `imunoise compare`
+    ///   .html  the whole report as one page with every figure
+    ///   .svg   every figure, as FILE-gyro_x-allan.svg and so on
+    ///   .csv   every parameter of every channel with 95 % bounds
+    ///   .yaml  noise for Kalibr, in rad/s and m/s^2
+    ///   .m     noise for MATLAB's imuSensor
+    ///   .py    noise for GTSAM
+    ///   .sdf   an IMU for Gazebo
+    /// FORMAT=FILE chooses it by name: openvins, vins, orbslam3, kf-gins,
+    /// basalt, or json, html, svg, csv, kalibr, matlab, gtsam, gazebo.
+    /// The name - is JSON on standard output, FORMAT=- another format.
+    /// Example: -o report.html -o imu.yaml -o openvins=chain.yaml
+    #[arg(verbatim_doc_comment, short, long = "output", value_name = "FILE", value_parser = OsStringValueParser::new().try_map(output_file))]
+    pub(crate) outputs: Vec<OutputFile>,
+    /// Overwrite files that exist
+    ///
+    /// Without it they are kept, and the command ends with exit code 1.
+    #[arg(verbatim_doc_comment, short, long)]
     pub(crate) force: bool,
-    /// Write the report as a web page, DIR/index.html.
-    #[arg(long, value_name = "DIR")]
-    pub(crate) page: Option<PathBuf>,
-    /// Noise for a program, as kalibr=imu.yaml; repeatable.
-    #[arg(long = "export", value_name = "FORMAT=OUT", value_parser = export_target)]
-    pub(crate) exports: Vec<ExportTarget>,
-    /// One number for three axes: rms [default] or worst.
+    /// One number for three axes: rms [default] or worst
+    ///
+    /// For formats that have one number for x, y and z: their root mean
+    /// square, or the largest.
     #[arg(
-        long,
+        verbatim_doc_comment,
+        long = "combine-axes",
+        value_name = "HOW",
         value_enum,
         default_value_t,
-        requires = "exports",
+        requires = "outputs",
         hide_possible_values = true,
         hide_default_value = true
     )]
     pub(crate) axis: AxisChoice,
 }
 
-/// A file for another program.
-#[derive(Debug, Clone)]
-pub(crate) struct ExportTarget {
-    /// Its format.
-    pub(crate) format: ExportFormat,
-    /// The file to write.
-    pub(crate) file: PathBuf,
-}
-
-fn export_target(text: &str) -> Result<ExportTarget, String> {
-    let (name, file) = text
-        .split_once('=')
-        .filter(|(_, file)| !file.is_empty())
-        .ok_or("expected FORMAT=OUT, as in kalibr=imu.yaml")?;
-    let format = ExportFormat::from_str(name, true).map_err(|_| {
-        let names = ExportFormat::value_variants().iter().filter_map(ValueEnum::to_possible_value);
-        let names: Vec<String> = names.map(|name| name.get_name().to_owned()).collect();
-        let tip = similar_name(name, &names).map_or(String::new(), |similar| format!("; did you mean {similar}?"));
-        format!("`{name}` is none of {}{tip}", names.join(", "))
-    })?;
-    Ok(ExportTarget { format, file: file.into() })
+impl OutputArguments {
+    /// Whether an output is standard output, which has nothing beside it then.
+    pub(crate) fn prints_to_standard_output(&self) -> bool {
+        self.outputs.iter().any(|output| is_standard_stream(&output.file))
+    }
 }
 
 /// Where a result goes that is no report.
 #[derive(Debug, Args)]
 pub(crate) struct JsonArgument {
-    /// Write the result as JSON.
-    #[arg(long, value_name = "OUT")]
-    pub(crate) json: Option<PathBuf>,
-    /// Overwrite files that exist.
-    #[arg(long)]
+    /// Write the result as JSON; - for standard output
+    ///
+    /// Example: -o result.json
+    #[arg(verbatim_doc_comment, short, long = "output", value_name = "FILE", value_parser = OsStringValueParser::new().try_map(json_file))]
+    pub(crate) output: Option<OutputFile>,
+    /// Overwrite files that exist
+    ///
+    /// Without it they are kept, and the command ends with exit code 1.
+    #[arg(verbatim_doc_comment, short, long)]
     pub(crate) force: bool,
+}
+
+impl JsonArgument {
+    /// The file, if one is named.
+    pub(crate) fn file(&self) -> Option<&Path> {
+        self.output.as_ref().map(|output| output.file.as_path())
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::{Cli, with_subcommand};
     use clap::{CommandFactory, Parser};
-    use std::ffi::OsString;
+
+    /// The words of a line of a shell, in which quotation marks may hold blanks.
+    fn words(line: &str) -> Vec<String> {
+        let parts = line.split('"').enumerate();
+        let words = |(at, part): (usize, &str)| -> Vec<String> {
+            if at % 2 == 1 { vec![part.to_owned()] } else { part.split_whitespace().map(str::to_owned).collect() }
+        };
+        parts.flat_map(words).collect()
+    }
+
+    fn is_taken(words: &[String]) -> bool {
+        Cli::try_parse_from(with_subcommand(words.iter().map(Into::into).collect())).is_ok()
+    }
 
     #[test]
-    fn every_command_has_examples_that_the_program_takes() {
+    fn every_command_and_option_has_examples_that_the_program_takes() {
         Cli::command().debug_assert();
         let program = Cli::command();
+        let mut of_options = 0;
         for command in std::iter::once(&program).chain(program.get_subcommands()) {
             let text = command.get_after_help().map(ToString::to_string).unwrap_or_default();
             let lines = text.lines().filter(|line| line.starts_with("  imunoise"));
-            let examples: Vec<&str> = lines.filter_map(|line| line.trim_start().split("   ").next()).collect();
+            let examples: Vec<_> = lines.filter_map(|line| line.trim_start().split("   ").next()).map(words).collect();
             assert!(!examples.is_empty(), "{}", command.get_name());
-            for example in examples {
-                let words = with_subcommand(example.split_whitespace().map(OsString::from).collect());
-                assert!(Cli::try_parse_from(words).is_ok(), "{example}");
+            for example in &examples {
+                assert!(is_taken(example), "{example:?}");
+            }
+            // The options of an example go with one of the command.
+            let texts = command.get_arguments().filter_map(|argument| argument.get_long_help());
+            for line in texts.flat_map(|text| text.to_string().lines().map(str::to_owned).collect::<Vec<_>>()) {
+                let Some(options) = line.strip_prefix("Example: ").map(words) else { continue };
+                let is_whole = options[0] == "imunoise";
+                let in_one = examples.iter().any(|example| is_taken(&[example.as_slice(), &options].concat()));
+                assert!(if is_whole { is_taken(&options) } else { in_one }, "{}: {line}", command.get_name());
+                of_options += 1;
             }
         }
+        assert!(of_options > 30, "{of_options}");
     }
 }

@@ -2,10 +2,10 @@
 
 use crate::cli::{self, Cli, Command, MonitorArguments, ReplayArguments};
 use crate::inspect::{self, Question};
-use crate::live::{self, DeviceSource, GrowingRecording};
-use crate::output::{self, Incomplete};
+use crate::output::{self, Incomplete, Misuse};
 use crate::output_files::OutputFiles;
-use crate::{analyze, batch, compare, convert, export, interrupt, monitor, record, simulate, tip};
+use crate::output_format::{OutputFile, OutputFormat};
+use crate::{analyze, batch, compare, convert, export, interrupt, live, monitor, record, simulate, tip};
 use anyhow::{Context, Result};
 use clap::{CommandFactory, Parser};
 use observatory::message_text::summary;
@@ -13,15 +13,15 @@ use observatory::recording_report::PROGRAM;
 use recordings::Printable;
 use std::ffi::OsString;
 use std::io::{self, Write};
-use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// Folder of the page if none is named.
-const DEFAULT_PAGE: &str = "report";
+/// What `demo` writes if nothing is named.
+const DEFAULT_PAGE: &str = "report.html";
 
 /// Exit codes.
 const SUCCESS: u8 = 0;
 const FAILURE: u8 = 1;
+const WRONG_USAGE: u8 = 2;
 /// Exit code of a result of a recording that was not read to its end.
 const INCOMPLETE: u8 = 3;
 
@@ -61,7 +61,7 @@ pub fn run(arguments: Vec<OsString>, prepare: impl FnOnce(bool)) -> u8 {
             if let Some(question) = error.downcast_ref::<Question>() {
                 let _ = write!(io::stderr(), "{}{}", question.text, question.hint);
             }
-            FAILURE
+            if error.chain().any(|cause| cause.is::<Misuse>()) { WRONG_USAGE } else { FAILURE }
         }
     }
 }
@@ -69,9 +69,11 @@ pub fn run(arguments: Vec<OsString>, prepare: impl FnOnce(bool)) -> u8 {
 fn run_subcommand(Cli { command }: Cli) -> Result<()> {
     match command {
         Command::Demo { simulate, mut output } => {
-            output.page.get_or_insert_with(|| PathBuf::from(DEFAULT_PAGE));
+            if output.outputs.is_empty() {
+                output.outputs.push(OutputFile { format: OutputFormat::Page, file: DEFAULT_PAGE.into() });
+            }
             let files = OutputFiles::new([], output.force);
-            output::check(&output, &files)?;
+            output::check(&output.outputs, &files)?;
             output::write_report(&record::simulate(&simulate.simulation(3600.0))?.into(), None, &output, &files)
         }
         Command::Analyze(arguments) => analyze::run(&arguments),
@@ -79,7 +81,7 @@ fn run_subcommand(Cli { command }: Cli) -> Result<()> {
         Command::Replay(arguments) => {
             let ReplayArguments { file, output, .. } = &arguments;
             let files = OutputFiles::new([file.as_path()], output.force);
-            output::check(output, &files)?;
+            output::check(&output.outputs, &files)?;
             let report = analyze::analyze_replay(&arguments)?;
             output::write_report(&report.into(), Some(&output::source_name(file)), output, &files)
         }
@@ -88,7 +90,7 @@ fn run_subcommand(Cli { command }: Cli) -> Result<()> {
             OutputFiles::new([], output.force).check(&out)?;
             // The log is read again: nothing else is written to it.
             let files = OutputFiles::new([out.as_path()], output.force);
-            output::check(&output, &files)?;
+            output::check(&output.outputs, &files)?;
             let report = record::record_device(&out, &port, baud, seconds)?;
             output::write_report(&report.into(), Some(&output::source_name(&out)), &output, &files)
         }
@@ -103,47 +105,28 @@ fn run_subcommand(Cli { command }: Cli) -> Result<()> {
             clap_complete::generate(shell, &mut Cli::command(), PROGRAM, &mut script);
             output::print(|out| out.write_all(&script))
         }
-        Command::Monitor(arguments) => monitor_source(&arguments),
+        Command::Monitor(arguments) => monitor_device(&arguments),
     }
 }
 
-/// Shows a device or a recording live, or in lines where there is no terminal.
-fn monitor_source(arguments: &MonitorArguments) -> Result<()> {
-    let MonitorArguments { source, seconds, speed, .. } = arguments;
-    let deadline = seconds
-        .map(|seconds| {
-            let duration = Duration::try_from_secs_f64(seconds).ok();
-            let deadline = duration.and_then(|duration| Instant::now().checked_add(duration));
-            deadline.with_context(|| format!("a duration of {seconds} s: it must be positive and finite, and no age"))
-        })
-        .transpose()?;
-    if !source.is_file() && !source.is_dir() {
-        return monitor_device(arguments, deadline).with_context(|| source.display().to_string());
-    }
-    let name = source.file_name().unwrap_or_default().to_string_lossy();
-    let name = Printable(&name).to_string();
-    let mut recording = GrowingRecording::new(analyze::read_measurement(&arguments.recording())?, name.clone(), *speed);
-    let report = if live::has_terminal() {
-        live::show(&mut recording, deadline)?;
-        recording.into_report()
-    } else {
-        recording.write_lines(deadline, &mut io::stdout().lock())?
+/// Shows a device live, or in lines where there is no terminal.
+fn monitor_device(arguments: &MonitorArguments) -> Result<()> {
+    let MonitorArguments { port, baud, send, seconds } = arguments;
+    // No end is later than that of the clock.
+    let end = |seconds: f64| Instant::now().checked_add(Duration::try_from_secs_f64(seconds).ok()?);
+    let deadline = seconds.and_then(end);
+    let show = || -> Result<()> {
+        let mut cable = record::open_link(port, *baud)?;
+        for command in send {
+            cable.send_command(command)?;
+        }
+        if live::has_terminal() {
+            live::show(&mut cable, port, deadline)?;
+            return output::print(|out| writeln!(out, "{}", summary(&cable.counters())));
+        }
+        Ok(monitor::show(&mut cable, deadline, monitor::LONG_SILENCE, &mut io::stdout().lock())?)
     };
-    report.map_or(Ok(()), |report| output::show_screen(&report, Some(&name)))
-}
-
-fn monitor_device(arguments: &MonitorArguments, deadline: Option<Instant>) -> Result<()> {
-    let MonitorArguments { source, baud, send, .. } = arguments;
-    let port = source.to_str().context("a name of a port that is not UTF-8")?;
-    let mut cable = record::open_link(port, *baud)?;
-    for command in send {
-        cable.send_command(command)?;
-    }
-    if live::has_terminal() {
-        live::show(&mut DeviceSource::new(&mut cable, port.to_owned()), deadline)?;
-        return output::print(|out| writeln!(out, "{}", summary(&cable.counters())));
-    }
-    Ok(monitor::show(&mut cable, deadline, monitor::LONG_SILENCE, &mut io::stdout().lock())?)
+    show().with_context(|| port.to_owned())
 }
 
 fn is_broken_pipe(error: &anyhow::Error) -> bool {

@@ -3,7 +3,7 @@
 use crate::analyze::{Recorded, open_rows};
 use crate::cli::{ConvertArguments, InputArguments, RecordingArguments, RecordingFormat};
 use crate::inspect::read_or_ask;
-use crate::output::{Incomplete, note};
+use crate::output::{Incomplete, Misuse, note};
 use crate::output_files::OutputFiles;
 use crate::recording_file;
 use anyhow::{Error, Result, anyhow, bail};
@@ -16,7 +16,8 @@ pub(crate) fn run(arguments: &ConvertArguments) -> Result<()> {
     let ConvertArguments { recording, out, format, force } = arguments;
     let InputArguments { file, sensor, .. } = &recording.input;
     if recording.rate.is_some() && recording.time_range().is_none() {
-        bail!("--rate says where --from and --to are in a recording without times; leave it out");
+        let words = "--rate says where --from and --to are in a recording without times; leave it out";
+        return Err(Misuse(words.to_owned()).into());
     }
     let sensor = sensor.as_deref().map(Path::new);
     let files = OutputFiles::new([file.as_path()].into_iter().chain(sensor), *force);

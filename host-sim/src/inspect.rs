@@ -1,7 +1,7 @@
 //! `inspect`: what is in a file, without an analysis; and the command that would analyse a file which does not say all that is needed.
 
 use crate::cli::{self, InputArguments, InspectArguments, RecordingArguments};
-use crate::output::{self, note};
+use crate::output::{self, Incomplete, note};
 use crate::output_files::is_standard_stream;
 use anyhow::{Result, anyhow};
 use measurement::Measurement;
@@ -28,13 +28,16 @@ type ReadMeasurement = fn(&RecordingArguments) -> Result<Measurement>;
 /// Prints what is in the files of the arguments; `read` reads a log of the bus.
 pub(crate) fn run(arguments: &InspectArguments, read: ReadMeasurement) -> Result<()> {
     let InspectArguments { files, topic } = arguments;
+    let mut is_complete = true;
     for (number, file) in files.iter().enumerate() {
         let input = RecordedInput::open(file)?;
         let text = match input.format() {
             RecordedFormat::FrameLog | RecordedFormat::SpiExport => describe_bus_log(file, read)?,
             _ => {
                 let input_arguments = InputArguments { topic: topic.clone(), ..InputArguments::new(file) };
-                Contents::read(&input, RecordingArguments::new(input_arguments))?.to_string()
+                let contents = Contents::read(&input, RecordingArguments::new(input_arguments))?;
+                is_complete &= !contents.tables.iter().any(|table| table.is_damaged);
+                contents.to_string()
             }
         };
         output::print(|out| {
@@ -45,7 +48,7 @@ pub(crate) fn run(arguments: &InspectArguments, read: ReadMeasurement) -> Result
             out.write_all(text.as_bytes())
         })?;
     }
-    Ok(())
+    Incomplete::check(is_complete)
 }
 
 /// A log of the bus has no columns to choose: it is read as `analyze` reads it.
@@ -64,7 +67,7 @@ fn describe_bus_log(file: &Path, read: ReadMeasurement) -> Result<String> {
     ))
 }
 
-/// The arguments for each sensor that the file of `recording` has, with what the file does not say guessed where `--yes` takes it.
+/// The arguments for each sensor that the file of `recording` has, with what the file does not say guessed where `--accept-guess` takes it.
 ///
 /// # Errors
 /// The file is damaged, or has one sensor, or something is missing that is not guessed.
@@ -75,7 +78,7 @@ pub(crate) fn each_sensor(recording: &RecordingArguments) -> Result<Vec<Recordin
         contents.several.is_empty() || proposal.topic.as_ref().is_some_and(|topic| contents.several.contains(topic))
     };
     let proposals: Vec<&Proposal> = contents.proposals().filter(is_offered).collect();
-    let taken = |proposal: &&Proposal| recording.input.yes && proposal.is_safe() || proposal.is_complete();
+    let taken = |proposal: &&Proposal| recording.input.accept_guess && proposal.is_safe() || proposal.is_complete();
     if proposals.is_empty() || !proposals.iter().all(taken) {
         let error = anyhow!(
             "{}: what each sensor is, the file does not say",
@@ -197,7 +200,7 @@ impl Display for Contents {
         // As `--each-sensor` takes them.
         let is_taken = |proposal: &Proposal| proposal.is_complete() || proposal.is_safe();
         if self.proposals().count() > 1 && self.proposals().all(is_taken) {
-            let rest = if self.proposals().all(Proposal::is_complete) { "" } else { " --yes" };
+            let rest = if self.proposals().all(Proposal::is_complete) { "" } else { " --accept-guess" };
             let file = quoted(&self.given.input.file.display().to_string());
             writeln!(f, "all of them, as several recordings:\n  imunoise analyze {file} --each-sensor{rest}")?;
         }
@@ -324,7 +327,7 @@ pub(crate) struct Question {
     error: anyhow::Error,
     /// The table and the command, in lines.
     pub(crate) text: String,
-    /// Effect of the option `--yes`, in a line; empty if there is none.
+    /// Effect of the option `--accept-guess`, in a line; empty if there is none.
     pub(crate) hint: &'static str,
 }
 
@@ -337,7 +340,7 @@ impl Display for Question {
 impl std::error::Error for Question {}
 
 /// Result of `read` for a recording. If the file does not say all that is needed, the error shows its columns and the command with the
-/// best guess; with `--yes` the guess is taken, and told, if it is safe.
+/// best guess; with `--accept-guess` the guess is taken, and told, if it is safe.
 pub(crate) fn read_or_ask<R>(
     recording: &RecordingArguments,
     read: impl Fn(&RecordingArguments) -> Result<R>,
@@ -346,7 +349,7 @@ pub(crate) fn read_or_ask<R>(
         Ok(read) => return Ok(read),
         Err(error) => error,
     };
-    let InputArguments { file, yes, .. } = &recording.input;
+    let InputArguments { file, accept_guess, .. } = &recording.input;
     if !is_answered_by_columns(&error) || is_standard_stream(file) {
         return Err(error);
     }
@@ -354,12 +357,12 @@ pub(crate) fn read_or_ask<R>(
     let Ok(contents) = opened.and_then(|opened| Contents::read(&opened, recording.clone())) else { return Err(error) };
     let proposals: Vec<&Proposal> = contents.proposals().collect();
     let hint = match proposals.as_slice() {
-        [proposal] if *yes && proposal.is_safe() => {
+        [proposal] if *accept_guess && proposal.is_safe() => {
             note(format_args!("guessed: {}", contents.command(proposal)));
             return read(&contents.arguments(proposal));
         }
-        [proposal] if proposal.is_safe() => "--yes takes this guess\n",
-        _ if *yes => "--yes takes no guess in doubt, no rate, and none of several\n",
+        [proposal] if proposal.is_safe() => "--accept-guess takes this guess\n",
+        _ if *accept_guess => "--accept-guess takes no guess in doubt, no rate, and none of several\n",
         _ => "",
     };
     Err(Question { error, text: contents.to_string(), hint }.into())

@@ -15,6 +15,7 @@ mod live;
 pub mod monitor;
 mod output;
 mod output_files;
+mod output_format;
 mod progress;
 mod record;
 pub mod recording_analysis;

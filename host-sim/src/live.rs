@@ -1,35 +1,19 @@
-//! `monitor` on a terminal: the whole screen shows the verdict and the curves of a record while it grows.
-
-mod device_source;
-mod growing_recording;
-
-pub(crate) use device_source::DeviceSource;
-pub(crate) use growing_recording::GrowingRecording;
+//! `monitor` on a terminal: the whole screen shows the latest messages of a device.
 
 use crate::interrupt;
 use anyhow::{Context, Result};
+use observatory::latest_messages::LatestMessages;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
-use reports::live::{CurveGroup, LiveView};
-use std::io::IsTerminal;
+use recordings::serial::SerialLink;
+use reports::live::CurveGroup;
+use std::io::{IsTerminal, Read, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
 /// Time between two drawings.
 const FRAME: Duration = Duration::from_millis(100);
-
-/// Where a growing record comes from.
-pub(crate) trait LiveSource {
-    /// Takes what has come, and waits for it until `deadline`. Returns false at the end of the source, after which nothing comes.
-    ///
-    /// # Errors
-    /// The source fails.
-    fn advance(&mut self, deadline: Instant) -> Result<bool>;
-
-    /// What is shown now.
-    fn view(&self) -> LiveView;
-}
 
 /// Whether the program has a terminal to draw on and to read keys from.
 pub(crate) fn has_terminal() -> bool {
@@ -41,12 +25,12 @@ fn wants_colour() -> bool {
     std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }
 
-/// Shows a source on the whole terminal until the user ends it, the source ends, `until`, or an interrupt. The terminal is
-/// restored then, and also if the program panics.
+/// Shows the device on `port`, at the other end of `cable`, on the whole terminal until the user ends it, the device hangs up, `until`, or an
+/// interrupt. The terminal is restored then, and also if the program panics.
 ///
 /// # Errors
-/// The source or the terminal fails.
-pub(crate) fn show(source: &mut impl LiveSource, until: Option<Instant>) -> Result<()> {
+/// The port or the terminal fails.
+pub(crate) fn show<P: Read + Write>(cable: &mut SerialLink<P>, port: &str, until: Option<Instant>) -> Result<()> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
     // In the terminal's raw mode Ctrl-C is a key; this is for a signal from elsewhere.
@@ -56,21 +40,23 @@ pub(crate) fn show(source: &mut impl LiveSource, until: Option<Instant>) -> Resu
     });
     let shown = ratatui::try_init()
         .context("terminal")
-        .and_then(|mut terminal| draw_until_end(source, &mut terminal, until, &interrupted));
+        .and_then(|mut terminal| draw_until_end(cable, port, &mut terminal, until, &interrupted));
     ratatui::restore();
     shown
 }
 
-fn draw_until_end(
-    source: &mut impl LiveSource,
+fn draw_until_end<P: Read + Write>(
+    cable: &mut SerialLink<P>,
+    port: &str,
     terminal: &mut DefaultTerminal,
     until: Option<Instant>,
     interrupted: &AtomicBool,
 ) -> Result<()> {
     let in_colour = wants_colour();
     let mut group = CurveGroup::default();
+    let (mut messages, mut last_received) = (LatestMessages::new(port.to_owned()), Instant::now());
     loop {
-        let view = source.view();
+        let view = messages.view(last_received.elapsed(), &cable.counters());
         // A changed size of the terminal is taken up here.
         terminal.draw(|frame| view.draw(frame, group, in_colour))?;
         if interrupted.load(Relaxed) || until.is_some_and(|until| Instant::now() >= until) {
@@ -88,7 +74,12 @@ fn draw_until_end(
                 _ => {}
             }
         }
-        if !source.advance(Instant::now() + FRAME)? {
+        let next_frame = Some(Instant::now() + FRAME);
+        while let Some(received) = cable.next(next_frame)? {
+            messages.take(received);
+            last_received = Instant::now();
+        }
+        if cable.is_disconnected() {
             return Ok(());
         }
     }

@@ -1,12 +1,13 @@
 //! Destinations of results: standard output, files, notes and progress on standard error.
 
-use crate::cli::{ExportTarget, JsonArgument, OutputArguments};
+use crate::cli::OutputArguments;
 use crate::output_files::{OutputFiles, is_standard_stream};
+use crate::output_format::{OutputFile, OutputFormat};
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 use noise_analysis::report::Report;
 use recordings::Printable;
-use reports::export::{self, AxisChoice};
+use reports::export::{self, AxisChoice, ExportFormat};
 use reports::figure::{self, Picture};
 use reports::json::ReportJson;
 use reports::reading::ReadingRecord;
@@ -16,7 +17,6 @@ use reports::{full_tables, page};
 use serde::Serialize;
 use std::borrow::Cow;
 use std::fmt;
-use std::fs;
 use std::io::{self, BufWriter, StdoutLock, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -28,21 +28,18 @@ const USUAL_COLUMNS: usize = 80;
 ///
 /// # Errors
 /// Names the file.
-pub(crate) fn check(output: &OutputArguments, files: &OutputFiles) -> Result<()> {
-    let json = output.json.as_deref().filter(|file| !is_standard_stream(file));
-    for (folder, endings) in [(&output.page, &["html"][..]), (&output.pictures, &["svg"])] {
-        if let Some(folder) = folder {
-            fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-            files.check_folder(folder, endings)?;
-        }
-    }
+pub(crate) fn check<'a>(outputs: impl IntoIterator<Item = &'a OutputFile>, files: &OutputFiles) -> Result<()> {
     // A figure that a report with gyros has stands for all of them.
-    let [page, picture] = [(&output.page, page::FILE), (&output.pictures, "overview-gyros.svg")]
-        .map(|(folder, file)| Some(folder.as_ref()?.join(file)));
-    let exports = output.exports.iter().map(|ExportTarget { file, .. }| file.as_path());
-    let written: Vec<&Path> =
-        json.into_iter().chain(exports).chain(page.as_deref()).chain(picture.as_deref()).collect();
-    files.check_all(&written)
+    let written = |OutputFile { format, file }: &OutputFile| match format {
+        OutputFormat::Figures => figure_file(file, "overview-gyros"),
+        _ => file.clone(),
+    };
+    files.check_all(&outputs.into_iter().map(written).collect::<Vec<_>>())
+}
+
+/// `run1.svg` as the file of one of its figures, `run1-gyro_x-allan.svg`.
+fn figure_file(file: &Path, figure: &str) -> PathBuf {
+    file.with_file_name(format!("{}-{figure}.svg", file.file_stem().unwrap_or_default().to_string_lossy()))
 }
 
 /// A report, and what was read for it.
@@ -73,6 +70,11 @@ impl Analysed {
 #[error("{0}")]
 pub(crate) struct Incomplete(pub(crate) String);
 
+/// Wrong usage that the parser of the arguments does not see.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct Misuse(pub(crate) String);
+
 impl Incomplete {
     /// An error if the recording was not read to its end.
     pub(crate) fn check(is_complete: bool) -> Result<()> {
@@ -92,19 +94,29 @@ pub(crate) fn write_report(
     files: &OutputFiles,
 ) -> Result<()> {
     let Analysed { report, reading } = analysed;
-    let as_json = ReportJson::from(report).with_reading(reading.as_ref());
-    let json = output.json.as_ref().map_or(Ok(()), |file| write_json(&as_json, file, files));
-    let exports = write_exports(report, output, files);
-    let write_page = |folder: &PathBuf| -> Result<PathBuf> {
-        let file = folder.join(page::FILE);
-        files.write(&file, page::html_with_reading(report, source, reading.as_ref()).as_bytes())?;
-        Ok(file)
-    };
-    let page = output.page.as_ref().map(write_page).transpose();
-    let pictures = output.pictures.as_ref().map_or(Ok(()), |folder| write_pictures(report, folder, files));
-    show(analysed, source, output, page.as_ref().ok().and_then(Option::as_deref))?;
-    json.and(exports).and(pictures)?;
-    page?;
+    let (mut written, mut pages) = (Ok(()), Vec::new());
+    for target in &output.outputs {
+        let OutputFile { format, file } = target;
+        let result = match format {
+            OutputFormat::Json => write_json(&ReportJson::from(report).with_reading(reading.as_ref()), file, files),
+            OutputFormat::Page => {
+                let page = page::html_with_reading(report, source, reading.as_ref());
+                write_text(&page, file, files).map(|()| pages.push(file))
+            }
+            OutputFormat::Figures => figure::pictures(report)
+                .into_iter()
+                .try_for_each(|Picture { name, svg }| write_text(&svg, &figure_file(file, &name), files)),
+            OutputFormat::Noise(format) => write_noise(&SavedReport::from(report), *format, file, output.axis, files),
+        };
+        written = written.and(result);
+    }
+    if !output.prints_to_standard_output() {
+        show(analysed, source, output)?;
+        for page in pages {
+            print(|out| writeln!(out, "page: {}", Printable(&page.display().to_string())))?;
+        }
+    }
+    written?;
     Incomplete::check(analysed.is_complete())
 }
 
@@ -117,25 +129,16 @@ pub(crate) fn source_name(file: &Path) -> String {
     Printable(&name).to_string()
 }
 
-/// Prints a report, and where its page is.
-fn show(analysed: &Analysed, source: Option<&str>, output: &OutputArguments, page: Option<&Path>) -> Result<()> {
+/// Prints a report.
+fn show(analysed: &Analysed, source: Option<&str>, output: &OutputArguments) -> Result<()> {
     let Analysed { report, reading } = analysed;
-    // Nothing beside JSON on standard output.
-    if output.quiet || output.json.as_deref().is_some_and(is_standard_stream) {
+    if output.quiet {
         return Ok(());
     }
     if let Some(sentence) = reading.as_ref().and_then(ReadingRecord::incomplete) {
         print(|out| writeln!(out, "{}", Printable(&sentence)))?;
     }
-    if output.full {
-        print(|out| full_tables::write(report, source, out))?;
-    } else {
-        show_screen(report, source)?;
-    }
-    match page {
-        Some(page) => print(|out| writeln!(out, "page: {}", Printable(&page.display().to_string()))),
-        None => Ok(()),
-    }
+    if output.full { print(|out| full_tables::write(report, source, out)) } else { show_screen(report, source) }
 }
 
 /// Prints the screen of a report on the recording `source`.
@@ -151,32 +154,24 @@ fn columns() -> usize {
     console::Term::stdout().size_checked().map_or(USUAL_COLUMNS, |(_, columns)| usize::from(columns))
 }
 
-/// Writes every figure of a report as SVG into `folder`.
-fn write_pictures(report: &Report, folder: &Path, files: &OutputFiles) -> Result<()> {
-    let write = |picture: Picture| files.write(&folder.join(format!("{}.svg", picture.name)), picture.svg.as_bytes());
-    figure::pictures(report).into_iter().try_for_each(write)
-}
-
-/// Writes the noise of a report in the formats that the arguments name, each as far as the others can be written.
-fn write_exports(report: &Report, output: &OutputArguments, files: &OutputFiles) -> Result<()> {
-    if output.exports.is_empty() {
-        return Ok(());
+/// Writes a text; - is standard output.
+fn write_text(text: &str, file: &Path, files: &OutputFiles) -> Result<()> {
+    if is_standard_stream(file) {
+        return print(|out| out.write_all(text.as_bytes()));
     }
-    let saved = SavedReport::from(report);
-    let write = |target: &ExportTarget| write_export(&saved, target, output.axis, files);
-    output.exports.iter().map(write).fold(Ok(()), Result::and)
+    files.write(file, text.as_bytes())
 }
 
 /// Writes the noise of a report in a format, and notes what the format wants and the report does not say.
-pub(crate) fn write_export(
+pub(crate) fn write_noise(
     report: &SavedReport,
-    target: &ExportTarget,
+    format: ExportFormat,
+    file: &Path,
     axis: AxisChoice,
     files: &OutputFiles,
 ) -> Result<()> {
-    let ExportTarget { format, file } = target;
-    let export = export::export(report, *format, axis).with_context(|| file.display().to_string())?;
-    files.write(file, export.text.as_bytes())?;
+    let export = export::export(report, format, axis).with_context(|| file.display().to_string())?;
+    write_text(&export.text, file, files)?;
     for field in &export.missing {
         note(format_args!("{}: no {field}: the report has no channel with it", file.display()));
     }
@@ -195,17 +190,6 @@ pub(crate) fn write_json(result: &impl Serialize, file: &Path, files: &OutputFil
         serde_json::to_writer_pretty(&mut *out, result)?;
         Ok(writeln!(out)?)
     })
-}
-
-/// Writes a result to the JSON file that the arguments name, if they name one.
-pub(crate) fn write_result(result: &impl Serialize, output: &JsonArgument, files: &OutputFiles) -> Result<()> {
-    output.json.as_ref().map_or(Ok(()), |file| write_json(result, file, files))
-}
-
-/// Checks that the file of a result can be written and is no input, before any work is done.
-pub(crate) fn check_result(output: &JsonArgument, files: &OutputFiles) -> Result<()> {
-    let file = output.json.as_ref().filter(|file| !is_standard_stream(file));
-    file.map_or(Ok(()), |file| files.check(file))
 }
 
 /// Prints to standard output.

@@ -64,19 +64,21 @@ impl OutputFiles {
     fn check_name(&self, file: &Path) -> Result<()> {
         self.check_identity(file)?;
         if !self.overwrites && fs::metadata(file).is_ok_and(|metadata| metadata.is_file()) {
-            bail!("exists already; --force overwrites it");
+            bail!("exists already; -f overwrites it");
         }
         Ok(())
     }
 
-    /// Checks before any work that `files` can be written, and that they are different ones and no inputs.
+    /// Checks before any work that `files` can be written, and that they are different ones and no inputs; `-` is standard output.
     ///
     /// # Errors
     /// Names the file.
-    pub(crate) fn check_all(&self, files: &[&Path]) -> Result<()> {
+    pub(crate) fn check_all(&self, files: &[PathBuf]) -> Result<()> {
         let mut places: Vec<PathBuf> = Vec::new();
         for file in files {
-            self.check(file)?;
+            if !is_standard_stream(file) {
+                self.check(file)?;
+            }
             let place = place(file);
             if places.contains(&place) {
                 bail!("{}: named twice as an output", file.display());
@@ -103,20 +105,6 @@ impl OutputFiles {
             incomplete_file(&target, IncompleteFiles::in_folder(folder_of(&target))?.path()).map(drop)
         };
         check().with_context(|| file.display().to_string())
-    }
-
-    /// Refuses a `folder` in which a name with one of `endings`, which the command may write, is that of an input.
-    ///
-    /// # Errors
-    /// Names the file.
-    pub(crate) fn check_folder(&self, folder: &Path, endings: &[&str]) -> Result<()> {
-        let entries = fs::read_dir(folder).with_context(|| folder.display().to_string())?;
-        for file in entries.filter_map(|entry| Some(entry.ok()?.path())) {
-            if file.extension().is_some_and(|ending| endings.iter().any(|known| ending == *known)) {
-                self.check_identity(&file).with_context(|| file.display().to_string())?;
-            }
-        }
-        Ok(())
     }
 
     /// Writes `content` to `file`.

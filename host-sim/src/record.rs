@@ -10,6 +10,7 @@ use adis16405_driver::GyroRange;
 use anyhow::{Context, Error, Result, ensure};
 use noise_analysis::report::Report;
 use observatory::message_text::summary;
+use recordings::Printable;
 use recordings::serial::{self, SerialLink};
 use simulation::Simulation;
 use std::io::{ErrorKind, Read, Write};
@@ -28,6 +29,7 @@ pub(crate) fn simulate(simulation: &Simulation) -> Result<Report> {
 
 /// A link to the device on a serial port. The error of a port that is not there, or may not be opened, has a tip.
 pub(crate) fn open_link(port: &str, baud: u32) -> Result<SerialLink<impl Read + Write + use<>>> {
+    ensure!(!Path::new(port).is_file(), "is a file and no serial port; `imunoise {}` analyses it", Printable(port));
     let port = serial::open(port, baud).map_err(|error| match error.kind() {
         ErrorKind::NotFound => UnknownPort.into(),
         ErrorKind::PermissionDenied => DeniedPort.into(),

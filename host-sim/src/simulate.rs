@@ -1,6 +1,6 @@
 //! `simulate`: a recording of a virtual sensor whose noise, effects and faults the arguments describe.
 
-use crate::cli::{RecordingFormat, SimulateArguments};
+use crate::cli::{ChannelNoise, RecordingFormat, SimulateArguments};
 use crate::output::{note, progress_bar};
 use crate::output_files::OutputFiles;
 use crate::recording_file;
@@ -44,8 +44,11 @@ fn simulation(arguments: &SimulateArguments) -> Result<Simulation> {
     (simulation.rate_hz, simulation.range) = (arguments.rate, arguments.range.into());
     let least_taps = 1 << simulation.range.min_filter_taps_log2();
     simulation.set_taps(arguments.taps.unwrap_or(least_taps))?;
-    for (prefix, text) in arguments.coefficients() {
-        simulation.set_coefficients(prefix, text)?;
+    // Those of one channel come after those of all.
+    let (of_one, of_all): (Vec<&ChannelNoise>, _) =
+        arguments.noise.iter().partition(|noise| !noise.prefix.ends_with('_'));
+    for ChannelNoise { prefix, coefficients } in of_all.into_iter().chain(of_one) {
+        simulation.set_coefficients(prefix, coefficients).context("--noise")?;
     }
     arguments.environment.iter().try_for_each(|text| simulation.set_environment(text)).context("--environment")?;
     arguments.effect.iter().try_for_each(|text| simulation.add_effect(text)).context("--effect")?;

@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 const SIMILAR: f64 = 0.7;
 
 /// Options as other programs call them, and those of this program.
-const OPTIONS: [(&str, &str); 2] = [("html", "--page"), ("svg", "--pictures")];
+const OPTIONS: [(&str, &str); 4] =
+    [("html", "-o report.html"), ("json", "-o report.json"), ("svg", "-o figures.svg"), ("yaml", "-o imu.yaml")];
 /// Words that are no commands, and how they are asked for.
 const COMMANDS: [(&str, &str); 1] = [("explain", "analyze FILE --full")];
 

@@ -80,7 +80,7 @@ if [ -f "$run" ]; then
 fi
 echo "virtual hour"
 hour=$((3600 * 2048 / 10))
-measure "imunoise" "$hour" "$target/release/imunoise" demo --page "$folder/page" --force --quiet
+measure "imunoise" "$hour" "$target/release/imunoise" demo -o "$folder/page.html" --force --quiet
 # 166 recordings of a minute at 100 Hz.
 rows=996000 minute=6000
 table=$(table_of "$rows")

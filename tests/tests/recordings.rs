@@ -14,10 +14,10 @@ fn report(arguments: &[&str], recording: &PathBuf) -> Value {
         .arg(command)
         .arg(recording)
         .args(options)
-        .arg("--json")
+        .arg("-o")
         .arg(&json)
-        .arg("--page")
-        .arg(folder.path())
+        .arg("-o")
+        .arg(folder.path().join("report.html"))
         .output()
         .expect("imunoise runs");
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));

@@ -2,9 +2,8 @@
 // The device, live.
 (() => {
   const { element, show, Thread, save, saveFrom, open, bytesOf } = observatory;
-  const BAUD = 460_800;
   const SHOWN_LINES = 300;
-  const LOOK_MS = 250, ASK_AGAIN_MS = 2_000, SETTING_MS = 500;
+  const LOOK_MS = 250, ASK_AGAIN_MS = 2_000;
   show("no-serial", !navigator.serial);
   show("connect", Boolean(navigator.serial));
 
@@ -83,7 +82,7 @@
   const connect = async () => {
     const port = await navigator.serial.requestPort();
     try {
-      await port.open({ baudRate: BAUD, bufferSize: 1 << 16 });
+      await port.open({ baudRate: Number(element("connect").dataset.baud), bufferSize: 1 << 16 });
     } catch (error) {
       throw new Error(`The port does not open; another program may have it. (${error.message})`);
     }
@@ -145,8 +144,7 @@
       step = await next(false);
     }
     if (step.table === undefined) return;
-    // The device takes some bytes at a time.
-    for (const command of step.restore) await send(command).then(() => pause(SETTING_MS));
+    for (const command of step.restore) await send(command).then(() => pause(1000 * step.pause_s));
     element("bench-table").textContent = step.table;
     show("bench-result", true);
     say("Checked.");

@@ -5,6 +5,7 @@
 use clap::ValueEnum;
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use recordings::serial;
 use reports::export::ExportFormat;
 use sha2::{Digest, Sha256};
 use std::collections::VecDeque;
@@ -142,6 +143,7 @@ fn page(image: Option<&str>, program: Option<&str>) -> String {
         ("POLICY", policy.as_str()),
         ("STYLE", &style),
         ("FORMATS", &formats),
+        ("BAUD", &serial::BAUD.to_string()),
         ("IMAGE", image.unwrap_or("")),
         ("WORKER", WORKER),
         ("PROGRAM", program.unwrap_or("")),

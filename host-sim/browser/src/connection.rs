@@ -4,7 +4,7 @@ use anyhow::{Context, Result};
 use link::{Decoder, Message, Received};
 use observatory::bench::{self, BenchPlan, BenchRun};
 use observatory::latest_messages::LatestMessages;
-use observatory::message_text::{MessageFormatter, summary};
+use observatory::message_text::MessageFormatter;
 use reports::page;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
@@ -41,8 +41,18 @@ struct ReceivedParts {
 #[derive(Serialize)]
 #[serde(untagged)]
 enum BenchStep {
-    Ask { command: String, seconds: f64, position: usize, steps: usize },
-    End { table: String, restore: Vec<String> },
+    Ask {
+        command: String,
+        seconds: f64,
+        position: usize,
+        steps: usize,
+    },
+    /// The settings are restored one after the other, each with a pause after it.
+    End {
+        table: String,
+        restore: Vec<String>,
+        pause_s: f64,
+    },
 }
 
 impl Connection {
@@ -65,9 +75,7 @@ impl Connection {
             self.messages.take(received);
         }
         let silence = Duration::try_from_secs_f64(*silence_s).unwrap_or_default();
-        let mut view = self.messages.view(silence);
-        view.health += &format!(" Link: {}.", summary(&self.decoder.counters()));
-        parts.html = page::live(&view);
+        parts.html = page::live(&self.messages.view(silence, &self.decoder.counters()));
         Ok(serde_json::to_string(&parts)?)
     }
 
@@ -88,7 +96,8 @@ impl Connection {
                 let transcript = self.bench.take().context("no bench")?.finish(self.decoder.counters());
                 let mut table = Vec::new();
                 bench::write_table(&bench::checks(&transcript), &mut table)?;
-                BenchStep::End { table: String::from_utf8(table)?, restore: transcript.settings_before() }
+                let (table, restore) = (String::from_utf8(table)?, transcript.settings_before());
+                BenchStep::End { table, restore, pause_s: bench::SETTING_S }
             }
         };
         Ok(serde_json::to_string(&step)?)

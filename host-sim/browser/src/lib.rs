@@ -157,9 +157,9 @@ pub extern "C" fn compare() -> u32 {
 struct ExportRequest {
     /// Its JSON.
     report: String,
-    /// As the option `--export` calls it.
+    /// As `-o FORMAT=FILE` of the command calls it.
     format: String,
-    /// As the option `--axis` calls it.
+    /// As the option `--combine-axes` calls it.
     axis: String,
 }
 

@@ -44,8 +44,8 @@ fn differences(path: &str, one: &Value, other: &Value, tolerance: f64, found: &m
 
 /// Differences of the report `of_page`, a file, from that of the command with these arguments.
 pub(crate) fn differences_from_command(arguments: &[String], of_page: &Path, tolerance: f64) -> Vec<String> {
-    let of_command = of_page.with_extension("of-command");
-    let output = Command::new(host_sim()).args(arguments).arg("--quiet").arg("--json").arg(&of_command).output();
+    let of_command = of_page.with_extension("command.json");
+    let output = Command::new(host_sim()).args(arguments).arg("--quiet").arg("-o").arg(&of_command).output();
     let output = output.expect("imunoise starts");
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     let read = |file: &Path| -> Value { serde_json::from_slice(&std::fs::read(file).expect("written")).expect("JSON") };
@@ -107,15 +107,14 @@ fn the_page_makes_the_report_of_the_command() {
     if !drive(TEST, "reports.js", "observatory.html", folder.path(), &Value::from(jobs).to_string()) {
         return;
     }
-    let simulation = ["demo", "--seconds", "600", "--seed", "1", "--page"].map(str::to_owned);
-    let page = folder.path().join("page").display().to_string();
+    let simulation = ["demo", "--seconds", "600", "--seed", "1"].map(str::to_owned);
     let mut failed = String::new();
     for at in 0..=10 {
         let (arguments, tolerance) = match files.get(at) {
             Some((file, options)) => {
                 ([&["analyze".to_owned(), file.display().to_string()], options.as_slice()].concat(), TOLERANCE)
             }
-            None => ([simulation.as_slice(), std::slice::from_ref(&page)].concat(), TOLERANCE_OF_SIMULATION),
+            None => (simulation.to_vec(), TOLERANCE_OF_SIMULATION),
         };
         let of_page = folder.path().join(format!("page{at}.json"));
         let found = differences_from_command(&arguments, &of_page, tolerance);

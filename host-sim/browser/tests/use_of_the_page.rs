@@ -40,6 +40,6 @@ fn a_user_finds_the_way_and_nothing_is_requested() {
     let agreement = run(&["compare", &compared[0], &compared[1]]);
     assert_eq!(of_page("agreement.txt"), String::from_utf8(agreement).expect("text"));
     let kalibr = folder.path().join("kalibr.yaml").display().to_string();
-    run(&["analyze", &csv, "--quiet", "--export", &format!("kalibr={kalibr}")]);
+    run(&["analyze", &csv, "--quiet", "-o", &kalibr]);
     assert_eq!(of_page("export-kalibr"), std::fs::read_to_string(kalibr).expect("written"));
 }

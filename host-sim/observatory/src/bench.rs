@@ -12,6 +12,9 @@ use transcript::Topic;
 pub use transcript::{BenchPlan, Step, Transcript};
 pub use verdicts::{Cause, Check, checks};
 
+/// Pause after a command that restores a setting, s: the device takes some bytes at a time.
+pub const SETTING_S: f64 = 0.5;
+
 /// The steps one after the other. The caller sends the commands, and hands over what the device answers.
 #[derive(Debug)]
 pub struct BenchRun {

@@ -3,8 +3,8 @@
 use crate::message_text;
 use adis16405_driver::{Channel, GyroRange};
 use link::{
-    ChannelMessage, Health, Hello, LearnedMessage, Message, Received, ReportedAddedTerm, ReportedParameter,
-    ReportedRegressor, ReportedTerm, ValidationMessage,
+    ChannelMessage, DecoderCounters, Health, Hello, LearnedMessage, Message, Received, ReportedAddedTerm,
+    ReportedParameter, ReportedRegressor, ReportedTerm, ValidationMessage,
 };
 use measurement::{SensorProfile, adis16405};
 use noise_analysis::bounds::BoundedEstimate;
@@ -81,10 +81,11 @@ impl LatestMessages {
         }
     }
 
-    /// The live view after a time without a message.
+    /// The live view after a time without a message, with the counters of the decoder.
     #[must_use]
-    pub fn view(&self, silence: Duration) -> LiveView {
+    pub fn view(&self, silence: Duration, link: &DecoderCounters) -> LiveView {
         let (mut view, name) = (self.report(), &self.name);
+        view.health += &format!(" Link: {}.", message_text::summary(link));
         if silence >= message_text::LONG_SILENCE {
             view.headline = format!("{name}   Nothing received for {} s", silence.as_secs());
             view.sentences = format!("Probably {}.", message_text::SILENCE);
@@ -188,6 +189,7 @@ impl LatestMessages {
                         clearest: 0,
                         validated: Validation::Untestable,
                         share_percent: BTreeMap::new(),
+                        minute_percent: BTreeMap::new(),
                     }),
                 }
             }
@@ -312,7 +314,7 @@ mod tests {
     fn silence_and_a_lost_sensor_are_the_headline() {
         let mut messages = LatestMessages { name: "/dev/ttyACM0".to_owned(), ..LatestMessages::default() };
         let shown = |messages: &LatestMessages, seconds| {
-            let view = messages.view(Duration::from_secs(seconds));
+            let view = messages.view(Duration::from_secs(seconds), &DecoderCounters::default());
             format!("{}. {}", view.headline, view.sentences)
         };
         assert!(shown(&messages, 14).contains("has not reported yet"));
@@ -371,7 +373,7 @@ mod tests {
                     for message in of_kind.flatten().flatten().chain([hostile]) {
                         messages.take(message);
                     }
-                    let view = messages.view(Duration::ZERO);
+                    let view = messages.view(Duration::ZERO, &DecoderCounters::default());
                     taken += 1;
                     // Drawing costs a hundred times as much.
                     if taken % 16 == 0 {

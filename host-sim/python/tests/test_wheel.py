@@ -29,10 +29,10 @@ def test_the_wheel_is_all_that_is_needed(tmp_path: Path) -> None:
     demo = run(programs / "imunoise", "demo", "--seconds", "120")
     assert demo.returncode == 0, demo.stderr
     assert "ADIS16405" in demo.stdout
-    assert (tmp_path / "report" / "index.html").stat().st_size > 10_000
+    assert (tmp_path / "report.html").stat().st_size > 10_000
     recording = tmp_path / "imu.csv"
     recording.write_bytes(as_csv(columns(2_000)))
-    analysed = run(programs / "imunoise", "analyze", recording, "--units", ",".join(UNITS), "--json", "report.json")
+    analysed = run(programs / "imunoise", "analyze", recording, "--units", ",".join(UNITS), "-o", "report.json")
     assert analysed.returncode == 0, analysed.stderr
     code = (
         "import imunoise, json, sys; report = imunoise.analyze(sys.argv[1], units=sys.argv[2]);"

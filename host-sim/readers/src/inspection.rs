@@ -64,6 +64,8 @@ pub struct InspectedTable {
     pub rows: usize,
     /// More rows were not examined.
     pub is_cut: bool,
+    /// The file ends early or cannot be read further; a note says why.
+    pub is_damaged: bool,
     pub columns: Vec<InspectedColumn>,
     pub rate: Option<RateEstimate>,
     /// Stated, Hz.
@@ -95,6 +97,7 @@ impl InspectedTable {
             kind: table.kind.clone(),
             rows: table.rows(),
             is_cut: table.is_cut,
+            is_damaged: table.is_damaged,
             columns: Vec::new(),
             rate: None,
             stated_rate_hz: table.rate_hz,

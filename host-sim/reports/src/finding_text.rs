@@ -15,6 +15,7 @@ use noise_analysis::bounds::{BoundedEstimate, Parameter};
 use noise_analysis::effects::{Effect, Observation, Unexplained, UnexplainedPlace};
 use noise_analysis::report::{Finding, Report, Validation};
 pub use shown_effect::{ShownEffect, shown_effects};
+use std::collections::BTreeMap;
 use std::f64::consts::SQRT_2;
 
 /// Hz; below it nothing that turns or hums makes a line.
@@ -109,10 +110,13 @@ pub fn describe(finding: &Finding, shown: &[ShownEffect]) -> FindingText {
     }
 }
 
-/// Largest share of the variance, and the second half's confirmation; empty if unknown.
+/// Largest share of the variance, that around a minute, and the second half's confirmation; empty if unknown.
 fn weight(finding: &Finding) -> String {
-    let largest = finding.share_percent.values().copied().filter(|share| share.is_finite()).fold(0.0, f64::max);
-    let share = (largest >= 0.5).then(|| format!("up to {} % of σ²", significant(largest.min(100.0), 2)));
+    let largest = |shares: &BTreeMap<String, f64>| shares.values().copied().fold(0.0, f64::max);
+    let percent = |share: f64| (share >= 0.5).then(|| significant(share, 2));
+    let minute = percent(largest(&finding.minute_percent)).map(|share| format!(", {share} % around τ = 1 min"));
+    let share = percent(largest(&finding.share_percent))
+        .map(|share| format!("up to {share} % of σ²{}", minute.unwrap_or_default()));
     let held = match finding.validated {
         Validation::Yes => Some("the second half confirms it".to_owned()),
         Validation::No => Some("the second half does not confirm it".to_owned()),
@@ -601,6 +605,7 @@ mod tests {
             clearest: 0,
             validated: Validation::Untestable,
             share_percent: Default::default(),
+            minute_percent: Default::default(),
         }
     }
 

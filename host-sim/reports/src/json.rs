@@ -41,6 +41,7 @@ struct FindingJson<'a> {
     evidence: &'a Effect,
     validated: Validation,
     share_percent: &'a BTreeMap<String, f64>,
+    minute_percent: &'a BTreeMap<String, f64>,
 }
 
 #[derive(Debug, Serialize)]
@@ -117,7 +118,7 @@ impl<'a> From<&'a Report> for ReportJson<'a> {
 impl<'a> FindingJson<'a> {
     fn new(report: &'a Report, index: usize) -> Self {
         let finding = &report.findings[index];
-        let Finding { effect, channels, clearest, validated, share_percent } = finding;
+        let Finding { effect, channels, clearest, validated, share_percent, minute_percent } = finding;
         let shown = shown_effects(report, index).into_iter();
         Self {
             kind: effect.name(),
@@ -128,6 +129,7 @@ impl<'a> FindingJson<'a> {
             evidence: effect,
             validated: *validated,
             share_percent,
+            minute_percent,
         }
     }
 }

@@ -18,7 +18,6 @@ use crate::summary;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use noise_analysis::report::assessment::Assessment;
 use noise_analysis::report::{ChannelReport, Finding, Report};
-use std::path::{Path, PathBuf};
 
 /// The style of the page.
 pub const STYLE: &str = include_str!("page/style.css");
@@ -26,9 +25,6 @@ pub const STYLE: &str = include_str!("page/style.css");
 pub const SCRIPT: &str = include_str!("page/script.js");
 /// Only the file itself; a figure saved as PNG is an image of its text.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
-
-/// Name of the page in its folder.
-pub const FILE: &str = "index.html";
 
 /// The report on the recording `source` as a page.
 #[must_use]
@@ -82,27 +78,6 @@ pub fn live(view: &LiveView) -> String {
 #[must_use]
 pub fn figure_styles() -> [String; 2] {
     figure::style()
-}
-
-/// The page could not be written.
-#[derive(Debug, thiserror::Error)]
-#[error("cannot write the page {}: {reason}", path.display())]
-pub struct PageError {
-    pub path: PathBuf,
-    pub reason: std::io::Error,
-}
-
-/// Writes [`FILE`] on the recording `source` into `dir`, which is made if it is missing, and returns its path.
-///
-/// # Errors
-/// The folder or the file cannot be written.
-pub fn write(report: &Report, source: Option<&str>, dir: &Path) -> Result<PathBuf, PageError> {
-    let page = html(report, source);
-    let path = dir.join(FILE);
-    std::fs::create_dir_all(dir)
-        .and_then(|()| std::fs::write(&path, page))
-        .map_err(|reason| PageError { path: path.clone(), reason })?;
-    Ok(path)
 }
 
 fn render(report: &Report, source: Option<&str>, reading: Option<&ReadingRecord>, extent: Extent) -> Markup {

@@ -99,7 +99,7 @@ pub enum SavedReportError {
         path: String,
         reason: serde_json::Error,
     },
-    #[error("{0}: the report contradicts itself; make it anew with `analyze --json`")]
+    #[error("{0}: the report contradicts itself; make it anew with `analyze -o report.json`")]
     Contradiction(String),
     #[error("{0} is in both reports; those of one sensor's parts have different channels")]
     SameChannel(String),
@@ -128,7 +128,7 @@ fn unseen_error<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64
 }
 
 impl SavedReport {
-    /// Reads the JSON of `analyze --json`.
+    /// Reads the JSON of `analyze -o report.json`.
     ///
     /// # Errors
     /// The text is no JSON, has another schema, or lacks a field; the error names the field.

@@ -17,6 +17,7 @@ use noise_analysis::report::{
 };
 use noise_analysis::report::{DataSheetReport, TermReport};
 use noise_analysis::units::conversions;
+use std::collections::BTreeMap;
 use time_base::TimeRange;
 
 /// Deviance per point on the unseen half above which a model is marked; a true model has about 1.
@@ -804,7 +805,8 @@ fn magnetometers(report: &Report) -> Vec<String> {
     told
 }
 
-/// Order of the findings: motion, causes in inertial channels, in conditions, unexplained; then by share of variance.
+/// Order of the findings: motion, causes in inertial channels, in conditions, unexplained; then by what they cost: their share of the variance
+/// of an angle or a velocity after a minute, and then the largest share at any time.
 pub(crate) fn finding_order(report: &Report) -> Vec<usize> {
     let is_inertial = |name: &String| name.starts_with("gyro_") || name.starts_with("accl_");
     let rank = |&index: &usize| {
@@ -815,9 +817,17 @@ pub(crate) fn finding_order(report: &Report) -> Vec<usize> {
             _ => 1 + u8::from(!channels.iter().any(is_inertial)),
         }
     };
-    let share = |index: &usize| report.findings[*index].share_percent.values().copied().fold(0.0, f64::max);
+    let largest = |shares: &BTreeMap<String, f64>| shares.values().copied().fold(0.0, f64::max);
+    let shares = |index: &usize| {
+        let Finding { share_percent, minute_percent, .. } = &report.findings[*index];
+        [minute_percent, share_percent].map(largest)
+    };
+    let by_cost = |a: &usize, b: &usize| {
+        let ([a_minute, a_largest], [b_minute, b_largest]) = (shares(a), shares(b));
+        b_minute.total_cmp(&a_minute).then(b_largest.total_cmp(&a_largest))
+    };
     let mut order: Vec<usize> = (0..report.findings.len()).collect();
-    order.sort_by(|a, b| rank(a).cmp(&rank(b)).then(share(b).total_cmp(&share(a))));
+    order.sort_by(|a, b| rank(a).cmp(&rank(b)).then_with(|| by_cost(a, b)));
     order
 }
 
@@ -956,7 +966,7 @@ pub(crate) fn numbered_steps(report: &Report) -> Vec<String> {
 /// `None` without a gyro or accelerometer.
 pub(crate) fn for_filter(report: &Report) -> Option<String> {
     inertial(report).next()?;
-    let how = if is_short(report) { "record at rest for hours" } else { "add --export kalibr=imu.yaml" };
+    let how = if is_short(report) { "record at rest for hours" } else { "add -o imu.yaml" };
     Some(format!("For a filter: {how}."))
 }
 

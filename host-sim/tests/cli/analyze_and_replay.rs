@@ -1,6 +1,6 @@
 //! A recording gives the same report whether its counts are read or its bursts are replayed over the emulated bus.
 
-use crate::program::{analysis_of, counts, imunoise, json_of, write};
+use crate::program::{analysis_of, counts, flight_log, imunoise, json_of, write};
 use serde_json::Value;
 use tempfile::tempdir;
 
@@ -35,30 +35,16 @@ fn a_recorded_simulation_replays_to_the_same_report() {
     }
 }
 
-/// A log of PX4 whose rows are a gyroscope at 250 Hz.
-fn flight_log(rows: u64) -> Vec<u8> {
-    let record =
-        |kind: u8, body: &[u8]| [&u16::try_from(body.len()).expect("short").to_le_bytes()[..], &[kind], body].concat();
-    let mut log = [&b"ULog\x01\x12\x35\x01"[..], &[0; 8]].concat();
-    log.extend(record(b'F', b"sensor_gyro:uint64_t timestamp;float x;float y;float z;"));
-    log.extend(record(b'A', &[&[0, 0, 0][..], b"sensor_gyro"].concat()));
-    for row in 0..rows {
-        let axes = [0u64, 1, 2].map(|axis| ((row + axis) * 7919 % 1009) as f32 * 1e-5 - 5e-3).map(f32::to_le_bytes);
-        log.extend(record(b'D', &[&[0, 0][..], &(row * 4000).to_le_bytes(), &axes.concat()].concat()));
-    }
-    log
-}
-
 /// In the JSON, on the screen, on the page and by the exit code; in a report of many as in that of one.
 #[test]
 fn a_file_that_is_cut_is_told_everywhere() {
     let dir = tempdir().expect("a folder");
-    let (whole, page, reports) = (flight_log(5000), dir.path().join("page"), dir.path().join("reports"));
+    let (whole, page, reports) = (flight_log(5000), dir.path().join("page.html"), dir.path().join("reports"));
     let cut = write(&dir, "cut.ulg", &whole[..whole.len() - 1010]);
     let file = cut.to_str().expect("UTF-8");
     let [json, page, reports] =
         [dir.path().join("cut.json"), page, reports].map(|path| path.to_str().expect("UTF-8").to_owned());
-    let output = imunoise(&["analyze", file, "--json", &json, "--page", &page]);
+    let output = imunoise(&["analyze", file, "-o", &json, "-o", &page]);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(3), "{errors}");
     assert!(errors.contains("not read to its end"), "{errors}");
@@ -72,7 +58,7 @@ fn a_file_that_is_cut_is_told_everywhere() {
     let hash = std::process::Command::new("sha256sum").arg(&cut).output().expect("sha256sum starts").stdout;
     let hash = String::from_utf8(hash).expect("digits");
     assert_eq!(reading["sha256"].as_str(), hash.split_whitespace().next());
-    let html = std::fs::read_to_string(format!("{page}/index.html")).expect("a page");
+    let html = std::fs::read_to_string(page).expect("a page");
     assert!(html.contains("Not read to its end: truncated") && html.contains("What was read"));
     // A file of many bytes.
     let intact = write(&dir, "whole.ulg", &whole);

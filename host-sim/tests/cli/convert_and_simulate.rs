@@ -48,10 +48,10 @@ fn a_simulated_table_has_the_noise_the_rate_and_the_line_that_were_asked_for() {
         "150",
         "--taps",
         "4",
-        "--gyro",
-        "0.05,0,0",
-        "--gyro-y",
-        "0.1,0,0",
+        "--noise",
+        "gyro=0.05,0,0",
+        "--noise",
+        "gyro_y=0.1,0,0",
         "--effect",
         "sinusoid:gyro_z:frequency=10,amplitude=0.5",
     ]);
@@ -121,13 +121,17 @@ fn a_report_is_exported() {
     let table = crate::program::counts(&dir);
     let table = table.to_str().expect("UTF-8");
     let lacks = "no accelerometer_random_walk: the report has no channel with it";
-    let notes = run(&["analyze", table, "--quiet", "--json", &report, "--export", &format!("kalibr={first}")]);
+    let notes = run(&["analyze", table, "--quiet", "-o", &report, "-o", &first]);
     assert!(notes.contains(lacks), "{notes}");
-    let notes = run(&["export", "--format", "kalibr", &report, &second]);
+    let notes = run(&["export", &report, "-o", &second]);
     assert!(notes.contains(lacks), "{notes}");
+    // Of the recording itself, to standard output.
+    let of_table = imunoise(&["export", table, "-o", "kalibr=-"]);
+    assert!(String::from_utf8_lossy(&of_table.stderr).contains(lacks));
     let [first, second] = [first, second].map(|file| std::fs::read_to_string(file).expect("a file"));
     assert_eq!(first, second);
-    let output = imunoise(&["export", "--format", "gtsam", &report, &never]);
+    assert_eq!(first, String::from_utf8(of_table.stdout).expect("text"));
+    let output = imunoise(&["export", &report, "-o", &format!("gtsam={never}")]);
     let error = crate::program::error_line(&output);
     assert!(error.contains("gyro_y is not in the report") && !Path::new(&never).exists(), "{error}");
 }

@@ -48,7 +48,8 @@ fn options_of_the_documentation_are_those_of_the_program() {
     assert!(commands > 30, "{commands} commands");
     // The options of reading are described.
     let page = std::fs::read_to_string(root.join("docs/recordings.md")).expect("a page");
-    for option in ["columns", "units", "topic", "rate", "sensor", "range", "from", "to", "yes", "each-sensor", "format"]
+    for option in
+        ["columns", "units", "topic", "rate", "sensor", "range", "from", "to", "accept-guess", "each-sensor", "format"]
     {
         assert!(page.contains(&format!("--{option}")), "docs/recordings.md does not have --{option}");
     }

@@ -3,18 +3,22 @@
 use crate::program::{imunoise, write};
 use std::process::Output;
 
-/// Lines and columns of a terminal window in which a help is read without scrolling.
-const SCREEN: (usize, usize) = (45, 80);
+/// Lines and columns of a terminal window in which the short help is read without scrolling.
+const SCREEN: (usize, usize) = (40, 80);
 
 fn text(bytes: Vec<u8>) -> String {
     String::from_utf8(bytes).expect("UTF-8")
 }
 
-/// The help of a command; of the program if `command` is empty.
-fn help(command: &[&str]) -> String {
-    let Output { status, stdout, .. } = imunoise(&[command, &["--help"]].concat());
+/// The help of a command by `-h` or `--help`; of the program if `command` is empty.
+fn help_by(option: &str, command: &[&str]) -> String {
+    let Output { status, stdout, .. } = imunoise(&[command, &[option]].concat());
     assert!(status.success(), "{command:?}");
     text(stdout)
+}
+
+fn help(command: &[&str]) -> String {
+    help_by("-h", command)
 }
 
 /// The first words of the lines of a section.
@@ -24,17 +28,23 @@ fn section(help: &str, heading: &str) -> Vec<String> {
 }
 
 #[test]
-fn the_help_of_every_command_fits_one_screen() {
+fn the_short_help_of_every_command_fits_one_screen_and_the_long_one_has_more() {
     let program = help(&[]);
     let commands = section(&program, "Commands:");
     assert!(commands.len() >= 10 && commands[0] == "analyze", "{commands:?}");
     for command in commands.iter().filter(|name| *name != "help").map(|name| vec![name.as_str()]).chain([Vec::new()]) {
-        let help = help(&command);
-        assert!(help.lines().count() <= SCREEN.0, "{} lines: {help}", help.lines().count());
-        for line in help.lines() {
+        let (short, long) = (help(&command), help_by("--help", &command));
+        assert!(short.lines().count() <= SCREEN.0, "{} lines: {short}", short.lines().count());
+        assert!(long.lines().count() > short.lines().count() || command == ["completions"], "{command:?}: {long}");
+        for line in short.lines().chain(long.lines()) {
             assert!(line.chars().count() <= SCREEN.1, "{command:?}: {line}");
         }
     }
+    let long = help_by("--help", &["analyze"]);
+    for words in ["Example: --rate 204.8", "In Hz.", "-o report.html -o imu.yaml -o openvins=chain.yaml"] {
+        assert!(long.contains(words), "{words}: {long}");
+    }
+    assert!(help_by("--help", &[]).contains("3  done, but a recording was not read to its end"));
 }
 
 #[test]
@@ -45,7 +55,7 @@ fn options_are_grouped_and_examples_follow() {
         assert!(!examples.is_empty() && examples.iter().all(|word| word == "imunoise"), "{command}: {examples:?}");
     }
     let help = help(&["analyze"]);
-    for (heading, option) in [("Input:", "--rate"), ("Sensor:", "--sensor"), ("Output:", "--page")] {
+    for (heading, option) in [("Input:", "--rate"), ("Sensor:", "--sensor"), ("Output:", "-o,")] {
         assert!(section(&help, heading).iter().any(|name| name == option), "{heading} {option}: {help}");
     }
     // An option without a group is about the help itself.
@@ -71,12 +81,12 @@ fn a_misspelt_command_option_or_file_gets_a_suggestion() {
         (vec!["analyze", &topics, "--topic", "gyros", "--to", "9"], 1, "tip: did you mean gyro?\n".to_owned()),
         (vec!["inspect", &topics, "--topic", "acel"], 1, "tip: did you mean accel?\n".to_owned()),
         (vec!["analize", "x.csv"], 2, "'analyze'".to_owned()),
-        (vec!["analyze", "--pagge", "d", "x.csv"], 2, "'--page'".to_owned()),
+        (vec!["analyze", "--outptu", "d", "x.csv"], 2, "'--output'".to_owned()),
         // Other names of what the program has.
-        (vec!["analyze", "--html", "d", "x.csv"], 2, "'--page'".to_owned()),
-        (vec!["--htlm", "d"], 2, "'--page'".to_owned()),
+        (vec!["analyze", "--html", "d", "x.csv"], 2, "'-o report.html'".to_owned()),
+        (vec!["--htlm", "d"], 2, "'-o report.html'".to_owned()),
         (vec!["explain", "report.json"], 2, "'analyze FILE --full'".to_owned()),
-        (vec!["analyze", &path, "--export", "kalib=x.yaml"], 2, "did you mean kalibr?".to_owned()),
+        (vec!["analyze", &path, "-o", "kalib=x.yaml"], 2, "did you mean kalibr?".to_owned()),
         (vec!["analyze", &path, "--sensor", "bmi08"], 1, "tip: a similar sensor exists: bmi088\n".to_owned()),
         (vec!["simulate", "x.csv", "--effect", "sinusiod:gyro_x:a=1"], 1, "tip: did you mean sinusoid?\n".to_owned()),
         (vec!["simulate", "x.csv", "--fault", "stuck_lo:from=1"], 1, "tip: did you mean stuck_low?\n".to_owned()),

@@ -57,12 +57,12 @@ fn columns_without_names_are_shown_with_the_command_that_reads_them() {
     let expected = ["analyze", name(&file), "--columns", columns, "--units", "rad/s,m/s^2"];
     assert_eq!(command(&text), expected, "{text}");
     assert!(text.contains("first values") && text.contains("131.0 LSB per deg/s"), "{text}");
-    // The command opens the file, and `--yes` takes it and says so.
+    // The command opens the file, and `--accept-guess` takes it and says so.
     let by_command = json_of(&dir, &command(&text));
-    assert_eq!(by_command, json_of(&dir, &["analyze", name(&file), "--yes"]));
+    assert_eq!(by_command, json_of(&dir, &["analyze", name(&file), "--accept-guess"]));
     let report: Value = serde_json::from_slice(&by_command).expect("JSON");
     assert_eq!((&report["samples"], &report["dropped"]["gap"]), (&Value::from(ROWS), &Value::from(0)));
-    let taken = imunoise(&["analyze", name(&file), "--yes", "--quiet"]);
+    let taken = imunoise(&["analyze", name(&file), "--accept-guess", "--quiet"]);
     assert!(String::from_utf8_lossy(&taken.stderr).contains("guessed: imunoise analyze"), "a guess is told");
     // The same without an error.
     let shown = inspected(&file);
@@ -88,7 +88,7 @@ fn a_guess_in_doubt_is_shown_and_not_taken() {
         ("n,gyro_x_deg_s", 1.0, &["--rate HZ"]),
     ] {
         let file = table(heading, noise);
-        let text = refusal(&imunoise(&["analyze", name(&file), "--yes"]));
+        let text = refusal(&imunoise(&["analyze", name(&file), "--accept-guess"]));
         assert!(words.iter().all(|word| text.contains(word)), "{heading}: {text}");
     }
 }

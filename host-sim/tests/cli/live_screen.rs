@@ -1,6 +1,6 @@
-//! `monitor` on a pseudo-terminal: the live screen of a replayed recording, how it ends, and that the terminal is restored.
+//! `monitor` on a pseudo-terminal: the live screen of a simulated device, how it ends, and that the terminal is restored.
 
-use crate::program::{imunoise, write};
+use crate::serial_device::DevicePort;
 use serial2::SerialPort;
 use std::fs::OpenOptions;
 use std::io::ErrorKind;
@@ -13,18 +13,6 @@ const ENTER: &str = "\u{1b}[?1049h";
 const LEAVE: &str = "\u{1b}[?1049l";
 /// Bound of a test that hangs; no result depends on it.
 const PATIENCE: Duration = Duration::from_secs(120);
-
-/// White noise of 30 s at 100 Hz in three gyros, made by a linear congruential generator with a fixed seed.
-fn table() -> Vec<u8> {
-    let mut state = 1_u64;
-    let mut next = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 60) as i64 - 8
-    };
-    let rows = (0..3000).map(|_| format!("{},{},{}\n", next(), next(), next()));
-    let head = "gyro_x_counts,gyro_y_counts,gyro_z_counts\n".to_owned();
-    [head].into_iter().chain(rows).collect::<String>().into_bytes()
-}
 
 /// The settings of a terminal by `stty`.
 fn settings(terminal: &str) -> String {
@@ -124,12 +112,10 @@ impl Drop for Session {
 
 #[test]
 fn the_live_screen_grows_and_every_end_restores_the_terminal() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let file = write(&folder, "still.csv", &table());
-    let file = file.to_str().expect("a name");
+    let device = DevicePort::open();
     // The key q, Ctrl-C as a key, and a signal.
     for (end, name) in [(Some(b"q".as_slice()), "q"), (Some(b"\x03"), "Ctrl-C"), (None, "SIGINT")] {
-        let mut session = Session::start(&["monitor", file, "--rate", "100", "--speed", "max"], &[]);
+        let mut session = Session::start(&["monitor", &device.name], &[]);
         session.wait_for(ENTER);
         for expected in ["°/√h", "What was found", "Health", "q ends"] {
             session.wait_for(expected);
@@ -143,18 +129,16 @@ fn the_live_screen_grows_and_every_end_restores_the_terminal() {
         }
         let (status, restored, seen) = session.end();
         assert!(status.success() && restored, "{name}: {status}, {seen:?}");
-        // The report stays on the terminal.
+        // The counters of the link stay on the terminal.
         let after = seen.rsplit(LEAVE).next().unwrap_or_default();
-        assert!(after.contains("ADIS16405") && after.contains("3,000 samples"), "{name}: {after:?}");
+        assert!(after.contains("missing by their numbers"), "{name}: {after:?}");
     }
 }
 
 #[test]
 fn a_terminal_that_changes_its_size_is_drawn_anew() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let file = write(&folder, "still.csv", &table());
-    let mut session =
-        Session::start(&["monitor", file.to_str().expect("a name"), "--rate", "100", "--speed", "max"], &[]);
+    let device = DevicePort::open();
+    let mut session = Session::start(&["monitor", &device.name], &[]);
     session.wait_for("What was found");
     session.seen.clear();
     let name = session.name.clone();
@@ -170,9 +154,7 @@ fn a_terminal_that_changes_its_size_is_drawn_anew() {
 
 #[test]
 fn no_color_is_respected() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let file = write(&folder, "still.csv", &table());
-    let arguments = ["monitor", file.to_str().expect("a name"), "--rate", "100", "--speed", "max"];
+    let device = DevicePort::open();
     // 36, 38;5;6 and the like are foreground colours, in which the curves are drawn.
     let has_colour = |seen: &str| {
         seen.split('\u{1b}')
@@ -180,28 +162,11 @@ fn no_color_is_respected() {
             .any(|(code, _)| code.split(';').any(|number| matches!(number.parse::<u8>(), Ok(30..=38 | 90..=97))))
     };
     for (environment, expected) in [(&[][..], true), (&[("NO_COLOR", "1")][..], false)] {
-        let mut session = Session::start(&arguments, environment);
+        let mut session = Session::start(&["monitor", &device.name], environment);
         session.wait_for("°/√h");
         session.wait_for("Health");
         session.near.write_all(b"q").expect("typed");
         let (_, _, seen) = session.end();
         assert_eq!(has_colour(&seen), expected, "{seen:?}");
     }
-}
-
-#[test]
-fn over_a_pipe_a_replay_prints_lines() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let file = write(&folder, "still.csv", &table());
-    let output = imunoise(&["monitor", file.to_str().expect("a name"), "--rate", "100", "--speed", "max"]);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let text = String::from_utf8(output.stdout).expect("text");
-    assert!(!text.contains('\u{1b}'), "{text}");
-    // 10 s, 20 s and the whole 30 s.
-    for length in ["10 s", "20 s", "30 s"] {
-        let lines: Vec<&str> = text.lines().filter(|line| line.starts_with(&format!("{length}: "))).collect();
-        assert_eq!(lines.len(), 4, "{length}: {text}");
-        assert!(lines[0].contains("gyro x, N ") && lines[0].contains("°/√h"), "{}", lines[0]);
-    }
-    assert!(text.contains("What was found"), "{text}");
 }

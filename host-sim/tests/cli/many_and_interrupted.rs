@@ -127,7 +127,7 @@ fn reading(pipe: &Path, copies: &Path, arguments: &[&str]) -> (Child, File) {
 
 #[test]
 fn an_interrupt_while_a_pipe_is_read_gives_the_report_of_what_came() {
-    for (number, quick) in [&["--json", "-"][..], &["--json", "-", "--quick"]].into_iter().enumerate() {
+    for (number, quick) in [&["-o", "-"][..], &["-o", "-", "--quick"]].into_iter().enumerate() {
         let dir = tempdir().expect("a folder");
         let copies = dir.path().join("copies");
         fs::create_dir(&copies).expect("a folder");

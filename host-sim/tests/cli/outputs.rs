@@ -23,7 +23,14 @@ fn the_profile_of_the_sensor_is_an_input() {
     let dir = tempdir().expect("a folder");
     let rows = table(&dir);
     let profile = write(&dir, "p.toml", b"name = \"x\"\n");
-    is_refused(&imunoise(&["analyze", name(&rows), "--sensor", name(&profile), "--json", name(&profile)]));
+    is_refused(&imunoise(&[
+        "analyze",
+        name(&rows),
+        "--sensor",
+        name(&profile),
+        "-o",
+        &format!("json={}", name(&profile)),
+    ]));
     assert_eq!(fs::read(&profile).expect("the profile"), b"name = \"x\"\n");
 }
 
@@ -34,19 +41,18 @@ fn another_name_of_an_input_is_the_input() {
     let content = fs::read(&rows).expect("rows");
     let hard = dir.path().join("hard.csv");
     fs::hard_link(&rows, &hard).expect("a link");
-    is_refused(&imunoise(&["analyze", name(&rows), "--json", name(&hard)]));
+    is_refused(&imunoise(&["analyze", name(&rows), "-o", name(&hard)]));
     assert!(fs::read(&rows).expect("the input") == content);
 }
 
 #[test]
-fn a_picture_that_leads_to_an_input_is_the_input() {
+fn a_figure_that_leads_to_an_input_is_the_input() {
     let dir = tempdir().expect("a folder");
     let rows = table(&dir);
     let content = fs::read(&rows).expect("rows");
-    let pictures = dir.path().join("pictures");
-    fs::create_dir(&pictures).expect("a folder");
-    std::os::unix::fs::symlink(&rows, pictures.join("gyro_x-allan.svg")).expect("a link");
-    is_refused(&imunoise(&["analyze", name(&rows), "--pictures", name(&pictures)]));
+    std::os::unix::fs::symlink(&rows, dir.path().join("run1-gyro_x-allan.svg")).expect("a link");
+    let figures = dir.path().join("run1.svg");
+    is_refused(&imunoise(&["analyze", name(&rows), "--force", "-o", name(&figures)]));
     assert!(fs::read(&rows).expect("the input") == content);
 }
 
@@ -56,7 +62,7 @@ fn the_file_on_standard_input_is_an_input() {
     let rows = table(&dir);
     let content = fs::read(&rows).expect("rows");
     let output = Command::new(PROGRAM)
-        .args(["analyze", "-", "--json", name(&rows)])
+        .args(["analyze", "-", "-o", name(&rows)])
         .stdin(File::open(&rows).expect("rows"))
         .output()
         .expect("the program starts");
@@ -77,12 +83,11 @@ fn a_file_that_cannot_be_written_whole_stays_as_it_was() {
     let rows = table(&dir);
     for (command, old) in [
         (&["convert", "--force"][..], "old.csv"),
-        (&["analyze", "--force", "--quiet", "--json"], "old.json"),
-        (&["analyze", "--force", "--quiet", "--page"], "index.html"),
+        (&["analyze", "-f", "-q", "-o"], "old.json"),
+        (&["analyze", "-f", "-q", "-o"], "old.html"),
     ] {
         let old = write(&dir, old, b"an old report\n");
-        let out = if command.last() == Some(&"--page") { dir.path() } else { old.as_path() };
-        let arguments = [&command[..1], &[name(&rows)], &command[1..], &[name(out)]].concat();
+        let arguments = [&command[..1], &[name(&rows)], &command[1..], &[name(&old)]].concat();
         let output = on_a_full_disk(&arguments);
         let error = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(!output.status.success() && error.contains("too large"), "{command:?}: {error}");
@@ -164,7 +169,7 @@ fn a_full_disk_is_named() {
     }
     // The report is printed all the same.
     let dir = tempdir().expect("a folder");
-    let output = imunoise(&["analyze", name(&table(&dir)), "--export", "csv=/dev/full"]);
+    let output = imunoise(&["analyze", name(&table(&dir)), "-o", "csv=/dev/full"]);
     let error = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code() == Some(1) && error.contains("No space left"), "{error}");
     assert!(String::from_utf8_lossy(&output.stdout).contains("°/√h"));
@@ -178,31 +183,32 @@ fn outputs_are_checked_before_the_work_and_never_overwrite_the_input() {
     let [link, blocked] = ["link.csv", "blocked"].map(|name| dir.path().join(name));
     std::os::unix::fs::symlink(&file, &link).expect("a link");
     let nowhere = dir.path().join("missing").join("out");
-    // Folders whose files cannot be written: a file is in the way, or a folder of the name of the page or of the figure.
-    for inside in ["index.html", "overview-gyros.svg"] {
-        fs::create_dir_all(blocked.join(inside)).expect("a folder");
-    }
-    for (option, prefix) in [("--json", ""), ("--export", "kalibr=")] {
-        let value = |file: &Path| format!("{prefix}{}", name(file));
+    // A folder is in the way of a file, and of the first figure.
+    fs::create_dir_all(blocked.join("index.html")).expect("a folder");
+    fs::create_dir(blocked.join("run1-overview-gyros.svg")).expect("a folder");
+    for format in ["json", "kalibr", "html"] {
+        let value = |file: &Path| format!("{format}={}", name(file));
         for same in [&file, &link] {
-            is_refused(&imunoise(&["analyze", name(&file), option, &value(same)]));
+            is_refused(&imunoise(&["analyze", name(&file), "-o", &value(same)]));
         }
-        let line = error_line(&imunoise(&["analyze", name(&file), option, &value(&nowhere)]));
+        let line = error_line(&imunoise(&["analyze", name(&file), "-o", &value(&nowhere)]));
         assert!(line.contains("No such file"), "{line}");
     }
-    for (option, folder) in [("--page", &file), ("--pictures", &file), ("--page", &blocked), ("--pictures", &blocked)] {
-        let line = error_line(&imunoise(&["analyze", name(&file), option, name(folder)]));
-        assert!(line.contains(name(folder)), "{option}: {line}");
+    for output in ["index.html", "run1.svg"].map(|name| blocked.join(name)) {
+        let line = error_line(&imunoise(&["analyze", name(&file), "-o", name(&output)]));
+        assert!(line.contains(name(&blocked)), "{line}");
     }
-    let twice = dir.path().join("twice");
-    let export = format!("csv={}", name(&twice));
-    let line = error_line(&imunoise(&["analyze", name(&file), "--json", name(&twice), "--export", &export]));
-    assert!(line.contains("named twice"), "{line}");
+    let twice = ["json", "csv"].map(|format| format!("{format}={}", name(&dir.path().join("twice"))));
+    for [one, other] in [[twice[0].as_str(), &twice[1]], ["-", "kalibr=-"]] {
+        let line = error_line(&imunoise(&["analyze", name(&file), "-o", one, "-o", other]));
+        assert!(line.contains("named twice"), "{line}");
+    }
+    let [as_json, as_csv] = ["json", "csv"].map(|format| format!("{format}={}", name(&file)));
     for command in [
-        &["compare", name(&file), "--data-sheet", "--json", name(&file)][..],
-        &["compare", name(&file), name(&file), "--json", name(&file)],
+        &["compare", name(&file), "--data-sheet", "-o", &as_json][..],
+        &["compare", name(&file), name(&file), "-o", &as_json],
         &["convert", name(&file), name(&link)],
-        &["export", "--format", "kalibr", name(&file), name(&link)],
+        &["export", name(&file), "-o", &as_csv],
     ] {
         is_refused(&imunoise(command));
     }
@@ -231,36 +237,32 @@ fn a_file_that_exists_is_overwritten_with_force_alone() {
     let dir = tempdir().expect("a folder");
     let rows = table(&dir);
     let report = dir.path().join("report.json");
-    assert!(imunoise(&["analyze", name(&rows), "--quiet", "--json", name(&report)]).status.success());
+    assert!(imunoise(&["analyze", name(&rows), "--quiet", "-o", name(&report)]).status.success());
     let [rows, report] = [name(&rows), name(&report)];
-    let [old, page, picture] =
-        ["old", "page/index.html", "pictures/overview-gyros.svg"].map(|file| dir.path().join(file));
+    let [old, page, figures, figure] =
+        ["old", "page.html", "run1.svg", "run1-overview-gyros.svg"].map(|file| dir.path().join(file));
     let reports = dir.path().join("reports");
     let one_report = reports.join("rows.json");
-    let [of_page, of_pictures] = [&page, &picture].map(|file| file.parent().expect("a folder"));
-    let export = format!("csv={}", name(&old));
+    let [json, csv] = ["json", "csv"].map(|format| format!("{format}={}", name(&old)));
     for (command, file) in [
-        (&["analyze", rows, "--quiet", "--json", name(&old)][..], &old),
-        (&["analyze", rows, "--quiet", "--export", &export], &old),
-        (&["analyze", rows, "--quiet", "--page", name(of_page)], &page),
-        (&["analyze", rows, "--quiet", "--pictures", name(of_pictures)], &picture),
+        (&["analyze", rows, "--quiet", "-o", &json][..], &old),
+        (&["analyze", rows, "--quiet", "-o", &csv], &old),
+        (&["analyze", rows, "--quiet", "-o", name(&page)], &page),
+        (&["analyze", rows, "--quiet", "-o", name(&figures)], &figure),
         (&["batch", rows, "--quiet", "-o", name(&reports)], &one_report),
-        (&["replay", rows, "--quiet", "--json", name(&old)], &old),
-        (&["demo", "--seconds", "60", "--quiet", "--page", name(of_page)], &page),
-        (&["compare", report, report, "--json", name(&old)], &old),
-        (&["export", "--format", "csv", report, name(&old)], &old),
+        (&["replay", rows, "--quiet", "-o", &json], &old),
+        (&["demo", "--seconds", "60", "--quiet", "-o", name(&page)], &page),
+        (&["compare", report, report, "-o", &json], &old),
+        (&["export", report, "-o", &csv], &old),
         (&["convert", rows, name(&old)], &old),
         (&["simulate", name(&old), "--seconds", "5"], &old),
     ] {
         fs::create_dir_all(file.parent().expect("a folder")).expect("a folder");
         fs::write(file, "what was there").expect("written");
         let line = error_line(&imunoise(command));
-        assert!(
-            line.contains(name(file)) && line.contains("exists already; --force overwrites it"),
-            "{command:?}: {line}"
-        );
+        assert!(line.contains(name(file)) && line.contains("exists already; -f overwrites it"), "{command:?}: {line}");
         assert_eq!(fs::read(file).expect("the file"), b"what was there", "{command:?}");
-        let output = imunoise(&[command, &["--force"]].concat());
+        let output = imunoise(&[command, &["-f"]].concat());
         assert!(output.status.success(), "{command:?}: {}", String::from_utf8_lossy(&output.stderr));
         assert_ne!(fs::read(file).expect("the file"), b"what was there", "{command:?}");
         // Nor is what the program wrote in the call before.
@@ -276,25 +278,16 @@ fn a_recording_of_a_device_is_not_overwritten() {
     let line = error_line(&imunoise(&["record", name(&log), "--port", "/dev/null"]));
     assert!(line.contains("night.csv") && line.contains("exists already"), "{line}");
     let again = dir.path().join("again.csv");
-    let line = error_line(&imunoise(&["record", name(&again), "--port", "/dev/null", "--json", name(&again)]));
+    let line = error_line(&imunoise(&[
+        "record",
+        name(&again),
+        "--port",
+        "/dev/null",
+        "-o",
+        &format!("json={}", name(&again)),
+    ]));
     assert!(line.contains("is an input"), "{line}");
     assert_eq!(names(dir.path()), ["night.csv"]);
-}
-
-/// Two reports and no file to write: the second one stays.
-#[test]
-fn an_export_does_not_overwrite_a_report() {
-    let dir = tempdir().expect("a folder");
-    let table = table(&dir);
-    let [one, other] = ["one.json", "other.json"].map(|name| dir.path().join(name));
-    for report in [&one, &other] {
-        let arguments = ["analyze", name(&table), "--quiet", "--json", name(report)];
-        assert!(imunoise(&arguments).status.success());
-    }
-    let before = std::fs::read(&other).expect("a report");
-    let line = error_line(&imunoise(&["export", name(&one), name(&other), "--format", "kalibr"]));
-    assert!(line.contains("other.json") && line.contains("is a report"), "{line}");
-    assert_eq!(std::fs::read(&other).expect("a report"), before);
 }
 
 /// Gyros and accelerometers in two files, as a phone writes them, or in one of two rates: one file for a filter has both.
@@ -313,19 +306,22 @@ fn the_parts_of_a_sensor_are_exported_as_one() {
     let accl = part("accl.csv", "t_s,ax_g,ay_g,az_g", 62.5, 0.01);
     let [gyro_json, accl_json, yaml] = ["gyro.json", "accl.json", "imu.yaml"].map(|file| dir.path().join(file));
     for (file, json) in [(&gyro, &gyro_json), (&accl, &accl_json)] {
-        assert!(imunoise(&["analyze", name(file), "--quick", "--quiet", "--json", name(json)]).status.success());
+        assert!(imunoise(&["analyze", name(file), "--quick", "--quiet", "-o", name(json)]).status.success());
     }
     let has_both = |file: &Path| {
         let text = fs::read_to_string(file).expect("a file");
         ["gyroscope_noise_density: ", "accelerometer_noise_density: "].iter().all(|key| text.contains(key))
     };
-    let exported = imunoise(&["export", "--format", "kalibr", name(&gyro_json), name(&accl_json), name(&yaml)]);
+    let exported = imunoise(&["export", name(&gyro_json), name(&accl_json), "-o", name(&yaml)]);
     assert!(exported.status.success() && has_both(&yaml), "{}", String::from_utf8_lossy(&exported.stderr));
-    // Without a file to write nothing is overwritten, and a format of samples has one rate.
-    let before = fs::read(&accl_json).expect("a report");
-    let line = error_line(&imunoise(&["export", "--format", "kalibr", name(&gyro_json), name(&accl_json)]));
-    assert!(line.contains("is a report") && fs::read(&accl_json).expect("a report") == before, "{line}");
-    let vins = ["export", "--force", "--format", "vins", name(&gyro_json), name(&accl_json), name(&yaml)];
+    // So are recordings, and a recording beside a report.
+    for gyros in [&gyro, &gyro_json] {
+        let exported = imunoise(&["export", name(gyros), name(&accl), "-f", "-o", name(&yaml)]);
+        assert!(exported.status.success() && has_both(&yaml), "{}", String::from_utf8_lossy(&exported.stderr));
+    }
+    // A format of samples has one rate.
+    let vins = format!("vins={}", name(&yaml));
+    let vins = ["export", "--force", name(&gyro_json), name(&accl_json), "-o", &vins];
     let line = error_line(&imunoise(&vins));
     assert!(line.contains("parts at 100"), "{line}");
     // The same in one table with blanks.
@@ -342,7 +338,6 @@ fn the_parts_of_a_sensor_are_exported_as_one() {
     let rows: String = rows.into_iter().map(|(_, row)| row).collect();
     let merged = write(&dir, "merged.csv", format!("t_ms,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g\n{rows}").as_bytes());
     let both = dir.path().join("both.yaml");
-    let target = format!("kalibr={}", name(&both));
-    let output = imunoise(&["analyze", name(&merged), "--each-sensor", "--quiet", "--export", &target]);
+    let output = imunoise(&["analyze", name(&merged), "--each-sensor", "--quiet", "-o", name(&both)]);
     assert!(output.status.success() && has_both(&both), "{}", String::from_utf8_lossy(&output.stderr));
 }

@@ -33,7 +33,7 @@ fn a_named_pipe_is_read_once() {
     for command in ["analyze", "replay"] {
         let out = dir.path().join(format!("{command}.json"));
         let mut program = Command::new(env!("CARGO_BIN_EXE_imunoise"))
-            .args([command, pipe.to_str().expect("UTF-8"), "--json", out.to_str().expect("UTF-8")])
+            .args([command, pipe.to_str().expect("UTF-8"), "-o", out.to_str().expect("UTF-8")])
             .stdout(Stdio::null())
             .spawn()
             .expect("the program starts");

@@ -22,10 +22,10 @@ pub(crate) fn with_default_signals() -> Command {
     command
 }
 
-/// Runs the program with `--json` and returns the bytes of the report.
+/// Runs the program with `-o report.json` and returns the bytes of the report.
 pub(crate) fn json_of(dir: &TempDir, arguments: &[&str]) -> Vec<u8> {
     let out = dir.path().join("report.json");
-    let output = imunoise(&[arguments, &["--json", out.to_str().expect("UTF-8")]].concat());
+    let output = imunoise(&[arguments, &["-o", out.to_str().expect("UTF-8")]].concat());
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     let bytes = std::fs::read(&out).expect("a report");
     std::fs::remove_file(&out).expect("removed");
@@ -100,4 +100,18 @@ pub(crate) fn send(port: &mut impl Write, unsent: &mut Vec<u8>) {
         Err(error) if error.kind() == ErrorKind::TimedOut => {}
         Err(_) => unsent.clear(),
     }
+}
+
+/// A log of PX4 whose rows are a gyroscope at 250 Hz.
+pub(crate) fn flight_log(rows: u64) -> Vec<u8> {
+    let record =
+        |kind: u8, body: &[u8]| [&u16::try_from(body.len()).expect("short").to_le_bytes()[..], &[kind], body].concat();
+    let mut log = [&b"ULog\x01\x12\x35\x01"[..], &[0; 8]].concat();
+    log.extend(record(b'F', b"sensor_gyro:uint64_t timestamp;float x;float y;float z;"));
+    log.extend(record(b'A', &[&[0, 0, 0][..], b"sensor_gyro"].concat()));
+    for row in 0..rows {
+        let axes = [0u64, 1, 2].map(|axis| ((row + axis) * 7919 % 1009) as f32 * 1e-5 - 5e-3).map(f32::to_le_bytes);
+        log.extend(record(b'D', &[&[0, 0][..], &(row * 4000).to_le_bytes(), &axes.concat()].concat()));
+    }
+    log
 }

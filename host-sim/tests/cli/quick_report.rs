@@ -216,17 +216,17 @@ fn the_number_of_cores_changes_no_byte_and_the_screen_says_what_is_missing() {
         let program = [cores, &[env!("CARGO_BIN_EXE_imunoise")]].concat();
         let output = Command::new(program[0])
             .args(&program[1..])
-            .args(["analyze", file.to_str().expect("UTF-8"), "--rate", "100", "--quick", "--json", "-"])
+            .args(["analyze", file.to_str().expect("UTF-8"), "--rate", "100", "--quick", "-o", "-"])
             .output()
             .expect("the program starts");
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         output.stdout
     };
     assert_eq!(run(&[]), run(&["taskset", "-c", "0"]));
-    let (page, file) = (dir.path().join("page"), file.to_str().expect("UTF-8"));
-    let output = imunoise(&["analyze", file, "--rate", "100", "--quick", "--page", page.to_str().expect("UTF-8")]);
+    let (page, file) = (dir.path().join("page.html"), file.to_str().expect("UTF-8"));
+    let output = imunoise(&["analyze", file, "--rate", "100", "--quick", "-o", page.to_str().expect("UTF-8")]);
     let screen = String::from_utf8_lossy(&output.stdout).replace('\n', " ");
-    let page = std::fs::read_to_string(page.join("index.html")).expect("a page");
+    let page = std::fs::read_to_string(page).expect("a page");
     for (text, place) in [(&screen, "screen"), (&page, "page")] {
         assert!(text.contains("Quick report, of the curves alone"), "{place}");
     }

@@ -81,7 +81,7 @@ fn screen(test: &str, file: &str, options: &[&str]) -> Option<String> {
     let path = recording(test, file)?;
     let folder = tempdir().expect("a folder");
     let json = folder.path().join("report.json");
-    let arguments = [&["analyze", path.to_str()?, "--json", json.to_str()?], options].concat();
+    let arguments = [&["analyze", path.to_str()?, "-o", json.to_str()?], options].concat();
     let output = imunoise(&arguments);
     assert!(output.status.success(), "{file}: {}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).expect("UTF-8");
@@ -97,14 +97,14 @@ fn the_screens_of_other_sensors_are_whole() {
     let test = "the_screens_of_other_sensors_are_whole";
     for (file, options, said) in [
         ("others/lsm6dso_static.txt", &["--rate", "100"][..], &["At rest throughout", "record at rest for hours"][..]),
-        ("others/mpu6050_accelerometer.mat", &["--yes"], &["N is known to ±20 %", "at 99.3 Hz"]),
+        ("others/mpu6050_accelerometer.mat", &["--accept-guess"], &["N is known to ±20 %", "at 99.3 Hz"]),
         ("others/mpu9250_imu1_raw.mat", &[], &["At rest but for", "an hour"]),
         (
             "others/px4_sample.ulg",
             &[],
             &["cannot be trusted as it is. It moved for up to", "Analyse the part at rest alone: add --from"],
         ),
-        ("others/stampfly_fft_20260114T115628.csv", &["--yes"], &["for strong lines"]),
+        ("others/stampfly_fft_20260114T115628.csv", &["--accept-guess"], &["for strong lines"]),
         ("others/vn100_nitin.bag", &[], &["so N is valid from one sample on", "Nothing"]),
         (
             "others/phone_gyro4.txt",

@@ -30,7 +30,7 @@ fn the_arguments_choose_what_is_printed() {
     let full = run(&dir, &["--full"]);
     assert!(full.contains("── supply") && full.contains("95 % interval"), "{full}");
     assert_eq!(run(&dir, &["--quiet"]), "");
-    let report: Value = serde_json::from_str(&run(&dir, &["--json", "-"])).expect("JSON alone");
+    let report: Value = serde_json::from_str(&run(&dir, &["-o", "-"])).expect("JSON alone");
     assert_eq!(report["schema"], 2);
     let spectrum = &report["channels"][1]["spectrum"];
     let points = spectrum["density"].as_array().expect("a spectrum").len();
@@ -40,10 +40,10 @@ fn the_arguments_choose_what_is_printed() {
 #[test]
 fn every_figure_is_written_as_svg() {
     let dir = TempDir::new().expect("a folder");
-    let pictures = dir.path().join("pictures");
-    run(&dir, &["--pictures", pictures.to_str().expect("UTF-8")]);
+    let figures = dir.path().join("run1.svg");
+    run(&dir, &["-o", figures.to_str().expect("UTF-8")]);
     for name in ["overview-gyros", "gyro_x-allan", "gyro_x-spectrum", "gyro_x-bias", "accl_z-allan"] {
-        let svg = std::fs::read(pictures.join(format!("{name}.svg"))).expect("an SVG");
+        let svg = std::fs::read(dir.path().join(format!("run1-{name}.svg"))).expect("an SVG");
         assert!(svg.starts_with(b"<svg "), "{name}");
     }
 }

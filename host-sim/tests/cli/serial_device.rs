@@ -3,13 +3,14 @@
 use crate::program::{imunoise, send};
 use ::host_sim::monitor;
 use recordings::serial::SerialLink;
+use serial2::SerialPort;
 use simulation::Device;
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind, Read, Write};
 use std::process::{Command, Output, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::thread;
+use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use system_tests::pseudo_terminals;
 use virtual_sensor::{NoiseModel, VirtualAdis16405};
@@ -37,32 +38,56 @@ impl NoisyDevice {
     }
 }
 
+/// A pseudo-terminal that a simulated device serves until this is dropped.
+pub(crate) struct DevicePort {
+    pub(crate) name: String,
+    is_over: Arc<AtomicBool>,
+    device: Option<JoinHandle<()>>,
+    /// Keeps the port open.
+    _far: SerialPort,
+}
+
+impl DevicePort {
+    pub(crate) fn open() -> Self {
+        let (mut near, far, name) = pseudo_terminals(Duration::from_millis(1));
+        let is_over = Arc::new(AtomicBool::new(false));
+        let done = Arc::clone(&is_over);
+        let device = thread::spawn(move || {
+            let (mut device, mut keys, mut unsent) = (NoisyDevice::new(), [0; 64], Vec::new());
+            while !done.load(Relaxed) {
+                match near.read(&mut keys) {
+                    Ok(count) => device.device.press(&keys[..count]),
+                    Err(error) => assert_eq!(error.kind(), ErrorKind::TimedOut),
+                }
+                // The device's time stands still until the program has read what was sent.
+                if unsent.is_empty() {
+                    unsent = device.next();
+                }
+                send(&mut near, &mut unsent);
+            }
+        });
+        Self { name, is_over, device: Some(device), _far: far }
+    }
+}
+
+impl Drop for DevicePort {
+    fn drop(&mut self) {
+        self.is_over.store(true, Relaxed);
+        let ended = self.device.take().map(JoinHandle::join);
+        assert!(thread::panicking() || ended.is_none_or(|ended| ended.is_ok()), "the device did not panic");
+    }
+}
+
 /// Runs `imunoise` with these arguments, `PORT` replaced by the port of a simulated device, until it has printed all of `expected`, or to
 /// its end where that is empty.
 fn with_device(arguments: &[&str], expected: &[&str]) -> Output {
-    let (mut near, far, port) = pseudo_terminals(Duration::from_millis(1));
-    let over = Arc::new(AtomicBool::new(false));
-    let done = Arc::clone(&over);
+    let port = DevicePort::open();
     let mut program = Command::new(env!("CARGO_BIN_EXE_imunoise"))
-        .args(arguments.iter().map(|&argument| if argument == "PORT" { &port } else { argument }))
+        .args(arguments.iter().map(|&argument| if argument == "PORT" { &port.name } else { argument }))
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .expect("the program starts");
-    let device = thread::spawn(move || {
-        let (mut device, mut keys, mut unsent) = (NoisyDevice::new(), [0; 64], Vec::new());
-        while !done.load(Relaxed) {
-            match near.read(&mut keys) {
-                Ok(count) => device.device.press(&keys[..count]),
-                Err(error) => assert_eq!(error.kind(), ErrorKind::TimedOut),
-            }
-            // The device's time stands still until the program has read what was sent.
-            if unsent.is_empty() {
-                unsent = device.next();
-            }
-            send(&mut near, &mut unsent);
-        }
-    });
     if !expected.is_empty() {
         let (mut printed, mut text, mut bytes) = (program.stdout.take().expect("a pipe"), String::new(), [0; 4096]);
         while !expected.iter().all(|words| text.contains(words)) {
@@ -72,11 +97,7 @@ fn with_device(arguments: &[&str], expected: &[&str]) -> Output {
         }
         program.kill().expect("an end");
     }
-    let output = program.wait_with_output().expect("an end");
-    over.store(true, Relaxed);
-    device.join().expect("the device did not panic");
-    drop(far);
-    output
+    program.wait_with_output().expect("an end")
 }
 
 /// A port whose device hangs up after 3 s of its time.
@@ -130,11 +151,11 @@ fn a_recording_of_a_device_and_its_replay_have_the_same_report() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("a name").to_owned();
     let (log, first, second) = (path("device.csv.gz"), path("first.json"), path("second.json"));
-    let output = with_device(&["record", &log, "--port", "PORT", "--seconds", "20", "--json", &first], &[]);
+    let output = with_device(&["record", &log, "--port", "PORT", "--seconds", "20", "-o", &first], &[]);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{errors}");
     assert!(errors.contains(" 0 missing between them") && errors.contains(" 0 missing by their numbers"), "{errors}");
-    assert!(imunoise(&["replay", &log, "--json", &second]).status.success());
+    assert!(imunoise(&["replay", &log, "-o", &second]).status.success());
     let [first, second] = [first, second].map(|file| std::fs::read_to_string(file).expect("a report"));
     assert_eq!(first, second);
     let report: serde_json::Value = serde_json::from_str(&first).expect("JSON");

@@ -16,9 +16,9 @@ fn equal_parts_agree_a_louder_axis_differs_and_is_called_worse() {
     let path = |name: &str| dir.path().join(name).to_str().expect("UTF-8").to_owned();
     let [one, two, three] = ["1.csv", "2.csv", "3.csv"].map(path);
     // Without slow noise, which two minutes do not determine. Gyro y of the third is 1.5 times as loud.
-    let quiet = ["--seconds", "120", "--gyro", "0.04,0,0", "--accl", "0.004,0,0"];
+    let quiet = ["--seconds", "120", "--noise", "gyro=0.04,0,0", "--noise", "accl=0.004,0,0"];
     for (out, seed, gyro_y) in [(&one, "1", "0.04,0,0"), (&two, "2", "0.04,0,0"), (&three, "3", "0.06,0,0")] {
-        text(&[&["simulate", out, "--seed", seed, "--gyro-y", gyro_y][..], &quiet].concat());
+        text(&[&["simulate", out, "--seed", seed, "--noise", &format!("gyro_y={gyro_y}")][..], &quiet].concat());
     }
     let summary: Value = serde_json::from_slice(&json_of(&dir, &["compare", &one, &two, &three])).expect("JSON");
     let channels = summary["agreement"]["channels"].as_array().expect("channels");
@@ -45,9 +45,9 @@ fn equal_parts_agree_a_louder_axis_differs_and_is_called_worse() {
     assert!(text(&["compare", &one, "--running", &three]).contains("inflation"));
 
     let [a, b, c] = ["a.json", "b.json", "c.json"].map(path);
-    text(&["analyze", &one, "--json", &a]);
-    text(&["analyze", &three, "--json", &b]);
-    let table = text(&["compare", &a, &b, "--json", &c]);
+    text(&["analyze", &one, "-o", &a]);
+    text(&["analyze", &three, "-o", &b]);
+    let table = text(&["compare", &a, &b, "-o", &c]);
     assert!(table.contains("not distinguishable") && table.contains("worse"), "{table}");
     let rows: Value = serde_json::from_slice(&std::fs::read(&c).expect("a file")).expect("JSON");
     for row in rows["coefficients"].as_array().expect("rows").iter().filter(|row| row["kind"] == "angle_random_walk") {
@@ -70,8 +70,7 @@ fn wrong_sets_of_recordings_and_reports_are_refused() {
     }
     for (arguments, expected) in [
         (&["compare", &one, &two][..], "recordings are compared at one rate"),
-        (&["compare", &one, "--data-sheet"], "no JSON report"),
-        (&["compare", &one, &two, "--json", &two], "it would be overwritten"),
+        (&["compare", &one, &two, "-o", &format!("json={two}")], "it would be overwritten"),
     ] {
         let output = imunoise(arguments);
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();

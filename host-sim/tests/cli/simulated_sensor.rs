@@ -17,9 +17,9 @@ fn effect<'a>(channel: &'a Value, kind: &str) -> &'a Value {
 #[test]
 fn the_two_hidden_effects_of_the_default_sensor_are_found() {
     let dir = TempDir::new().expect("a folder");
-    let page = dir.path().join("page");
+    let page = dir.path().join("page.html");
     // A third of the default hour has both effects: the warm-up, whose time constant is a quarter of an hour, is most of it.
-    let bytes = json_of(&dir, &["demo", "--seconds", "1200", "--page", page.to_str().expect("UTF-8")]);
+    let bytes = json_of(&dir, &["demo", "--seconds", "1200", "-o", page.to_str().expect("UTF-8")]);
     let report: Value = serde_json::from_slice(&bytes).expect("JSON");
 
     // 0.2 deg/s at 20.5 Hz on gyro z: within the 95 % interval of the amplitude, or 5 % where that is narrower.
@@ -52,10 +52,8 @@ fn number(yaml: &str, key: &str) -> f64 {
 fn the_file_for_kalibr_has_the_noise_of_the_virtual_sensor() {
     let dir = TempDir::new().expect("a folder");
     let file = dir.path().join("imu.yaml");
-    let page = dir.path().to_str().expect("UTF-8");
     let file_name = file.to_str().expect("UTF-8");
-    let output =
-        imunoise(&["demo", "--plain", "--seconds", "600", "--page", page, "--export", &format!("kalibr={file_name}")]);
+    let output = imunoise(&["demo", "--plain", "--seconds", "600", "-o", file_name]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let yaml = std::fs::read_to_string(&file).expect("the file");
     // The converter's steps of 3.33 mg add white noise of a twelfth of their square.

@@ -126,7 +126,7 @@ impl Campaign {
         let file = self.write(recorded.name, &recorded.bytes);
         let folder = self.folder().to_owned();
         let mut program = Program::new(&folder, &recorded.reading("analyze", &file));
-        program.arguments.extend(["--json", "-"].map(str::to_owned));
+        program.arguments.extend(["-o", "-"].map(str::to_owned));
         let run = self.checked(&program, &[0, 1], recorded.bytes.len() as u64);
         self.report(&run)
     }
@@ -466,7 +466,7 @@ const COMMANDS: [&str; 12] = [
     "uf2",
     "demo",
 ];
-const OPTIONS: [&str; 28] = [
+const OPTIONS: [&str; 26] = [
     "--rate",
     "--range",
     "--columns",
@@ -475,16 +475,14 @@ const OPTIONS: [&str; 28] = [
     "--sensor",
     "--from",
     "--to",
-    "--yes",
+    "--accept-guess",
     "--each-sensor",
     "--quick",
     "--full",
     "--quiet",
-    "--json",
-    "--page",
-    "--pictures",
-    "--export",
-    "--axis",
+    "-o",
+    "-f",
+    "--combine-axes",
     "--rows",
     "--running",
     "--seed",
@@ -496,7 +494,7 @@ const OPTIONS: [&str; 28] = [
     "--format",
     "--help",
 ];
-const VALUES: [&str; 26] = [
+const VALUES: [&str; 28] = [
     "0",
     "-1",
     "1e309",
@@ -511,6 +509,8 @@ const VALUES: [&str; 26] = [
     "rad/s",
     "m/s^2",
     "out/a.json",
+    "out/a.html",
+    "out/a.svg",
     "out",
     "kalibr=out/k.yaml",
     "\u{202e}",
@@ -582,7 +582,11 @@ fn mutated_report(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let out = out.to_str().expect("UTF-8");
     let bytes = text.len() as u64;
     // A format that does not exist is an error of the arguments.
-    let run = campaign.checked(&Program::new(&folder, &["export", "--format", format, &file, out]), &[0, 1, 2], bytes);
+    let run = campaign.checked(
+        &Program::new(&folder, &["export", &file, "-o", &format!("{format}={out}")]),
+        &[0, 1, 2],
+        bytes,
+    );
     if run.code == Some(0) {
         let written = std::fs::read(out).unwrap_or_default();
         let text = String::from_utf8_lossy(&written);
@@ -634,7 +638,7 @@ fn replay_and_conversion(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let file = file.to_str().expect("UTF-8");
     let rate = noise.rate_hz.to_string();
     let of = |campaign: &mut Campaign, words: &[&str]| {
-        let run = campaign.checked(&Program::new(&folder, &[words, &["--json", "-"]].concat()), &[0], 0);
+        let run = campaign.checked(&Program::new(&folder, &[words, &["-o", "-"]].concat()), &[0], 0);
         campaign.report(&run).unwrap_or_default()
     };
     let replayed = of(campaign, &["replay", file, "--rate", &rate]);
@@ -666,10 +670,11 @@ fn full_disk(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
     let old = b"an old file\n";
     let out = campaign.write("out.csv", old);
     let folder = campaign.folder().to_owned();
+    let json = format!("json={out}");
     let words: Vec<&str> = match rng.random_range(0..3) {
         0 => vec!["convert", &file, &out, "--force"],
         1 => vec!["simulate", &out, "--force", "--seconds", "5"],
-        _ => vec!["analyze", &file, "--rate", "100", "--quiet", "--force", "--json", &out],
+        _ => vec!["analyze", &file, "--rate", "100", "--quiet", "--force", "-o", &json],
     };
     let mut program = Program::new(&folder, &words);
     let whole = {

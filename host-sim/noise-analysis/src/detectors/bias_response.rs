@@ -41,10 +41,10 @@ impl Course {
         self.values.iter().sum::<f64>() / self.values.len() as f64
     }
 
-    /// Allan variance of the bias that follows the course with `sensitivity`.
-    pub(super) fn variance(&self, sensitivity: f64) -> ResponseVariance {
+    /// Allan variance of the bias that follows the course with `sensitivity`, of which a sample period takes `period_s`.
+    pub(super) fn variance(&self, sensitivity: f64, period_s: f64) -> ResponseVariance {
         let values: Vec<f64> = self.values.iter().map(|value| sensitivity * value).collect();
-        ResponseVariance::from_means(&values, self.width)
+        ResponseVariance::from_means(&values, self.width, period_s)
     }
 
     /// Bias that follows the course with `sensitivity`; 0 at the course's mean.

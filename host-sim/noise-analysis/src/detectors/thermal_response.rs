@@ -104,7 +104,7 @@ impl TemperatureCourse {
             sensitivity: interval(estimate, unit),
             time_constant_s: lag.bounds(1.0),
             p_value: estimate.p_value,
-            response: lagged.variance(estimate.size),
+            response: lagged.variance(estimate.size, self.period_s),
         };
         lagged.response(estimate.size, effect.into())
     }
@@ -123,7 +123,7 @@ impl TemperatureCourse {
             curvature: interval(estimate, unit),
             reference_degc: self.measured.mean(),
             p_value: estimate.p_value,
-            response: squared.variance(estimate.size),
+            response: squared.variance(estimate.size, self.period_s),
         };
         squared.response(estimate.size, effect.into())
     }

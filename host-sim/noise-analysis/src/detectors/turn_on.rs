@@ -57,7 +57,7 @@ impl Transient {
             size: interval(estimate, unit),
             time_constant_s: self.0.bounds(blocks.width as f64 * period_s),
             p_value: estimate.p_value,
-            response: course.variance(estimate.size),
+            response: course.variance(estimate.size, period_s),
         };
         course.response(estimate.size, effect.into())
     }

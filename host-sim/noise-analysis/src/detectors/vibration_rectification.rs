@@ -61,7 +61,7 @@ impl<'a> Vibration<'a> {
             accelerometer: name,
             strongest: self.course.values.iter().copied().fold(0.0, f64::max).sqrt(),
             p_value: estimate.p_value,
-            response: self.course.variance(estimate.size),
+            response: self.course.variance(estimate.size, series.period_s),
         };
         self.course.response(estimate.size, effect.into())
     }

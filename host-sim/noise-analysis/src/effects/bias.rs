@@ -105,7 +105,7 @@ impl Kind for TurnOnTransient {
     }
 
     fn avar(&self, at: &AveragingTime) -> AddedVariance {
-        AddedVariance::corrected(self.response.at(at.n))
+        AddedVariance::corrected(self.response.at(at.tau_s()))
     }
 
     fn course(&self, blocks: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {

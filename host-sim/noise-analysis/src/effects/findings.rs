@@ -31,6 +31,9 @@ pub struct Finding {
     /// By channel: the part of the channel's Allan variance that is due to this cause, in percent, at the averaging time where
     /// it is largest.
     pub share_percent: BTreeMap<String, f64>,
+    /// By channel: that part at the octave next to a minute, the part of the variance of an angle or a velocity that was integrated for so
+    /// long. Without the channels of records below some eight minutes.
+    pub minute_percent: BTreeMap<String, f64>,
 }
 
 /// Whether a finding holds on data that its model was not fitted to.

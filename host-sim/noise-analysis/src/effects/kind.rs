@@ -131,6 +131,11 @@ pub(crate) struct AveragingTime<'a> {
 }
 
 impl AveragingTime<'_> {
+    /// In s.
+    pub(crate) fn tau_s(&self) -> f64 {
+        self.n as f64 * self.period_s
+    }
+
     /// Of a term of the noise model with this coefficient.
     pub(crate) fn of_term(&self, term: &NoiseTerm, coefficient: f64) -> AddedVariance {
         AddedVariance::modelled(coefficient * coefficient * term.avar(self.n, self.period_s))

@@ -1,15 +1,19 @@
 //! The Allan variance of a bias that was computed from something measured.
 
-/// The Allan variance of a bias over a record, at averaging factors that are powers of two.
+/// Relative difference of two octaves' averaging times that is one of rounding.
+const SAME_TIME: f64 = 1e-6;
+
+/// The Allan variance of a bias over a record, at averaging times that are sample periods times powers of two.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ResponseVariance {
-    octaves: Vec<(u64, f64)>,
+    /// Averaging time, s, and variance.
+    octaves: Vec<(f64, f64)>,
 }
 
 impl ResponseVariance {
-    /// Of a bias of which the mean over each stretch of `width` sample periods is known: from the averaging factor `width` on, below
+    /// Of a bias of which the mean over each stretch of `width` periods of `period_s` is known: from the averaging factor `width` on, below
     /// which it hardly changes.
-    pub(crate) fn from_means(means: &[f64], width: u64) -> Self {
+    pub(crate) fn from_means(means: &[f64], width: u64, period_s: f64) -> Self {
         // The sum of the bias over the first sample periods, at the ends of the stretches.
         let mut sums = vec![0.0];
         for mean in means {
@@ -29,12 +33,13 @@ impl ResponseVariance {
             sum / count / (2.0 * (n as f64).powi(2))
         };
         let factors = (0..u64::BITS).map(|octave| 1_u64 << octave).skip_while(|n| *n < width);
-        Self { octaves: factors.take_while(|n| 2 * n <= length).map(|n| (n, avar(n))).collect() }
+        Self { octaves: factors.take_while(|n| 2 * n <= length).map(|n| (n as f64 * period_s, avar(n))).collect() }
     }
 
-    /// At the averaging factor `n`; 0 where it is not known.
-    pub(crate) fn at(&self, n: u64) -> f64 {
-        self.octaves.iter().find(|(of, _)| *of == n).map_or(0.0, |(_, avar)| *avar)
+    /// At the averaging time `tau_s`; 0 where it is not known.
+    pub(crate) fn at(&self, tau_s: f64) -> f64 {
+        let is_at = |of: f64| (of / tau_s - 1.0).abs() < SAME_TIME;
+        self.octaves.iter().find(|(of, _)| is_at(*of)).map_or(0.0, |(_, avar)| *avar)
     }
 }
 
@@ -47,25 +52,34 @@ mod tests {
     #[test]
     fn a_ramp_and_a_sinusoid_have_their_closed_forms() {
         const WIDTH: u64 = 12;
+        const PERIOD_S: f64 = 0.02;
         let means = |bias: &dyn Fn(f64) -> f64| -> Vec<f64> {
             (0..4096).map(|at| bias((f64::from(at) + 0.5) * WIDTH as f64)).collect()
         };
-        let ramp = ResponseVariance::from_means(&means(&|slot| 1e-3 * slot), WIDTH);
+        let ramp = ResponseVariance::from_means(&means(&|slot| 1e-3 * slot), WIDTH, PERIOD_S);
         for octave in 6..14 {
             // Within a stretch the bias is taken as constant: 16 of the 64² sample periods² that the sum of a ramp moves by.
             let n = 1_u64 << octave;
             let expected = (1e-3 * n as f64).powi(2) / 2.0;
-            assert!((ramp.at(n) / expected - 1.0).abs() < 0.02, "{n}: {}", ramp.at(n));
+            assert!(
+                (ramp.at(n as f64 * PERIOD_S) / expected - 1.0).abs() < 0.02,
+                "{n}: {}",
+                ramp.at(n as f64 * PERIOD_S)
+            );
         }
         // 48 periods of 1,024 sample periods: half a period more or less is a hundredth of the mean.
         let frequency = 1.0 / 1024.0;
-        let sine = ResponseVariance::from_means(&means(&|slot| 0.2 * (TAU * frequency * slot).sin()), WIDTH);
+        let sine = ResponseVariance::from_means(&means(&|slot| 0.2 * (TAU * frequency * slot).sin()), WIDTH, PERIOD_S);
         for octave in 6..10 {
             let n = 1_u64 << octave;
             let x = PI * frequency * n as f64;
             let expected = (0.2 * x.sin().powi(2) / x).powi(2);
-            assert!((sine.at(n) / expected - 1.0).abs() < 0.03, "{n}: {} {expected}", sine.at(n));
+            assert!(
+                (sine.at(n as f64 * PERIOD_S) / expected - 1.0).abs() < 0.03,
+                "{n}: {} {expected}",
+                sine.at(n as f64 * PERIOD_S)
+            );
         }
-        assert_eq!((ramp.at(8), ramp.at(1 << 20)), (0.0, 0.0), "not known");
+        assert_eq!((ramp.at(8.0 * PERIOD_S), ramp.at(20.0 * PERIOD_S)), (0.0, 0.0), "not known");
     }
 }

@@ -93,7 +93,7 @@ impl Kind for TemperatureCurvature {
     fn avar(&self, at: &AveragingTime) -> AddedVariance {
         // The model has the part that is proportional, and the samples are corrected for the square.
         AddedVariance {
-            corrected: self.response.at(at.n),
+            corrected: self.response.at(at.tau_s()),
             ..at.followed(Quantity::Temperature, "", self.sensitivity.value)
         }
     }
@@ -134,7 +134,7 @@ impl Kind for ThermalLag {
     }
 
     fn avar(&self, at: &AveragingTime) -> AddedVariance {
-        AddedVariance::corrected(self.response.at(at.n))
+        AddedVariance::corrected(self.response.at(at.tau_s()))
     }
 
     fn course(&self, blocks: &BiasBlocks) -> Vec<(f64, Vec<f64>)> {
@@ -221,7 +221,7 @@ impl Kind for VibrationRectification {
     }
 
     fn avar(&self, at: &AveragingTime) -> AddedVariance {
-        AddedVariance::corrected(self.response.at(at.n))
+        AddedVariance::corrected(self.response.at(at.tau_s()))
     }
 }
 

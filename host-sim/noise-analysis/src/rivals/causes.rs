@@ -24,7 +24,7 @@ use crate::rivals::cause::{Cause, Shown};
 use crate::rivals::table::{CauseClaim, stands_as_cause};
 use grouping::join;
 use measurement::SensorProfile;
-use std::collections::BTreeMap;
+use shares::Shares;
 
 /// The causes of the `effects` of all channels. Each channel is given the effects by which it reports a cause, which refer to the
 /// finding; `first_half` are the effects of the same channels from the first half alone.
@@ -88,13 +88,18 @@ fn merged(channels: &[(&str, &[Effect])], duration_s: f64) -> Vec<Cause> {
 fn finding(cause: &Cause, channels: &[ChannelReport], half: &[Cause], profile: &SensorProfile) -> Finding {
     let clearest = cause.clearest();
     let name = |shown: &Shown| channels[shown.channel].name.clone();
-    let share = |shown: &Shown| Some((name(shown), shares::percent(shown, channels, profile)?));
+    let shares: Vec<(String, Shares)> =
+        cause.shown.iter().filter_map(|shown| Some((name(shown), Shares::new(shown, channels, profile)?))).collect();
+    let share = |of: fn(&Shares) -> Option<f64>| {
+        shares.iter().filter_map(|(name, shares)| Some((name.clone(), of(shares)?))).collect()
+    };
     Finding {
         effect: cause.shown[clearest].effect.clone(),
         channels: cause.shown.iter().map(name).collect(),
         clearest,
         validated: validate(cause, half),
-        share_percent: cause.shown.iter().filter_map(share).collect::<BTreeMap<_, _>>(),
+        share_percent: share(|shares| Some(shares.largest)),
+        minute_percent: share(|shares| shares.after_minute),
     }
 }
 

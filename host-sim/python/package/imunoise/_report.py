@@ -208,7 +208,7 @@ class Report:
         return self.channels[channel]
 
     def to_json(self) -> str:
-        """The report as JSON, as `imunoise analyze --json` writes it; `docs/json-schema.md` of the repository describes it."""
+        """The report as JSON, as `imunoise analyze -o report.json` writes it; `docs/json-schema.md` of the repository describes it."""
         return self._native.json()
 
     def rows(self) -> Rows:

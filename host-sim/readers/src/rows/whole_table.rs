@@ -44,6 +44,8 @@ pub(crate) struct WholeTable {
     /// Stated, Hz.
     pub(crate) rate_hz: Option<f64>,
     pub(crate) is_cut: bool,
+    /// The source ended early; a note says why.
+    pub(crate) is_damaged: bool,
     pub(crate) notes: Vec<String>,
 }
 
@@ -66,6 +68,7 @@ impl WholeTable {
             Err(error) if builder.rows() == 0 || error.reason.is_limit() => return Err(error),
             Err(error) => Some(error.to_string()),
         };
+        self.is_damaged = damage.is_some();
         self.notes.extend(damage.map(|damage| format!("{damage}; the {} rows before that are shown", builder.rows())));
         let column = |(chosen, values): (ChosenColumn, Vec<f64>)| WholeColumn {
             column: AvailableColumn { name: chosen.label, unit: chosen.unit },

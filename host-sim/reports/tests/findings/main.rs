@@ -97,6 +97,7 @@ fn report(kind: fn(f64) -> Effect, sizes: [f64; 3], validated: Validation) -> Re
         clearest: 2,
         validated,
         share_percent: BTreeMap::from([("gyro_z".to_owned(), 62.0)]),
+        minute_percent: BTreeMap::from([("gyro_z".to_owned(), 8.0)]),
     }];
     for (channel, size) in report.channels.iter_mut().zip(sizes) {
         channel.effects = vec![ChannelEffect { effect: kind(size), finding: 0 }];

@@ -170,6 +170,7 @@ fn every_report_tells_how_the_noise_changes() {
         clearest: 0,
         validated: Validation::Yes,
         share_percent: Default::default(),
+        minute_percent: Default::default(),
     };
     // The followed line is at 21.1 Hz.
     report.findings = vec![line(20.7), line(40.0)];
@@ -187,9 +188,7 @@ fn every_report_tells_how_the_noise_changes() {
     let mut out = Vec::new();
     reports::full_tables::write(&report, None, &mut out).expect("a vector can be written");
     let full = String::from_utf8(out).expect("text").split_whitespace().collect::<Vec<_>>().join(" ");
-    let folder = tempfile::tempdir().expect("a folder");
-    let page =
-        std::fs::read_to_string(reports::page::write(&report, None, folder.path()).expect("a page")).expect("text");
+    let page = reports::page::html(&report, None);
     for told in [
         "fitted to the later quarter",
         "with the line where accel x has it in the second half, the model leaves 3.9; this uses the second half of accel x",

@@ -25,6 +25,7 @@ fn finding(effect: impl Into<Effect>, channels: &[&str], share: f64) -> Finding 
         clearest: 0,
         validated: Validation::Yes,
         share_percent: BTreeMap::from([(channels[0].to_owned(), share)]),
+        minute_percent: BTreeMap::new(),
     }
 }
 
@@ -127,6 +128,20 @@ fn the_screen_keeps_to_its_lines_and_columns() {
             }
         }
     }
+}
+
+/// A vibration averages out within a minute, a slow drift does not.
+#[test]
+fn findings_are_in_the_order_of_what_they_cost_after_a_minute() {
+    let mut report = report();
+    let costs = |frequency_hz: f64, largest: f64, after_minute: f64| Finding {
+        minute_percent: BTreeMap::from([("gyro_z".to_owned(), after_minute)]),
+        ..finding(line(frequency_hz), &["gyro_z"], largest)
+    };
+    report.findings = vec![costs(20.0, 90.0, 0.1), costs(0.01, 40.0, 30.0), costs(30.0, 95.0, 0.1)];
+    let (texts, _) = reports::summary::findings(&report);
+    let weights: Vec<&str> = texts.iter().map(|text| text.weight.split(';').next().unwrap_or_default()).collect();
+    assert_eq!(weights, ["up to 40 % of σ², 30 % around τ = 1 min", "up to 95 % of σ²", "up to 90 % of σ²"]);
 }
 
 #[test]

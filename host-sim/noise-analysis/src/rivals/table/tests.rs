@@ -267,7 +267,7 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
     let plausible = |is_plausible| Origin::Covariate { is_plausible };
     let not_in_spectrum = Refutation::NotInSpectrum { frequency_hz: 10.0 };
     let alone = |is_sudden| Origin::Motion { is_shared: false, is_sudden };
-    let response = ResponseVariance::from_means(&[0.0, 1.0, 0.0, 1.0], 1);
+    let response = ResponseVariance::from_means(&[0.0, 1.0, 0.0, 1.0], 1, 1.0);
     let lag = ThermalLag { sensitivity: size(1.0), time_constant_s: known(100.0), p_value: 1e-9, response };
     let point = |tau_s: f64| unexplained(tau_s, Observation::PointOfCurve { p_value: 1e-9 });
     let by_temperature = |explained| unexplained(0.01, Observation::LevelByTemperature { range_degc: [20.0, 30.0], explained });
