@@ -44,7 +44,7 @@ const MAY_DEPEND_ON: &[(&str, &str)] = &[
     ("observatory", "adis16405-driver link measurement noise-analysis recordings reports simulation"),
     ("host-sim", "adis16405-driver link measurement noise-analysis observatory recordings reports simulation"),
     ("imunoise-python", "allan-core host-sim noise-analysis recordings reports"),
-    ("system-tests", ""),
+    ("system-tests", "emulation"),
     ("emulation", "virtual-sensor"),
     ("driver-footprint", "adis16405-driver allan-core system-tests"),
     ("allan-core-c", "allan-core"),
