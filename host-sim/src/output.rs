@@ -16,6 +16,7 @@ use reports::terminal::Screen;
 use reports::{full_tables, page};
 use serde::Serialize;
 use std::borrow::Cow;
+use std::cell::LazyCell;
 use std::fmt;
 use std::io::{self, BufWriter, StdoutLock, Write};
 use std::path::{Path, PathBuf};
@@ -95,6 +96,7 @@ pub(crate) fn write_report(
 ) -> Result<()> {
     let Analysed { report, reading } = analysed;
     let (mut written, mut pages) = (Ok(()), Vec::new());
+    let saved = LazyCell::new(|| SavedReport::from(report));
     for target in &output.outputs {
         let OutputFile { format, file } = target;
         let result = match format {
@@ -106,12 +108,12 @@ pub(crate) fn write_report(
             OutputFormat::Figures => figure::pictures(report)
                 .into_iter()
                 .try_for_each(|Picture { name, svg }| write_text(&svg, &figure_file(file, &name), files)),
-            OutputFormat::Noise(format) => write_noise(&SavedReport::from(report), *format, file, output.axis, files),
+            OutputFormat::Noise(format) => write_noise(&saved, *format, file, output.axis, files),
         };
         written = written.and(result);
     }
-    if !output.prints_to_standard_output() {
-        show(analysed, source, output)?;
+    if !output.quiet && !output.prints_to_standard_output() {
+        show(analysed, source, output.full)?;
         for page in pages {
             print(|out| writeln!(out, "page: {}", Printable(&page.display().to_string())))?;
         }
@@ -130,15 +132,12 @@ pub(crate) fn source_name(file: &Path) -> String {
 }
 
 /// Prints a report.
-fn show(analysed: &Analysed, source: Option<&str>, output: &OutputArguments) -> Result<()> {
+fn show(analysed: &Analysed, source: Option<&str>, is_full: bool) -> Result<()> {
     let Analysed { report, reading } = analysed;
-    if output.quiet {
-        return Ok(());
-    }
     if let Some(sentence) = reading.as_ref().and_then(ReadingRecord::incomplete) {
         print(|out| writeln!(out, "{}", Printable(&sentence)))?;
     }
-    if output.full { print(|out| full_tables::write(report, source, out)) } else { show_screen(report, source) }
+    if is_full { print(|out| full_tables::write(report, source, out)) } else { show_screen(report, source) }
 }
 
 /// Prints the screen of a report on the recording `source`.

@@ -97,6 +97,16 @@ fn a_file_that_cannot_be_written_whole_stays_as_it_was() {
     assert_eq!(names(dir.path()), ["rows.csv"], "nothing is left beside");
 }
 
+#[test]
+fn a_quiet_command_prints_nothing() {
+    let dir = tempdir().expect("a folder");
+    let rows = table(&dir);
+    let page = dir.path().join("page.html");
+    let output = imunoise(&["analyze", name(&rows), "-q", "-o", name(&page)]);
+    assert!(output.status.success() && page.is_file());
+    assert_eq!((output.stdout, output.stderr), (Vec::new(), Vec::new()));
+}
+
 fn names(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).expect("the folder");
     let mut names: Vec<String> =
