@@ -115,7 +115,7 @@ impl EpochChannel<'_> {
         Some(covariance * self.lsb() * self.other(other).lsb())
     }
 
-    /// Of the channel, or a candidate, with a candidate.
+    /// The covariance of the channel, or of a candidate, with a candidate.
     fn covariance_of(self, candidates: &[usize], with: Option<usize>, covariate: usize, n: u64) -> Option<f64> {
         self.other(with.map_or(self.index, |other| candidates[other])).covariance(candidates[covariate], n)
     }

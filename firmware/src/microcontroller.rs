@@ -76,7 +76,7 @@ impl<U> UsbParts<U> {
     }
 }
 
-/// Of a microcontroller without USB.
+/// A port that a microcontroller does not have.
 impl ServedPort for Infallible {
     fn serve(&mut self, _now_us: u32) -> u32 {
         match *self {}

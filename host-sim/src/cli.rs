@@ -452,8 +452,8 @@ pub(crate) struct SimulateArguments {
     pub(crate) taps: Option<u32>,
     /// As in gyro=0.037,0.009,0.0013; see --help
     ///
-    /// Of one channel (gyro_x), or of all three of a kind (gyro, accl), which
-    /// those of one channel override; may be given several times. In deg/√s,
+    /// For one channel (gyro_x), or for all three of a kind (gyro, accl):
+    /// that of one channel is taken. May be given several times. In deg/√s,
     /// deg/s, deg/s/√s, and in g/√Hz, g, g/√s. Default: those of a published
     /// part.
     /// Example: --noise gyro=0.037,0.009,0.0013 --noise gyro_z=0.05,0.01,0
@@ -476,10 +476,11 @@ pub(crate) struct SimulateArguments {
     /// has deviation in g.
     #[arg(verbatim_doc_comment, long, help_heading = NOISE, value_name = "PROFILE")]
     pub(crate) environment: Vec<String>,
-    /// Of the bus, as in stuck_low:from=10,bursts=5
+    /// As in stuck_low:from=10,bursts=5
     ///
-    /// May be given several times; `from` is in s. Kinds: impossible_rate,
-    /// shifted, stuck_low, stuck_high, frozen, stale, low_supply.
+    /// A fault of the bus. May be given several times; `from` is in s. Kinds:
+    /// impossible_rate, shifted, stuck_low, stuck_high, frozen, stale,
+    /// low_supply.
     #[arg(verbatim_doc_comment, long, help_heading = NOISE, value_name = "FAULT")]
     pub(crate) fault: Vec<String>,
 }
@@ -776,7 +777,7 @@ pub(crate) struct MonitorArguments {
     pub(crate) baud: u32,
     /// Command for the device, such as "f 819.2"; repeatable
     ///
-    /// What the device's command line takes; `?` lists the commands.
+    /// A line for the device's command line; `?` lists the commands.
     /// The sample rate in Hz:
     /// Example: --send "f 819.2"
     #[arg(verbatim_doc_comment, long, help_heading = INPUT, value_name = "COMMAND")]
@@ -892,7 +893,7 @@ pub(crate) struct OutputArguments {
 }
 
 impl OutputArguments {
-    /// Whether an output is standard output, which has nothing beside it then.
+    /// True if an output is standard output, which has nothing beside it then.
     pub(crate) fn prints_to_standard_output(&self) -> bool {
         self.outputs.iter().any(|output| is_standard_stream(&output.file))
     }

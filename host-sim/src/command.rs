@@ -15,7 +15,7 @@ use std::ffi::OsString;
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
-/// What `demo` writes if nothing is named.
+/// The page that `demo` writes if no output is named.
 const DEFAULT_PAGE: &str = "report.html";
 
 /// Exit codes.

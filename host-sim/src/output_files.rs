@@ -8,10 +8,7 @@ use same_file::Handle;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
-use tempfile::{NamedTempFile, PersistError};
-
-/// Longest ending of the name of a file that it keeps while it is incomplete, bytes: writers choose the compression by it.
-const LONGEST_ENDING: usize = 32;
+use tempfile::{PathPersistError, TempPath};
 
 /// True if `-` is given for a file: standard input or standard output.
 pub(crate) fn is_standard_stream(file: &Path) -> bool {
@@ -115,7 +112,7 @@ impl OutputFiles {
         self.write_with(file, |file| Ok(fs::write(file, content)?))
     }
 
-    /// Writes `file` with `write`, which is given a file of the same ending in a folder beside it; that takes the name when it is complete.
+    /// Writes `file` with `write`, which is given a file of the same name in a folder beside it; that takes its place when it is complete.
     ///
     /// # Errors
     /// The file is an input, must not be overwritten, or cannot be written; it is then as it was. The error names it.
@@ -128,7 +125,7 @@ impl OutputFiles {
             let target = target(file);
             let folder = IncompleteFiles::in_folder(folder_of(&target))?;
             let incomplete = incomplete_file(&target, folder.path())?;
-            let written = write(incomplete.path())?;
+            let written = write(&incomplete)?;
             self.persist(incomplete, &target)?;
             Ok(written)
         };
@@ -136,17 +133,17 @@ impl OutputFiles {
     }
 
     /// Gives a complete file its name.
-    fn persist(&self, complete: NamedTempFile, target: &Path) -> io::Result<()> {
+    fn persist(&self, complete: TempPath, target: &Path) -> io::Result<()> {
         let complete = if self.overwrites {
             complete
         } else {
             match complete.persist_noclobber(target) {
-                Err(PersistError { error, file }) if error.kind() != ErrorKind::AlreadyExists => file,
-                persisted => return persisted.map(drop).map_err(Into::into),
+                Err(PathPersistError { error, path }) if error.kind() != ErrorKind::AlreadyExists => path,
+                persisted => return persisted.map_err(Into::into),
             }
         };
         // Not every file system can refuse to replace a file.
-        complete.persist(target).map(drop).map_err(Into::into)
+        complete.persist(target).map_err(Into::into)
     }
 
     /// Writes `file` through a buffer.
@@ -171,19 +168,18 @@ fn target(file: &Path) -> PathBuf {
     fs::canonicalize(file).unwrap_or_else(|_| file.to_owned())
 }
 
-/// An empty file in `folder` that will be `file`: with its ending, and its permissions if it exists.
-fn incomplete_file(file: &Path, folder: &Path) -> Result<NamedTempFile> {
-    let name = file.file_name().unwrap_or_default().to_string_lossy();
-    let start = (name.len().saturating_sub(LONGEST_ENDING)..=name.len()).find(|at| name.is_char_boundary(*at));
-    let ending = start.map_or("", |start| &name[start..]);
-    let mut incomplete = tempfile::Builder::new();
-    incomplete.suffix(ending);
+/// An empty file in `folder` that will be `file`: with its name, by whose ending writers choose the compression, and its permissions if it
+/// exists.
+fn incomplete_file(file: &Path, folder: &Path) -> Result<TempPath> {
+    let incomplete = folder.join(file.file_name().unwrap_or_default());
+    let mut options = OpenOptions::new();
+    options.write(true).create_new(true);
     #[cfg(unix)]
     {
-        use std::os::unix::fs::PermissionsExt;
+        use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
         // Those of a new file, less what the user's mask takes.
-        let mode = fs::metadata(file).map_or(0o666, |metadata| metadata.permissions().mode());
-        incomplete.permissions(fs::Permissions::from_mode(mode));
+        options.mode(fs::metadata(file).map_or(0o666, |metadata| metadata.permissions().mode()));
     }
-    Ok(incomplete.tempfile_in(folder)?)
+    options.open(&incomplete)?;
+    Ok(TempPath::try_from_path(incomplete)?)
 }

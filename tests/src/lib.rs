@@ -3,6 +3,7 @@
 //!
 //! The tests of the noise observatory as a whole live in `tests/`.
 
+mod flight_log;
 mod generated;
 pub mod stm32f4;
 
@@ -11,6 +12,7 @@ pub mod stm32f4;
 #[doc = include_str!("../../docs/libraries.md")]
 struct Libraries;
 
+pub use flight_log::FlightLog;
 pub use generated::{generated, generated_within, writes_docs};
 use serial2::SerialPort;
 use std::fs::{File, OpenOptions};

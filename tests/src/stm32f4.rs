@@ -31,7 +31,8 @@ pub fn run(image: &Path, scenario: Scenario) -> Outcome {
     Outcome::from_bytes(&output.stdout).expect("the results of the run")
 }
 
-/// Commands that are typed one after the other on the console of an emulated board.
+/// Commands that are typed one after the other on the console of an emulated board, from the time at which it has probed its sensor: that is
+/// left alone for its start-up.
 #[derive(Debug)]
 pub struct Typed {
     /// Each with its time in s.
@@ -41,15 +42,26 @@ pub struct Typed {
 }
 
 impl Typed {
-    /// The commands, each with the time for its answer in s, from the time at which a board has probed its sensor: it is left alone for its
-    /// start-up.
-    pub fn new(commands: impl IntoIterator<Item = (String, f64)>) -> Self {
-        let mut typed = Self { commands: Vec::new(), end_s: 0.8 };
-        for (command, seconds) in commands {
-            typed.commands.push((typed.end_s, command));
-            typed.end_s += seconds;
-        }
-        typed
+    /// Without a command.
+    pub fn nothing() -> Self {
+        Self { commands: Vec::new(), end_s: 0.8 }
+    }
+
+    /// And then a command, with so many seconds for its answer.
+    #[must_use]
+    pub fn then(mut self, command: &str, seconds: f64) -> Self {
+        self.commands.push((self.end_s, command.to_owned()));
+        self.end_s += seconds;
+        self
+    }
+
+    /// And then the steps of the bench, each with the longest time for its answer in s, on a board whose report takes `report_s`.
+    #[must_use]
+    pub fn then_steps(self, steps: impl IntoIterator<Item = (String, f64)>, report_s: f64) -> Self {
+        steps.into_iter().fold(self, |typed, (command, longest_s)| {
+            let seconds = answer_time(&command, longest_s, report_s);
+            typed.then(&command, seconds)
+        })
     }
 
     /// The times, in s, and the keys.
@@ -74,7 +86,7 @@ impl Typed {
 
 /// Time in s that is enough for the answer to a step of the bench by an emulated board whose report takes `report_s`; the step itself
 /// allows `longest_s`.
-pub fn answer_time(command: &str, longest_s: f64, report_s: f64) -> f64 {
+fn answer_time(command: &str, longest_s: f64, report_s: f64) -> f64 {
     match command.split(' ').next().unwrap_or_default() {
         "w" if command == "w 1" => longest_s,
         "r" => report_s,

@@ -4,9 +4,9 @@ use crate::harness::{IMAGE, drive};
 use crate::same_report::{TOLERANCE_OF_SIMULATION, differences_from_command};
 use emulation::{Outcome, Scenario, Sensor};
 use link::{Decoder, Message, Received};
-use observatory::bench::{BenchPlan, BenchRun, Step, checks, write_table};
+use observatory::bench::{BenchPlan, BenchRun, checks, write_table};
 use serde_json::json;
-use system_tests::stm32f4::{Typed, answer_time, h405_image, run};
+use system_tests::stm32f4::{Typed, h405_image, run};
 
 /// One message of each kind, the terms and regressors of a channel among them.
 const KEPT: &[u8] = include_bytes!("../../../firmware/link/tests/kept_stream/version-4-mixed-alarm.bin");
@@ -20,12 +20,9 @@ const SHORT: BenchPlan = BenchPlan { reads: 10_000, noise_s: 1.5, bursts_s: 2.0 
 /// [`SHORT`], each with its command.
 fn answers() -> Vec<(String, Vec<u8>)> {
     // The first report follows after four seconds of samples, the second after seven; the recording lasts six.
-    let before = [("i 0", 4.0), ("r", REPORT_S), ("r", REPORT_S), ("w 1", 6.0), ("w 0", 0.2)];
-    let bench = SHORT.steps().into_iter().map(|Step { command, seconds, .. }| {
-        let seconds = answer_time(&command, seconds, REPORT_S);
-        (command, seconds)
-    });
-    let typed = Typed::new(before.map(|(command, seconds)| (command.to_owned(), seconds)).into_iter().chain(bench));
+    let before =
+        Typed::nothing().then("i 0", 4.0).then("r", REPORT_S).then("r", REPORT_S).then("w 1", 6.0).then("w 0", 0.2);
+    let typed = before.then_steps(SHORT.steps().into_iter().map(|step| (step.command, step.seconds)), REPORT_S);
     let keys = typed.keys().map(|(at_s, text)| (at_s, text.into_bytes())).collect();
     let (sensor, seconds) = (Some(Sensor::Published(41)), typed.end_s);
     let Outcome { received, sensor, .. } = run(h405_image(), Scenario { sensor, keys, seconds, ..Scenario::default() });

@@ -110,9 +110,13 @@ pub fn describe(finding: &Finding, shown: &[ShownEffect]) -> FindingText {
     }
 }
 
+/// The largest of a finding's shares by channel, percent; 0 without one.
+pub(crate) fn largest(shares: &BTreeMap<String, f64>) -> f64 {
+    shares.values().copied().fold(0.0, f64::max)
+}
+
 /// Largest share of the variance, that around a minute, and the second half's confirmation; empty if unknown.
 fn weight(finding: &Finding) -> String {
-    let largest = |shares: &BTreeMap<String, f64>| shares.values().copied().fold(0.0, f64::max);
     let percent = |share: f64| (share >= 0.5).then(|| significant(share, 2));
     let minute = percent(largest(&finding.minute_percent)).map(|share| format!(", {share} % around τ = 1 min"));
     let share = percent(largest(&finding.share_percent))
@@ -127,7 +131,7 @@ fn weight(finding: &Finding) -> String {
 
 /// Reduction of σ, %, in the channel with the largest share; `None` if unknown.
 fn gain(finding: &Finding) -> Option<String> {
-    let share = finding.share_percent.values().copied().fold(0.0, f64::max) / 100.0;
+    let share = largest(&finding.share_percent) / 100.0;
     (share > 0.0 && share < 1.0).then(|| significant(100.0 * (1.0 - (1.0 - share).sqrt()), 2))
 }
 

@@ -1,9 +1,8 @@
 //! The live view of a growing record: verdict, curves, findings, health of the source.
 
 use crate::finding_text::FindingText;
-use crate::summary::{self, CoefficientTable};
+use crate::summary::CoefficientTable;
 use crate::terminal::table_lines;
-use noise_analysis::report::Report;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style};
@@ -69,29 +68,6 @@ pub struct LiveView {
 }
 
 impl LiveView {
-    /// From a report; `health` and `status` are those of its source.
-    #[must_use]
-    pub fn from_report(report: &Report, source: Option<&str>, health: String, status: String) -> Self {
-        let curve = |channel: &noise_analysis::report::ChannelReport| LiveCurve {
-            channel: channel.name.clone(),
-            unit: channel.unit.clone(),
-            points: channel.curve.iter().map(|point| (point.tau_s, point.adev)).collect(),
-        };
-        let contradicted = summary::contradictions(report).into_iter().next();
-        let contradicted = contradicted.map(|first| format!("Model is off: {first}."));
-        Self {
-            headline: summary::headline(report, source).join("   "),
-            sentences: summary::record_sentences_in_short(report).join(" "),
-            tables: summary::coefficient_tables(report),
-            curves: report.channels.iter().map(curve).collect(),
-            findings: summary::findings(report).0,
-            unexplained: summary::unexplained(report),
-            advice: contradicted.into_iter().chain(summary::next_steps(report)).collect(),
-            health,
-            status,
-        }
-    }
-
     /// Draws on the whole frame, at least 80 columns by 24 rows.
     pub fn draw(&self, frame: &mut Frame<'_>, group: CurveGroup, in_colour: bool) {
         let area = frame.area();

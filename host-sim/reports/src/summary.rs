@@ -1,7 +1,9 @@
 //! The summary of a report: trust, coefficients, contradictions, next steps.
 
 use crate::coefficients;
-use crate::finding_text::{ALL_CHANNELS, FindingText, SENSED, channel_list, departure, describe, shown_effects};
+use crate::finding_text::{
+    ALL_CHANNELS, FindingText, SENSED, channel_list, departure, describe, largest, shown_effects,
+};
 use crate::formatting::{count, enumerated, words};
 use crate::part_note;
 use crate::rounding::{
@@ -17,7 +19,6 @@ use noise_analysis::report::{
 };
 use noise_analysis::report::{DataSheetReport, TermReport};
 use noise_analysis::units::conversions;
-use std::collections::BTreeMap;
 use time_base::TimeRange;
 
 /// Deviance per point on the unseen half above which a model is marked; a true model has about 1.
@@ -817,7 +818,6 @@ pub(crate) fn finding_order(report: &Report) -> Vec<usize> {
             _ => 1 + u8::from(!channels.iter().any(is_inertial)),
         }
     };
-    let largest = |shares: &BTreeMap<String, f64>| shares.values().copied().fold(0.0, f64::max);
     let shares = |index: &usize| {
         let Finding { share_percent, minute_percent, .. } = &report.findings[*index];
         [minute_percent, share_percent].map(largest)

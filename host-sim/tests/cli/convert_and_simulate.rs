@@ -125,7 +125,7 @@ fn a_report_is_exported() {
     assert!(notes.contains(lacks), "{notes}");
     let notes = run(&["export", &report, "-o", &second]);
     assert!(notes.contains(lacks), "{notes}");
-    // Of the recording itself, to standard output.
+    // The recording itself goes to standard output.
     let of_table = imunoise(&["export", table, "-o", "kalibr=-"]);
     assert!(String::from_utf8_lossy(&of_table.stderr).contains(lacks));
     let [first, second] = [first, second].map(|file| std::fs::read_to_string(file).expect("a file"));

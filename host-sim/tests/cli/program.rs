@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Output};
 use std::thread;
 use std::time::Duration;
+use system_tests::FlightLog;
 use tempfile::TempDir;
 
 /// Runs the program.
@@ -104,14 +105,12 @@ pub(crate) fn send(port: &mut impl Write, unsent: &mut Vec<u8>) {
 
 /// A log of PX4 whose rows are a gyroscope at 250 Hz.
 pub(crate) fn flight_log(rows: u64) -> Vec<u8> {
-    let record =
-        |kind: u8, body: &[u8]| [&u16::try_from(body.len()).expect("short").to_le_bytes()[..], &[kind], body].concat();
-    let mut log = [&b"ULog\x01\x12\x35\x01"[..], &[0; 8]].concat();
-    log.extend(record(b'F', b"sensor_gyro:uint64_t timestamp;float x;float y;float z;"));
-    log.extend(record(b'A', &[&[0, 0, 0][..], b"sensor_gyro"].concat()));
+    let mut log = FlightLog::empty();
+    log.add(b'F', b"sensor_gyro:uint64_t timestamp;float x;float y;float z;");
+    log.add(b'A', b"\0\0\0sensor_gyro");
     for row in 0..rows {
         let axes = [0u64, 1, 2].map(|axis| ((row + axis) * 7919 % 1009) as f32 * 1e-5 - 5e-3).map(f32::to_le_bytes);
-        log.extend(record(b'D', &[&[0, 0][..], &(row * 4000).to_le_bytes(), &axes.concat()].concat()));
+        log.add(b'D', &[&[0, 0][..], &(row * 4000).to_le_bytes(), &axes.concat()].concat());
     }
-    log
+    log.0
 }

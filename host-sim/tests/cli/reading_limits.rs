@@ -9,6 +9,7 @@ use std::io::Write;
 use std::process::{Command, Stdio};
 use std::thread;
 use std::time::Duration;
+use system_tests::FlightLog;
 use tempfile::tempdir;
 
 /// Processor time, s, and memory that any command on a file below 1 MB may take.
@@ -67,16 +68,14 @@ fn brackets_in_the_header_of_an_array(levels: usize) -> Vec<u8> {
 
 /// A ULog with definitions that use each other.
 fn definitions(fields: impl Fn(usize) -> String, levels: usize) -> Vec<u8> {
-    let record =
-        |kind: u8, body: &[u8]| [&u16::try_from(body.len()).expect("short").to_le_bytes()[..], &[kind], body].concat();
-    let mut log = [&b"ULog\x01\x12\x35\x01"[..], &[0; 8]].concat();
+    let mut log = FlightLog::empty();
     for level in 0..levels {
-        log.extend(record(b'F', format!("a{level}:{}", fields(level)).as_bytes()));
+        log.add(b'F', format!("a{level}:{}", fields(level)).as_bytes());
     }
-    log.extend(record(b'F', format!("a{levels}:uint64_t timestamp;float x;float y;float z;").as_bytes()));
-    log.extend(record(b'A', &[&[0, 0, 0][..], b"a0"].concat()));
-    log.extend(record(b'D', &[0; 40]));
-    log
+    log.add(b'F', format!("a{levels}:uint64_t timestamp;float x;float y;float z;").as_bytes());
+    log.add(b'A', b"\0\0\0a0");
+    log.add(b'D', &[0; 40]);
+    log.0
 }
 
 fn one_definition(level: usize) -> String {

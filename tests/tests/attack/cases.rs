@@ -17,7 +17,7 @@ use std::path::Path;
 use std::process::Command;
 use std::thread;
 use std::time::Duration;
-use system_tests::pseudo_terminals;
+use system_tests::{FlightLog, pseudo_terminals};
 use tempfile::TempDir;
 
 /// A kind of attack: its name, and how it is run.
@@ -420,15 +420,10 @@ fn nested(campaign: &mut Campaign, rng: &mut ChaCha8Rng) {
             format!("{{\"a\": {}1{}}}\n", "[".repeat(levels), "]".repeat(levels)).repeat(3).into_bytes(),
         ),
         4 => {
-            let mut log = b"ULog\x01\x12\x35\x01\0\0\0\0\0\0\0\0".to_vec();
-            for level in 0..levels {
-                let text = format!("a{level}:a{} x;", level + 1);
-                log.extend((text.len() as u16).to_le_bytes());
-                log.push(b'F');
-                log.extend(text.bytes());
-            }
-            log.extend(b"\x05\0A\0\0\0a0");
-            ("nested.ulg", log)
+            let mut log = FlightLog::empty();
+            (0..levels).for_each(|level| log.add(b'F', format!("a{level}:a{} x;", level + 1).as_bytes()));
+            log.add(b'A', b"\0\0\0a0");
+            ("nested.ulg", log.0)
         }
         _ => {
             // Each definition has two of the next.

@@ -4,6 +4,7 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 use std::io::{Cursor, Write as _};
+use system_tests::FlightLog;
 
 /// Names of the files that the noise is written to; the first ones are text.
 pub(crate) const FORMS: [&str; 12] = [
@@ -158,28 +159,22 @@ impl Noise {
 
     /// `sensor_gyro` of PX4, in rad/s (ULog file format).
     fn ulog(&self) -> Vec<u8> {
-        fn add(log: &mut Vec<u8>, kind: u8, payload: &[u8]) {
-            log.extend((payload.len() as u16).to_le_bytes());
-            log.push(kind);
-            log.extend(payload);
-        }
-        let mut log = b"ULog\x01\x12\x35\x01\0\0\0\0\0\0\0\0".to_vec();
-        add(&mut log, b'B', &[0; 40]);
-        add(
-            &mut log,
+        let mut log = FlightLog::empty();
+        log.add(b'B', &[0; 40]);
+        log.add(
             b'F',
             b"sensor_gyro:uint64_t timestamp;uint64_t timestamp_sample;uint32_t device_id;float x;float y;float z;",
         );
-        add(&mut log, b'A', b"\0\0\0sensor_gyro");
+        log.add(b'A', b"\0\0\0sensor_gyro");
         for (at, time) in self.times_us().enumerate() {
             let mut payload = vec![0, 0];
             payload.extend((time + 50).to_le_bytes());
             payload.extend(time.to_le_bytes());
             payload.extend([1, 0, 0, 0]);
             payload.extend(self.rates(at).iter().flat_map(|rate| (rate.to_radians() as f32).to_le_bytes()));
-            add(&mut log, b'D', &payload);
+            log.add(b'D', &payload);
         }
-        log
+        log.0
     }
 
     /// Messages `IMU` of ArduPilot, in rad/s.

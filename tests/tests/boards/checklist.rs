@@ -2,18 +2,15 @@
 
 use super::bench::{feather_image, run};
 use emulation::{FEATHER, Outcome, Scenario, Sensor};
-use host_sim::bench::{BenchPlan, Step, Transcript, checks, write_table};
+use host_sim::bench::{BenchPlan, Transcript, checks, write_table};
 use link::Decoder;
-use system_tests::stm32f4::{Typed, answer_time};
+use system_tests::stm32f4::Typed;
 
 const PLAN: BenchPlan = BenchPlan { reads: 10_000, noise_s: 1.5, bursts_s: 2.0 };
 
 /// The steps as they are typed on a board whose report takes `report_s`.
 fn typed(report_s: f64) -> Typed {
-    Typed::new(PLAN.steps().into_iter().map(|Step { command, seconds, .. }| {
-        let seconds = answer_time(&command, seconds, report_s);
-        (command, seconds)
-    }))
+    Typed::nothing().then_steps(PLAN.steps().into_iter().map(|step| (step.command, step.seconds)), report_s)
 }
 
 /// Asserts that every check passes, of what a port has sent, each byte with its time in ns.

@@ -1,8 +1,5 @@
 //! The Allan variance of a bias that was computed from something measured.
 
-/// Relative difference of two octaves' averaging times that is one of rounding.
-const SAME_TIME: f64 = 1e-6;
-
 /// The Allan variance of a bias over a record, at averaging times that are sample periods times powers of two.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ResponseVariance {
@@ -11,8 +8,8 @@ pub struct ResponseVariance {
 }
 
 impl ResponseVariance {
-    /// Of a bias of which the mean over each stretch of `width` periods of `period_s` is known: from the averaging factor `width` on, below
-    /// which it hardly changes.
+    /// The variance of a bias whose mean over each stretch of `width` periods of `period_s` is known: from the averaging factor `width` on,
+    /// below which it hardly changes.
     pub(crate) fn from_means(means: &[f64], width: u64, period_s: f64) -> Self {
         // The sum of the bias over the first sample periods, at the ends of the stretches.
         let mut sums = vec![0.0];
@@ -36,9 +33,9 @@ impl ResponseVariance {
         Self { octaves: factors.take_while(|n| 2 * n <= length).map(|n| (n as f64 * period_s, avar(n))).collect() }
     }
 
-    /// At the averaging time `tau_s`; 0 where it is not known.
+    /// At the octave of the averaging time `tau_s`; 0 where it is not known.
     pub(crate) fn at(&self, tau_s: f64) -> f64 {
-        let is_at = |of: f64| (of / tau_s - 1.0).abs() < SAME_TIME;
+        let is_at = |of: f64| (of / tau_s).log2().round() == 0.0;
         self.octaves.iter().find(|(of, _)| is_at(*of)).map_or(0.0, |(_, avar)| *avar)
     }
 }
@@ -80,6 +77,6 @@ mod tests {
                 sine.at(n as f64 * PERIOD_S)
             );
         }
-        assert_eq!((ramp.at(8.0 * PERIOD_S), ramp.at(20.0 * PERIOD_S)), (0.0, 0.0), "not known");
+        assert_eq!((ramp.at(8.0 * PERIOD_S), ramp.at(f64::from(1 << 20) * PERIOD_S)), (0.0, 0.0), "not known");
     }
 }

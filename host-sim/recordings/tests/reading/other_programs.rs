@@ -5,7 +5,7 @@ use recordings::file_format::{RecordedFormat, RecordedInput};
 use recordings::sample_stream::StreamError;
 use serde_json::Value;
 use std::path::PathBuf;
-use system_tests::recorded_samples;
+use system_tests::{FlightLog, recorded_samples};
 
 pub(crate) struct Sample {
     pub(crate) name: String,
@@ -117,41 +117,37 @@ fn several_sensors_of_a_file_have_a_name_each() {
 
 #[test]
 fn a_field_without_a_number_leaves_the_others() {
-    let record =
-        |kind: u8, body: &[u8]| [&u16::try_from(body.len()).expect("short").to_le_bytes()[..], &[kind], body].concat();
-    let mut log = [&b"ULog\x01\x12\x35\x01"[..], &[0; 8]].concat();
-    log.extend(record(b'F', b"sensor_gyro:uint64_t timestamp;float[0] w;float x;float y;float z;"));
-    log.extend(record(b'A', &[&[0, 0, 0][..], b"sensor_gyro"].concat()));
+    let mut log = FlightLog::empty();
+    log.add(b'F', b"sensor_gyro:uint64_t timestamp;float[0] w;float x;float y;float z;");
+    log.add(b'A', b"\0\0\0sensor_gyro");
     for row in 0..100u64 {
         let values = [0.1f32, 0.2, 0.3].map(|value| value * ((row * 7919) % 13) as f32).map(f32::to_le_bytes).concat();
-        log.extend(record(b'D', &[&[0, 0][..], &(row * 10_000).to_le_bytes(), &values].concat()));
+        log.add(b'D', &[&[0, 0][..], &(row * 10_000).to_le_bytes(), &values].concat());
     }
-    let read = read("empty.ulg", &log, &[""; 0]).expect("a log");
+    let read = read("empty.ulg", &log.0, &[""; 0]).expect("a log");
     assert_eq!((read.samples.len(), read.samples.channels.len()), (100, 3));
 }
 
 #[test]
 fn data_that_were_appended_to_a_log_are_no_message() {
-    let record =
-        |kind: u8, body: &[u8]| [&u16::try_from(body.len()).expect("short").to_le_bytes()[..], &[kind], body].concat();
     let log = |flags: [u8; 8], has_appended: bool| {
-        let mut log = [&b"ULog\x01\x12\x35\x01"[..], &[0; 8]].concat();
-        let at_flags = log.len();
-        log.extend(record(b'B', &[&[0; 8][..], &flags, &[0; 24]].concat()));
-        log.extend(record(b'F', b"sensor_gyro:uint64_t timestamp;float x;float y;float z;"));
-        log.extend(record(b'A', &[&[0, 0, 0][..], b"sensor_gyro"].concat()));
+        let mut log = FlightLog::empty();
+        let at_flags = log.0.len();
+        log.add(b'B', &[&[0; 8][..], &flags, &[0; 24]].concat());
+        log.add(b'F', b"sensor_gyro:uint64_t timestamp;float x;float y;float z;");
+        log.add(b'A', b"\0\0\0sensor_gyro");
         for row in 0..100u64 {
             let values = [1u64, 2, 3].map(|axis| (axis * row * 7919 % 13) as f32 * 0.01).map(f32::to_le_bytes).concat();
-            log.extend(record(b'D', &[&[0, 0][..], &(row * 10_000).to_le_bytes(), &values].concat()));
+            log.add(b'D', &[&[0, 0][..], &(row * 10_000).to_le_bytes(), &values].concat());
         }
         if has_appended {
-            let cut = record(b'D', &[&[0, 0][..], &1_000_000u64.to_le_bytes(), &[0; 12]].concat());
-            log.extend(&cut[..7]);
-            let offset = (log.len() as u64).to_le_bytes();
-            log[at_flags + 3 + 16..][..8].copy_from_slice(&offset);
-            log.extend(record(b'L', b"6________hardfault"));
+            let cut = log.0.len() + 7;
+            log.add(b'D', &[&[0, 0][..], &1_000_000u64.to_le_bytes(), &[0; 12]].concat());
+            log.0.truncate(cut);
+            log.0[at_flags + 3 + 16..][..8].copy_from_slice(&(cut as u64).to_le_bytes());
+            log.add(b'L', b"6________hardfault");
         }
-        log
+        log.0
     };
     for appended in [false, true] {
         let flags = [u8::from(appended), 0, 0, 0, 0, 0, 0, 0];

@@ -1,18 +1,27 @@
 //! The live screen on a terminal in memory.
 
 use crate::fixture;
+use noise_analysis::report::ChannelReport;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::buffer::Buffer;
 use ratatui::style::Color;
 use reports::finding_text::FindingText;
-use reports::live::{CurveGroup, LiveView};
+use reports::live::{CurveGroup, LiveCurve, LiveView};
+use reports::summary;
 
 fn view() -> LiveView {
     let health = "Health: 1,000,000 samples used, 212 lost, 3 refused, 0 used with a warning.".to_owned();
     let status = "replayed 12 min of 2 h 47 min, 60 times real time".to_owned();
-    let mut view = LiveView::from_report(&fixture::report(), Some("run1.csv.gz"), health, status);
-    view.findings = vec![FindingText {
+    let report = fixture::report();
+    let curve = |channel: &ChannelReport| LiveCurve {
+        channel: channel.name.clone(),
+        unit: channel.unit.clone(),
+        points: channel.curve.iter().map(|point| (point.tau_s, point.adev)).collect(),
+    };
+    let contradicted = summary::contradictions(&report).into_iter().next();
+    let contradicted = contradicted.map(|first| format!("Model is off: {first}."));
+    let findings = vec![FindingText {
         channels: "gyro z".to_owned(),
         channel_count: 1,
         physics: String::new(),
@@ -21,8 +30,17 @@ fn view() -> LiveView {
         step: None,
         weight: String::new(),
     }];
-    view.unexplained = vec!["gyro z: σ is 9.0 % above the model around τ = 80 s".to_owned()];
-    view
+    LiveView {
+        headline: summary::headline(&report, Some("run1.csv.gz")).join("   "),
+        sentences: summary::record_sentences_in_short(&report).join(" "),
+        tables: summary::coefficient_tables(&report),
+        curves: report.channels.iter().map(curve).collect(),
+        findings,
+        unexplained: vec!["gyro z: σ is 9.0 % above the model around τ = 80 s".to_owned()],
+        advice: contradicted.into_iter().chain(summary::next_steps(&report)).collect(),
+        health,
+        status,
+    }
 }
 
 fn drawn(view: &LiveView, columns: u16, rows: u16, group: CurveGroup, in_colour: bool) -> Buffer {

@@ -14,7 +14,6 @@ use crate::effects::{AddedVariance, AveragingTime};
 use crate::report::{ChannelReport, CurvePoint};
 use crate::rivals::cause::Shown;
 use measurement::{Quantity, SensorProfile};
-use std::f64::consts::SQRT_2;
 
 /// Averaging time for an angle or a velocity, s.
 const MINUTE_S: f64 = 60.0;
@@ -36,7 +35,7 @@ impl Shares {
             .filter(|(point, _)| point.n <= channel.samples / 8)
             .filter_map(|(point, adev)| Some((point.tau_s, percent(shown, channels, profile, point, adev * adev)?)))
             .collect();
-        let is_minute = |(tau_s, _): &&(f64, f64)| (MINUTE_S / SQRT_2..MINUTE_S * SQRT_2).contains(tau_s);
+        let is_minute = |(tau_s, _): &&(f64, f64)| (tau_s / MINUTE_S).log2().round() == 0.0;
         let after_minute = shares.iter().find(is_minute).map(|of| of.1);
         let largest = shares.iter().map(|of| of.1).fold(0.0, f64::max);
         (largest > 0.0).then_some(Self { largest, after_minute })
