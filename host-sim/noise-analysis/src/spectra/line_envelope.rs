@@ -43,8 +43,6 @@ const SAME: f64 = 1.5;
 pub struct Modulation {
     /// Hz.
     pub frequency: MeasuredValue,
-    /// Deviation of the line alone over that of all lines merged with it.
-    pub of_line: f64,
     /// Relative amplitude of the change, or of the phase in rad.
     pub depth: MeasuredValue,
     /// True if the phase changes, not the amplitude.
@@ -106,7 +104,6 @@ impl Modulation {
         let relative = 1.0 / (2.0 * ratio).sqrt();
         Some(Self {
             frequency: MeasuredValue { value: frequency, error: 3f64.sqrt() / (PI * rest.duration()) * relative },
-            of_line: 1.0,
             depth: MeasuredValue { value: depth, error: depth * relative },
             of_phase: matches!(part, Part::Quadrature),
             statistic: 2.0 * ratio,
@@ -344,8 +341,7 @@ mod tests {
     fn lines_at_multiples_of_a_change_are_its_sidebands() {
         let change = |turns: f64| MeasuredValue { value: turns / 400.0, error: 0.01 / 400.0 };
         let (frequency, depth) = (change(8.0), change(1.0));
-        let found =
-            Modulation { frequency, of_line: 1.0, depth, of_phase: false, statistic: 100.0, with_multiples: 100.0 };
+        let found = Modulation { frequency, depth, of_phase: false, statistic: 100.0, with_multiples: 100.0 };
         let is_sideband = |turns: f64| found.is_sideband(turns / 400.0, 400.0);
         assert!([8.0, -24.0, 40.5].into_iter().all(is_sideband));
         // The fifth has one part in 25 of 25 times the noise.
