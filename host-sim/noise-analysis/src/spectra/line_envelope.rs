@@ -4,11 +4,13 @@
 //! In noise their ordinates are exponential; a change is the coherent sum of two sidebands. Wandering falls as 1/f² to
 //! the noise (D. B. Leeson, Proc. IEEE 54, 1966).
 
+use super::harmonics::nearest_multiple;
 use super::line_models::{Sine, for_each_phase};
 use super::periodogram::taper;
 use super::whittle::{Sign, SpectralBand, fit_mixture};
 use crate::bounds::MeasuredValue;
 use crate::distributions::NORMAL_975;
+use crate::minimum::summit;
 use crate::samples::uniform_series::UniformSeries;
 use fourier::Complex;
 use std::f64::consts::{PI, TAU};
@@ -57,9 +59,8 @@ impl Modulation {
     /// True if a line at a distance, Hz, from the modulated one is a sideband, at a multiple of the change.
     pub(super) fn is_sideband(&self, distance: f64, duration: f64) -> bool {
         let highest = highest_multiple(0.5 * self.statistic);
-        let multiple = (distance.abs() / self.frequency.value).round().clamp(1.0, highest);
-        let error = (multiple - 1.0) * self.frequency.error;
-        (distance.abs() - multiple * self.frequency.value).abs() < (SAME / duration).hypot(NORMAL_975 * error)
+        let (multiple, distance) = nearest_multiple(distance.abs(), self.frequency.value, highest);
+        distance < (SAME / duration).hypot(NORMAL_975 * (multiple - 1.0) * self.frequency.error)
     }
 
     /// The clearest change of `sine` in `rest`; `None` if noise of `density`, unit²/Hz, or another line explains it.
@@ -181,11 +182,9 @@ impl Envelope {
 
     /// The maximum near `periods` a record.
     fn vertex(&self, part: Part, periods: f64) -> f64 {
-        AROUND.into_iter().fold(periods, |at, step| {
-            let [left, middle, right] = [at - step, at, at + step].map(|at| self.power(part, at));
-            let curvature = 2.0 * middle - left - right;
-            if curvature > 0.0 { at + (0.5 * step * (right - left) / curvature).clamp(-step, step) } else { at }
-        })
+        AROUND
+            .into_iter()
+            .fold(periods, |at, step| at + step * summit([at - step, at, at + step].map(|at| self.power(part, at))))
     }
 
     fn without(&self, part: Part, periods: f64) -> Self {
@@ -215,10 +214,7 @@ fn over_wandering(envelope: &Envelope, part: Part, periods: f64, most: usize, un
     let rest = envelope.without(part, periods);
     let power = envelope.power(part, periods) / unit;
     let highest = highest_multiple(power);
-    let is_multiple = |at: f64| {
-        let multiple = (at / periods).round().clamp(1.0, highest);
-        (at - multiple * periods).abs() < OF_MULTIPLE
-    };
+    let is_multiple = |at: f64| nearest_multiple(at, periods, highest).1 < OF_MULTIPLE;
     let band =
         |periods: f64| SpectralBand { frequency: periods, density: rest.power(part, periods) / unit, ordinates: 1.0 };
     let beside: Vec<SpectralBand> = (1..=most).map(|at| at as f64).filter(|at| !is_multiple(*at)).map(band).collect();

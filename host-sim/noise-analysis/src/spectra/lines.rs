@@ -8,10 +8,11 @@ use super::alternation::Alternation;
 use super::found_sines::{FoundSine, FoundSines, is_on_skirts};
 use super::line_models::Sine;
 use super::periodogram::{PADDING, Periodogram};
+use super::spectral_lines::gain_of_mean;
 use super::whitened_spectrum::{Candidate, FEWEST_PERIODS, Resonance, SpectralLine, Spectrum, WhitenedSpectrum, refit};
 use crate::effects::findings::SIGNIFICANCE;
 use crate::samples::uniform_series::UniformSeries;
-use std::f64::consts::{LN_2, PI};
+use std::f64::consts::LN_2;
 
 pub(super) const MOST: usize = 6;
 /// Most resonances refitted when one is added: each fits the background again.
@@ -112,8 +113,7 @@ pub(crate) fn without_sines(mut series: UniformSeries) -> UniformSeries {
     for _ in 0..MOST {
         let Some(sine) = sine_that_stands_out(&means) else { break };
         means = sine.subtracted_from(&means);
-        let (half_turn, count) = (PI * sine.frequency * width, size as f64);
-        let gain = half_turn.sin() / (count * (half_turn / count).sin());
+        let gain = gain_of_mean(sine.frequency, width, size as u64);
         series = sine.scaled(1.0 / gain).delayed(delay).subtracted_from(&series);
     }
     series

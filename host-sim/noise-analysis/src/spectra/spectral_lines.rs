@@ -60,7 +60,7 @@ pub(crate) fn before_averaging(line: &MergedLine, width: f64, m: u64) -> Measure
 }
 
 /// Gain of the mean of `m` samples over `width` s at `frequency`, Hz: `sin(πfw)/(m·sin(πfw/m))`.
-fn gain_of_mean(frequency: f64, width: f64, m: u64) -> f64 {
+pub(super) fn gain_of_mean(frequency: f64, width: f64, m: u64) -> f64 {
     let (phase, m) = (PI * frequency * width, m as f64);
     phase.sin() / (m * (phase / m).sin())
 }

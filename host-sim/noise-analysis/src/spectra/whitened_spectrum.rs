@@ -8,6 +8,7 @@ use super::smooth_shape::{Background, Filters, LocalLevel, WINDOW};
 use crate::bounds::MeasuredValue;
 use crate::distributions::mean_ratio_tail;
 use crate::effects::findings::{REFUTED, SIGNIFICANCE};
+use crate::minimum::summit;
 use crate::samples::rounding::Rounding;
 use crate::samples::uniform_series::UniformSeries;
 use std::cell::OnceCell;
@@ -360,9 +361,7 @@ impl<'a> WhitenedSpectrum<'a> {
         let highest = near.max_by(|&a, &b| padded[a].total_cmp(&padded[b])).unwrap_or(1);
         let level = self.background.level(self.whitened(), highest / PADDING).value;
         // ln of a taper's main lobe is nearly a parabola.
-        let [left, here, right] = [highest - 1, highest, highest + 1].map(|at| padded[at].ln());
-        let curvature = 2.0 * here - left - right;
-        let shift = if curvature > 0.0 { (0.5 * (right - left) / curvature).clamp(-0.5, 0.5) } else { 0.0 };
+        let shift = summit([highest - 1, highest, highest + 1].map(|at| padded[at].ln())).clamp(-0.5, 0.5);
         let centre = (highest as f64 + shift) / PADDING as f64;
         let exceeds = |at: &usize| padded[*at] > level * (1.0 + EXCEEDS / self.independent.sqrt());
         let below = (1..highest).rev().take(MOST_REACHED).take_while(exceeds).count().max(PADDING).min(highest - 1);

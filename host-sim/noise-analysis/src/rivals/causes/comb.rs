@@ -2,6 +2,7 @@
 
 use super::line::{Frequency, Line, NORMAL_995};
 use super::waveform::{SQUARE_BY_CHANCE, by_channel, is_equal, is_square};
+use crate::spectra::nearest_multiple;
 
 /// Probability of chance below which lines are those of a comb.
 const BY_CHANCE: f64 = 0.01;
@@ -140,16 +141,15 @@ impl Lines<'_> {
         let change = modulation.map_or(0.0, |of| (of.frequency - carrier.frequency).abs());
         let at = |sideband: i32| {
             let offset = f64::from(sideband) * change;
-            let times = ((line.frequency - offset) / carrier.frequency).round();
+            let (times, distance) = nearest_multiple(line.frequency - offset, carrier.frequency, f64::INFINITY);
             let tooth = Tooth { harmonic: times as u32, sideband };
             let error_of_change = modulation.filter(|_| sideband != 0).map_or(0.0, |of| of.error.hypot(carrier.error));
             let error = (times * carrier.error).hypot(line.error).hypot(error_of_change);
             let width = 0.5 * (times * width_of_first).max(self.frequencies[number].width());
             let within = NORMAL_995 * error + width + 1.0 / self.duration_s;
-            let distance = (line.frequency - times * carrier.frequency - offset).abs();
             // The fundamental itself, in another channel, is a member already.
-            let is_other = tooth.harmonic >= 1 && tooth != Tooth::FUNDAMENTAL;
-            (is_other && distance < within).then_some((distance / within, Member { number, tooth, within }))
+            (tooth != Tooth::FUNDAMENTAL && distance < within)
+                .then_some((distance / within, Member { number, tooth, within }))
         };
         let sidebands = if beside.is_some() { -1..=1 } else { 0..=0 };
         sidebands.filter_map(at).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, member)| member)
@@ -187,17 +187,18 @@ impl Lines<'_> {
         let [low, middle, high] = [below, line, above].map(|number| self.best(number).frequency);
         let change = 0.5 * (high - low);
         let tooth = |number: usize| {
-            let sideband = ((self.best(number).frequency - middle) / change).round();
-            let multiple = sideband.abs();
+            let offset = self.best(number).frequency - middle;
+            let (multiple, distance) = nearest_multiple(offset.abs(), change, f64::INFINITY);
             let errors = error(number).hypot(error(line)).hypot(multiple * 0.5 * error(below).hypot(error(above)));
             let within = NORMAL_995 * errors + SHIFT_OF_NEIGHBOURS / self.duration_s;
             // One of 2k places near f₀, with the spread of unrelated lines that harmonics have.
             let by_chance = 4.0 * multiple * within / (middle * self.log_range()) * count as f64;
-            let is_further = (self.best(number).frequency - middle - sideband * change).abs() < within
+            let is_further = distance < within
                 && by_chance < BY_CHANCE
                 && self.in_one_channel([below, line, number]).next().is_some();
+            let sideband = if number == line { 0 } else { multiple.copysign(offset) as i32 };
             let is_of_three = [below, line, above].contains(&number);
-            (is_of_three || is_further).then_some((number, Tooth { harmonic: 1, sideband: sideband as i32 }))
+            (is_of_three || is_further).then_some((number, Tooth { harmonic: 1, sideband }))
         };
         Some(Comb { teeth: (0..count).filter_map(tooth).collect(), p_value })
     }
