@@ -158,7 +158,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     #[inline]
     pub fn push(&mut self, sample: i32) {
-        // Also true once in 2³² samples without need, which changes nothing.
+        // The subtraction wraps, so this is true once in 2³² samples without need: the slow path gives the same sums.
         if (self.elapsed as u32).wrapping_sub(self.settling) < Self::WARM as u32 - 1 {
             return self.push_unsettled(sample);
         }
@@ -185,7 +185,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.advance(Self::SHORT, middle);
     }
 
-    /// [`push`](Self::push) where a gap lies before the sample or an octave must leave out differences.
+    /// [`push`](Self::push) for a sample after a gap, or while an octave must leave out differences.
     #[inline(never)]
     fn push_unsettled(&mut self, sample: i32) {
         if self.pending > 0 {
@@ -205,14 +205,14 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.advance(0, middle);
     }
 
-    /// Passes `middle`, the sum that left the line above `level`, down all lines of which the newest sample ends a stride.
+    /// Passes `middle`, the sum that left the line above `level`, down all lines whose stride the newest sample ends.
     #[inline(never)]
     fn advance(&mut self, level: usize, mut middle: i64) {
         let (elapsed, newest) = (self.elapsed, self.sum);
         let due = (elapsed.trailing_zeros() as usize + 1).min(Self::LEVELS);
-        // As a slice: chained iterators would be kept on the stack, and the code for an index's panic linked.
+        // A slice: chained iterators would be kept on the stack, and an index would link the code of its panic.
         let lines = self.octaves.get_mut(Self::FINE + level..Self::FINE + due).unwrap_or_default();
-        // Shifts of 64 bits by a variable take ten instructions; a slot depends on bits below the 31st.
+        // 32 bits are enough for a slot, and a 64-bit shift by a variable takes ten instructions.
         let (mut step, mut reach) = ((elapsed >> level) as u32, 2 << (Self::FINE + level));
         for (at, octave) in (Self::FINE + level..).zip(lines) {
             let oldest = octave.exchange(step.into(), middle);
@@ -224,7 +224,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     }
 }
 
-// The page of the documentation has the methods in this order: `new`, `push`, `gap`, `curve`, `snapshot`, the others.
+// rustdoc lists the methods in this order: `new`, `push`, `gap`, `curve`, `snapshot`, the others.
 mod gap;
 
 pub(crate) mod checkpoint;
@@ -405,7 +405,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         (self.elapsed, self.pending)
     }
 
-    /// Slot of the sum of a step of a level in its line.
+    /// The slot of a step's sum in the line of its level.
     #[inline]
     const fn slot(step: u64) -> usize {
         step as usize & (OVERLAP - 1)
@@ -426,10 +426,8 @@ pub(crate) fn second_difference(newest: i64, middle: i64, oldest: i64) -> i64 {
 
 /// [`second_difference`] in words of any width `w`, which hold the sums modulo `2ʷ`.
 ///
-/// Congruences may be subtracted, so the result is congruent modulo `2ʷ` to the true difference `d = b − a` of the sums
-/// of the newest `n` samples and of the `n` before. Both are in `−2ʷ⁻¹ ..= 2ʷ⁻¹ − 1` if `|d| < 2ʷ⁻¹`, where congruent
-/// numbers are equal. Samples of `w/2` bits have `|d| ≤ n·(2^(w/2) − 1)`, below `2ʷ⁻¹` for `n ≤ 2^(w/2−1)`: for `n ≤
-/// 2³¹` in 64 bits, and the longest octave has `2³⁰`.
+/// The result is exact while the true difference is below `2ʷ⁻¹`. For samples of `w/2` bits it is, up to `n =
+/// 2^(w/2−1)`: up to `n = 2³¹` in 64 bits, and the longest octave has `2³⁰`.
 #[inline]
 fn wrapped_second_difference<W: Sub<Output = W> + Copy>(newest: W, middle: W, oldest: W) -> W {
     newest - middle - (middle - oldest)
@@ -439,7 +437,7 @@ fn wrapped_second_difference<W: Sub<Output = W> + Copy>(newest: W, middle: W, ol
 mod tests {
     use super::*;
 
-    /// Every sum of samples of 4 bits from every start of a running sum of 8 bits.
+    /// Tries all sums of 4-bit samples from every start of an 8-bit running sum.
     #[test]
     fn second_differences_of_wrapped_sums_are_exact_up_to_the_longest_averaging_time() {
         let word = |sum: i32| Wrapping(sum as i8);

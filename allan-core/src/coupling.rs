@@ -14,7 +14,7 @@ pub struct Covariance {
     pub n: u64,
     /// Half the mean product of the two channels' differences of averages, in the product of their units.
     pub covariance: f64,
-    /// Number of products that it is the mean of.
+    /// Number of products averaged.
     pub count: u64,
 }
 
@@ -43,7 +43,7 @@ pub struct Covariance {
 /// estimators must have started together and go through the same time: otherwise nothing is added and
 /// [`out_of_step`](Self::out_of_step) counts the sample.
 ///
-/// Samples that are missing in both channels raise shared noise by up to 1.5 times their share.
+/// Samples missing in both channels raise the covariance of shared noise by up to 1.5 times their fraction.
 ///
 /// # Range
 /// Exact for 2⁴⁰ samples within ±2²³. An octave whose sum overflows 128 bits has no covariance from then on.

@@ -146,7 +146,7 @@ impl<'a, const OCTAVES: usize> From<&'a Curve<OCTAVES>> for CurveView<'a> {
     }
 }
 
-/// Why a table is no [`Curve`]. Rows are counted from 0.
+/// The reason for which a table is not a [`Curve`]. Rows are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TableError {
@@ -242,7 +242,7 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
     /// ```
     ///
     /// # Errors
-    /// The first row that a curve cannot have.
+    /// A [`TableError`] with the first row that a curve cannot have.
     ///
     /// # Cost
     /// | `Curve::from_points` | Cortex-M4F | Cortex-M0+ |
@@ -348,14 +348,14 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self.points.retain(keep);
     }
 
-    /// The same curve in another unit: `avar` and its bounds are multiplied by the square of `lsb`, units per count.
+    /// Returns the curve in another unit: `avar` and its bounds are multiplied by the square of `lsb`, units per count.
     #[must_use]
     pub fn scaled(mut self, lsb: f64) -> Self {
         self.scale(lsb);
         self
     }
 
-    /// As [`scaled`](Self::scaled), in place.
+    /// Converts the curve to another unit in place: see [`scaled`](Self::scaled).
     pub fn scale(&mut self, lsb: f64) {
         let square = lsb * lsb;
         for point in &mut self.points {
@@ -377,8 +377,8 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         }
     }
 
-    /// Subtracts `variance` of its averaging factor from every point, up to nine tenths of the measured variance in
-    /// all.
+    /// Subtracts `variance(n)`, in the square of the unit, from the point at averaging factor `n`, for every point. At
+    /// most nine tenths of a measured variance are subtracted in all.
     #[cfg(feature = "host")]
     pub fn subtract_interpolation(&mut self, variance: impl Fn(u64) -> f64) {
         for point in &mut self.points {
@@ -403,7 +403,8 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
         self.points.extend(other.points.iter().copied());
     }
 
-    /// The same curve with the confidence of the variance fractions that `fractions` returns for each point.
+    /// Returns the curve with degrees of freedom and bounds from the variance fractions that `fractions` returns for
+    /// each point.
     #[must_use]
     pub fn with_confidence(mut self, mut fractions: impl FnMut(&AllanPoint) -> VarianceFractions) -> Self {
         self.set_confidence(&mut fractions);

@@ -69,7 +69,8 @@ fn fit_of<T: TermSet>(curve: CurveView, kinds: &[NoiseTerm]) -> Model {
     model
 }
 
-/// Fits the coefficients of `kinds` as [`fit`] does, and their shape parameters, starting from the given ones.
+/// Fits the coefficients of `kinds` as [`fit`] does, and their shape parameters ([`NoiseTerm::shape`]), starting from
+/// the given ones.
 ///
 /// # Cost
 /// | `fit::fit_shapes` | Cortex-M4F | Cortex-M0+ |
@@ -92,13 +93,14 @@ pub(crate) fn set_bounds(curve: CurveView, model: &mut Model) {
     bounds::set::<AllTerms>(curve, model);
 }
 
-/// As [`set_bounds`], with the shapes that are not `free` known exactly.
+/// Sets the bounds of `model`, which was fitted to `curve`; shapes that are not `free` count as exactly known.
 #[cfg(feature = "host")]
 pub(crate) fn set_free_bounds(curve: CurveView, model: &mut Model, free: FreeShapes) {
     bounds::set_free::<AllTerms>(curve, model, free);
 }
 
-/// Tests whether `model`, which was fitted to `curve`, describes it within its uncertainty.
+/// Tests whether `model`, which was fitted to `curve`, describes it within its uncertainty: the [`Goodness`] of the
+/// fit.
 ///
 /// # Cost
 /// | `fit::goodness` | Cortex-M4F | Cortex-M0+ |
@@ -153,7 +155,7 @@ pub(crate) fn estimate<T: TermSet>(
     model.set(curve.sample_period(), problem.terms());
 }
 
-/// How well a model describes the curve that it was fitted to.
+/// The goodness of a fit: how well a model describes the curve that it was fitted to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -214,7 +216,7 @@ pub(crate) struct Baseline<'a> {
     tried: Problem<AllTerms>,
 }
 
-/// By how much another set of terms fits better.
+/// The improvement of the fit by another set of terms.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Improvement {
     fall: f32,
@@ -235,7 +237,7 @@ impl Improvement {
 }
 
 impl<'a> Baseline<'a> {
-    /// To be filled in place: too large to be moved over a small stack.
+    /// An empty baseline, to be filled in place: it is too large to be moved over a small stack.
     #[inline(always)]
     pub(crate) const fn empty(curve: CurveView<'a>) -> Self {
         Self {
@@ -267,7 +269,7 @@ impl<'a> Baseline<'a> {
         self.deviance - self.tried.minimise(&self.points)
     }
 
-    /// [`fall`](Self::fall) where the Allan variances of some terms at some averaging factors are known.
+    /// [`fall`](Self::fall) with the `known` Allan variances of some terms at some averaging factors.
     #[cfg(feature = "host")]
     pub(crate) fn fall_with(&mut self, kinds: &[NoiseTerm], known: impl Fn(&NoiseTerm, u64) -> Option<f64>) -> f32 {
         self.tried.set_terms_with(&self.points, kinds, known);

@@ -33,13 +33,15 @@ pub fn percentage_accuracy(samples: u64, n: u64) -> f64 {
 }
 
 /// N: the value at τ = 1 s of the line of slope −½ through the longest interval of this slope left of the minimum.
+/// `None` if no two neighbouring points have this slope within [`LINE_TOLERANCE`].
 #[must_use]
 pub fn angle_random_walk<'a>(curve: impl Into<CurveView<'a>>) -> Option<SlopeEstimate> {
     let (points, lowest) = accurate_points(curve.into())?;
     on_line(&points[..=lowest], -0.5, 1.0)
 }
 
-/// B: the minimum of σ times `√(π/(2 ln 2))`, if it lies in a flat interval.
+/// B: the minimum of σ times `√(π/(2 ln 2))`. `None` if the minimum is not in an interval that is flat within
+/// [`FLAT_TOLERANCE`].
 #[must_use]
 pub fn bias_instability<'a>(curve: impl Into<CurveView<'a>>) -> Option<SlopeEstimate> {
     let (points, lowest) = accurate_points(curve.into())?;
@@ -49,6 +51,7 @@ pub fn bias_instability<'a>(curve: impl Into<CurveView<'a>>) -> Option<SlopeEsti
 }
 
 /// K: the value at τ = 3 s of the line of slope +½ through the longest interval of this slope right of the minimum.
+/// `None` if no two neighbouring points have this slope within [`LINE_TOLERANCE`].
 #[must_use]
 pub fn rate_random_walk<'a>(curve: impl Into<CurveView<'a>>) -> Option<SlopeEstimate> {
     let (points, lowest) = accurate_points(curve.into())?;

@@ -60,8 +60,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
 
     /// Replaces the state by one with these sums of `samples` samples; `missing` more were missing.
     ///
-    /// `sums` returns the [`octave_sums`](Self::octave_sums) of an octave; no difference will contain samples from
-    /// before and after.
+    /// `sums` returns the [`octave_sums`](Self::octave_sums) of an octave. No difference contains samples from before
+    /// and after this call.
     ///
     /// # Cost
     /// | `Cascade::restore` | Cortex-M4F | Cortex-M0+ |
@@ -124,7 +124,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         curve
     }
 
-    /// As [`rebuild_curve`](Self::rebuild_curve), for [`curve_without_confidence`](Self::curve_without_confidence).
+    /// Makes `curve` the [`curve_without_confidence`](Self::curve_without_confidence) of `samples` samples with the
+    /// octave sums that `sums` returns.
     pub fn rebuild_without_confidence(
         curve: &mut Curve<OCTAVES>,
         sample_period: f64,
@@ -133,7 +134,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     ) {
         let points = Self::points(samples, sums, |octave, sums, overlap, added: AddedVariance<f32>| {
             let n = 1_u64 << octave;
-            // Divided by one factor after the other, so that no intermediate value leaves the range of single precision.
+            // One division per factor keeps every intermediate value within the range of single precision.
             let measured = sums.squares as f32 / sums.count as f32 / n as f32 / (2 * n) as f32;
             let interpolation = added.subtracted(measured);
             AllanPoint {
@@ -147,7 +148,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         curve.fill_without_confidence(sample_period, samples, points);
     }
 
-    /// Makes `curve` the [`curve`](Self::curve) of `samples` samples with the sums of each octave that `sums` returns.
+    /// Makes `curve` the [`curve`](Self::curve) of `samples` samples with the octave sums that `sums` returns.
     pub fn rebuild_curve(
         curve: &mut Curve<OCTAVES>,
         sample_period: f64,
@@ -205,7 +206,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// See [`guide::costs`](crate::guide::costs) for how they are counted.
     ///
     /// # Errors
-    /// The error says what is wrong with the state.
+    /// The state has another version, type or size, a wrong checksum, or values that no samples lead to.
     pub fn read_serialized<'de, D: serde::Deserializer<'de>>(&mut self, deserializer: D) -> Result<(), D::Error> {
         crate::serialized::deserialize_in_place(deserializer, self)
     }
@@ -213,7 +214,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
     /// True if a serialised state has the version and the size of this type and a correct checksum.
     ///
     /// # Errors
-    /// The error says what is wrong with the state.
+    /// The state has another version, type or size, or a wrong checksum.
     pub fn check_serialized<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
         crate::serialized::check::<Self, D>(deserializer)
     }
@@ -266,7 +267,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> StateWords for Cascade<OCTAVES,
             return Some("the newest running sum is not the running sum");
         }
         for (k, octave) in self.octaves.iter().enumerate() {
-            // Sums of steps up to the start of the stretch are 0.
+            // The sums of steps before the first sample are 0.
             let step = self.elapsed >> k.saturating_sub(Self::FINE);
             let empty = |back: u64| step <= back && octave.line[Self::slot(step.wrapping_sub(back))] != 0;
             if (OVERLAP as u64..2 * OVERLAP as u64).any(empty) {

@@ -80,7 +80,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         snapshot
     }
 
-    /// As [`snapshot`](Self::snapshot), in place.
+    /// Copies the sums into `snapshot`, without a second copy on the stack.
     ///
     /// # Cost
     /// | `Cascade::snapshot_into` | Cortex-M4F | Cortex-M0+ |
