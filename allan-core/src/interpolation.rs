@@ -211,7 +211,7 @@ mod tests {
 
     /// A gap of 6 samples adds its squared error less `2·6/64` of it in the octave of 64.
     #[test]
-    fn what_a_gap_adds_becomes_less_with_its_length() {
+    fn the_variance_that_a_gap_adds_falls_with_its_length() {
         let tested = Interpolation::new(100, 50, 7_000);
         assert_close(added(tested, 64).variance, 14_000.0 * (1.0 - 12.0 / 64.0) / 64.0 / 1_000.0);
         assert_close(added(tested, 8).variance, 14_000.0 * (1.0 - 2.0 / 8.0) / 8.0 / 1_000.0);

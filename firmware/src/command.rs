@@ -375,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_changes_nothing() {
+    fn noise_runs_no_command_that_needs_a_whole_line() {
         let mut parser = CommandParser::default();
         let mut state = 1_u64;
         for _ in 0..1_000_000 {

@@ -230,7 +230,7 @@ mod tests {
 
     /// A covariance of 0 differs from a missing one.
     #[test]
-    fn a_covariance_of_zero_is_one() {
+    fn a_covariance_of_zero_counts_as_observed() {
         let mut estimators = Box::new([const { ChannelEstimator::new() }; CHANNELS.len()]);
         let mut sums = Box::new(CrossSums::new());
         for _ in 0..2048 {

@@ -205,7 +205,7 @@ fn an_item_of_no_bytes_is_no_record() {
 
 /// The flash does not take what is written, as when a debugger has locked it, or in an emulator.
 #[test]
-fn what_is_not_there_afterwards_is_not_called_written() {
+fn a_record_that_is_not_read_back_is_not_called_written() {
     let mut flash = SmallFlash::new();
     flash.ignores_writes = true;
     let (flash, done) = flash.write_record(&record(1));

@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_image_for_the_pico_is_refused() {
+    fn a_file_that_is_no_image_for_the_pico_is_refused() {
         assert!(matches!(from_elf(b"MZ"), Err(ImageError::Elf(_))));
         assert_eq!(from_elf(&elf(0x0800_0000, &[1])), Err(ImageError::NoFlash(0x1000_0000)));
         let whole = elf(0x1000_0000, &[1, 2, 3]);

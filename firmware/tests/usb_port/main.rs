@@ -196,7 +196,7 @@ fn too_much_input_is_counted() {
 /// No host reads while 36,000 lines are printed; then a terminal reads. It gets the lines that the queue held, whole,
 /// and all later ones. The others are counted.
 #[test]
-fn a_host_that_does_not_read_costs_what_it_does_not_read() {
+fn a_host_that_does_not_read_loses_only_the_lines_of_that_time() {
     let mut bench = Bench::new();
     bench.enumerate();
     bench.open();

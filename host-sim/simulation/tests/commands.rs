@@ -204,7 +204,7 @@ fn no_sequence_of_commands_stops_or_misconfigures_the_device() {
 
 /// Each bit of GLOB_CMD that writes the sensor's flash needs `arm`, which is valid for one write and ten seconds.
 #[test]
-fn what_writes_the_flash_of_the_sensor_needs_arming() {
+fn a_write_to_the_flash_of_the_sensor_needs_arming() {
     // Auto-null, factory restore and flash update (data sheet Rev. B, pages 10 and 13), also with other bits.
     for value in ["1", "2", "8", "0009"] {
         let mut session = Session::new(3);

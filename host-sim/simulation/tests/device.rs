@@ -319,7 +319,7 @@ fn a_sensor_that_was_reset_is_configured_again() {
 /// An epoch accumulates, reports, fits its model and begins again. From the second one on, the model of the previous
 /// epoch is validated.
 #[test]
-fn an_epoch_ends_with_a_report_and_its_model_is_checked_on_the_next() {
+fn an_epoch_ends_with_a_report_and_its_model_is_validated_on_the_next() {
     let mut device = device();
     let heard = after(&mut device, "i0\re20\r", 61 * SECOND);
     assert_eq!(heard.reports(), 3);
@@ -449,7 +449,7 @@ fn a_part_with_another_prod_id_is_used_if_asked_for() {
 
 /// A gyro whose self-test fails, as in motion, is marked in the report and in the table. All samples are used.
 #[test]
-fn a_failed_self_test_is_no_gate() {
+fn a_failed_self_test_excludes_no_sample() {
     let mut part = VirtualAdis16405::new(NoiseModel::paper(), 1);
     part.break_sensor(OutputRegister::GyroY);
     let mut device = Device::new(part, Device::blank_memory());

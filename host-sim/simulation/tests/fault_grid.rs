@@ -195,7 +195,7 @@ fn an_hour_with_each_fault() {
 /// self-test), a sensor without power or in reset for a second, and a USB port whose host does not read. All but the second and third last
 /// for 110 s.
 #[test]
-fn states_that_last_cost_no_sample_that_there_is() {
+fn a_lasting_state_costs_no_sample_that_the_sensor_delivers() {
     fn hold(device: &mut Device, flag: DiagnosisFlag, is_on: bool) {
         device.bus().part_mut().hold_flag(flag, is_on);
     }

@@ -104,7 +104,7 @@ fn a_log_is_read_behind_a_byte_order_mark_or_blank_lines() {
 }
 
 #[test]
-fn what_is_no_burst_of_the_driver_is_refused() {
+fn a_transaction_that_is_no_burst_of_the_driver_is_refused() {
     let zeros = |digits: usize| "0".repeat(digits);
     for (text, words) in [
         ("a,b\n1,2\n".to_owned(), &["line 1", "no known column", "gyro_x_counts"][..]),

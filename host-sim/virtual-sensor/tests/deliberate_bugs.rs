@@ -115,7 +115,7 @@ const BUGS: [Bug; 34] = [
         "at_0x09_the_driver_takes_the_safe_side"),
     bug("the wake-up pulse is 10 µs", "clock.rs",
         "wake_pulse_ns: 25_000,", "wake_pulse_ns: 10_000,",
-        "sleep_and_wake"),
+        "a_sleep_lasts_as_long_as_requested_or_until_the_part_is_woken"),
     bug("the precision auto-null is given 30 s, without its flash update", "clock.rs",
         "precision_auto_null_us: 31_000_000,", "precision_auto_null_us: 30_000_000,",
         "the_precision_auto_null_averages_for_thirty_silent_seconds"),

@@ -163,7 +163,7 @@ mod linux {
     }
 
     #[test]
-    fn probe_reset_and_all_channels() {
+    fn probe_and_reset_succeed_and_all_channels_read_as_sensed() {
         let (mut part, counts) = sensing();
         assert_eq!(probe(&mut part), (0x0000, 0x4015));
         // adis_reset, sw_reset_ms = 170.
@@ -178,7 +178,7 @@ mod linux {
 
     /// `adis16400_trigger_handler` sends two transfers in one message, at the clock for bursts.
     #[test]
-    fn a_burst() {
+    fn a_burst_reads_the_sensed_values() {
         let (mut part, counts) = sensing();
         let words = [[0x3E00].as_slice(), &[0; 12]].concat();
         let burst = Row { source: "adis_buffer.c:47", words: &words, low_ns: 0, high_ns: MESSAGE_NS };
@@ -190,7 +190,7 @@ mod linux {
     /// `adis16400_set_freq`: at 12.8 and 4 SPS it omits the −1 of the slow time base, so the rates are 10.57 and 3.78
     /// SPS.
     #[test]
-    fn rates() {
+    fn each_rate_has_its_register_value_and_its_sample_period() {
         for (millihertz, smpl_prd, hz) in [
             (819_200, 0x01, 819.2),
             (409_600, 0x03, 409.6),
@@ -232,7 +232,7 @@ mod linux {
     /// `adis16400_stop_device` writes SLP_CNT = 0x0100. The first frame of the next probe has chip select low for 8 µs and its delay of 50
     /// µs, which wakes the part (20 µs, Table 1). The part answers 4 ms later, during the wait for the self-test.
     #[test]
-    fn removed_and_probed_again() {
+    fn a_part_that_was_put_to_sleep_answers_the_next_probe() {
         let (mut part, counts) = sensing();
         probe(&mut part);
         write_16(&mut part, FAST_HZ, 0x3A, 0x0100);
@@ -338,7 +338,7 @@ mod psas {
     }
 
     #[test]
-    fn a_burst() {
+    fn a_burst_reads_the_sensed_values() {
         let (mut part, counts) = sensing();
         let words = [[0x3E00].as_slice(), &[0; 12]].concat();
         let burst = Row { source: "ADIS16405.c:47", words: &words, low_ns: 0, high_ns: 20_000 };
@@ -372,7 +372,7 @@ mod psas {
 
     /// `adis_reset` holds the reset line low for 500 ms.
     #[test]
-    fn the_reset_line() {
+    fn the_part_answers_after_its_reset_line_was_low() {
         let (mut part, _) = sensing();
         part.drive_reset(false);
         wait(&mut part, 500 * MS);
@@ -414,7 +414,7 @@ mod canopus {
     /// `aocs.c:160, 632`, then `configure_imu` (`aocs.c:270`) with the values of `aocs.h`; the registers are read back. SENS_AVG is written
     /// with the filter first, and the range of ±75 °/s keeps it at 64 taps.
     #[test]
-    fn identity_configuration_and_burst() {
+    fn identity_configuration_and_burst_read_as_written_and_sensed() {
         let (mut part, counts) = sensing();
         part.power_off();
         part.power_on();

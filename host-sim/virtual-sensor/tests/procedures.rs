@@ -228,7 +228,7 @@ fn a_flash_update_outlives_a_reset() {
 }
 
 #[test]
-fn sleep_and_wake() {
+fn a_sleep_lasts_as_long_as_requested_or_until_the_part_is_woken() {
     both_shells!(NoiseModel::noiseless(), |bus, imu|
         expect imu.sleep(Sleep::HalfSeconds(NonZeroU8::new(3).unwrap())) => Ok(());
         given slept = bus.part().now();

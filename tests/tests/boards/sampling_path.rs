@@ -144,7 +144,7 @@ const FLASH: Range<u32> = 0x1000_0000..0x1100_0000;
 /// While the flash takes commands nothing can be read from it: the functions that command it lie in RAM, call nothing in flash by its
 /// address, and know no address there. They call the boot ROM and the copy of the second stage through pointers.
 #[test]
-fn what_runs_while_the_flash_is_busy_does_not_use_it() {
+fn code_that_runs_while_the_flash_is_busy_does_not_use_it() {
     let image = Image::of_board("pico", PICO, &[]);
     let output = Command::new("arm-none-eabi-objdump")
         .args(["--disassemble-all", "--section=.data", "--demangle", "--no-show-raw-insn"])
