@@ -9,7 +9,7 @@ use serde::Serialize;
 use std::io::{self, Write};
 use virtual_sensor::SensorScenario;
 
-/// What each sentence has that no other one has, with its row in the table.
+/// A text that only one sentence contains, with the sentence's row in the table.
 const SENTENCES: [(&str, &str); 2] = [
     ("standard errors", "… at τ = …: σ is … the model (… standard errors)"),
     ("smaller error than it has", "a Kalman filter with the models of … would claim a smaller error than it has"),
@@ -26,7 +26,7 @@ pub struct ContradictionPlan {
     pub jobs: usize,
 }
 
-/// The answer of one record's report.
+/// The report of one record.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ContradictedRecord {
     pub seed: u64,
@@ -44,7 +44,7 @@ impl ContradictionPlan {
     /// Generates and analyses every record; `progress` gets the numbers of finished and of all records.
     ///
     /// # Errors
-    /// The error of the first record that has no timeline.
+    /// The error of the first record without a time base.
     pub fn run(&self, progress: impl Fn(usize, usize) + Sync) -> Result<ContradictionTable, ScoreError> {
         let seeds: Vec<u64> = (self.first_seed..self.first_seed + self.records).collect();
         let work = |&seed: &u64| {
@@ -61,7 +61,7 @@ impl ContradictionPlan {
 }
 
 impl ContradictionTable {
-    /// Writes the share of records with each sentence, and its count; unknown sentences as they are.
+    /// Writes the share of records with each sentence, and its count; an unknown sentence is written in full.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         let all = self.records.len();
         writeln!(out, "Sentences under \"Contradicted\", nothing hidden, {all} records\n")?;

@@ -1,4 +1,4 @@
-//! Benchmark of lost samples: records complete and with losses, compared in curve and model.
+//! Benchmark of lost samples: curve and model of complete records and of records with losses.
 //!
 //! ```text
 //! seed ─► noise ─► complete record ─► Cascade ─► curve, N, B, K ─┐
@@ -18,7 +18,7 @@ pub use table::{CoefficientComparison, LossComparison, LossTable, OctaveRatio};
 use crate::parallel;
 use std::convert::Infallible;
 
-/// How many records to simulate.
+/// The records to simulate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LossPlan {
     pub records: u64,
@@ -47,7 +47,7 @@ impl LossPlan {
         LossTable { records: self.records, samples: self.samples, comparisons }
     }
 
-    /// The record of a seed, complete and with each loss.
+    /// The record of a seed, complete and with each pattern of losses.
     fn record(&self, noise: TestNoise, seed: u64) -> Vec<EstimatedRecord> {
         let record = noise.record(self.samples, seed);
         let losses = LossPattern::ALL.into_iter().map(|pattern| pattern.gaps(self.samples, seed));

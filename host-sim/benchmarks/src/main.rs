@@ -17,7 +17,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Most recordings of a benchmark: each has a seed of its own, and its result is kept until the end.
+/// Most recordings of a benchmark. Each has its own seed, and its result is kept until the end.
 const MOST_RECORDINGS: u64 = 100_000;
 
 /// Benchmarks of the noise analysis, on recordings whose noise or whose effects are known.
@@ -198,19 +198,20 @@ fn in_filter(text: &str) -> Result<usize, String> {
     }
 }
 
-/// The number of threads, by default that of the cores, and 1 where the machine does not say how many it has.
+/// The number of threads. The default is the number of cores, or 1 if the machine does not report it.
 fn threads(jobs: Option<NonZeroUsize>) -> usize {
     jobs.or_else(|| std::thread::available_parallelism().ok()).map_or(1, NonZeroUsize::get)
 }
 
-/// Exit code 0 for success, 1 for an error; the argument parser ends the process with 2 for wrong usage.
+/// Runs the program. The exit code is 0 for success and 1 for an error; the argument parser exits with 2 for wrong
+/// usage.
 fn main() -> ExitCode {
     match run(Cli::parse()) {
         Ok(()) => ExitCode::SUCCESS,
-        // Closed by its reader, as `head` does.
+        // The reader of standard output may close it, as `head` does.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            // If standard error is closed too, the exit code remains.
+            // If standard error is closed too, only the exit code shows the error.
             let _ = writeln!(io::stderr(), "error: {error:#}");
             ExitCode::FAILURE
         }
@@ -220,7 +221,7 @@ fn main() -> ExitCode {
 fn run(Cli { benchmark, json }: Cli) -> Result<()> {
     let json = json.as_deref();
     if let Some(file) = json.filter(|file| !is_standard_output(file)) {
-        // Before hours of work; keeps the content of a file.
+        // The file is opened before hours of work; its content is kept.
         OpenOptions::new().append(true).create(true).open(file).with_context(|| file.display().to_string())?;
     }
     let bar = ProgressBar::new(0);

@@ -5,7 +5,7 @@
 //!           └──────────────────────────── truth ────────────────────────────────────────────────────► score ─► table
 //! ```
 //!
-//! Development uses open seeds; sealed seeds only measure the finished method.
+//! Development uses the open seeds; sealed seeds only measure the finished method.
 
 mod block_covariance;
 mod channel_under_test;
@@ -40,7 +40,7 @@ use crate::parallel;
 
 /// Offset of the sealed seeds; earlier ones, 2⁴⁰ … 2⁶², have been used.
 const SEALED: u64 = 1 << 63;
-/// Reserved per group.
+/// Number of seeds reserved for each group.
 pub const SEEDS_PER_GROUP: u64 = 1 << 20;
 
 /// Recordings to simulate and score.
@@ -51,7 +51,7 @@ pub struct UndeclaredPlan {
     pub empty: u64,
     pub pairs: u64,
     pub triples: u64,
-    /// Recordings of each kind outside the vocabulary.
+    /// Number of recordings of each kind outside the vocabulary.
     pub outside: u64,
     /// Length of a recording, s.
     pub seconds: f64,
@@ -82,7 +82,7 @@ impl UndeclaredPlan {
     /// Generates and scores every recording; `progress` gets the numbers of finished and of all.
     ///
     /// # Errors
-    /// The error of the first recording, in the order of the plan, that has no timeline.
+    /// The error of the first recording without a time base, in the order of the plan.
     pub fn run(&self, progress: impl Fn(usize, usize) + Sync) -> Result<ScoreTable, ScoreError> {
         let work = |&(group, seed): &(RecordingGroup, u64)| {
             let drawn = DrawnRecording::from_group(group, self.seconds, seed);

@@ -1,4 +1,4 @@
-//! The program `benchmarks`: the limits of its arguments, and where it writes.
+//! The program `benchmarks`: limits of its arguments, and its outputs.
 
 use std::process::{Command, Output};
 
@@ -28,7 +28,7 @@ fn benchmarks_have_limits() {
         let output = benchmarks(arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     }
-    // Too short may be the answer.
+    // The result may be that a recording is too short.
     let few =
         ["--nothing", "2", "--per-kind", "0", "--pairs", "0", "--triples", "0", "--outside", "0", "--seconds", "1"];
     let [many, one] = ["1000000", "1"].map(|jobs| benchmarks(&[&["undeclared", "--jobs", jobs], &few[..]].concat()));
@@ -56,7 +56,7 @@ fn json_goes_to_a_file_beside_the_tables_or_alone_to_standard_output() {
     assert!(output.stdout.is_empty(), "checked before the work is done");
 }
 
-/// Without stamps a rate is needed.
+/// A recording without time stamps needs a rate.
 #[test]
 fn measured_noise_is_read_from_a_table_and_an_unusable_one_is_named() {
     let dir = tempfile::tempdir().expect("a folder");

@@ -4,7 +4,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
-/// An estimate with 95 % bounds; 0 and lower bound 0 if not significant.
+/// An estimate with 95 % bounds; the value and the lower bound are 0 if it is not significant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FilteredCoefficient {
     pub truth: f64,
@@ -22,11 +22,11 @@ pub struct FilteredChannel {
     pub filter: Option<[f64; 2]>,
     /// N, B and K with their truth, if the model has them.
     pub coefficients: [Option<FilteredCoefficient>; 3],
-    /// Named effects, without the filter itself.
+    /// Named effects other than the filter itself.
     pub named: Vec<String>,
 }
 
-/// Channels of one filter and reading.
+/// The channels of one filter and decimation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FilterCell {
     /// Taps of each of the two averages.
@@ -47,7 +47,7 @@ impl FilterCell {
         self.channels.iter().filter_map(move |channel| channel.coefficients[at])
     }
 
-    /// Mean ratio to the truth less 1 and its standard error, percent, over the channels that have the coefficient.
+    /// Mean ratio to the truth less 1, and its standard error, in percent, over the channels that have the coefficient.
     fn bias_percent(&self, at: usize) -> Option<(f64, f64)> {
         let shown = self.estimates(at).filter(|estimate| estimate.value > 0.0);
         let errors: Vec<f64> = shown.map(|estimate| 100.0 * (estimate.value / estimate.truth - 1.0)).collect();

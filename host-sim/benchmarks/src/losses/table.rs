@@ -1,4 +1,4 @@
-//! Comparison of the complete records with those that have lost samples.
+//! Complete records compared with records that have lost samples.
 
 use super::estimate::EstimatedRecord;
 use super::loss_pattern::LossPattern;
@@ -23,12 +23,12 @@ pub struct LossComparison {
     pub noise: TestNoise,
     #[serde(serialize_with = "as_text")]
     pub loss: LossPattern,
-    /// Lost share of all samples.
+    /// Lost fraction of all samples.
     pub lost: f64,
-    /// Records that keep the longest averaging time.
+    /// Number of records that keep the longest averaging time.
     pub same_longest: usize,
     pub octaves: Vec<OctaveRatio>,
-    /// N, B and K, if the noise has them.
+    /// Comparisons of N, B and K, if the noise has them.
     pub coefficients: Vec<CoefficientComparison>,
 }
 
@@ -38,7 +38,7 @@ pub struct OctaveRatio {
     pub n: u64,
     /// Ratio of mean variances, less 1.
     pub bias: f64,
-    /// By the scatter of the differences.
+    /// Standard error of the bias, from the scatter of the differences.
     pub standard_error: f64,
     /// Bias without the correction for interpolation.
     pub uncorrected: f64,
@@ -46,20 +46,20 @@ pub struct OctaveRatio {
     pub edf: f64,
 }
 
-/// One fitted coefficient; behind the filter from four filter lengths on.
+/// One fitted coefficient. Behind the filter the fit begins at four filter lengths.
 #[derive(Debug, Clone, Serialize)]
 pub struct CoefficientComparison {
     pub symbol: &'static str,
-    /// Complete records: mean over truth, less 1.
+    /// Bias in complete records: mean over truth, less 1.
     pub complete_bias: f64,
-    /// Complete records: standard deviation over truth.
+    /// Scatter in complete records: standard deviation over truth.
     pub scatter: f64,
-    /// Mean difference by the losses, over truth.
+    /// Mean difference caused by the losses, over truth.
     pub shift: f64,
     pub standard_error: f64,
-    /// Records whose 95 % interval contains the truth.
+    /// Number of records whose 95 % interval contains the truth.
     pub covered: usize,
-    /// Complete records of that kind.
+    /// Number of complete records whose 95 % interval contains the truth.
     pub complete_covered: usize,
 }
 
@@ -68,7 +68,7 @@ fn as_text<S: Serializer>(value: &impl ToString, serializer: S) -> Result<S::Ok,
 }
 
 impl LossComparison {
-    /// Compares pairs of a complete record and the same with losses.
+    /// Compares pairs of a complete record and the same record with losses.
     #[must_use]
     pub fn new(noise: TestNoise, loss: LossPattern, pairs: &[(&EstimatedRecord, &EstimatedRecord)]) -> Self {
         let total = |of: fn(&(&EstimatedRecord, &EstimatedRecord)) -> u64| pairs.iter().map(of).sum::<u64>() as f64;

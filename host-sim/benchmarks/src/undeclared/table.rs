@@ -1,4 +1,4 @@
-//! Scores of all recordings, with summary.
+//! The scores of all recordings, with a summary.
 
 use super::draw::RecordingGroup;
 use super::effect::EffectKind;
@@ -8,12 +8,12 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
-/// Smallest required strength.
+/// Least strength of effects in the summary.
 pub const STRONG: f64 = 2.0;
 const CLASSES: [f64; 5] = [0.5, 1.0, 2.0, 5.0, f64::INFINITY];
 const CLASS_NAMES: [&str; 5] = ["< 0.5", "0.5…1", "1…2", "2…5", "≥ 5"];
 
-/// In the order of the plan.
+/// The scores, in the order of the plan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ScoreTable {
     pub outcomes: Vec<(RecordingGroup, RecordingScore)>,
@@ -32,7 +32,7 @@ impl Proportion {
         cases.into_iter().fold(Self::default(), add)
     }
 
-    /// In percent; `None` if there is no case.
+    /// The proportion in percent; `None` if there is no case.
     #[must_use]
     pub fn percent(self) -> Option<f64> {
         (self.all > 0).then(|| 100.0 * self.yes as f64 / self.all as f64)
@@ -61,70 +61,71 @@ impl ScoreTable {
         self.outcomes(RecordingGroup::Single(kind)).flat_map(|outcome| &outcome.answers)
     }
 
-    /// Single effects of at least [`STRONG`].
+    /// Named single effects, of those with a strength of at least [`STRONG`].
     #[must_use]
     pub fn named(&self) -> Proportion {
         let strong = self.singles().flat_map(|outcome| &outcome.answers).filter(|answer| answer.strength >= STRONG);
         Proportion::count(strong.map(|answer| answer.named))
     }
 
-    /// Without an effect.
+    /// Recordings without an effect whose report has a name.
     #[must_use]
     pub fn false_alarms(&self) -> Proportion {
         Proportion::count(self.outcomes(RecordingGroup::Nothing).map(|outcome| !outcome.false_alarms.is_empty()))
     }
 
-    /// With one effect.
+    /// Recordings with one effect whose report also has a wrong name.
     #[must_use]
     pub fn something_else(&self) -> Proportion {
         Proportion::count(self.singles().map(|outcome| !outcome.false_alarms.is_empty()))
     }
 
-    /// All of several: [`RecordingGroup::Pair`] or [`RecordingGroup::Triple`].
+    /// Recordings of [`RecordingGroup::Pair`] or [`RecordingGroup::Triple`] whose effects are all named.
     #[must_use]
     pub fn all_named(&self, group: RecordingGroup) -> Proportion {
         Proportion::count(self.outcomes(group).map(|outcome| outcome.answers.iter().all(|answer| answer.named)))
     }
 
-    /// All groups.
+    /// Recordings of all groups whose report has a wrong name.
     #[must_use]
     pub fn wrong_names(&self) -> Proportion {
         Proportion::count(self.outcomes.iter().map(|(_, outcome)| !outcome.false_alarms.is_empty()))
     }
 
-    /// Outside the vocabulary, at least [`STRONG`]: unexplained, or described.
+    /// Effects outside the vocabulary with a strength of at least [`STRONG`] that are reported as unexplained or
+    /// described.
     #[must_use]
     pub fn outside_told(&self) -> Proportion {
         let strong = self.outcomes.iter().filter_map(|(_, outcome)| outcome.outside.as_ref());
         Proportion::count(strong.filter(|score| score.strength >= STRONG).map(OutsideScore::is_told))
     }
 
-    /// With other reports instead.
+    /// The scores of a kind outside the vocabulary, each with the other findings of its report.
     fn outside(&self, kind: OutsideKind) -> impl Iterator<Item = (&OutsideScore, &[String])> {
         let of = self.outcomes(RecordingGroup::Outside(kind));
         of.filter_map(|outcome| Some((outcome.outside.as_ref()?, outcome.false_alarms.as_slice())))
     }
 
-    /// Parameters of strong single effects: 2 % for frequencies and rate, 10 % for others.
+    /// Accurate parameters of strong single effects: within 2 % for frequencies and rate, 10 % for others.
     #[must_use]
     pub fn near(&self) -> Proportion {
         Proportion::count(self.estimates(None).map(ParameterScore::is_near))
     }
 
-    /// 95 % intervals of named single effects with the truth.
+    /// Parameters of named single effects whose 95 % interval contains the truth.
     #[must_use]
     pub fn coverage(&self) -> Proportion {
         Proportion::count(self.singles().flat_map(|outcome| &outcome.estimates).map(ParameterScore::is_covered))
     }
 
-    /// Strong single effects with errors that fulfil `which`.
+    /// Strong single effects whose errors fulfil `which`.
     #[must_use]
     pub fn unseen(&self, which: fn(&UnseenErrors) -> bool) -> Proportion {
         let strong = self.singles().filter(|outcome| is_strong(outcome));
         Proportion::count(strong.filter_map(|outcome| outcome.unseen).map(|unseen| which(&unseen)))
     }
 
-    /// Strong single effects, of one kind or all.
+    /// Parameters of strong single effects, of one kind or of all.
     fn estimates(&self, kind: Option<EffectKind>) -> impl Iterator<Item = &ParameterScore> {
         let strong = self.singles().filter(|outcome| is_strong(outcome));
         strong
@@ -144,7 +145,7 @@ impl ParameterScore {
 }
 
 impl OutsideScore {
-    /// Unexplained, or described, in its channel.
+    /// True if the channel is reported as unexplained, or the effect is described.
     #[must_use]
     pub fn is_told(&self) -> bool {
         self.unexplained || self.named
@@ -152,22 +153,22 @@ impl OutsideScore {
 }
 
 impl UnseenErrors {
-    /// Largest ratio of equally good errors.
+    /// Largest ratio of two errors that count as equally good.
     const TOLERANCE: f64 = 1.5;
 
-    /// Added terms as good as the true model.
+    /// True if the added terms are as good as the true model.
     #[must_use]
     pub fn is_near_truth(&self) -> bool {
         self.after <= Self::TOLERANCE * self.truth
     }
 
-    /// Added terms as good as the fitted true terms.
+    /// True if the added terms are as good as the fitted true terms.
     #[must_use]
     pub fn is_near_true_terms(&self) -> bool {
         self.after <= Self::TOLERANCE * self.refitted
     }
 
-    /// Fitted true terms as good as the true model.
+    /// True if the fitted true terms are as good as the true model.
     #[must_use]
     pub fn are_true_terms_near_truth(&self) -> bool {
         self.refitted <= Self::TOLERANCE * self.truth

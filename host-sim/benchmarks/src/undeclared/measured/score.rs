@@ -10,20 +10,20 @@ use noise_analysis::report::{ChannelEffect, ChannelReport, Effect, ModelReport, 
 use serde::Serialize;
 use std::collections::BTreeSet;
 
-/// Deviance per point of a failing model.
+/// Deviance per point from which a model counts as failing.
 pub(super) const FAILS: f64 = 3.0;
 
-/// Deviances per point on the unseen half, in the effect's first channel; absent for too few samples.
+/// Deviances per point on the unseen half, in the effect's first channel; absent if there are too few samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MeasuredErrors {
     pub before: Option<f64>,
     pub after: Option<f64>,
-    /// Deviance without what the first half's rules exclude.
+    /// Deviances without the samples that the rules of the first half exclude.
     pub excluding: [Option<f64>; 2],
-    /// Curve of the first half as a model.
+    /// Deviance of the first half's curve, used as a model.
     pub first_half_curve: Option<f64>,
     pub untouched_before: Option<f64>,
-    /// With added terms, untouched.
+    /// Deviance with added terms in the untouched stretch.
     pub untouched_after: Option<f64>,
 }
 
@@ -31,17 +31,17 @@ pub struct MeasuredErrors {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MeasuredScore {
     pub recording: String,
-    /// s from the recording's first sample.
+    /// Start of the stretch, s from the recording's first sample.
     pub from_s: f64,
     pub kind: HiddenKind,
     pub channels: Vec<&'static str>,
     /// Size over detection limit.
     pub strength: f64,
-    /// Named; outside the vocabulary also `unexplained`.
+    /// True if the effect is named; outside the vocabulary also if it is reported as `unexplained`.
     pub named: bool,
-    /// Report on the effect's channels, `channel: kind`.
+    /// Findings on the effect's channels, as `channel: kind`.
     pub found: Vec<String>,
-    /// Names beyond those of the untouched stretch and the right one, `channel: kind`.
+    /// Wrong names that the untouched stretch does not have, as `channel: kind`.
     pub wrong_names: Vec<String>,
     pub estimates: Vec<ParameterScore>,
     pub errors: MeasuredErrors,
@@ -74,7 +74,7 @@ fn channel_report(report: &Report, channel: Channel) -> Option<&ChannelReport> {
     report.channels.iter().find(|of| of.name == channel.name())
 }
 
-/// True if it was named, right names, parameters.
+/// True if the effect was named, then the right names, and the parameters.
 fn answer(
     kind: HiddenKind,
     effect: &HiddenEffect,
@@ -107,7 +107,7 @@ fn answer(
     }
 }
 
-/// True if none of `others` has the kind and parameters: one estimate within the other's interval.
+/// True if none of `others` has the same kind and parameters, that is one estimate within the other's interval.
 fn is_new(effect: &Effect, others: &[ChannelEffect]) -> bool {
     let parameters = effect.parameters();
     let is_same = |other: &ChannelEffect| {
@@ -121,7 +121,7 @@ fn is_new(effect: &Effect, others: &[ChannelEffect]) -> bool {
     !others.iter().any(is_same)
 }
 
-/// New names in the first report that are neither `right` in `own` channels nor of a part of the effect.
+/// New names of the first report that are neither `right` in `own` channels nor of a part of the effect.
 fn wrong_names(
     own: &[Channel],
     right: &[&str],
@@ -177,7 +177,7 @@ impl MeasuredErrors {
         }
     }
 
-    /// True if the added terms fail and are worse than N, B and K as recorded.
+    /// True if the model with added terms fails and is worse than N, B and K, without exclusions.
     #[must_use]
     pub fn grew(&self) -> bool {
         self.before.zip(self.after).is_some_and(|(before, after)| after > before.max(FAILS))

@@ -1,4 +1,4 @@
-//! The scores of all effects in measured noise, and their tables.
+//! The scores of all effects in measured noise, and tables of them.
 
 use super::hidden_kind::HiddenKind;
 use super::score::{MeasuredErrors, MeasuredScore};
@@ -8,7 +8,7 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 
-/// In the order of the stretches.
+/// The scores, in the order of the stretches.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct MeasuredNoiseTable {
     pub not_hidden: Vec<HiddenKind>,
@@ -16,27 +16,27 @@ pub struct MeasuredNoiseTable {
 }
 
 impl MeasuredNoiseTable {
-    /// Effects that the report has a name for, and that were named.
+    /// Named effects, of those for which the report has a name.
     #[must_use]
     pub fn named(&self) -> Proportion {
         let known = self.scores.iter().filter(|score| matches!(score.kind, HiddenKind::Known(_)));
         Proportion::count(known.map(|score| score.named))
     }
 
-    /// Outside the vocabulary: unexplained, or a name that describes it.
+    /// Effects outside the vocabulary that are reported as unexplained or by a name that describes them.
     #[must_use]
     pub fn outside_told(&self) -> Proportion {
         let outside = self.scores.iter().filter(|score| matches!(score.kind, HiddenKind::Outside(_)));
         Proportion::count(outside.map(|score| score.named))
     }
 
-    /// Stretches with an effect that have a wrong name.
+    /// Stretches with an effect whose report has a wrong name.
     #[must_use]
     pub fn wrong_names(&self) -> Proportion {
         Proportion::count(self.scores.iter().map(|score| !score.wrong_names.is_empty()))
     }
 
-    /// Whose error on the unseen half grew.
+    /// Effects whose report increases the error on the unseen half.
     #[must_use]
     pub fn grew(&self) -> Proportion {
         Proportion::count(self.scores.iter().map(|score| score.errors.grew()))
@@ -108,7 +108,7 @@ impl MeasuredNoiseTable {
         writeln!(out)
     }
 
-    /// One line per effect with names of the sort `what`.
+    /// Writes one line per effect with names of the sort `what`.
     fn write_rest(
         &self,
         out: &mut dyn Write,
