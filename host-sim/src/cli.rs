@@ -170,10 +170,10 @@ pub(crate) enum Command {
     /// Simulate an hour of the virtual sensor and analyse it
     #[command(after_help = EXAMPLES_OF_DEMO)]
     Demo {
-        /// What is simulated.
+        /// Time and noise of the virtual sensor.
         #[command(flatten)]
         simulate: SimulationArguments,
-        /// Where the report goes besides the terminal.
+        /// Outputs of the report besides the terminal.
         #[command(flatten)]
         output: OutputArguments,
     },
@@ -214,7 +214,7 @@ pub(crate) enum Command {
         /// Length of the recording, s.
         #[arg(long, help_heading = INPUT, default_value_t = DEFAULT_S, allow_negative_numbers = true, value_parser = duration)]
         seconds: f64,
-        /// Where the report goes besides the terminal.
+        /// Outputs of the report besides the terminal.
         #[command(flatten)]
         output: OutputArguments,
     },
@@ -250,7 +250,7 @@ pub(crate) struct AnalyzeArguments {
     /// findings, for recordings of days.
     #[arg(verbatim_doc_comment, long, help_heading = OUTPUT)]
     pub(crate) quick: bool,
-    /// Where the report goes besides the terminal.
+    /// Outputs of the report besides the terminal.
     #[command(flatten)]
     pub(crate) output: OutputArguments,
 }
@@ -290,7 +290,7 @@ pub(crate) struct ReplayArguments {
     /// it: a count is 0.05, 0.025 or 0.0125 deg/s.
     #[arg(verbatim_doc_comment, long, help_heading = SENSOR, value_name = "DPS", value_enum, default_value = "300", hide_possible_values = true, hide_default_value = true)]
     pub(crate) range: GyroRangeArgument,
-    /// Where the report goes besides the terminal.
+    /// Outputs of the report besides the terminal.
     #[command(flatten)]
     pub(crate) output: OutputArguments,
 }
@@ -319,7 +319,7 @@ pub(crate) struct CompareArguments {
     /// names. A recording is analysed first.
     #[arg(verbatim_doc_comment, long, conflicts_with = "more")]
     pub(crate) data_sheet: bool,
-    /// Where the result goes besides the terminal.
+    /// Output of the result besides the terminal.
     #[command(flatten)]
     pub(crate) result: JsonArgument,
 }
@@ -609,7 +609,7 @@ impl RecordingArguments {
         Self { input, rate: None, from: None, to: None }
     }
 
-    /// The same options for `file`.
+    /// These options for another `file`.
     pub(crate) fn of_file(&self, file: &Path) -> Self {
         Self { input: InputArguments { file: file.to_owned(), ..self.input.clone() }, ..self.clone() }
     }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! seed ─► noise ─► complete record ─► Cascade ─► curve, N, B, K ─┐
-//!                  └► losses ───────► Cascade ─► curve, N, B, K ─┴► ratios, degrees of freedom, intervals ─► table
+//!                  └► losses ───────► Cascade ─► curve, N, B, K ─┴► ratios, degrees of freedom, intervals ─► JSON ─► tables.py
 //! ```
 
 mod estimate;
@@ -44,7 +44,7 @@ impl LossPlan {
                 comparisons.push(LossComparison::new(of_noise[0].0, pattern, &pairs));
             }
         }
-        LossTable { records: self.records, samples: self.samples, comparisons }
+        LossTable { records: self.records, rate_hz: RATE_HZ, samples: self.samples, comparisons }
     }
 
     /// The record of a seed, complete and with each pattern of losses.

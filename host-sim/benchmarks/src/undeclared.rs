@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! seed ─► draw (noise, environment, effects; sizes from the detection limit) ─► generator ─► analysis ─► report ─┐
-//!           └──────────────────────────── truth ────────────────────────────────────────────────────► score ─► table
+//!           └──────────────────────────── truth ────────────────────────────────────────────────────► score ─► JSON ─► tables.py
 //! ```
 //!
 //! Development uses the open seeds; sealed seeds only measure the finished method.
@@ -19,7 +19,6 @@ mod outside;
 mod outside_limit;
 mod sample_loss;
 mod score;
-mod table;
 mod truth;
 
 #[cfg(test)]
@@ -34,9 +33,9 @@ pub use measured::{
 };
 pub use outside::{OutsideEffect, OutsideKind};
 pub use score::{EffectScore, OutsideScore, ParameterScore, RecordingScore, ScoreError, UnseenErrors, score_recording};
-pub use table::{Proportion, STRONG, ScoreTable};
 
 use crate::parallel;
+use serde::Serialize;
 
 /// Offset of the sealed seeds; earlier ones, 2⁴⁰ … 2⁶², have been used.
 const SEALED: u64 = 1 << 63;
@@ -61,6 +60,12 @@ pub struct UndeclaredPlan {
     pub seed: u64,
     pub sealed: bool,
     pub jobs: usize,
+}
+
+/// The scores of all recordings, in the order of the plan.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ScoreTable {
+    pub outcomes: Vec<(RecordingGroup, RecordingScore)>,
 }
 
 impl UndeclaredPlan {

@@ -53,8 +53,4 @@ fn each_method_gives_n_and_only_the_full_model_has_white_innovations() {
     // p < 0.001 occurs once in a thousand cases. Innovations are larger without B and K.
     assert!(full.whiteness_p > 1e-3 && only_n.whiteness_p < 1e-6, "{full:?} {only_n:?}");
     assert!(only_n.normalised > only_n.consistent.1 && only_n.normalised > full.normalised, "{full:?} {only_n:?}");
-    let mut text = Vec::new();
-    record.write(&mut text).expect("a vector can be written");
-    let text = String::from_utf8(text).expect("UTF-8");
-    assert!(text.lines().all(|line| line.chars().count() <= 110), "{text}");
 }

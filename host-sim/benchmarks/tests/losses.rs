@@ -1,5 +1,6 @@
 //! Lost samples in a few short records.
 
+use crate::tables;
 use benchmarks::losses::{LossPattern, LossPlan, TestNoise};
 
 #[test]
@@ -29,6 +30,9 @@ fn without_the_correction_the_benchmark_would_see_the_bias() {
     let table = LossPlan { records: 8, samples: 1 << 16, first_seed: 9_000, jobs: 2 }.run(|_, _| ());
     let white =
         table.comparisons.iter().find(|comparison| comparison.loss == LossPattern::Random(0.05)).expect("white, 5 %");
+    let text = tables::of("losses", &serde_json::to_value(&table).expect("JSON"));
+    // Both tables list each noise with each loss, except for coefficients that a noise does not have.
+    assert!(text.matches(&white.loss.to_string()).count() >= 2 * TestNoise::ALL.len(), "{text}");
     let octave = white.octaves.iter().find(|octave| octave.n == 64).expect("n = 64");
     // The expected bias is 1.5 · 5 % · (1 − 2/64).
     assert!((octave.uncorrected - 0.0727).abs() < 4.5 * octave.standard_error + 0.003, "{octave:?}");

@@ -1,5 +1,6 @@
 //! Slope method and fit over simulated hours, compared with theory.
 
+use crate::tables;
 use benchmarks::reproduction::Reproduction;
 
 const SEEDS: u64 = 16;
@@ -34,8 +35,9 @@ fn the_slope_method_is_biased_by_the_other_terms_and_the_fit_is_not() {
         let square = 15.0 * (octave.plain / octave.formula).powi(2);
         assert!(octave.tau_s < 0.15 || (2.4..44.3).contains(&square), "{octave:?}");
     }
-    let mut text = Vec::new();
-    result.write(&mut text).expect("a vector can be written");
-    let text = String::from_utf8(text).expect("text");
-    assert!(text.contains("16 simulated hours") && text.lines().all(|line| line.chars().count() <= 110), "{text}");
+    let text = tables::of("paper", &serde_json::to_value(&result).expect("JSON"));
+    assert!(
+        text.contains("16 simulated hours") && text.contains("Four methods") && text.contains("95 % if true"),
+        "{text}"
+    );
 }

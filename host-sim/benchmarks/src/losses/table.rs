@@ -2,16 +2,15 @@
 
 use super::estimate::EstimatedRecord;
 use super::loss_pattern::LossPattern;
-use super::noise::{RATE_HZ, TestNoise};
-use reports::formatting::{TextTable, number};
+use super::noise::TestNoise;
 use serde::{Serialize, Serializer};
 use statrs::statistics::Statistics;
-use std::io::{self, Write};
 
 /// The results for every noise and every loss.
 #[derive(Debug, Clone, Serialize)]
 pub struct LossTable {
     pub records: u64,
+    pub rate_hz: f64,
     pub samples: usize,
     pub comparisons: Vec<LossComparison>,
 }
@@ -133,71 +132,4 @@ impl CoefficientComparison {
 
 fn standard_error(values: &[f64]) -> f64 {
     values.iter().std_dev() / (values.len() as f64).sqrt()
-}
-
-const RANGES: [(&str, u64, u64); 4] =
-    [("1 … 4", 1, 4), ("8 … 512", 8, 512), ("1,024 … 8,192", 1024, 8192), ("above", 8193, u64::MAX)];
-
-impl LossTable {
-    /// Writes two tables as text: the variances, then the coefficients.
-    pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
-        let hours = self.samples as f64 / RATE_HZ / 3600.0;
-        writeln!(out, "{} records of {hours:.2} h at {RATE_HZ} SPS for each noise\n", self.records)?;
-        writeln!(
-            out,
-            "variance over that of the complete record, minus 1, in %: the octave that is farthest from 0, and its"
-        )?;
-        writeln!(
-            out,
-            "standard error; in brackets without the correction; smallest degrees of freedom over the complete ones"
-        )?;
-        let row = |comparison: &LossComparison| {
-            let mut cells = vec![
-                comparison.noise.to_string(),
-                comparison.loss.to_string(),
-                format!("{:.2}", 100.0 * comparison.lost),
-                format!("{}", comparison.same_longest),
-            ];
-            for (_, from, to) in RANGES {
-                let octaves = comparison.octaves.iter().filter(|octave| (from..=to).contains(&octave.n));
-                let weight = |octave: &OctaveRatio| {
-                    if to == u64::MAX { (octave.bias / octave.standard_error).abs() } else { octave.bias.abs() }
-                };
-                let worst = octaves.clone().max_by(|a, b| weight(a).total_cmp(&weight(b)));
-                let edf = octaves.map(|octave| octave.edf).fold(f64::INFINITY, f64::min);
-                cells.push(worst.map_or_else(String::new, |worst| {
-                    let [bias, error, uncorrected] =
-                        [worst.bias, worst.standard_error, worst.uncorrected].map(|share| 100.0 * share);
-                    format!("{bias:+.2} ± {error:.2} ({uncorrected:+.2}) {edf:.3}")
-                }));
-            }
-            cells
-        };
-        let header = ["noise", "lost", "%", "same longest τ"].into_iter().chain(RANGES.map(|(name, ..)| name));
-        writeln!(out, "{}\n", TextTable::new(header, 2, self.comparisons.iter().map(row)))?;
-        writeln!(
-            out,
-            "fitted coefficients, % of the truth: what the losses change ± its standard error, scatter and bias"
-        )?;
-        writeln!(
-            out,
-            "of the complete records; records of which the 95 % interval holds the truth, with and without losses"
-        )?;
-        let rows = self.comparisons.iter().flat_map(|comparison| {
-            comparison.coefficients.iter().map(|coefficient| {
-                vec![
-                    comparison.noise.to_string(),
-                    comparison.loss.to_string(),
-                    coefficient.symbol.to_owned(),
-                    format!("{:+.3} ± {:.3}", 100.0 * coefficient.shift, 100.0 * coefficient.standard_error),
-                    number(100.0 * coefficient.scatter),
-                    format!("{:+.2}", 100.0 * coefficient.complete_bias),
-                    coefficient.covered.to_string(),
-                    coefficient.complete_covered.to_string(),
-                ]
-            })
-        });
-        let header = ["noise", "lost", "", "change", "scatter", "bias", "hold", "complete"];
-        writeln!(out, "{}", TextTable::new(header, 3, rows))
-    }
 }

@@ -2,11 +2,12 @@
 
 use super::four_methods::FourMethods;
 use super::published_gyro::{
-    OCTAVES, RATE_HZ, SAMPLES, TRUTH, allan_curve, deviations, fitted_terms, simulate_counts, slope_coefficients,
-    true_model,
+    INTERVALS, OCTAVES, RATE_HZ, SAMPLES, TRUTH, allan_curve, deviations, fitted_terms, simulate_counts,
+    slope_coefficients, true_model,
 };
 use allan_core::{AllanPoint, Cascade, Model, NoiseTerm, fit::fit};
 use serde::Serialize;
+use std::ops::RangeInclusive;
 
 /// Seeds of the simulated hours.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,6 +45,10 @@ pub struct OctaveScatter {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReproductionResult {
     pub seeds: u64,
+    /// N, °/√s, B, °/s, and K, °/s^1.5.
+    pub truth: [f64; 3],
+    /// Averaging times from which the slope method takes each of them, s.
+    pub intervals_s: [RangeInclusive<f64>; 3],
     /// Bias of the slope method on the true curve: its inherent error.
     pub inherent: [f64; 3],
     /// Error of the slope method without overlap, as in the paper.
@@ -83,6 +88,8 @@ impl Reproduction {
         let inherent = slope_coefficients(octaves.clone().map(|n| (tau(n), truth.avar(n).sqrt())));
         ReproductionResult {
             seeds: self.seeds,
+            truth: TRUTH,
+            intervals_s: INTERVALS,
             inherent: relative_errors(inherent),
             plain: each(|term| error_over(&hours, |hour| hour.slopes[0][term] / TRUTH[term])),
             overlapped: each(|term| error_over(&hours, |hour| hour.slopes[1][term] / TRUTH[term])),

@@ -9,8 +9,6 @@ use virtual_sensor::{NoiseModel, OutputRegister, VirtualAdis16405};
 
 /// N in deg/√s, B in deg/s and K in deg/s^1.5 of gyro z, as printed in the paper.
 pub const TRUTH: [f64; 3] = [0.0368, 0.0093, 0.0013];
-/// Symbols of the coefficients, in the order of [`TRUTH`].
-pub const SYMBOLS: [&str; 3] = ["N", "B", "K"];
 /// Sample rate, Hz.
 pub const RATE_HZ: f64 = 204.8;
 /// Length of the record, s.

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! recording ─► stretch ─┬───────────────────────────► analysis ─► report of the noise ──────────────┐
-//!                       ├─► N, B, K ─► size ─► effect ─┐                                            ├─► score ─► table
+//!                       ├─► N, B, K ─► size ─► effect ─┐                                            ├─► score ─► JSON ─► tables.py
 //!                       └──────────────────────────────┴► counts ─► analysis ─► report ─────────────┘
 //! ```
 //!
@@ -15,17 +15,16 @@ mod noise_estimate;
 mod recording;
 mod score;
 mod stretch;
-mod table;
 
 pub use hidden_kind::HiddenKind;
 pub use recording::{MeasuredNoiseError, NoiseRecording};
 pub use score::{MeasuredErrors, MeasuredScore};
-pub use table::MeasuredNoiseTable;
 
 use crate::parallel;
 use noise_analysis::analysis::analyze;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
 use std::convert::Infallible;
 use stretch::Stretch;
 
@@ -52,6 +51,14 @@ pub struct MeasuredNoisePlan {
     pub strength: f64,
     pub seed: u64,
     pub jobs: usize,
+}
+
+/// The scores, in the order of the stretches.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct MeasuredNoiseTable {
+    /// Kinds that no channel of a stretch can have at the strength.
+    pub not_hidden: Vec<HiddenKind>,
+    pub scores: Vec<MeasuredScore>,
 }
 
 impl MeasuredNoisePlan {

@@ -10,11 +10,8 @@ use noise_analysis::report::{ChannelEffect, ChannelReport, Effect, ModelReport, 
 use serde::Serialize;
 use std::collections::BTreeSet;
 
-/// Deviance per point from which a model counts as failing.
-pub(super) const FAILS: f64 = 3.0;
-
 /// Deviances per point on the unseen half, in the effect's first channel; absent if there are too few samples.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct MeasuredErrors {
     pub before: Option<f64>,
     pub after: Option<f64>,
@@ -55,7 +52,7 @@ pub(super) fn hidden(stretch: &Stretch<'_>, kind: HiddenKind, effect: &HiddenEff
     };
     let own: Vec<Channel> = Channel::INERTIAL.into_iter().filter(is_in).collect();
     let (named, right, estimates) = answer(kind, effect, strength, &own, &report, &stretch.report);
-    let errors = own.first().map_or_else(MeasuredErrors::none, |first| errors(*first, &report, &stretch.report));
+    let errors = own.first().map(|first| errors(*first, &report, &stretch.report)).unwrap_or_default();
     MeasuredScore {
         recording: stretch.recording.to_owned(),
         from_s: stretch.from_s,
@@ -151,7 +148,7 @@ fn named_as(names: &BTreeSet<(Channel, &'static str)>) -> Vec<String> {
 
 fn errors(channel: Channel, report: &Report, untouched: &Report) -> MeasuredErrors {
     let (Some(report), Some(untouched)) = (channel_report(report, channel), channel_report(untouched, channel)) else {
-        return MeasuredErrors::none();
+        return MeasuredErrors::default();
     };
     let raw = |model: &ModelReport| model.unseen.deviance_per_point;
     let excluding = |model: &ModelReport| model.unseen_excluding.as_ref().unwrap_or(&model.unseen).deviance_per_point;
@@ -162,24 +159,5 @@ fn errors(channel: Channel, report: &Report, untouched: &Report) -> MeasuredErro
         first_half_curve: report.first_half_curve.deviance_per_point,
         untouched_before: raw(&untouched.before),
         untouched_after: raw(&untouched.after),
-    }
-}
-
-impl MeasuredErrors {
-    const fn none() -> Self {
-        Self {
-            before: None,
-            after: None,
-            excluding: [None; 2],
-            first_half_curve: None,
-            untouched_before: None,
-            untouched_after: None,
-        }
-    }
-
-    /// True if the model with added terms fails and is worse than N, B and K, without exclusions.
-    #[must_use]
-    pub fn grew(&self) -> bool {
-        self.before.zip(self.after).is_some_and(|(before, after)| after > before.max(FAILS))
     }
 }
