@@ -10,15 +10,15 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-STRONG = 2.0  # strength, in detection limits, from which on an effect is expected to be named
+STRONG = 2.0  # strength in detection limits from which an effect must be named
 CLASSES = (("< 0.5", 0.0, 0.5), ("0.5…1", 0.5, 1.0), ("1…2", 1.0, 2.0), ("2…5", 2.0, 5.0), ("≥ 5", 5.0, math.inf))
 SAMPLES = (("1 … 4", 1, 4), ("8 … 512", 8, 512), ("1,024 … 8,192", 1024, 8192), ("above", 8193, math.inf))
-# What the sentences under "Contradicted" have that no other one has, with what they say.
+# A text that only one kind of sentence under "Contradicted" contains, and the row of the table for that kind.
 SENTENCES = {
     "standard errors": "… at τ = …: σ is … the model (… standard errors)",
     "smaller error than it has": "a Kalman filter with the models of … would claim a smaller error than it has",
 }
-TOLERANCE = 1.5  # largest ratio of errors on unseen data that are equally good
+TOLERANCE = 1.5  # largest ratio of two errors on unseen data that count as equally good
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -31,7 +31,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
 
 
 def share(cases: Iterable[bool]) -> tuple[int, int]:
-    """The number of cases that are true, and of all."""
+    """The number of true cases, and the number of all cases."""
     cases = list(cases)
     return sum(cases), len(cases)
 
@@ -62,7 +62,7 @@ def counted(names: Iterable[str]) -> str:
 
 
 def in_order(values: Iterable[Any]) -> list[Any]:
-    """Each value once, in the order of the first ones."""
+    """Each value once, in the order of its first occurrence."""
     return list(dict.fromkeys(values))
 
 
