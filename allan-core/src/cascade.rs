@@ -8,6 +8,9 @@ use core::ops::Sub;
 
 /// Streaming Allan variance at the averaging factors `n = 1, 2, 4 … 2^(OCTAVES−1)` samples.
 ///
+/// With the running sums `x` of the samples, the variance at `n` is the mean of `(x[k+2n] − 2x[k+n] + x[k])²/(2n²)` over
+/// `k` in steps of `n/OVERLAP`, or of 1 for `n < OVERLAP` (overlapping Allan variance; W. Riley, NIST SP 1065).
+///
 /// ```
 /// let mut estimator = allan_core::Cascade::<20, 8>::new();
 /// estimator.push(-12); // a sample, in counts
@@ -143,7 +146,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         }
     }
 
-    /// Adds the next sample, in counts.
+    /// Adds the next sample, in counts. Every `i32` is allowed; see the range of [`Cascade`].
     ///
     /// The first 2048 samples, and those after a gap until the shortest octaves have left it behind, take more time.
     ///
@@ -287,7 +290,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         (self.ended, self.missing) = (0, 0);
     }
 
-    /// Samples taken.
+    /// Number of samples taken, without missing ones.
     #[must_use]
     pub const fn len(&self) -> u64 {
         self.ended.saturating_add(self.elapsed - self.absent)
@@ -299,13 +302,13 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         self.len() == 0
     }
 
-    /// Samples reported missing through [`gap`](Self::gap).
+    /// Number of samples reported missing through [`gap`](Self::gap).
     #[must_use]
     pub const fn missing(&self) -> u64 {
         self.missing.saturating_add(self.absent).saturating_add(self.pending)
     }
 
-    /// Missing samples that the curve replaces: those in gaps that its longer octaves bridge.
+    /// Number of missing samples that the curve replaces: those in gaps that its longer octaves bridge.
     #[must_use]
     pub fn replaced(&self) -> u64 {
         self.octaves.iter().map(|octave| u64::from(octave.interpolation.replaced())).sum()

@@ -12,7 +12,8 @@ pub const NORMAL_975: f64 = 1.959_963_984_540_054;
 /// Equivalent degrees of freedom of the mean of `count` squared second differences at averaging factor `n`, taken every
 /// `n/overlap` samples.
 ///
-/// `overlap` is 1 to 16, and the result at least 1 for a count of at least 1.
+/// `n` is in samples, and `overlap` is 1 to 16. With the correlation matrix `R` of the `M = count` differences, the
+/// result is `M²/tr R²` (Greenhall and Riley, 2003): at least 1 for a count of at least 1.
 #[must_use]
 pub fn edf(n: u64, count: u64, overlap: u32, fractions: VarianceFractions) -> f64 {
     ChiSquareApproximation::new(Difference::Second, n, count, overlap, fractions).edf
@@ -21,8 +22,8 @@ pub fn edf(n: u64, count: u64, overlap: u32, fractions: VarianceFractions) -> f6
 /// Correlation coefficient of the Allan variances measured at two octaves that are `lag` octaves apart, for near-full
 /// overlap; `a` and `b` are the noise mixtures at the two octaves.
 ///
-/// The result is exact for lags of up to three octaves of pure noises in an infinite record; beyond, it decays
-/// geometrically.
+/// The result is between 0 and 1. It is exact for lags of up to three octaves of pure noises in an infinite record;
+/// beyond, it decays geometrically.
 #[must_use]
 pub fn octave_correlation(lag: usize, a: VarianceFractions, b: VarianceFractions) -> f64 {
     let (a, b): ([f64; 3], [f64; 3]) = (roots(a), roots(b));

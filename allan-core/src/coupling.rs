@@ -108,7 +108,8 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
         self.out_of_step = self.out_of_step.saturating_add(later.out_of_step);
     }
 
-    /// The exact sum of products of second differences of sums of `2^octave` samples, and their number.
+    /// The exact sum of products of second differences of sums of `2^octave` samples, in the product of the channels' counts,
+    /// and their number.
     ///
     /// `None` beyond the last octave and where the sum has overflowed.
     #[must_use]
@@ -117,7 +118,8 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
         (sum != OVERFLOWED).then(|| (sum, self.counts[octave]))
     }
 
-    /// The covariance of every octave that has at least one product, shortest first.
+    /// The covariance, in the product of the channels' counts, of every octave that has at least one product, shortest
+    /// first.
     ///
     /// # Cost
     /// | `Coupling::points` | Cortex-M4F | Cortex-M0+ |
@@ -138,7 +140,8 @@ impl<const OCTAVES: usize> Coupling<OCTAVES> {
         points.collect()
     }
 
-    /// Samples left out because the two estimators were not at the same time or one has a gap before its next sample.
+    /// Number of samples left out because the two estimators were not at the same time or one has a gap before its next
+    /// sample.
     #[must_use]
     pub const fn out_of_step(&self) -> u64 {
         self.out_of_step

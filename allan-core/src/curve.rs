@@ -116,6 +116,7 @@ pub struct CurveView<'a> {
 
 impl<'a> CurveView<'a> {
     /// The curve with these points, shortest averaging time first, of `samples` samples every `sample_period` seconds.
+    /// The arguments are not checked.
     #[must_use]
     pub const fn new(sample_period: f64, samples: u64, points: &'a [AllanPoint]) -> Self {
         Self { sample_period, samples, points }
@@ -228,8 +229,9 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
     /// The curve of a table that was computed elsewhere, with the noise type and the confidence that this crate gives
     /// it.
     ///
-    /// A row is an averaging factor in samples and the Allan *variance*; `overlap` is the number of differences per
-    /// averaging time, 1 to 16. The number of differences is that of `samples` samples without gaps.
+    /// A row is an averaging factor in samples and the Allan *variance*, in the square of the unit. `sample_period` is in
+    /// seconds, and `overlap` is the number of differences per averaging time, 1 to 16. The number of differences is that
+    /// of `samples` samples without gaps.
     ///
     /// ```
     /// use allan_core::{Curve, NoiseTerm, fit::fit};
@@ -242,7 +244,7 @@ impl<const OCTAVES: usize> Curve<OCTAVES> {
     /// ```
     ///
     /// # Errors
-    /// A [`TableError`] with the first row that a curve cannot have.
+    /// A [`TableError`] for the first argument or row that a curve cannot have.
     ///
     /// # Cost
     /// | `Curve::from_points` | Cortex-M4F | Cortex-M0+ |

@@ -27,8 +27,9 @@ const EDF_ROUNDS: usize = 4;
 /// Fits the coefficients of `kinds` to all points of a curve; shape parameters stay as given.
 ///
 /// The first [`MAX_TERMS`] of `kinds` are used, each of which must occur once. Coefficients are in the unit of the
-/// curve (see [`NoiseTerm::unit`]), with 95 % bounds. A curve without points, or of a channel that never changed, gives
-/// coefficients of 0.
+/// curve (see [`NoiseTerm::unit`]), with 95 % bounds. They maximise the gamma likelihood of the [module](self). A curve
+/// without points, or of a channel that never changed, gives coefficients of 0. Of a curve with more than
+/// [`MAX_POINTS`] points only the octaves are used.
 ///
 /// # Cost
 /// | `fit::fit` | Cortex-M4F | Cortex-M0+ |
@@ -69,8 +70,8 @@ fn fit_of<T: TermSet>(curve: CurveView, kinds: &[NoiseTerm]) -> Model {
     model
 }
 
-/// Fits the coefficients of `kinds` as [`fit`] does, and their shape parameters ([`NoiseTerm::shape`]), starting from
-/// the given ones.
+/// Fits the coefficients of `kinds` as [`fit`] does, and their shape parameters in s and Hz ([`NoiseTerm::shape`]),
+/// starting from the given ones.
 ///
 /// # Cost
 /// | `fit::fit_shapes` | Cortex-M4F | Cortex-M0+ |
@@ -160,9 +161,10 @@ pub(crate) fn estimate<T: TermSet>(
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct Goodness {
-    /// `Σ edf·(v/m − 1 − ln(v/m))` over all points.
+    /// `Σ edf·(v/m − 1 − ln(v/m))` over all points, 0 or more.
     pub deviance: f64,
-    /// Probability of a deviance at least this large if the model is correct.
+    /// Probability, 0 to 1, of a deviance at least this large if the model is correct. It is computed from a scaled χ²
+    /// distribution (F. Satterthwaite, Biometrics 2, 1946).
     pub p_value: f64,
 }
 

@@ -97,7 +97,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> FractionalOctaves<OCTAVES, OVER
         Some((self.moments.get(doubling)?[k].squares.get(), self.counts.get(doubling)?[k]))
     }
 
-    /// The curve of `cascade`, which must be the observed one, with these points between its octaves.
+    /// The curve, in counts², of `cascade`, which must be the observed one, with these points between its octaves.
     ///
     /// `sample_period` is in seconds; `POINTS` must be `4·OCTAVES` or more. Neighbouring points are strongly
     /// correlated: the bounds of a [`fit`](crate::fit::fit) hold for curves of octaves only.

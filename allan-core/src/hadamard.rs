@@ -1,4 +1,5 @@
-//! Hadamard variance: by third differences of the running sum, on which a linear drift of the rate has no effect.
+//! Hadamard variance (W. Riley, NIST SP 1065): by third differences of the running sum, on which a linear drift of the
+//! rate has no effect.
 
 use crate::cascade::Cascade;
 use crate::confidence::{ChiSquareApproximation, Difference};

@@ -105,14 +105,15 @@ impl Model {
         filter_of(self.terms.iter().map(|term| &term.kind))
     }
 
-    /// Allan variance of a term at averaging factor `n`, in the square of the unit, behind the
-    /// [`filter`](Self::filter).
+    /// Allan variance of a term at averaging factor `n`, in the square of the unit: `value²` times
+    /// [`NoiseTerm::avar`] behind the [`filter`](Self::filter).
     #[must_use]
     pub fn part(&self, term: &FittedTerm, n: u64) -> f64 {
         term.value * term.value * term.kind.avar_behind(self.filter().as_ref(), n, self.sample_period)
     }
 
-    /// Modelled Allan variance at averaging factor `n`, in the square of the unit.
+    /// Modelled Allan variance at averaging factor `n`, in the square of the unit: the sum of the
+    /// [`part`](Self::part)s of all terms.
     #[must_use]
     pub fn avar(&self, n: u64) -> f64 {
         self.contributions(n).map(|(_, avar)| avar).sum()
@@ -149,7 +150,8 @@ impl Model {
         )
     }
 
-    /// Equivalent degrees of freedom of a measured point if the model is correct.
+    /// Equivalent degrees of freedom of a measured point if the model is correct, at most 10¹⁸ (Greenhall and Riley; see
+    /// [`confidence`](crate::confidence)).
     #[must_use]
     pub fn edf(&self, point: &AllanPoint) -> f64 {
         let avar = self.avar(point.n);

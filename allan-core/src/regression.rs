@@ -52,7 +52,7 @@ pub struct Covariate<const POINTS: usize> {
 }
 
 impl<const POINTS: usize> Covariate<POINTS> {
-    /// A covariate with this curve, one count of which is `lsb`; its measurement noise is estimated.
+    /// A covariate with this curve, of which one count is `lsb` in its unit; its measurement noise is estimated.
     ///
     /// Averaging factors below `from` and beyond the first `POINTS` are not used.
     #[must_use]
@@ -115,7 +115,8 @@ pub struct CovariateRegression<'a, const POINTS: usize, const COUPLED: usize = P
 }
 
 impl<const POINTS: usize, const COUPLED: usize> CovariateRegression<'_, POINTS, COUPLED> {
-    /// The significant sensitivities of the channel, by forward selection: in the order of their significance when chosen.
+    /// The significant sensitivities of the channel, by forward selection: in the order of their significance when chosen,
+    /// which is at least 4.5 normal standard deviations.
     ///
     /// # Cost
     /// | `CovariateRegression::sensitivities` | Cortex-M4F | Cortex-M0+ |

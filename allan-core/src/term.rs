@@ -189,7 +189,8 @@ impl NoiseTerm {
         with_process!(self, process => process)
     }
 
-    /// Allan variance at averaging factor `n` and `sample_period` seconds for a coefficient of 1.
+    /// Allan variance at averaging factor `n` and `sample_period` seconds for a coefficient of 1, by the formula of the
+    /// term's [process](Self::process).
     #[must_use]
     pub fn avar(&self, n: u64, sample_period: f64) -> f64 {
         with_process!(self, process => process.avar(n, sample_period))

@@ -104,7 +104,7 @@ impl Trace {
 }
 
 /// Fits N, B and K to `curve` and adds the missing terms, the most significant first, until no candidate is
-/// significant.
+/// significant: a term must reduce the deviance by 14 times its scatter, and by 4 more for each further parameter.
 ///
 /// The candidates are quantization, a rate ramp, Markov processes, the `lines`, and digital low-pass filters with the
 /// starting shapes `filters`, with a decimation of 1 where every value is read. The first 64 of each are used.

@@ -29,9 +29,10 @@ impl OctaveSums {
 }
 
 impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
-    /// The Allan variance, in counts², of every octave that has at least one difference.
+    /// The Allan variance, in counts², of every octave that has at least one difference, shortest first.
     ///
-    /// `sample_period` is in seconds; a [`fit`](crate::fit::fit) gives the confidence of the fitted mixture of noises.
+    /// `sample_period` is in seconds. Degrees of freedom and 95 % bounds are those of the power law that dominates at
+    /// each point; a [`fit`](crate::fit::fit) uses the fitted mixture of noises instead.
     ///
     /// # Cost
     /// | `Cascade::curve` | Cortex-M4F | Cortex-M0+ |
@@ -50,7 +51,7 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         curve
     }
 
-    /// The sums of an octave; `None` beyond the last.
+    /// The sums at `n = 2^octave`; `None` beyond the last octave.
     #[must_use]
     pub fn octave_sums(&self, octave: usize) -> Option<OctaveSums> {
         let Octave { moments, interpolation, .. } = *self.octaves.get(octave)?;
@@ -60,8 +61,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
 
     /// Replaces the state by one with these sums of `samples` samples; `missing` more were missing.
     ///
-    /// `sums` returns the [`octave_sums`](Self::octave_sums) of an octave. No difference contains samples from before
-    /// and after this call.
+    /// `sums` returns the [`octave_sums`](Self::octave_sums) of an octave, which are not checked. No difference contains
+    /// samples from before and after this call.
     ///
     /// # Cost
     /// | `Cascade::restore` | Cortex-M4F | Cortex-M0+ |
@@ -103,9 +104,9 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
 
     /// The [`curve`](Self::curve) without confidence: less flash, and a small part of the instructions.
     ///
-    /// Variances have a relative error below 10⁻⁶, bounds of 0 and infinity, no kurtosis, and white noise as their
-    /// type; the degrees of freedom are a lower limit. A [`fit`](crate::fit::fit) gives nearly the same coefficients
-    /// from both curves.
+    /// `sample_period` is in seconds. Variances have a relative error below 10⁻⁶, bounds of 0 and infinity, no kurtosis,
+    /// and white noise as their type; the degrees of freedom are a lower limit. A [`fit`](crate::fit::fit) gives nearly
+    /// the same coefficients from both curves.
     ///
     /// # Cost
     /// | `Cascade::curve_without_confidence` | Cortex-M4F | Cortex-M0+ |
@@ -124,8 +125,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         curve
     }
 
-    /// Makes `curve` the [`curve_without_confidence`](Self::curve_without_confidence) of `samples` samples with the
-    /// octave sums that `sums` returns.
+    /// Makes `curve` the [`curve_without_confidence`](Self::curve_without_confidence) of `samples` samples every
+    /// `sample_period` seconds, with the octave sums that `sums` returns.
     pub fn rebuild_without_confidence(
         curve: &mut Curve<OCTAVES>,
         sample_period: f64,
@@ -148,7 +149,8 @@ impl<const OCTAVES: usize, const OVERLAP: usize> Cascade<OCTAVES, OVERLAP> {
         curve.fill_without_confidence(sample_period, samples, points);
     }
 
-    /// Makes `curve` the [`curve`](Self::curve) of `samples` samples with the octave sums that `sums` returns.
+    /// Makes `curve` the [`curve`](Self::curve) of `samples` samples every `sample_period` seconds, with the octave sums
+    /// that `sums` returns.
     pub fn rebuild_curve(
         curve: &mut Curve<OCTAVES>,
         sample_period: f64,

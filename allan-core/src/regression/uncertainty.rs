@@ -100,7 +100,7 @@ pub struct Sensitivity {
 }
 
 impl Sensitivity {
-    /// A known sensitivity.
+    /// A sensitivity that is known without error.
     #[must_use]
     pub fn exact(covariate: usize, value: f64) -> Self {
         Self { covariate, value, error: 0.0, degrees_of_freedom: f64::INFINITY }
@@ -119,7 +119,8 @@ impl Sensitivity {
         (self.value - half_width, self.value + half_width)
     }
 
-    /// Significance: the normal deviate with the same probability as this distance from 0 by Student's t.
+    /// Significance: the normal deviate with the same probability as this distance from 0 by Student's t (D. Wallace, Ann.
+    /// Math. Statist. 30, 1959).
     #[must_use]
     pub fn sigmas(&self) -> f64 {
         let widening = student(NORMAL_975, self.degrees_of_freedom) / NORMAL_975;

@@ -67,7 +67,8 @@ impl MovingAverageFilter {
         f64::from(self.taps) / self.decimation * sample_period * sqrt(f64::from(self.stages) / 2.0)
     }
 
-    /// Power gain at `frequency` in Hz for what passes the filter.
+    /// Power gain, 0 to 1, at `frequency` in Hz: `(sin(L·x)/(L·sin x))²` per stage, with `x = π·f·sample_period/decimation`
+    /// and `L` taps. `sample_period` is that of the samples that are read, s.
     #[must_use]
     pub fn gain(&self, frequency: f64, sample_period: f64) -> f64 {
         let half = PI * frequency * sample_period / self.decimation;
