@@ -203,7 +203,7 @@ mod tests {
 
     /// A sample replaced by the mean of its two neighbours has the error of its own noise and half of theirs: `3/2 σ²`.
     #[test]
-    fn gaps_without_a_test_are_off_as_white_noise_would_be() {
+    fn gaps_without_a_test_add_the_variance_of_white_noise() {
         let AddedVariance { variance, replaced } = added(Interpolation::new(100, 0, 0), 64);
         assert_close(variance, 100.0 * 1.5 * WHITE / 64.0 / 1_000.0);
         assert_close(replaced, 0.1);

@@ -47,7 +47,7 @@ mod tests {
     use std::vec::Vec;
 
     #[test]
-    fn every_counter_of_events_is_told_when_it_rises() {
+    fn every_event_counter_is_reported_when_it_rises() {
         // Numbers 1, 2, 3, … in the wire format's order.
         let bytes: Vec<u8> = (1..=Health::COUNTERS as u8).collect();
         let health: Health = postcard::from_bytes(&bytes).expect("as many varints as there are counters");

@@ -411,7 +411,7 @@ mod tests {
     }
 
     #[test]
-    fn the_third_crash_within_ten_minutes_is_told() {
+    fn the_third_crash_within_ten_minutes_is_reported() {
         let memory = memory();
         let crash_after = |seconds: u32| {
             let mut retained = RetainedRam::open(memory);

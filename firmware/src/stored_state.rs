@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn the_kept_bytes_are_read_and_written_as_ever() {
+    fn the_kept_bytes_are_read_and_written_unchanged() {
         let (settings, rest) =
             decode_settings(&kept()).map(|(settings, rest)| (settings, rest.to_vec())).expect("format 1");
         assert_eq!(settings, SETTINGS);

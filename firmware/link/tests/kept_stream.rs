@@ -46,7 +46,7 @@ fn frame(body: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn the_kept_streams_say_what_they_said() {
+fn the_kept_streams_decode_to_the_kept_messages() {
     for (stream, said) in [
         (VERSION_4, VERSION_4_MESSAGES),
         (SECOND_VERSION_4, SECOND_VERSION_4_MESSAGES),

@@ -241,7 +241,7 @@ fn a_terminal_begins_with_what_comes_after_it() {
 
 /// The host sleeps and wakes. The device continues where it was, and counts the bytes for which it had no room.
 #[test]
-fn a_suspended_bus_is_survived() {
+fn a_suspended_bus_gets_nothing_and_the_kept_lines_after_it_has_resumed() {
     let mut bench = Bench::new();
     bench.enumerate();
     bench.open();
@@ -263,7 +263,7 @@ fn a_suspended_bus_is_survived() {
 /// The cable is unplugged at any byte of a line and plugged in again, a hundred times. The host finds the device again, and reads whole
 /// lines.
 #[test]
-fn unplugging_is_survived() {
+fn the_port_works_each_time_that_it_is_plugged_in_again() {
     let mut bench = Bench::new();
     for attempt in 0..100 {
         bench.enumerate();

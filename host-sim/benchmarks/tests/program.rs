@@ -8,7 +8,7 @@ fn benchmarks(arguments: &[&str]) -> Output {
 }
 
 #[test]
-fn benchmarks_have_limits() {
+fn impossible_arguments_are_refused_and_any_number_of_jobs_is_accepted() {
     for arguments in [
         &["undeclared", "--nothing", "18446744073709551615"][..],
         &["undeclared", "--nothing", "1000000000"],

@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_named() {
+    fn an_error_of_a_profile_names_its_cause() {
         let sensor = "name = \"A1\"\nsource = \"none\"\n";
         let channel = |unit: &str, lsb: &str, rest: &str| {
             format!(

@@ -189,7 +189,7 @@ fn hidden_effects_are_learned_and_subtracted() {
 /// during the self-test, after the firmware has set no filter and before it samples. This is the other board.
 #[test]
 #[ignore = "long: two epochs and twice the fits take a minute; run with --long"]
-fn another_filter_is_found() {
+fn a_filter_that_another_device_has_changed_is_found() {
     let filter = vec![(SELF_TEST_S, Event::WriteRegister(0xB804))];
     let Epochs { learned, validated, table, .. } =
         run_two_epochs(feather_image(), FEATHER, Sensor::Warming, filter, BOTH_FITS);

@@ -198,7 +198,7 @@ fn settings_survive_power_in_the_flash_of_the_pico() {
 
 /// A board outside of `firmware` connects RST. The fourth step of the recovery resets the sensor by it, and samples flow again.
 #[test]
-fn a_board_of_ones_own_resets_the_sensor_by_its_pin() {
+fn the_example_board_resets_the_sensor_by_its_pin() {
     let events = [(1.5, Event::Stuck(Some(0))), (5.6, Event::Stuck(None))];
     let outcome = run_example(sensor(25), 8.5, &["0.5=i 0\r", "8.0=k"], &events);
     let lines = Decoded::decode(&outcome.received).lines;

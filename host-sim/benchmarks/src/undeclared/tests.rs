@@ -358,7 +358,7 @@ fn an_effect_is_named_in_its_channel_and_a_false_alarm_in_another() {
 }
 
 #[test]
-fn an_effect_outside_the_vocabulary_is_told_by_its_own_name_or_as_unexplained() {
+fn an_effect_outside_the_vocabulary_is_reported_by_its_own_name_or_as_unexplained() {
     let quiet = |kind: OutsideKind| {
         let mut case = DrawnRecording::from_group(RecordingGroup::Outside(kind), 100.0, 2);
         case.simulation.scenario.environment.motion.deviation_g = 0.0;
