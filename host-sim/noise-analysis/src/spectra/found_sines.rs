@@ -85,7 +85,8 @@ impl FoundSines {
         rest
     }
 
-    /// The lines with their changes, without sidebands of others; `rest` is the record without the lines.
+    /// The lines with their changes, if these are likelier than the `resonances` around them, and without sidebands of others; `rest` is the
+    /// record without the lines.
     pub(super) fn into_lines(self, rest: &UniformSeries, resonances: &[Resonance]) -> Vec<SpectralLine> {
         let Self { mut found } = self;
         let duration = rest.duration();
@@ -97,9 +98,12 @@ impl FoundSines {
             let near: Vec<&FoundSine> = found.iter().filter(|other| other.is_near(frequency, duration)).collect();
             let with_near = near.iter().fold(rest.clone(), |rest, other| other.sine.negative().subtracted_from(&rest));
             let has_line = |of: f64| near.iter().any(|other| is_same(distance(other).abs(), of, duration));
-            let is_examined = !resonances.iter().any(|resonance| is_on_skirts(frequency, &resonance.line));
-            let find = || Modulation::find(&strongest.sine, &with_near, strongest.density, has_line);
-            let modulation = if is_examined { find() } else { None };
+            let is_likelier = |change: &Modulation| {
+                let mut bands = resonances.iter().filter(|resonance| is_on_skirts(frequency, &resonance.line));
+                bands.all(|resonance| change.with_multiples >= resonance.line.statistic)
+            };
+            let modulation =
+                Modulation::find(&strongest.sine, &with_near, strongest.density, has_line).filter(is_likelier);
             found.retain(|other| !modulation.is_some_and(|change| change.is_sideband(distance(other), duration)));
             lines.push(SpectralLine { modulation, ..strongest.line(rest) });
         }

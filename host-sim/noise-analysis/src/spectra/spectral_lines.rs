@@ -148,6 +148,9 @@ pub(crate) fn is_read_slowly(kind: &NoiseTerm) -> bool {
 
 impl MergedLine {
     fn merge(peaks: &[spectra::SpectralLine], duration_s: f64, rate_error: f64) -> Self {
+        let strongest = peaks[0];
+        // What is left of sidebands is no part of the line between them.
+        let peaks = if strongest.modulation.is_some() { &peaks[..1] } else { peaks };
         let power = |peak: &spectra::SpectralLine| peak.deviation.value * peak.deviation.value;
         let total: f64 = peaks.iter().map(power).sum();
         let mean = |of: &dyn Fn(&spectra::SpectralLine) -> f64| {
@@ -157,7 +160,6 @@ impl MergedLine {
         let spread = mean(&|peak| (peak.frequency.value - frequency).powi(2)).sqrt();
         let own_width = mean(&|peak| width(peak));
         let width_error = mean(&|peak| peak.width.map_or(0.0, |width| width.error));
-        let strongest = peaks[0];
         Self {
             frequency: MeasuredValue {
                 value: frequency,
