@@ -3,7 +3,7 @@
 use crate::finding_text::channel_list;
 use crate::formatting::{capital, count, words};
 use crate::rounding::{NONE, signed, significant, span};
-use crate::summary::off_percent;
+use crate::summary::{self, off_percent};
 use noise_analysis::nonstationarity::{FittedPart, RelatedLine, TrackedSet};
 use noise_analysis::report::{ChannelReport, CommonModeRegression, ModelErrorReport, Nonstationarity, Report};
 
@@ -51,10 +51,15 @@ pub(crate) fn model(channel: &ChannelReport) -> String {
         error.rms_percent.map_or_else(|| NONE.to_owned(), |of| format!("{} %", off_percent(of)))
     };
     let terms: Vec<String> = channel.after.terms.iter().map(|term| words(term.kind())).collect();
-    let excluding = channel.before.unseen_excluding.as_ref().zip(channel.after.unseen_excluding.as_ref());
+    let [without, with] = summary::models(channel);
+    let excluding = without.unseen_excluding.as_ref().zip(with.unseen_excluding.as_ref());
     let excluding = excluding.map_or_else(String::new, |(before, after)| {
         format!(" Without the spikes and knocks of both halves {} become {}.", off(before), off(after))
     });
+    let error = match channel.effects.is_empty() {
+        true => off(&with.unseen),
+        false => format!("{} with N, B and K, and by {} with what was found", off(&without.unseen), off(&with.unseen)),
+    };
     let events = channel.after.events.as_ref().map_or_else(String::new, |events| {
         let rate = &events.rate_per_hour;
         format!(
@@ -65,10 +70,8 @@ pub(crate) fn model(channel: &ChannelReport) -> String {
         )
     });
     format!(
-        "On the second half, which the models had not seen, σ is off by {} with N, B and K, and by {} with what was found ({}{events}). \
+        "On the second half, which the models had not seen, σ is off by {error} ({}{events}). \
          The curve of the first half itself is off by {}: a model of stationary noise cannot be expected to do better.{excluding}",
-        off(&channel.before.unseen),
-        off(&channel.after.unseen),
         terms.join(", "),
         off(&channel.first_half_curve),
     )

@@ -128,9 +128,9 @@ pub fn allan_deviation(report: &Report, channel: &ChannelReport) -> String {
 /// The channel whose effects lower its error on the unseen half most, else that of the largest error; or `None`.
 pub(crate) fn story(report: &Report) -> Option<Plot> {
     let errors: Vec<(&ChannelReport, [f64; 2])> = summary::inertial(report)
-        .filter_map(|channel| match summary::unseen_errors(channel) {
-            [Some(before), Some(after)] => Some((channel, [before, after])),
-            _ => None,
+        .filter_map(|channel| {
+            let [before, after] = summary::models(channel).map(|model| model.unseen.deviance_per_point);
+            Some((channel, [before?, after?]))
         })
         .collect();
     let gains = errors.iter().filter(|(_, [before, after])| before > after);

@@ -392,7 +392,7 @@ fn definitions() -> Markup {
                 dd { "have a confidence of 95 %, from the equivalent degrees of freedom (edf) of each point." }
                 dt { "Before, after, model" }
                 dd { "Before is the baseline model: angle random walk " i { "N" } ", bias instability " i { "B" }
-                     ", rate random walk " i { "K" } ". After adds what was found; both are fitted to the first half. The model is "
+                     ", rate random walk " i { "K" } ". After adds what the first half shows; both are fitted to it. The model is "
                      "that of after, fitted once more to the whole record: the one to use." }
                 dt { "Error" }
                 dd { "With " i { "v" } " the measured and " i { "m" } " the modelled Allan variance, over the "

@@ -15,7 +15,7 @@ use noise_analysis::effects::{Effect, Unexplained};
 use noise_analysis::nonstationarity::FittedPart;
 use noise_analysis::report::assessment::Innovations;
 use noise_analysis::report::{
-    BiasOverTime, ChannelReport, Finding, ModelErrorReport, Parameter, PartNote, Report, Stretch,
+    BiasOverTime, ChannelReport, Finding, ModelErrorReport, ModelReport, Parameter, PartNote, Report, Stretch,
 };
 use noise_analysis::report::{DataSheetReport, TermReport};
 use noise_analysis::units::conversions;
@@ -106,7 +106,7 @@ impl ChannelCoefficients {
             name: channel.name.clone(),
             unit: channel.unit.clone(),
             coefficients: LETTERS.map(|(kind, _)| coefficient(channel, kind)),
-            rms_percent: [&channel.before, &channel.after].map(|model| model.unseen.rms_percent),
+            rms_percent: models(channel).map(|model| model.unseen.rms_percent),
             deviance: channel.after.unseen.deviance_per_point,
         }
     }
@@ -224,9 +224,10 @@ pub fn coefficient(channel: &ChannelReport, kind: &str) -> Option<Parameter> {
     Some(Parameter::new(value, low, high, unit))
 }
 
-/// For the models `before` and `after` on the unseen half as recorded.
-pub(crate) fn unseen_errors(channel: &ChannelReport) -> [Option<f64>; 2] {
-    [&channel.before, &channel.after].map(|model| model.unseen.deviance_per_point)
+/// The models of the first half without and with the findings: twice the same one for a channel without a finding, even if its first half alone
+/// has shown an effect.
+pub(crate) fn models(channel: &ChannelReport) -> [&ModelReport; 2] {
+    [if channel.effects.is_empty() { &channel.after } else { &channel.before }, &channel.after]
 }
 
 /// Error of σ before and after; empty without unseen data.
@@ -396,9 +397,14 @@ fn unseen_half(report: &Report) -> Option<String> {
     let with = range(&|channel| channel.after.unseen.rms_percent)?;
     let halves = range(&|channel| channel.first_half_curve.rms_percent)
         .map_or_else(String::new, |halves| format!(" (the two halves differ by {halves})"));
-    let is_changed = inertial(report).any(|channel| channel.before.unseen != channel.after.unseen);
-    let without = range(&|channel| channel.before.unseen.rms_percent).filter(|_| is_changed);
-    let without = without.map_or_else(String::new, |without| format!("; without what was found, by {without}"));
+    let is_changed = |channel: &ChannelReport| {
+        let [without, with] = models(channel);
+        without.unseen != with.unseen
+    };
+    let changed = inertial_names(report, is_changed);
+    let without = range(&|channel| channel.before.unseen.rms_percent.filter(|_| is_changed(channel))).zip(changed);
+    let without =
+        without.map_or_else(String::new, |(range, names)| format!("; without what was found in {names}, by {range}"));
     Some(format!("On the second half, which the model had not seen, σ is off by {with}{halves}{without}."))
 }
 
@@ -708,22 +714,25 @@ fn length_advice(report: &Report) -> LengthAdvice {
     LengthAdvice { known, except, longer, limits }
 }
 
+/// The inertial channels that are so, in few words; `None` without any.
+fn inertial_names(report: &Report, is_so: impl Fn(&ChannelReport) -> bool) -> Option<String> {
+    let names = inertial(report).filter(|channel| is_so(channel)).map(|channel| channel.name.clone());
+    let names: Vec<String> = names.collect();
+    (!names.is_empty()).then(|| channel_list(&names))
+}
+
 /// Channels fitted to the later quarter; `None` without any.
 fn recent_fit(report: &Report) -> Option<String> {
-    let recent: Vec<String> =
-        inertial(report).filter(|channel| is_fitted_to_later_quarter(channel)).map(|of| of.name.clone()).collect();
-    (!recent.is_empty()).then(|| {
-        format!(
-            "Because the noise changed, the model of {} was fitted to the last quarter before the second half alone.",
-            channel_list(&recent)
-        )
-    })
+    let recent = inertial_names(report, is_fitted_to_later_quarter)?;
+    Some(format!(
+        "Because the noise changed, the model of {recent} was fitted to the last quarter before the second half alone."
+    ))
 }
 
 /// `None` without spikes and knocks.
 fn without_events(report: &Report) -> Option<String> {
     let excluding = inertial(report).filter_map(|channel| {
-        let [before, after] = [&channel.before, &channel.after].map(|model| model.unseen_excluding.as_ref());
+        let [before, after] = models(channel).map(|model| model.unseen_excluding.as_ref());
         let change = error_change([before?, after?].map(|error| error.rms_percent));
         Some(format!("{} {change}", channel_list(std::slice::from_ref(&channel.name))))
     });

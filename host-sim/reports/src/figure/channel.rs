@@ -45,17 +45,13 @@ pub(super) fn allan_deviation_plot(report: &Report, channel: &ChannelReport) -> 
 /// The measured curve, both models fitted to the first half, and their errors on the second.
 pub(super) fn story_plot(report: &Report, channel: &ChannelReport, [before, after]: [f64; 2]) -> Plot {
     let is_lowered = after < before;
+    let models = summary::models(channel);
     let mut lines = vec![
-        model_line(
-            channel,
-            &channel.before,
-            if is_lowered { "before: N, B, K" } else { "model: N, B, K" },
-            Look::Before,
-        ),
+        model_line(channel, models[0], if is_lowered { "before: N, B, K" } else { "model: N, B, K" }, Look::Before),
         measured(channel, Look::Measured, "measured, whole record"),
     ];
     if is_lowered {
-        lines.insert(1, model_line(channel, &channel.after, "after: with effects", Look::Model));
+        lines.insert(1, model_line(channel, models[1], "after: with effects", Look::Model));
     }
     let unseen: Vec<(f64, f64)> = channel
         .curve
@@ -76,8 +72,7 @@ pub(super) fn story_plot(report: &Report, channel: &ChannelReport, [before, afte
     let up = Axis::logarithmic(&label, lines.iter().flat_map(heights).chain(level), frame);
     lines.splice(0..0, terms);
     let name = capital(&channel_name(channel));
-    let [before, after] = [&channel.before, &channel.after]
-        .map(|model| model.unseen.rms_percent.map_or_else(|| NONE.to_owned(), off_percent));
+    let [before, after] = models.map(|model| model.unseen.rms_percent.map_or_else(|| NONE.to_owned(), off_percent));
     let (title, description) = if is_lowered {
         (
             format!("{name}: σ is off by {before} % without what was found, by {after} % with it"),
