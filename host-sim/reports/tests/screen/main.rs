@@ -278,7 +278,7 @@ fn a_channel_without_a_finding_has_one_error() {
     }
     let mut full = Vec::new();
     reports::full_tables::write(&report, None, &mut full).expect("a vector can be written");
-    let page = reports::page::html(&report, None);
+    let page = reports::page::html(&report, None, None);
     for text in [plain(&report, 120).join(" "), String::from_utf8(full).expect("text"), page.replace('\u{a0}', " ")] {
         let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(text.contains("σ is off by 6.3 %"), "{text}");
