@@ -7,7 +7,7 @@ use super::bias_response::BiasResponse;
 use super::bias_step::{self, BiasStep, StepPosition};
 use super::block_means::{BLOCKS, BlockMeans};
 use super::gls_regression::{GlsRegression, RegressionEstimate};
-use super::noise_grid::{NoiseGrid, NoiseGrids};
+use super::noise_grid::NoiseGrid;
 use super::thermal_response::{self, TemperatureCourse};
 use super::time_constant::TimeConstant;
 use super::turn_on::Transient;
@@ -76,7 +76,6 @@ pub(crate) fn find(
     series: &Series,
     regressors: &[&Series],
     accelerations: &[Acceleration],
-    grids: &NoiseGrids,
     least_step: &dyn Fn() -> f64,
 ) -> BiasChanges {
     let regressors: Vec<(usize, &Series)> =
@@ -88,9 +87,9 @@ pub(crate) fn find(
             regressors.iter().map(|&(index, regressor)| (index, regressor.clone().in_common(&[&series]))).collect();
         let regressors: Vec<(usize, &Series)> =
             regressors.iter().map(|(index, regressor)| (*index, regressor)).collect();
-        return find_on_common_samples(&series, &regressors, accelerations, grids, least_step);
+        return find_on_common_samples(&series, &regressors, accelerations, least_step);
     }
-    find_on_common_samples(series, &regressors, accelerations, grids, least_step)
+    find_on_common_samples(series, &regressors, accelerations, least_step)
 }
 
 fn covers(regressor: &Series, series: &Series) -> bool {
@@ -102,14 +101,13 @@ fn find_on_common_samples(
     series: &Series,
     regressors: &[(usize, &Series)],
     accelerations: &[Acceleration],
-    grids: &NoiseGrids,
     least_step: &dyn Fn() -> f64,
 ) -> BiasChanges {
     // Squares of small changes beside a large bias would lose digits.
     let (first, bias) = series.slots.first().copied().zip(series.values.first().copied()).unwrap_or_default();
     let series = &series.clone().lowered_from(first, bias);
     let Some(blocks) = BlockMeans::from_series(series) else { return BiasChanges::default() };
-    let grid = grids.get(&blocks);
+    let grid = NoiseGrid::from_blocks(&blocks);
     let series_of = |index: usize| regressors.iter().find(|(of, _)| *of == index).map(|(_, series)| *series);
     let regressors: Vec<(usize, DVector<f64>)> = regressors
         .iter()

@@ -8,7 +8,6 @@ use crate::detectors::bias::{self, BiasChanges, BiasSensitivity};
 use crate::detectors::bias_response::BiasResponse;
 use crate::detectors::knock_search::{self, LoudStretches, SearchedChannel, slots_within};
 use crate::detectors::knocks::Knock;
-use crate::detectors::noise_grid::NoiseGrids;
 use crate::detectors::output_range::find_noise_below_count;
 use crate::detectors::spikes::{self, SpikeRule};
 use crate::detectors::vibration_rectification::{Acceleration, largest_sensitivity};
@@ -63,11 +62,7 @@ struct ChannelBias {
 
 impl Preprocessing {
     /// Finds knocks, spikes, steps, ramps and sensitivities in the inertial channels, and in the `first_half` alone.
-    pub(crate) fn detect(
-        record: &CondensedRecord,
-        first_half: Option<&CondensedRecord>,
-        noise_grids: &NoiseGrids,
-    ) -> Self {
+    pub(crate) fn detect(record: &CondensedRecord, first_half: Option<&CondensedRecord>) -> Self {
         let measurement = record.means.as_ref();
         let slots: Arc<[u64]> = measurement.slots.as_slice().into();
         let by_first_half = || {
@@ -76,10 +71,10 @@ impl Preprocessing {
                 // Repeated samples of the second half are dropped by either exclusion.
                 let repeated = record.repeated.iter().copied().filter(|slot| *slot >= middle);
                 let repeated = half.repeated.iter().copied().chain(repeated).collect();
-                Shown::by_first_half(record, half, &slots, repeated, noise_grids)
+                Shown::by_first_half(record, half, &slots, repeated)
             })
         };
-        let by_whole = || Shown::by_whole(record, &slots, noise_grids);
+        let by_whole = || Shown::by_whole(record, &slots);
         let (by_first_half, (by_whole, effects)) = parallel::both(by_first_half, by_whole);
         Self { slots, by_whole, by_first_half, effects }
     }
@@ -196,11 +191,7 @@ fn all_measured(
 
 impl Shown {
     /// The findings in the whole record, and the effects of each channel.
-    fn by_whole(
-        record: &CondensedRecord,
-        slots: &Arc<[u64]>,
-        noise_grids: &NoiseGrids,
-    ) -> (Self, PerChannel<Vec<Effect>>) {
+    fn by_whole(record: &CondensedRecord, slots: &Arc<[u64]>) -> (Self, PerChannel<Vec<Effect>>) {
         let measurement = record.means.as_ref();
         let counts_per_step = record.channels.map(|of| of.counts_per_step);
         let series = all_measured(measurement, slots, &counts_per_step);
@@ -216,7 +207,7 @@ impl Shown {
             let can_show_spikes = record.channels[channel].can_show_spikes;
             let spikes = can_show_spikes.then(|| spikes::find(&quiet[channel], by_itself)).flatten();
             let excluded = spikes.as_ref().map(|found| found.excluded().to_vec()).unwrap_or_default();
-            let (bias, found) = bias_of(measurement, channel, (&once, &quiet), &excluded, noise_grids);
+            let (bias, found) = bias_of(measurement, channel, (&once, &quiet), &excluded);
             let BiasChanges { step, ramp, responses, .. } = found;
             let events = knock_detections(measurement, &loud, &once[channel], channel).into_iter().chain(spikes);
             let events = events.chain(step).chain(ramp).map(|detection| detection.effect);
@@ -234,7 +225,6 @@ impl Shown {
         first_half: &CondensedRecord,
         slots: &Arc<[u64]>,
         repeated: Vec<u64>,
-        noise_grids: &NoiseGrids,
     ) -> Self {
         let measurement = record.means.as_ref();
         let middle = measurement.middle();
@@ -253,7 +243,7 @@ impl Shown {
                 rule.as_ref().map(|rule| rule.slots(series, &loud.by_itself)).unwrap_or_default()
             };
             let of_first = spikes(&quiet[channel], &loud[0][channel]);
-            let (bias, _) = bias_of(measurement, channel, (&once[0], &quiet), &of_first, noise_grids);
+            let (bias, _) = bias_of(measurement, channel, (&once[0], &quiet), &of_first);
             let knocks = [0, 1].map(|half| slots_within(&once[half][channel], &loud[half][channel].knocks)).concat();
             let of_second = spikes(&quiet_second[channel], &loud[1][channel]);
             ShownInChannel { knocks, spikes: [of_first, of_second].concat(), bias }
@@ -275,7 +265,6 @@ fn bias_of(
     channel: ChannelId,
     (series, quiet): (&PerChannel<Series>, &PerChannel<Series>),
     spikes: &[u64],
-    noise_grids: &NoiseGrids,
 ) -> (ChannelBias, BiasChanges) {
     let regressors: Vec<ChannelId> =
         measurement.ids().filter(|&regressor| may_depend(measurement, channel, regressor)).collect();
@@ -288,7 +277,7 @@ fn bias_of(
     let least_step = || *smallest_step;
     let own = quiet[channel].clone().without(spikes);
     let accelerations = accelerations(measurement, series, channel);
-    let found = bias::find(&without_lines(own.clone()), &others, &accelerations, noise_grids, &least_step);
+    let found = bias::find(&without_lines(own.clone()), &others, &accelerations, &least_step);
     let own = offset(&found).into_iter().fold(own, |own, (from, size)| own.lowered_from(from, size));
     // Differences, or the force at each frequency, determine a sensitivity to motion better.
     let is_force = |at: &usize| measurement[regressors[*at]].profile.quantity == Quantity::SpecificForce;
