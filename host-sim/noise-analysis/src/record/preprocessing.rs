@@ -207,7 +207,7 @@ impl Shown {
             let can_show_spikes = record.channels[channel].can_show_spikes;
             let spikes = can_show_spikes.then(|| spikes::find(&quiet[channel], by_itself)).flatten();
             let excluded = spikes.as_ref().map(|found| found.excluded().to_vec()).unwrap_or_default();
-            let (bias, found) = bias_of(measurement, channel, (&once, &quiet), &excluded);
+            let (bias, found) = bias_of(record, channel, (&once, &quiet), &excluded);
             let BiasChanges { step, ramp, responses, .. } = found;
             let events = knock_detections(measurement, &loud, &once[channel], channel).into_iter().chain(spikes);
             let events = events.chain(step).chain(ramp).map(|detection| detection.effect);
@@ -243,7 +243,7 @@ impl Shown {
                 rule.as_ref().map(|rule| rule.slots(series, &loud.by_itself)).unwrap_or_default()
             };
             let of_first = spikes(&quiet[channel], &loud[0][channel]);
-            let (bias, _) = bias_of(measurement, channel, (&once[0], &quiet), &of_first);
+            let (bias, _) = bias_of(record, channel, (&once[0], &quiet), &of_first);
             let knocks = [0, 1].map(|half| slots_within(&once[half][channel], &loud[half][channel].knocks)).concat();
             let of_second = spikes(&quiet_second[channel], &loud[1][channel]);
             ShownInChannel { knocks, spikes: [of_first, of_second].concat(), bias }
@@ -261,11 +261,12 @@ impl ShownInChannel {
 
 /// Changes of the bias of `channel` without its spikes; `quiet` are all `series` without their knocks.
 fn bias_of(
-    measurement: &Measurement,
+    record: &CondensedRecord,
     channel: ChannelId,
     (series, quiet): (&PerChannel<Series>, &PerChannel<Series>),
     spikes: &[u64],
 ) -> (ChannelBias, BiasChanges) {
+    let measurement = record.means.as_ref();
     let regressors: Vec<ChannelId> =
         measurement.ids().filter(|&regressor| may_depend(measurement, channel, regressor)).collect();
     let others: Vec<&Series> = regressors.iter().map(|&regressor| &quiet[regressor]).collect();
@@ -276,7 +277,7 @@ fn bias_of(
     });
     let least_step = || *smallest_step;
     let own = quiet[channel].clone().without(spikes);
-    let accelerations = accelerations(measurement, series, channel);
+    let accelerations = accelerations(record, series, channel);
     let found = bias::find(&without_lines(own.clone()), &others, &accelerations, &least_step);
     let own = offset(&found).into_iter().fold(own, |own, (from, size)| own.lowered_from(from, size));
     // Differences, or the force at each frequency, determine a sensitivity to motion better.
@@ -352,14 +353,15 @@ fn loud_stretches<const PARTS: usize>(
 
 /// The accelerometers that may shake `channel`.
 fn accelerations<'s>(
-    measurement: &Measurement,
+    record: &'s CondensedRecord,
     series: &'s PerChannel<Series>,
     channel: ChannelId,
 ) -> Vec<Acceleration<'s>> {
+    let measurement = record.means.as_ref();
     let acceleration = |of: ChannelId| {
         let profile = &measurement[of].profile;
         let largest = largest_sensitivity(measurement[channel].profile.range, profile.range);
-        Acceleration { name: profile.name, series: &series[of], largest }
+        Acceleration { name: profile.name, series: &series[of], variances: &record.channels[of].variances, largest }
     };
     measurement.of_quantity(Quantity::SpecificForce).map(acceleration).collect()
 }
