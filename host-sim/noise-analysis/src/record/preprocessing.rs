@@ -20,7 +20,7 @@ use crate::samples::rounding::NEIGHBOURING_COUNTS;
 use crate::samples::series::Series;
 use crate::samples::uniform_series::UniformSeries;
 use crate::spectra;
-use crate::spectra::force_regression::force_sensitivities;
+use crate::spectra::force_regression::Forces;
 use measurement::{ChannelId, Measurement, PerChannel, Quantity};
 use std::cell::LazyCell;
 use std::sync::Arc;
@@ -199,6 +199,7 @@ impl Shown {
         let once = series.map(|of| of.clone().without(&record.repeated));
         // Covariates, without their own knocks.
         let quiet = without_knocks(&once, &loud);
+        let forces = forces(measurement, &quiet);
         let of_channel = |channel: ChannelId| {
             if !record.is_traced(channel) {
                 return (ShownInChannel::default(), Vec::new());
@@ -207,7 +208,7 @@ impl Shown {
             let can_show_spikes = record.channels[channel].can_show_spikes;
             let spikes = can_show_spikes.then(|| spikes::find(&quiet[channel], by_itself)).flatten();
             let excluded = spikes.as_ref().map(|found| found.excluded().to_vec()).unwrap_or_default();
-            let (bias, found) = bias_of(record, channel, (&once, &quiet), &excluded);
+            let (bias, found) = bias_of(record, channel, (&once, &quiet), &forces, &excluded);
             let BiasChanges { step, ramp, responses, .. } = found;
             let events = knock_detections(measurement, &loud, &once[channel], channel).into_iter().chain(spikes);
             let events = events.chain(step).chain(ramp).map(|detection| detection.effect);
@@ -234,6 +235,7 @@ impl Shown {
         let loud = loud_stretches(first_half, &repeated, halves.each_ref());
         let once = halves.map(|half| half.map(|of| of.clone().without(&repeated)));
         let [quiet, quiet_second] = [0, 1].map(|half| without_knocks(&once[half], &loud[half]));
+        let forces = forces(measurement, &quiet);
         let of_channel = |channel: ChannelId| {
             if !record.is_traced(channel) {
                 return ShownInChannel::default();
@@ -243,7 +245,7 @@ impl Shown {
                 rule.as_ref().map(|rule| rule.slots(series, &loud.by_itself)).unwrap_or_default()
             };
             let of_first = spikes(&quiet[channel], &loud[0][channel]);
-            let (bias, _) = bias_of(record, channel, (&once[0], &quiet), &of_first);
+            let (bias, _) = bias_of(record, channel, (&once[0], &quiet), &forces, &of_first);
             let knocks = [0, 1].map(|half| slots_within(&once[half][channel], &loud[half][channel].knocks)).concat();
             let of_second = spikes(&quiet_second[channel], &loud[1][channel]);
             ShownInChannel { knocks, spikes: [of_first, of_second].concat(), bias }
@@ -264,6 +266,7 @@ fn bias_of(
     record: &CondensedRecord,
     channel: ChannelId,
     (series, quiet): (&PerChannel<Series>, &PerChannel<Series>),
+    forces: &Forces,
     spikes: &[u64],
 ) -> (ChannelBias, BiasChanges) {
     let measurement = record.means.as_ref();
@@ -281,18 +284,17 @@ fn bias_of(
     let found = bias::find(&without_lines(own.clone()), &others, &accelerations, &least_step);
     let own = offset(&found).into_iter().fold(own, |own, (from, size)| own.lowered_from(from, size));
     // Differences, or the force at each frequency, determine a sensitivity to motion better.
-    let is_force = |at: &usize| measurement[regressors[*at]].profile.quantity == Quantity::SpecificForce;
-    let is_slow = |regressor: ChannelId| measurement[regressor].profile.quantity.is_environment();
-    let forces: Vec<usize> = (0..regressors.len()).filter(is_force).collect();
-    let of_forces: Vec<&Series> = forces.iter().map(|&at| others[at]).collect();
-    let by_force = force_sensitivities(&own, &of_forces);
-    let slow = found.sensitivities.iter().filter(|(at, _)| is_slow(regressors[*at])).copied();
-    let sensitivities = slow.chain(by_force.into_iter().map(|(place, of)| (forces[place], of)));
+    let is_slow = |(regressor, _): &(ChannelId, _)| measurement[*regressor].profile.quantity.is_environment();
+    let slow = found.sensitivities.iter().map(|&(at, of)| (regressors[at], of)).filter(is_slow);
+    let is_rate = measurement[channel].profile.quantity == Quantity::AngularRate;
+    let by_force = if is_rate { forces.sensitivities_of(&own) } else { Vec::new() };
+    let accelerometers: Vec<ChannelId> = measurement.of_quantity(Quantity::SpecificForce).collect();
+    let sensitivities = slow.chain(by_force.into_iter().map(|(place, of)| (accelerometers[place], of)));
     let bias = ChannelBias {
         offset: offset(&found),
         has_ramp: found.ramp.is_some(),
         responses: found.responses.clone(),
-        sensitivities: sensitivities.map(|(at, of)| (regressors[at], of)).collect(),
+        sensitivities: sensitivities.collect(),
     };
     (bias, found)
 }
@@ -349,6 +351,13 @@ fn loud_stretches<const PARTS: usize>(
         inertial.iter().zip(found.next().unwrap_or_default()).for_each(|(&of, found)| loud[of] = found);
         loud
     })
+}
+
+/// The forces that the gyroscopes may follow.
+fn forces(measurement: &Measurement, quiet: &PerChannel<Series>) -> Forces {
+    let has_rates = measurement.of_quantity(Quantity::AngularRate).next().is_some();
+    let forces = measurement.of_quantity(Quantity::SpecificForce).filter(|_| has_rates).map(|of| &quiet[of]);
+    Forces::new(&forces.collect::<Vec<&Series>>())
 }
 
 /// The accelerometers that may shake `channel`.
