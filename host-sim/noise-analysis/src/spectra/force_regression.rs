@@ -113,7 +113,10 @@ impl<'a> ForceRegression<'a> {
         let of_axis = |(at, force): (usize, &&Force)| {
             let (sensitivity, error) = (found.sensitivities[at], covariance[(at, at)].sqrt());
             let is_shown = sensitivity.abs() > NORMAL_975 * error;
-            is_shown.then_some((force.place, BiasSensitivity { sensitivity, error, degrees_of_freedom: freedom }))
+            is_shown.then_some((
+                force.place,
+                BiasSensitivity { sensitivity, error, degrees_of_freedom: freedom, smoothed_over_s: 0.0 },
+            ))
         };
         Some(self.forces.iter().enumerate().filter_map(of_axis).collect())
     }
