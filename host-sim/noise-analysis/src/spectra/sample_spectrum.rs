@@ -27,6 +27,8 @@ const BANDS: usize = 512;
 /// Coefficients, and points of Welch's spectrum, on either side of a line that are left out.
 const LINE_COEFFICIENTS: f64 = 8.0;
 const LINE_POINTS: f64 = 4.0;
+/// Neighbouring bands of Welch's spectrum that are one where it is used alone: the nulls of 2 × 64 taps are two of these apart.
+const JOINED: usize = 2;
 /// Part of the rate of means up to which their coefficients are used, and the lowest point of Welch's spectrum: below, the window
 /// spreads drift over several points.
 const OF_MEANS: f64 = 0.25;
@@ -76,8 +78,22 @@ impl SampleSpectrum {
         let below = OF_MEANS / means.sample_period();
         let mut spectrum = Self::of_values(means, samples_per_mean, lines, below)?;
         spectrum.point_resolution = welch.resolution();
-        spectrum.bands.extend(bands_of_points(welch, lines, below.max(LOWEST_POINT * welch.resolution())));
+        spectrum.bands.extend(bands_of_points(welch, lines, below.max(LOWEST_POINT * welch.resolution()), 1));
         Some(spectrum)
+    }
+
+    /// Of Welch's spectrum of samples with this rounding alone, in which also long gaps are left out; `lines` are at these frequencies in Hz.
+    pub(crate) fn of_welch(welch: &Welch, rounding: &Rounding, lines: &[f64]) -> Self {
+        Self {
+            bands: bands_of_points(welch, lines, LOWEST_POINT * welch.resolution(), JOINED).collect(),
+            count: 0,
+            samples_per_mean: 1,
+            period: welch.sample_period(),
+            resolution: welch.resolution(),
+            point_resolution: welch.resolution(),
+            rounding: rounding.clone(),
+            interpolated: 0.0,
+        }
     }
 
     /// Whether at most a thousandth of the samples is interpolated.
@@ -129,8 +145,8 @@ impl SampleSpectrum {
     }
 }
 
-/// The bands of Welch's spectrum above a frequency.
-fn bands_of_points(welch: &Welch, lines: &[f64], above: f64) -> impl Iterator<Item = SampleBand> {
+/// The bands of Welch's spectrum above a frequency, so many of them `joined`.
+fn bands_of_points(welch: &Welch, lines: &[f64], above: f64, joined: usize) -> impl Iterator<Item = SampleBand> {
     let reach = LINE_POINTS * welch.resolution();
     let is_line = |frequency: f64| lines.iter().any(|line| (frequency - line).abs() < reach);
     let band = |points: Vec<usize>| {
@@ -139,7 +155,8 @@ fn bands_of_points(welch: &Welch, lines: &[f64], above: f64) -> impl Iterator<It
         let measured = SpectralBand { density: average.density / 2.0, ..average };
         SampleBand { measured, place: Place::Points(points) }
     };
-    welch.band_points((above / welch.resolution()).ceil() as usize, is_line).into_iter().map(band)
+    let bands = welch.band_points((above / welch.resolution()).ceil() as usize, is_line);
+    bands.chunks(joined).map(<[Vec<usize>]>::concat).map(band).collect::<Vec<SampleBand>>().into_iter()
 }
 
 /// Squares of the coefficients of the cosine transform of `values` around `mean`, of the orders 1, 2, 3 …, normalised so that those of
