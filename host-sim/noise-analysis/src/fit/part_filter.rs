@@ -82,8 +82,7 @@ pub(crate) fn estimate(
     let averages = TriedFamily::all(&Family::averages(filters), &spectra, rate_hz);
     let joint = JointSpectra::that_show_one(&spectra, &averages)?;
     let tried = in_parallel(&averages, |family| family.likeliest(&joint.weights));
-    let limit = tried.iter().map(|of| joint.total(of)).fold(f64::INFINITY, f64::min) + joint.rise;
-    let simplest = simplest(&tried, |of| joint.total(of), limit, nominal_decimation);
+    let simplest = simplest(&tried, |of| joint.total(of), joint.rise, nominal_decimation);
     let (chosen, other_taps) = simplest.ok_or(Unidentified::NotCorrelated)?;
     let low_passes = if may_be_low_pass { &Family::low_passes()[..] } else { &[] };
     let low_passes = TriedFamily::all(low_passes, &spectra, rate_hz);
@@ -367,7 +366,7 @@ mod tests {
         let (profile, rate_hz) = (measurement::adis16405::profile(0.05), 91.8);
         let mut held = 0;
         for seed in 1..=3 {
-            let mut recorded = [5.0, 10.0, 20.0].map(|deviation| {
+            let mut recorded = [5.0, 10.0, 20.0_f64].map(|deviation| {
                 let seed = 100 * seed + deviation.to_bits() % 97;
                 read(&RecordedChannel { taps: 8, decimation: CLOCK_HZ / rate_hz, deviation, samples: 1 << 16, seed })
             });

@@ -55,13 +55,15 @@ impl SamplesOfCurve<'_> {
     /// Welch's spectrum of them, in which long gaps are left out, without lines at these frequencies in Hz; `None` where means of the samples
     /// alone are kept.
     pub(crate) fn averaged_spectrum(&self, curve: &Curve<OCTAVES>, lines: &[f64]) -> Option<SampleSpectrum> {
-        let rounding = self.rest.rounding();
+        let of = |spectrum: &Welch, interpolated: f64| {
+            SampleSpectrum::of_welch(spectrum, self.rest.rounding(), lines, interpolated)
+        };
         if let Some(spectrum) = self.spectrum {
-            return Some(SampleSpectrum::of_welch(spectrum, rounding, lines));
+            return Some(of(spectrum, curve.points().first().map_or(0.0, |point| point.replaced)));
         }
         let length = (self.rest.present() / LEAST_SEGMENTS).clamp(1, LONGEST_SEGMENT).ilog2();
         let spectrum = self.are_samples(curve).then(|| Welch::estimate(self.rest, 1 << length))?;
-        spectrum.map(|spectrum| SampleSpectrum::of_welch(&spectrum, rounding, lines))
+        Some(of(&spectrum?, self.rest.interpolated().1))
     }
 
     /// The spectrum of their longest part without a gap that interpolation does not close; `None` where the means alone are kept.

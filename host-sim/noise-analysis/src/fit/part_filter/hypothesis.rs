@@ -10,6 +10,8 @@ use std::collections::BTreeSet;
 
 /// Accuracy of the likeliest decimation or frequency, as a part of it: 10⁶ samples know it to some thousandths.
 const ACCURACY: f64 = 1e-4;
+/// Largest factor between the sensor's clock and its nominal one: beyond √2, within which one of the taps, powers of 2, has any length.
+const FARTHEST_CLOCK: f64 = 1.5;
 
 /// A family of filters with the deviance of each channel at some of its decimations or frequencies.
 pub(super) struct TriedFamily<'a> {
@@ -61,10 +63,8 @@ impl<'a> TriedFamily<'a> {
         let behind = self.behind(at(best));
         let sum = |adjusted: f64| sum_behind(&behind, weights, *family, adjusted);
         let between = least_within((range.0.ln(), range.1.ln()), ACCURACY, |log| sum(log.exp())).exp();
-        let whole = match family {
-            Family::ReadSlowly(_) => range.0.ceil() as u32..=range.1.floor() as u32,
-            Family::EveryValue(_) | Family::LowPass(_) => 1..=0,
-        };
+        let is_read_slowly = matches!(family, Family::ReadSlowly(_));
+        let whole = (range.0.ceil() as u32..=range.1.floor() as u32).filter(|_| is_read_slowly);
         let likelier = |best: (f64, f64), next: (f64, f64)| if next.1 < best.1 { next } else { best };
         let whole = whole.map(f64::from).map(|of| (of, sum(of)));
         let (adjusted, _) = whole.fold((between, sum(between)), likelier);
@@ -111,22 +111,53 @@ fn sum_behind(behind: &[ChannelBehindFilter], weights: &[f64], family: Family, a
     weighted.map(|(of, weight)| weight * of.deviance(family.with(adjusted))).sum()
 }
 
-/// The position of the simplest of those of `tried` whose `total` is at most `limit`, and the other taps of these. Every value recorded
-/// is simpler than a filter that is read slowly, and of several of these the one nearest to the sensor's own clock is.
+/// The position of the simplest of those of `tried` whose `total` is above the least one by at most `rise`, and the other taps of these. Every
+/// value recorded is simpler than a filter that is read slowly, and of several of these the one nearest to the sensor's own clock is. Far
+/// from that clock none is chosen: what limits the bandwidth before the filter resembles more taps at a multiple of it.
 pub(super) fn simplest(
     tried: &[Hypothesis],
     total: impl Fn(&Hypothesis) -> f64,
-    limit: f64,
+    rise: f64,
     nominal_decimation: f64,
 ) -> Option<(usize, Vec<u16>)> {
-    let as_good = || tried.iter().enumerate().filter(|(_, of)| total(of) <= limit);
     let distance = |of: &Hypothesis| match of.family {
-        Family::EveryValue(_) => -1.0,
+        Family::EveryValue(_) => -1.0_f64,
+        // Without a stated clock all are equal.
+        Family::ReadSlowly(_) | Family::LowPass(_) if nominal_decimation == 0.0 => 0.0,
         Family::ReadSlowly(_) | Family::LowPass(_) => (of.adjusted / nominal_decimation).ln().abs(),
     };
+    let possible = || tried.iter().filter(|of| distance(of) < FARTHEST_CLOCK.ln());
+    let limit = possible().map(&total).fold(f64::INFINITY, f64::min) + rise;
     let nearer =
         |a: &Hypothesis, b: &Hypothesis| distance(a).total_cmp(&distance(b)).then(total(a).total_cmp(&total(b)));
-    let (at, chosen) = as_good().min_by(|(_, a), (_, b)| nearer(a, b))?;
+    let as_good = || tried.iter().enumerate().filter(|(_, of)| total(of) <= limit);
+    let near = as_good().filter(|(_, of)| distance(of) < FARTHEST_CLOCK.ln());
+    let (at, chosen) = near.min_by(|(_, a), (_, b)| nearer(a, b))?;
     let taps = as_good().filter_map(|(_, of)| of.family.taps()).filter(|taps| Some(*taps) != chosen.family.taps());
     Some((at, taps.collect::<BTreeSet<u16>>().into_iter().collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use allan_core::term::MovingAverageFilter;
+
+    /// As in 60 s of a measured part at 816 Hz, whose bandwidth of 330 Hz is before its filter of 4 taps.
+    #[test]
+    fn more_taps_at_twice_the_clock_are_not_chosen() {
+        let of = |family, adjusted, deviance| Hypothesis {
+            family,
+            adjusted,
+            range: (adjusted, adjusted),
+            deviances: vec![deviance],
+        };
+        let tried = [
+            of(Family::EveryValue(MovingAverageFilter::bartlett(4)), 1.0, 300.0),
+            of(Family::ReadSlowly(MovingAverageFilter::bartlett(8)), 2.0, 200.0),
+        ];
+        let chosen = |nominal: f64| simplest(&tried, |of| of.total(&[1.0]), 4.0, nominal).map(|(at, _)| at);
+        assert_eq!(chosen(1.003), Some(0));
+        // Where every second value is read, and where the clock is not known.
+        assert_eq!([chosen(2.006), chosen(0.0)], [Some(1), Some(1)]);
+    }
 }
