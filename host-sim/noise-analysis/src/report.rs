@@ -113,7 +113,7 @@ pub enum PartNote {
         /// The sample rate that is stated, Hz.
         stated_hz: f64,
     },
-    /// The curves give the length of the filter; the taps follow from the nominal clock.
+    /// The spectra give the length of the filter; the taps follow from the nominal clock.
     LengthAlone {
         /// Length of the filter in samples of the record.
         length: f64,

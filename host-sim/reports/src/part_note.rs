@@ -50,7 +50,7 @@ pub(crate) fn sentence(note: &PartNote) -> String {
             estimate(sample_rate_hz.value, sample_rate_hz.low, sample_rate_hz.high)
         ),
         PartNote::LengthAlone { length, taps, other_taps, nominal_hz } => format!(
-            "The curves give the length of the filter, {} samples, and not its taps. {taps} taps are nearest to the nominal clock of {} \
+            "The spectra give the length of the filter, {} samples, and not its taps. {taps} taps are nearest to the nominal clock of {} \
              Hz; {} taps at another clock have the same length.",
             significant(*length, 3),
             plain(*nominal_hz, 4),

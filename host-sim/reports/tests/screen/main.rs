@@ -358,7 +358,7 @@ fn what_the_record_does_not_tell_of_the_part_is_told_in_sentences() {
     let last = [
         "Without time stamps the sample rate is the stated 100 Hz; by the part's nominal clock of 819.2 Hz it would be \
          90.80 ± 0.10 Hz. Every τ and N scale with it.",
-        "The curves give the length of the filter, 1.77 samples, and not its taps. 8 taps are nearest to the nominal clock of 819.2 Hz; \
+        "The spectra give the length of the filter, 1.77 samples, and not its taps. 8 taps are nearest to the nominal clock of 819.2 Hz; \
          4 or 16 taps at another clock have the same length.",
         "Gyro z alone would have its filter read every 8.873 values, farther from the common figure than chance explains.",
         "The filter shows in 5 of the 6 channels whose noise is larger than a count.",
