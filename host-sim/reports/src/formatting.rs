@@ -2,10 +2,9 @@
 
 use crate::line_breaks::broken;
 use crate::rounding::{NONE, grouped, quantity_digits, significant, span};
-use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
+use comfy_table::{Table, presets};
 use noise_analysis::report::assessment::{Innovations, RecordLength};
 use noise_analysis::report::{ChannelReport, MissingSamples, ModelErrorReport, ModelReport};
-use std::fmt;
 
 /// Four significant digits; [`NONE`] if not finite.
 pub fn number(value: f64) -> String {
@@ -176,42 +175,6 @@ pub(crate) fn plain_table<const COLUMNS: usize>(header: [&str; COLUMNS]) -> Tabl
     let mut table = Table::new();
     table.load_preset(presets::NOTHING).set_header(header);
     table
-}
-
-/// A table in a frame of box characters. `Display` writes no final line break.
-pub struct TextTable(Table);
-
-impl TextTable {
-    /// `left` columns are aligned left, the others right.
-    pub fn new<H: Into<String>>(
-        header: impl IntoIterator<Item = H>,
-        left: usize,
-        rows: impl IntoIterator<Item = Vec<String>>,
-    ) -> Self {
-        let mut table = Table::new();
-        table
-            .load_preset(presets::UTF8_FULL_CONDENSED)
-            .apply_modifier(modifiers::UTF8_ROUND_CORNERS)
-            .set_content_arrangement(ContentArrangement::Disabled)
-            .set_header(header.into_iter().map(Into::into).collect::<Vec<String>>())
-            .add_rows(rows);
-        for column in table.column_iter_mut().skip(left) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-        Self(table)
-    }
-
-    /// At most `width` columns wide; longer cells are broken.
-    pub fn within(mut self, width: u16) -> Self {
-        self.0.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
-        self
-    }
-}
-
-impl fmt::Display for TextTable {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
 }
 
 #[cfg(test)]

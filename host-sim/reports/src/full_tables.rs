@@ -7,11 +7,12 @@ use crate::evidence;
 use crate::explanation;
 use crate::finding_text::FindingText;
 use crate::formatting::{
-    TextTable, count, duration, filter_consistency, interval, missing_samples, number, optional, parameter_name,
-    percent, recording_advice, words, worst_deviations, wrap,
+    count, duration, filter_consistency, interval, missing_samples, number, optional, parameter_name, percent,
+    recording_advice, words, worst_deviations, wrap,
 };
 use crate::rounding::{NONE, Scale, p_value, parameter_magnitude, quantity_digits, unit};
 use crate::summary;
+use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
 use noise_analysis::report::assessment::navigation::CALIBRATION_S;
 use noise_analysis::report::assessment::{Assessment, Coefficient, NavigationDrift};
 use noise_analysis::report::{
@@ -150,11 +151,19 @@ fn section(channel: &ChannelReport, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "{}", curve_table(channel))
 }
 
-fn table(header: &[&str], left: usize, rows: impl IntoIterator<Item = Vec<String>>) -> TextTable {
-    TextTable::new(header.iter().copied(), left, rows).within(WIDTH)
+/// In a frame; `left` columns are aligned left, the others right.
+fn table(header: &[&str], left: usize, rows: impl IntoIterator<Item = Vec<String>>) -> Table {
+    let mut table = Table::new();
+    table.load_preset(presets::UTF8_FULL_CONDENSED).apply_modifier(modifiers::UTF8_ROUND_CORNERS);
+    table.set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH);
+    table.set_header(header.to_vec()).add_rows(rows);
+    for column in table.column_iter_mut().skip(left) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
 }
 
-fn coefficient_table(channel: &ChannelReport) -> TextTable {
+fn coefficient_table(channel: &ChannelReport) -> Table {
     let SlopeMethodReport { angle_random_walk, bias_instability, rate_random_walk } = &channel.read_off;
     let terms = &channel.before.terms;
     let classical = KINDS.into_iter().zip([angle_random_walk, bias_instability, rate_random_walk]);
@@ -180,7 +189,7 @@ fn coefficient_table(channel: &ChannelReport) -> TextTable {
     table(&header, 2, classical.chain(others).map(row))
 }
 
-fn term_table(terms: &[TermReport]) -> TextTable {
+fn term_table(terms: &[TermReport]) -> Table {
     let rows = terms.iter().flat_map(|term| {
         term.parameters().into_iter().map(move |(name, parameter)| {
             let scale = Scale::new([parameter_magnitude(&parameter)], &parameter.unit);
@@ -192,7 +201,7 @@ fn term_table(terms: &[TermReport]) -> TextTable {
     table(&header, 3, rows)
 }
 
-fn error_table(channel: &ChannelReport) -> TextTable {
+fn error_table(channel: &ChannelReport) -> Table {
     let after = if summary::is_fitted_to_later_quarter(channel) { "after, later quarter" } else { "after" };
     // Fitted, and unseen.
     let row = |name: String, errors: [Option<&ModelErrorReport>; 2]| {
@@ -212,7 +221,7 @@ fn error_table(channel: &ChannelReport) -> TextTable {
     table(&header, 1, rows)
 }
 
-fn curve_table(channel: &ChannelReport) -> TextTable {
+fn curve_table(channel: &ChannelReport) -> Table {
     let (headings, rows) = curve_numbers(channel);
     table(&headings.iter().map(String::as_str).collect::<Vec<_>>(), 0, rows)
 }
@@ -239,7 +248,7 @@ fn write_assessment(assessment: &Assessment, out: &mut impl Write) -> io::Result
     assessment.record.iter().try_for_each(|record| writeln!(out, "• {}.", recording_advice(record)))
 }
 
-fn unit_table(coefficients: &[Coefficient]) -> TextTable {
+fn unit_table(coefficients: &[Coefficient]) -> Table {
     let row = |coefficient: &Coefficient| {
         let scale = Scale::new([parameter_magnitude(&coefficient.value)], &coefficient.value.unit);
         let sense = if coefficient.discrete { "discrete, of samples" } else { "continuous" };
@@ -250,7 +259,7 @@ fn unit_table(coefficients: &[Coefficient]) -> TextTable {
     table(&header, 3, coefficients.iter().map(row))
 }
 
-fn drift_table(drifts: &[NavigationDrift]) -> TextTable {
+fn drift_table(drifts: &[NavigationDrift]) -> Table {
     let row = |drift: &NavigationDrift| {
         let observed = drift.observed.as_ref();
         let scale = Scale::new([drift.predicted].into_iter().chain(observed.map(parameter_magnitude)), &drift.unit);
