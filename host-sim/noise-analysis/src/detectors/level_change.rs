@@ -1,6 +1,6 @@
 //! A noise level that changes once, by the logarithms of the levels of blocks.
 
-use super::noise_levels::{DIFFERENCES, SquaredDifferences, TRIMMED_MEAN, exceedance, longer_levels};
+use super::noise_levels::{BlockLevels, DIFFERENCES, SquaredDifferences, TRIMMED_MEAN, exceedance};
 use super::telegraph_models::{gauss_markov_log_likelihood, independent_log_likelihood};
 use crate::bounds::BoundedEstimate;
 use crate::distributions::{NORMAL_975, student_tail};
@@ -34,8 +34,8 @@ struct TwoLevels {
 pub(crate) fn find(series: &Series) -> Option<LevelChange> {
     let differences = SquaredDifferences::new(series, 1);
     let all = differences.levels(DIFFERENCES, 0);
-    let doublings = (all.len() / LEAST_BLOCKS).checked_ilog2()?;
-    let levels = Levels::new(&longer_levels(&all, doublings))?;
+    let doublings = (all.count / LEAST_BLOCKS).checked_ilog2()?;
+    let levels = Levels::new(&all.doubled(doublings))?;
     let count = levels.of_blocks.len() as f64;
     let two = levels.two()?;
     let (around_mean, around_line) = levels.squares_of_mean_and_line();
@@ -93,10 +93,10 @@ impl Side {
 }
 
 impl Levels {
-    fn new(levels: &[Option<f64>]) -> Option<Self> {
-        let known = levels.iter().enumerate().filter_map(|(at, level)| level.map(|level| (at as f64, level.ln())));
+    fn new(levels: &BlockLevels) -> Option<Self> {
+        let known = levels.known.iter().map(|(at, level)| (*at as f64, level.ln()));
         let of_blocks: Vec<(f64, f64)> = known.filter(|(_, level)| level.is_finite()).collect();
-        (2 * of_blocks.len() >= levels.len() && of_blocks.len() >= LEAST_BLOCKS / 2).then_some(Self { of_blocks })
+        (2 * of_blocks.len() >= levels.count && of_blocks.len() >= LEAST_BLOCKS / 2).then_some(Self { of_blocks })
     }
 
     /// The split with the least scatter around the two means.
