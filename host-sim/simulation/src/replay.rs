@@ -1,7 +1,7 @@
-//! A recording, replayed over an SPI bus to the real driver.
+//! Replay of a recording over an SPI bus to the real driver.
 //!
-//! Each burst of a frame log, or each row of a table as the burst that the part would have sent, is one transaction. The
-//! driver requests and decodes it as from a part; the decoded samples become the recording.
+//! Each burst of a frame log is one transaction; so is each row of a table, as the burst that the part would have sent.
+//! The driver requests and decodes it as from a part. The decoded samples are the recording.
 
 use crate::bus_timing::CapturedBusTiming;
 use adis16405_driver::{Adis16405, BURST_BYTES, BURST_REQUEST, Burst, Channel, Config, GyroRange, Register};
@@ -20,13 +20,13 @@ use std::rc::Rc;
 pub struct Replay {
     /// The samples that the driver decoded.
     pub recording: Recording,
-    /// Number of transactions that were no burst reads; they are not decoded.
+    /// Number of transactions that were not burst reads; they are not decoded.
     pub other_transactions: u64,
-    /// The times on the bus, as far as the file says them.
+    /// The times on the bus, as far as the file has them.
     pub timing: CapturedBusTiming,
 }
 
-/// Replays a table of counts, a frame log or an export of a logic analyzer, told apart by the header of `file`.
+/// Replays a table of counts, a frame log or an export of a logic analyzer; the header of `file` tells which.
 ///
 /// # Errors
 /// The file cannot be read, or a transaction differs from the one that the driver requests.
@@ -41,7 +41,7 @@ pub fn replay(file: impl Into<FileBytes>, range: GyroRange) -> Result<Replay, In
 /// Replays a table of counts: every row as the burst that the part would have sent.
 ///
 /// # Errors
-/// As [`replay`].
+/// Those of [`replay`].
 pub fn replay_table(file: impl Into<FileBytes>, range: GyroRange) -> Result<Replay, InputError> {
     let file = &file.into();
     let mut recorder: Option<Recorder> = None;
@@ -53,7 +53,7 @@ pub fn replay_table(file: impl Into<FileBytes>, range: GyroRange) -> Result<Repl
         Ok(())
     })
     .map_err(|error| match &error.reason {
-        // No option says which column is which.
+        // No option assigns columns to channels here.
         Reason::Selection(selection) if matches!(**selection, SelectionError::NoChannel(_)) => {
             InputError { reason: Reason::NoChannel, ..error }
         }
@@ -66,14 +66,14 @@ pub fn replay_table(file: impl Into<FileBytes>, range: GyroRange) -> Result<Repl
 /// Replays a frame log. The range is `range` unless a write to SENS_AVG before the first burst selects another.
 ///
 /// # Errors
-/// As [`replay`], or the log has no burst, or bursts of two ranges.
+/// Those of [`replay`], or the log has no burst, or bursts of two ranges.
 pub fn replay_log(file: impl Into<FileBytes>, range: GyroRange) -> Result<Replay, InputError> {
     let file = &file.into();
     replay_frames(file, FrameReader::Log(FrameLogReader::open(file)?), range)
 }
 
 fn replay_frames(file: &FileBytes, mut frames: FrameReader, range: GyroRange) -> Result<Replay, InputError> {
-    // As the log last selected it, and of the bursts so far.
+    // The range that the log selected last, and the range of the bursts so far.
     let (mut selected, mut taken_in) = (range, range);
     let mut recorder = Recorder::new(Channel::ALL.to_vec(), range);
     let mut player = Player::new();
@@ -122,7 +122,7 @@ impl Player {
         Self { driver: Adis16405::new(bus.clone(), NoDelay, Config::default()), bus }
     }
 
-    /// Lets the driver read one recorded transaction.
+    /// Makes the driver read one recorded transaction.
     fn burst(&mut self, mosi: &[u8], miso: &[u8]) -> Result<Burst, Reason> {
         self.bus.load(mosi, miso);
         self.driver.burst().map_err(|e| Reason::Bus(e.to_string()))
@@ -176,17 +176,17 @@ struct Recorded {
     played: bool,
 }
 
-/// A difference of the driver's transaction from the recorded one.
+/// The difference of the driver's transaction from the recorded one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum ReplayError {
-    /// Nothing was loaded since the last transaction.
+    /// No transaction was loaded since the last one.
     NothingLoaded,
     /// A byte from the host differs from the recorded one.
     OtherRequest {
         /// Position in the transaction, from 0.
         at: usize,
     },
-    /// More or fewer bytes than were recorded.
+    /// The transaction has more or fewer bytes than the recorded one.
     OtherLength {
         /// Bytes recorded.
         recorded: usize,
@@ -249,7 +249,8 @@ impl SpiDevice<u8> for ReplayBus {
                     }
                 }
                 Operation::Transfer(read, write) => {
-                    // The shorter side is padded: zeros go out, surplus answers are dropped (rule of embedded-hal).
+                    // The shorter side is padded, as embedded-hal requires: zeros are sent, surplus answers are
+                    // dropped.
                     for i in 0..read.len().max(write.len()) {
                         let answer = recorded.exchange(at, write.get(i).copied().unwrap_or(0))?;
                         if let Some(word) = read.get_mut(i) {
