@@ -232,6 +232,16 @@ fn of_kind(effect: &Effect) -> EvidenceText {
             ),
             "; a machine that is switched on, or a setting of the sensor",
         ),
+        Effect::WanderingLevel(of) => text(
+            format!(
+                "the deviation of neighbours' differences is like that some time before, by chance {}; its logarithm varies by {:.3} \
+                 (1 σ) and forgets in {:.3} s",
+                chance(of.p_value),
+                of.deviation.value,
+                of.time_constant_s.value
+            ),
+            "; a vibration, a supply or a temperature that changes",
+        ),
         Effect::TemperatureSensitivity(of) => text(
             format!("follows the measured temperature, {:.0} σ", of.sigmas),
             "; a bias that drifts with temperature",

@@ -344,6 +344,17 @@ fn sentences(finding: &Finding, amounts: &Amounts) -> (String, Advice) {
                 "; N is that of both levels together: cut the record there.",
             ),
         ),
+        Effect::WanderingLevel(of) => (
+            format!(
+                "The noise grows and falls by {}| (1 σ)|, within {}.",
+                each("deviation"),
+                seconds(of.time_constant_s)
+            ),
+            Advice::new(
+                "Look for what shakes the part, or changes its supply or temperature",
+                "; N is that of the mean level.",
+            ),
+        ),
         Effect::TemperatureSensitivity(_) => (
             format!("The bias follows the temperature: {}.", each("sensitivity")),
             Advice::compensate(

@@ -4,6 +4,7 @@
 //! them. The likeliest stretch around a loud block is the knock; the rest is tested again. The time of a knock is
 //! tested in the other channels alone.
 
+use super::change_point::ChangeOfLevel;
 use super::noise_levels::{
     BlockLevels, DIFFERENCES, FEW_DIFFERENCES, HALF_EFFICIENCY, LevelScatter, NEIGHBOURS, Neighbourhood,
     SquaredDifferences, TRIMMED_MEAN, Wandering, averaging_factors, doublings, exceedance, ratio_by_chance,
@@ -29,10 +30,6 @@ const LARGEST_SHARE: f64 = 0.1;
 const PASSES: usize = 8;
 const FEWEST_DIFFERENCES: usize = 16;
 const SIDE: i64 = 6;
-/// Half of the 95 % quantile of χ² with one degree of freedom: loss of ln likelihood at the end of a knock.
-const LIKELIHOOD_LOSS: f64 = 1.92;
-/// Cap on the square of a difference over the knock's level, against single samples; 0.3 % of normal ones are larger.
-const LARGEST_SQUARE: f64 = 9.0;
 
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Knock {
@@ -456,33 +453,15 @@ pub(super) fn join(knocks: &mut Vec<Knock>, mut knock: Knock) {
 /// The likeliest stretch of a raised level around a block, tried at the root of the block's ratio.
 fn knock_around(block: &LoudBlock, differences: &SquaredDifferences, p_value: f64) -> Knock {
     let quiet = block.quiet / TRIMMED_MEAN;
-    let tried = block.ratio.sqrt();
     let length = block.differences.len();
-    // ln likelihood ratio of each difference; correlated ones count as fewer.
-    let weight = 0.5 * block.freedom.block / length as f64;
     let window =
         block.differences.start.saturating_sub(4 * length)..(block.differences.end + 4 * length).min(differences.len());
-    let gain = |square: f64| {
-        if !square.is_finite() {
-            return 0.0;
-        }
-        let ratio = (square / quiet).min(LARGEST_SQUARE * block.ratio);
-        weight * (ratio * (1.0 - 1.0 / tried) - tried.ln())
-    };
     let squares = differences.squares(window.clone());
-    let mut sums = vec![0.0];
-    squares.iter().for_each(|square| sums.push(sums[sums.len() - 1] + gain(*square)));
+    let levels = [quiet, block.ratio.sqrt() * quiet];
+    let change = ChangeOfLevel::new(&squares, levels, block.ratio * quiet, block.freedom.block / length as f64);
     let middle = (block.differences.start + block.differences.end) / 2 - window.start;
-    let by = |a: &usize, b: &usize| sums[*a].total_cmp(&sums[*b]);
-    let start = (0..=middle).min_by(by).unwrap_or(middle);
-    let end = (middle + 1..sums.len()).max_by(by).unwrap_or(middle + 1);
-    let starts = || (0..=middle).filter(|&at| sums[at] < sums[start] + LIKELIHOOD_LOSS);
-    let ends = || (middle + 1..sums.len()).filter(|&at| sums[at] > sums[end] - LIKELIHOOD_LOSS);
-    let bounds = |possible: &mut dyn Iterator<Item = usize>, likeliest: usize| {
-        possible.fold((likeliest, likeliest), |(low, high), at| (low.min(at), high.max(at)))
-    };
-    let (start_low, start_high) = bounds(&mut starts(), start);
-    let (end_low, end_high) = bounds(&mut ends(), end);
+    let [start_low, start, start_high] = change.place(0..middle + 1);
+    let [end_low, end, end_high] = change.place_of_return(middle + 1..change.len());
     let certain = if end_low > start_high + FEWEST_DIFFERENCES { start_high..end_low } else { start..end };
     let inside = squares[certain].iter().filter(|square| square.is_finite());
     let (sum, count) = inside.fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0));

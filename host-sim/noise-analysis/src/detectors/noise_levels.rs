@@ -171,15 +171,15 @@ impl SquaredDifferences {
     /// Levels of the blocks of `size` differences from the difference `from` on.
     pub(super) fn levels(&self, size: usize, from: usize) -> BlockLevels {
         let count = self.count.saturating_sub(from) / size;
-        self.levels_without(TRIMMED, (size, from), 0..count)
+        self.levels_without(TRIMMED, size, from, 0..count)
     }
 
     /// The same, of the smaller half of the squares, of these blocks alone.
     pub(super) fn half_levels(&self, size: usize, from: usize, blocks: Range<usize>) -> BlockLevels {
-        self.levels_without(0.5, (size, from), blocks)
+        self.levels_without(0.5, size, from, blocks)
     }
 
-    fn levels_without(&self, left_out: f64, (size, from): (usize, usize), blocks: Range<usize>) -> BlockLevels {
+    fn levels_without(&self, left_out: f64, size: usize, from: usize, blocks: Range<usize>) -> BlockLevels {
         let start = |block: usize| from + block * size;
         let (mut known, mut squares) = (Vec::new(), Vec::with_capacity(size));
         let (mut position, end) = (self.position(start(blocks.start)), self.position(start(blocks.end)));

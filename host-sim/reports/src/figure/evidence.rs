@@ -44,6 +44,7 @@ pub(crate) fn evidence(report: &Report, index: usize, number: usize) -> Option<P
             in_time(report, channel, finding, Some(TimePlace { label, from_s, to_s }))
         }
         Effect::ShotNoise(_)
+        | Effect::WanderingLevel(_)
         | Effect::LinearDrift(_)
         | Effect::TurnOnTransient(_)
         | Effect::CommonMode(_)
