@@ -10,7 +10,7 @@ use recordings::inspection::{ColumnGuess, InspectedColumn, InspectedTable, Propo
 use recordings::sample_stream::StreamError;
 use recordings::time_base::{TimeBaseError, TimeRange};
 use recordings::{ColumnSelection, InputError, Printable, ReadMonitor, Reason};
-use reports::rounding::plain;
+use reports::rounding::compact;
 use reports::summary::time_options;
 use std::fmt::{self, Display, Write as _};
 use std::io::Write;
@@ -281,7 +281,7 @@ fn write_steady(table: &InspectedTable, f: &mut fmt::Formatter<'_>) -> fmt::Resu
 
 fn line(column: &InspectedColumn, reason: &str) -> [String; 7] {
     let InspectedColumn { name, unit, first, mean, noise, step, guess } = column;
-    let first: Vec<String> = first.iter().map(|value| short(*value)).collect();
+    let first: Vec<String> = first.iter().map(|value| compact(*value, 6)).collect();
     let guess = guess.as_ref().map_or_else(String::new, |ColumnGuess { channel, unit, .. }| {
         let unit = unit.map_or_else(String::new, |unit| format!(" in {unit}"));
         let reason = if reason.is_empty() { String::new() } else { format!(": {reason}") };
@@ -292,26 +292,11 @@ fn line(column: &InspectedColumn, reason: &str) -> [String; 7] {
         Printable(name).to_string(),
         unit.unwrap_or("").to_owned(),
         if is_number { first.join(" ") } else { "no numbers".to_owned() },
-        if is_number { short(*mean) } else { String::new() },
-        if is_number { rounded(*noise, 3) } else { String::new() },
-        step.map_or_else(String::new, short),
+        if is_number { compact(*mean, 6) } else { String::new() },
+        if is_number { compact(*noise, 3) } else { String::new() },
+        step.map_or_else(String::new, |step| compact(step, 6)),
         guess,
     ]
-}
-
-/// A number with six significant digits; an integer has all of its digits.
-fn short(value: f64) -> String {
-    if value.fract() == 0.0 && value.abs() < 1e20 { format!("{value:.0}") } else { rounded(value, 6) }
-}
-
-/// A number with `digits` significant digits.
-fn rounded(value: f64, digits: i32) -> String {
-    let magnitude = value.abs();
-    if value == 0.0 || (1e-3..1e7).contains(&magnitude) {
-        plain(value, digits)
-    } else {
-        format!("{value:.*e}", digits as usize - 1)
-    }
 }
 
 /// A text as one word of a shell, without terminal control characters.

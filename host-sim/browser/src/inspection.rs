@@ -7,7 +7,7 @@ use measurement::profile_file;
 use recordings::file_format::{RecordedFormat, TopicDescription};
 use recordings::inspection::{ColumnGuess, InspectedColumn, InspectedTable, Proposal};
 use recordings::time_base::TimeRange;
-use reports::rounding::plain;
+use reports::rounding::{compact, plain};
 use reports::summary::time_options;
 
 /// Most columns of a table, and most topics, that are shown.
@@ -106,23 +106,11 @@ fn row(column: &InspectedColumn) -> Markup {
                 @if !reason.is_empty() { span.under { (reason) } }
             } }
             td { (unit.unwrap_or("")) }
-            td { @if is_number { @for value in first { (short(*value)) " " } } @else { "no numbers" } }
-            td.number { @if is_number { (short(*mean)) } }
-            td.number { @if is_number { (short(*noise)) } }
-            td.number { @if let Some(step) = step { (short(*step)) } }
+            td { @if is_number { @for value in first { (compact(*value, 6)) " " } } @else { "no numbers" } }
+            td.number { @if is_number { (compact(*mean, 6)) } }
+            td.number { @if is_number { (compact(*noise, 3)) } }
+            td.number { @if let Some(step) = step { (compact(*step, 6)) } }
         }
-    }
-}
-
-/// A number with six significant digits; an integer has all of its digits.
-fn short(value: f64) -> String {
-    let magnitude = value.abs();
-    if value.fract() == 0.0 && magnitude < 1e15 {
-        format!("{value:.0}")
-    } else if (1e-3..1e7).contains(&magnitude) {
-        plain(value, 6)
-    } else {
-        format!("{value:.5e}")
     }
 }
 

@@ -1,7 +1,7 @@
 //! Estimates with their errors or bounds.
 
 use crate::distributions::NORMAL_975;
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// An estimate with its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,16 +46,22 @@ pub struct ChannelEstimate {
 
 /// An estimated number with its 95 % bounds, as a report lists it. A term that the data does not show has the value and the lower
 /// bound 0.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
     /// Estimate.
     pub value: f64,
     /// Lower 95 % bound.
     pub low: f64,
-    /// Upper 95 % bound.
+    /// Upper 95 % bound; infinite if unknown.
+    #[serde(deserialize_with = "unbounded")]
     pub high: f64,
     /// Unit of all three.
     pub unit: String,
+}
+
+/// JSON has `null` for infinity.
+pub(crate) fn unbounded<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
 }
 
 impl BoundedEstimate {
@@ -129,7 +135,8 @@ impl Parameter {
     }
 
     /// Without the unit.
-    pub(crate) const fn estimate(&self) -> BoundedEstimate {
+    #[must_use]
+    pub const fn estimate(&self) -> BoundedEstimate {
         BoundedEstimate::new(self.value, self.low, self.high)
     }
 }

@@ -20,6 +20,7 @@
 //! ```
 
 mod alternation;
+pub(crate) mod block_cosines;
 mod coherent_track;
 pub(crate) mod common_mode;
 pub(crate) mod cosine_spectrum;

@@ -1,7 +1,7 @@
 //! Numbers, units, names and tables as the terminal, the figures and the page show them.
 
 use crate::line_breaks::broken;
-use crate::rounding::{NONE, quantity_digits, significant, span};
+use crate::rounding::{NONE, grouped, quantity_digits, significant, span};
 use comfy_table::{CellAlignment, ContentArrangement, Table, modifiers, presets};
 use noise_analysis::report::assessment::{Innovations, RecordLength};
 use noise_analysis::report::{ChannelReport, MissingSamples, ModelErrorReport, ModelReport};
@@ -13,7 +13,6 @@ pub fn number(value: f64) -> String {
     if is_usual || !value.is_finite() { significant(value, 4) } else { format!("{value:.3e}") }
 }
 
-/// `value`, or [`NONE`].
 pub fn optional(value: Option<f64>) -> String {
     value.map_or_else(|| NONE.to_owned(), number)
 }
@@ -25,15 +24,7 @@ pub fn percent(value: Option<f64>) -> String {
 
 /// A whole number with its thousands separated: `1,000,000`.
 pub fn count(value: u64) -> String {
-    let digits = value.to_string();
-    let mut out = String::with_capacity(digits.len() + digits.len() / 3);
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            out.push(',');
-        }
-        out.push(digit);
-    }
-    out
+    grouped(&value.to_string())
 }
 
 /// Lost, refused and replaced samples of a channel in one sentence; empty without any.
@@ -155,16 +146,14 @@ pub fn worst_deviation(error: &ModelErrorReport, data: &str) -> Option<String> {
 
 /// Deviations of the channel's models beyond chance, by half.
 pub fn worst_deviations(channel: &ChannelReport) -> Vec<String> {
-    let (before, after) = (&channel.before, &channel.after);
-    let same = before == after;
-    let of = |name: &str, model: &ModelReport| {
-        let name = if same { "" } else { name };
-        let halves = [(&model.fitted, "the fitted half"), (&model.unseen, "the unseen half")];
-        let told = halves.into_iter().filter_map(|(error, data)| worst_deviation(error, data));
-        told.map(|text| if name.is_empty() { text } else { format!("{name}: {text}") }).collect::<Vec<_>>()
+    let (before, after) = (("before: ", &channel.before), ("after: ", &channel.after));
+    let models = if channel.before == channel.after { vec![("", &channel.after)] } else { vec![before, after] };
+    let told = |(name, model): (&str, &ModelReport)| {
+        let halves = [(&model.fitted, "the fitted half"), (&model.unseen, "the unseen half")].into_iter();
+        let told = halves.filter_map(|(error, data)| worst_deviation(error, data));
+        told.map(|text| format!("{name}{text}")).collect::<Vec<_>>()
     };
-    let after = of("after", after);
-    if same { after } else { of("before", before).into_iter().chain(after).collect() }
+    models.into_iter().flat_map(told).collect()
 }
 
 /// Recording time for a coefficient within ±20 %.
@@ -180,6 +169,13 @@ pub fn recording_advice(record: &RecordLength) -> String {
 /// Lines of at most `width` columns, indented by two after the first.
 pub fn wrap(text: &str, width: usize) -> String {
     broken(text, width, "  ").join("\n")
+}
+
+/// A table without a frame.
+pub(crate) fn plain_table<const COLUMNS: usize>(header: [&str; COLUMNS]) -> Table {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING).set_header(header);
+    table
 }
 
 /// A table in a frame of box characters. `Display` writes no final line break.

@@ -10,6 +10,11 @@ const SYMMETRIC: f64 = 0.25;
 /// Largest ratio of both sides of such an interval.
 const SKEW: f64 = 1.3;
 
+/// The least and the largest; infinite without any.
+pub(crate) fn extremes(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+    values.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), of| (of.min(low), of.max(high)))
+}
+
 /// As printed: `deg/sqrt(s)` becomes `°/√s`.
 pub fn unit(name: &str) -> String {
     let symbols = [("degC", "°C"), ("deg", "°"), ("sqrt(Hz)", "√Hz"), ("sqrt(s)", "√s"), ("sqrt(h)", "√h")];
@@ -25,14 +30,14 @@ fn fixed(value: f64, decimals: usize) -> String {
     if whole.bytes().chain(fraction.into_iter().flat_map(str::bytes)).all(|digit| digit == b'0') {
         return fraction.map_or_else(|| "0".to_owned(), |fraction| format!("0.{fraction}"));
     }
-    let mut grouped = String::new();
-    for (index, digit) in whole.chars().enumerate() {
-        if index > 0 && (whole.len() - index).is_multiple_of(3) {
-            grouped.push(',');
-        }
-        grouped.push(digit);
-    }
-    fraction.map_or_else(|| format!("{sign}{grouped}"), |fraction| format!("{sign}{grouped}.{fraction}"))
+    let whole = grouped(whole);
+    fraction.map_or_else(|| format!("{sign}{whole}"), |fraction| format!("{sign}{whole}.{fraction}"))
+}
+
+/// Thousands separated by commas.
+pub(crate) fn grouped(digits: &str) -> String {
+    let is_start = |at: usize| at > 0 && (digits.len() - at).is_multiple_of(3);
+    digits.char_indices().flat_map(|(at, digit)| is_start(at).then_some(',').into_iter().chain([digit])).collect()
 }
 
 /// Decimals for an uncertainty: two digits if it begins with 1 or 2, else one.
@@ -120,6 +125,21 @@ pub fn signed(value: f64, digits: i32) -> String {
 pub fn plain(value: f64, digits: i32) -> String {
     let text = significant(value, digits);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// Of a column of any magnitude: `100`, `−0.0413`, `−3.92e−4`. An integer has all of its digits.
+#[must_use]
+pub fn compact(value: f64, digits: i32) -> String {
+    let is_usual = !value.is_finite() || (1e-3..1e7).contains(&value.abs());
+    if value.fract() != 0.0 && is_usual {
+        return plain(value, digits);
+    }
+    if value.fract() == 0.0 && value.abs() < 1e20 {
+        return format!("{value:.0}").replace('-', "−");
+    }
+    let scaled = format!("{value:.*e}", usize::try_from(digits - 1).unwrap_or(0)).replace('-', "−");
+    let (mantissa, exponent) = scaled.split_once('e').unwrap_or((&scaled, "0"));
+    format!("{}e{exponent}", mantissa.trim_end_matches('0').trim_end_matches('.'))
 }
 
 /// Two digits; `< 0.001` below.
@@ -368,6 +388,22 @@ mod tests {
         }
         // Only the upper bound is known: its prefix.
         assert_eq!(bounded_quantity(&Parameter::new(0.0, 0.0, 19e-6, "g")), "< 19 µg");
+    }
+
+    #[test]
+    fn a_number_of_any_magnitude_has_one_minus_sign_and_no_zeros_at_its_end() {
+        for (value, text) in [
+            (0.0, "0"),
+            (-300.0, "−300"),
+            (1_784_000_000_123_456.0, "1784000000123456"),
+            (-0.041_3, "−0.0413"),
+            (-3.916_65e-4, "−3.91665e−4"),
+            (1e-4, "1e−4"),
+            (12_345_678.5, "1.23457e7"),
+            (f64::NAN, NONE),
+        ] {
+            assert_eq!(compact(value, 6), text, "{value:e}");
+        }
     }
 
     #[test]

@@ -228,10 +228,10 @@ impl Covariances {
         let (mut values, mut present, mut next) = (Vec::new(), Vec::new(), None);
         for stretch in 0..stretches {
             let from = stretch * (of.len() - length) / (stretches - 1).max(1);
-            for position in from..from + length {
+            for (position, difference) in of.iter().enumerate().skip(from).take(length) {
                 let number = differences.number_at(position);
                 let missing = next.map_or(0, |next: usize| number.abs_diff(next).min(DIFFERENCES));
-                values.extend(std::iter::repeat_n(0.0, missing).chain([of[position]]));
+                values.extend(std::iter::repeat_n(0.0, missing).chain([*difference]));
                 present.extend(std::iter::repeat_n(0.0, missing).chain([1.0]));
                 next = Some(number + 1);
             }

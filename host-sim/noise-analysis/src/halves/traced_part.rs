@@ -228,7 +228,7 @@ impl ChannelTrace {
     ) -> Self {
         let (own, bias) = (&samples.series[channel], &samples.biases[channel]);
         let covariates = CovariateFit::estimate(curves, channel, bias.has_ramp, |to| bias.sensitivity(to));
-        let compensated = covariates.compensated_series(own, samples.series);
+        let compensated = covariates.compensated_series(own, samples.series, own.span.end);
         let rest = UniformSeries::from_series(compensated.as_ref().unwrap_or(own));
         let rest = rest.with_rounding(covariates.rounding().clone());
         let samples_per_mean = samples.record.samples_per_mean;
