@@ -95,6 +95,11 @@ impl BoundedEstimate {
         Self::new(1.0 / self.value, 1.0 / self.high, 1.0 / self.low)
     }
 
+    /// The standard deviation of a normal distribution with these bounds.
+    pub(crate) fn error(self) -> f64 {
+        (self.high - self.low) / (2.0 * NORMAL_975)
+    }
+
     /// All three times `factor`, which is positive.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
@@ -107,6 +112,11 @@ impl ChannelEstimate {
     #[must_use]
     pub const fn estimate(self) -> BoundedEstimate {
         BoundedEstimate::new(self.value, self.low, self.high)
+    }
+
+    /// The standard deviation of a normal distribution with these bounds.
+    pub(crate) fn error(self) -> f64 {
+        self.estimate().error()
     }
 
     /// As a parameter in the unit of the channel.
