@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! Series ─┬► noise_levels ─┬► knocks ─► knock_search       stretches that are louder than those around them
-//!         │                └► level_change                 a level that becomes another one
+//!         │                └► level_change, level_wandering
+//!         │                                                a level that becomes another one, or that grows and falls
 //!         ├► prediction ─► spikes                          single samples
 //!         ├► effective_lsb                                 values rounded to several counts
 //!         ├► output_range                                  values that are cut off, and noise below a count
@@ -19,11 +20,13 @@ pub(crate) mod bias;
 pub(crate) mod bias_response;
 mod bias_step;
 pub mod block_means;
+mod change_point;
 pub(crate) mod effective_lsb;
 pub mod gls_regression;
 pub(crate) mod knock_search;
 pub(crate) mod knocks;
 pub(crate) mod level_change;
+mod level_wandering;
 pub mod noise_grid;
 mod noise_levels;
 pub(crate) mod output_range;

@@ -24,7 +24,7 @@ mod signals;
 mod unexplained;
 
 pub use bias::{LevelStep, LinearDrift, LinearDriftEvidence, TurnOnTransient};
-pub use disturbances::{LevelChange, MotionInterval, MotionScale, NoisyInterval, Spikes};
+pub use disturbances::{LevelChange, MotionInterval, MotionScale, NoisyInterval, Spikes, WanderingLevel};
 pub use evidence::{CurveEvidence, LineEvidence, LineSource, Multiples, SpectrumEvidence};
 pub use faults::{ClockDeviation, DroppedSamples, RateChange, RepeatedSamples, Saturation, StuckOutput};
 pub use filters::{LowPassDesign, LowPassFilter, OutputFilter};
@@ -113,6 +113,7 @@ kinds! {
         Spikes = "spikes",
         NoisyInterval = "knock",
         LevelChange = "level_change",
+        WanderingLevel = "wandering_level",
         MotionInterval = "motion",
         Saturation = "saturated",
         StuckOutput = "stuck",

@@ -183,6 +183,26 @@ fn a_change_of_the_noise_level_is_told() {
     }
 }
 
+/// By ±30 % within 20 s, in a record of which all samples are kept or only means: told, and nothing else is.
+#[test]
+fn a_noise_level_that_grows_and_falls_is_told() {
+    for samples in [40_000, 400_000] {
+        let mut random = ChaCha8Rng::seed_from_u64(11);
+        let (kept, mut level) = ((-1.0 / (20.0 * RATE_HZ)).exp(), 0.0);
+        let louder = |count: &i32| {
+            level = kept * level + (1.0 - kept * kept).sqrt() * random.sample::<f64, _>(StandardNormal);
+            (f64::exp(0.3 * level) * f64::from(*count)).round() as i32
+        };
+        let report = analyze(&gyro(white(8, samples, 20.0).iter().map(louder).collect()));
+        let [ChannelEffect { effect: Effect::WanderingLevel(level), .. }] = &only(&report).effects[..] else {
+            panic!("{samples} samples: {:?}", only(&report).effects)
+        };
+        for (of, truth) in [(level.deviation, 0.3), (level.time_constant_s, 20.0)] {
+            assert!((of.low..=of.high).contains(&truth), "{samples} samples: {level:?}");
+        }
+    }
+}
+
 /// Behind a filter over 64 samples neighbours are equal for long, and so are those of half a count.
 #[test]
 fn equal_neighbours_of_filtered_or_small_noise_are_not_stuck() {

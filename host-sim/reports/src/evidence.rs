@@ -180,6 +180,13 @@ fn of_kind(effect: &Effect) -> String {
             100.0 * of.explained,
             chance(of.p_value)
         ),
+        Effect::WanderingLevel(of) => format!(
+            "the deviation of neighbours' differences is like that some time before, by chance {}; its logarithm varies by {:.3} (1 σ) \
+             and forgets in {:.3} s; a vibration, a supply or a temperature that changes",
+            chance(of.p_value),
+            of.deviation.value,
+            of.time_constant_s.value
+        ),
         Effect::TemperatureSensitivity(of) => {
             format!("follows the measured temperature, {:.0} σ; a bias that drifts with temperature", of.sigmas)
         }

@@ -275,6 +275,10 @@ fn template(finding: &Finding, shown: &[ShownEffect]) -> Template {
             "From {time:moment} on the noise is {ratio:each} times as large| as before|.",
             "Look for what was switched on or off at that time|; N is that of both levels together: cut the record there.",
         ),
+        Effect::WanderingLevel(_) => look(
+            "The noise grows and falls by {deviation:each}| (1 σ)|, within {time_constant}.",
+            "Look for what shakes the part, or changes its supply or temperature|; N is that of the mean level.",
+        ),
         Effect::TemperatureSensitivity(_) => compensate(
             "The bias follows the temperature: {sensitivity:each}.",
             "Subtract {this/each channel's} sensitivity times the change of temperature|.{limits}{off}",

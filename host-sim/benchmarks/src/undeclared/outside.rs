@@ -101,7 +101,7 @@ impl OutsideKind {
             Self::Decays => &["shot_noise"],
             Self::Sawtooth | Self::SupplyDroop => &["periodic"],
             Self::ModulatedLine | Self::SwitchedLine => &["modulated_line"],
-            Self::LevelByTemperature => &["level_change"],
+            Self::LevelByTemperature => &["level_change", "wandering_level"],
             Self::HeldValue | Self::DeadTime => &["stuck"],
             // It is a line at half the sample rate.
             Self::AlternatingConverters => &["sinusoid", "periodic"],

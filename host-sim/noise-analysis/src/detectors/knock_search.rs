@@ -7,7 +7,7 @@
 //!                                          └► what single samples show of the knocks of other channels
 //! ```
 
-use super::knocks::{BlockSize, Knock, KnockRule, find_by, join};
+use super::knocks::{BlockSize, Knock, KnockRule, find_by, join, slots_within};
 use super::spikes::{Disturbance, FoundSpikes, SpikeRule};
 use crate::parallel::in_parallel;
 use crate::samples::series::Series;
@@ -99,19 +99,15 @@ fn add(knocks: &mut [Vec<Knock>], found: Vec<Vec<Knock>>) {
     knocks.iter_mut().zip(found).for_each(|(own, found)| found.into_iter().for_each(|knock| join(own, knock)));
 }
 
-/// Sample periods of the samples within knocks, in ascending order.
-pub(crate) fn slots_within(series: &Series, knocks: &[Knock]) -> Vec<u64> {
-    let is_within = |slot: &u64| knocks.iter().any(|knock| knock.slots.contains(slot));
-    if knocks.is_empty() { Vec::new() } else { series.slots.iter().copied().filter(is_within).collect() }
-}
-
 impl<'a> StandingOut<'a> {
     /// Applies a rule to a part of a channel; a wandering level that explains louder noise is no disturbance.
     fn find(rule: &'a SpikeRule, levels: &KnockRule, part: &Series) -> Self {
         let samples = part.values.len() as u64;
         let (singles, disturbed) = rule.separate(rule.find(part), samples);
-        let moves = |of: &Disturbance| levels.moves_by_itself(part, &of.certain);
-        let (moving, disturbances): (Vec<Disturbance>, Vec<Disturbance>) = disturbed.into_iter().partition(moves);
+        let certain: Vec<Range<u64>> = disturbed.iter().map(|of| of.certain.clone()).collect();
+        let mut moves = levels.move_by_themselves(part, &certain).into_iter();
+        let (moving, disturbances): (Vec<Disturbance>, Vec<Disturbance>) =
+            disturbed.into_iter().partition(|_| moves.next().unwrap_or(false));
         let by_itself = moving.into_iter().map(|of| of.slots).collect();
         Self { rule, disturbances, by_itself, singles, samples }
     }

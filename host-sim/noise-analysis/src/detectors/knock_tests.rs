@@ -2,6 +2,8 @@
 
 use super::knock_search::{self, SearchedChannel};
 use super::knocks::{BlockSize, Knock, KnockRule, find_by};
+use super::noise_levels::tests::samples_read;
+use crate::effects::Effect;
 use crate::effects::findings::SIGNIFICANCE;
 use crate::parallel::in_parallel;
 use crate::samples::series::Series;
@@ -268,7 +270,7 @@ fn assert_knocks_are_found(lost: f64) {
         let record = record.filtered(|slot| kept[slot as usize]);
         let found = find(std::slice::from_ref(&record)).remove(0);
         let [knock] = &found[..] else { panic!("{length_s} s at {level}: {found:?}") };
-        let effect = knock.detection(&record, &["accl_x"]).effect;
+        let effect = Effect::from(knock.interval(PERIOD_S, &["accl_x"]));
         assert_eq!(effect.name(), "knock");
         for (name, truth) in [("from", start_s), ("to", start_s + length_s), ("level", level)] {
             let parameter = &effect.parameters()[name];
@@ -330,6 +332,37 @@ fn a_shock_is_found_in_every_channel_that_shows_it_and_in_no_other() {
     assert!(find(&channels[1..]).iter().all(Vec::is_empty));
     let found = find(&channels);
     assert_eq!(found.iter().map(Vec::len).collect::<Vec<_>>(), [1, 1, 0], "{found:?}");
+}
+
+/// A knock of 3 s at 200 s, and the same record with a pause of 10¹² sample periods at 300 s.
+fn knock_before_a_pause(level: f64) -> [Series; 2] {
+    const PAUSE: u64 = 1_000_000_000_000;
+    let record = white(80, |at| if (20_000..20_300).contains(&at) { level } else { 1.0 });
+    let later = |slot: u64| if slot < 30_000 { slot } else { slot + PAUSE };
+    let slots = record.slots.iter().map(|slot| later(*slot)).collect();
+    [record.clone(), Series { slots, span: 0..SAMPLES as u64 + PAUSE, ..record }]
+}
+
+/// An array of 10¹² sample periods would not be allocated.
+#[test]
+fn a_long_pause_takes_no_memory_and_changes_no_knock_before_it() {
+    let [of_record, of_paused] = knock_before_a_pause(3.0).map(|record| find(&[record]).remove(0));
+    assert_eq!((of_record.len(), of_paused.len()), (1, 1), "{of_record:?} {of_paused:?}");
+    assert_eq!(of_record[0].slots, of_paused[0].slots);
+}
+
+/// Seven lengths of the knock on either side give the level around it; six averaging times read twice as many, and their ends.
+#[test]
+fn a_known_time_is_looked_up_near_it_alone() {
+    let [record, paused] = knock_before_a_pause(1.35);
+    let rule = KnockRule::fit(&record, DITHERED);
+    let known = find(&knock_before_a_pause(6.0)[..1]).remove(0).remove(0);
+    let before = samples_read();
+    let found = rule.at_known_time(&record, &known);
+    let read = samples_read() - before;
+    assert!(found.is_some() && found == rule.at_known_time(&paused, &known), "{found:?}");
+    let length = known.slots.end - known.slots.start;
+    assert!(read < 6 * 20 * length, "{read} samples for a knock of {length}");
 }
 
 #[test]

@@ -4,15 +4,16 @@
 //! them. The likeliest stretch around a loud block is the knock; the rest is tested again. The time of a knock is
 //! tested in the other channels alone.
 
+use super::change_point::ChangeOfLevel;
 use super::noise_levels::{
-    DIFFERENCES, FEW_DIFFERENCES, HALF_EFFICIENCY, LevelScatter, NEIGHBOURS, Neighbourhood, SquaredDifferences,
-    TRIMMED_MEAN, Wandering, averaging_factors, doublings, exceedance, longer_levels, ratio_by_chance,
+    BlockLevels, DIFFERENCES, FEW_DIFFERENCES, HALF_EFFICIENCY, LevelScatter, NEIGHBOURS, Neighbourhood,
+    SquaredDifferences, TRIMMED_MEAN, Wandering, averaging_factors, doublings, exceedance, ratio_by_chance,
 };
 use super::spikes::Disturbance;
 use crate::bounds::BoundedEstimate;
 use crate::distributions::NORMAL_975;
 use crate::effects::NoisyInterval;
-use crate::effects::findings::{Correction, Detection, SIGNIFICANCE};
+use crate::effects::findings::SIGNIFICANCE;
 use crate::parallel::in_parallel;
 use crate::robust::median;
 use crate::samples::rounding::dithered_avar;
@@ -29,10 +30,6 @@ const LARGEST_SHARE: f64 = 0.1;
 const PASSES: usize = 8;
 const FEWEST_DIFFERENCES: usize = 16;
 const SIDE: i64 = 6;
-/// Half of the 95 % quantile of χ² with one degree of freedom: loss of ln likelihood at the end of a knock.
-const LIKELIHOOD_LOSS: f64 = 1.92;
-/// Cap on the square of a difference over the knock's level, against single samples; 0.3 % of normal ones are larger.
-const LARGEST_SQUARE: f64 = 9.0;
 
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Knock {
@@ -170,7 +167,7 @@ impl KnockRule {
             };
             let blocks = fit(false);
             let moving = blocks.iter().any(|of| of.moves).then(|| fit(true));
-            let typical = median(&mut levels.into_iter().flatten().collect::<Vec<f64>>()) / TRIMMED_MEAN;
+            let typical = median(&mut levels.levels()) / TRIMMED_MEAN;
             // The Allan variance is half the mean square of the differences.
             is_dithered |= 0.5 * typical > dithered_avar(dithered_avar_counts2, n as u64) * count;
             if blocks[0].freedoms.is_empty() {
@@ -195,11 +192,9 @@ impl KnockRule {
             if next.is_empty() {
                 break;
             }
-            let excluded: Vec<Range<u64>> = next.iter().map(|knock| knock.slots.clone()).collect();
-            rest = rest.filtered(|slot| !excluded.iter().any(|of| of.contains(&slot)));
-            for knock in next {
-                join(&mut knocks, knock);
-            }
+            let excluded = slots_within(&rest, &next);
+            rest = rest.without(&excluded);
+            next.into_iter().for_each(|knock| join(&mut knocks, knock));
             if (series.values.len() - rest.values.len()) as f64 > LARGEST_SHARE * series.values.len() as f64 {
                 return Vec::new();
             }
@@ -269,15 +264,13 @@ impl KnockRule {
         let (mut loud, mut tested) = (Vec::new(), 0);
         let levels = differences.levels(*size, from);
         for doublings in doublings(differences, *size, period_s) {
-            let longer = longer_levels(&levels, doublings);
+            let longer = levels.doubled(doublings);
             let Some(&freedom) = freedoms.get(doublings as usize).or(freedoms.last()) else { continue };
             let size = size << doublings;
             let neighbourhood = Neighbourhood::new(&longer);
             let least = ratio_by_chance(SIGNIFICANCE, freedom.block, freedom.neighbours);
-            for (at, level) in longer.iter().enumerate() {
-                let (Some(level), Some(quiet)) = (level, neighbourhood.level(at, freedom.block)) else {
-                    continue;
-                };
+            for (position, (at, level)) in longer.known.iter().enumerate() {
+                let Some(quiet) = neighbourhood.level(position, freedom.block) else { continue };
                 tested += 1;
                 let quiet = quiet.max(self.floor);
                 let ratio = level / quiet;
@@ -299,38 +292,53 @@ impl KnockRule {
         let (at, from) = (block.differences.start / size, block.differences.start % size);
         let first = at.saturating_sub(NEIGHBOURS + 1);
         let blocks = first..(at + NEIGHBOURS + 2).min((differences.len() - from) / size);
-        let levels: Vec<Option<f64>> =
-            blocks.map(|block| differences.half_level(from + block * size..from + (block + 1) * size)).collect();
+        let levels = differences.half_levels(size, from, blocks);
         let freedom = HALF_EFFICIENCY * block.freedom.block;
-        let Some(quiet) = Neighbourhood::new(&levels).level(at - first, freedom) else { return false };
-        let Some(level) = levels[at - first] else { return false };
+        let Some(position) = levels.positions(&(at..at + 1)).next() else { return false };
+        let Some(quiet) = Neighbourhood::new(&levels).level(position, freedom) else { return false };
+        let level = levels.known[position].1;
         let others = HALF_EFFICIENCY * block.freedom.neighbours;
         exceedance(level / quiet.max(self.floor), freedom, others) < SIGNIFICANCE_THROUGHOUT
     }
 
-    /// True if a wandering level explains the loudness in these sample periods.
-    pub(crate) fn moves_by_itself(&self, series: &Series, slots: &Range<u64>) -> bool {
-        let of_scale = |scale: &Scale| {
-            let Blocks { size, freedoms, .. } = &scale.blocks[0];
-            let differences = SquaredDifferences::new(series, scale.n);
-            let own = differences.number(slots.start)..differences.number(slots.end);
-            let doublings = (own.len() / size).checked_ilog2().unwrap_or(0).min(freedoms.len().checked_sub(1)? as u32);
-            let levels = longer_levels(&differences.levels(*size, 0), doublings);
-            let (freedom, size) = (freedoms[doublings as usize], size << doublings);
-            let neighbourhood = Neighbourhood::new(&levels);
-            let ratio = |at: usize| Some((*levels.get(at)?)? / neighbourhood.level(at, freedom.block)?.max(self.floor));
-            let ratio = (own.start / size..own.end.div_ceil(size)).filter_map(ratio).fold(0.0, f64::max);
-            let by_itself = freedom.wandering.map_or(0.0, |of| of.exceedance(ratio) * levels.len() as f64);
-            Some((ratio, by_itself))
-        };
-        let loudest = self.scales.iter().filter_map(of_scale).max_by(|(a, _), (b, _)| a.total_cmp(b));
-        loudest.is_some_and(|(_, by_itself)| by_itself >= SIGNIFICANCE)
+    /// For each of these stretches of sample periods, whether a wandering level explains its loudness.
+    pub(crate) fn move_by_themselves(&self, series: &Series, stretches: &[Range<u64>]) -> Vec<bool> {
+        let mut loudest = vec![(0.0, 0.0); stretches.len()];
+        let scales = if stretches.is_empty() { &[] } else { &self.scales[..] };
+        for Scale { n, blocks: [Blocks { size, freedoms, .. }, _], .. } in scales {
+            let differences = SquaredDifferences::new(series, *n);
+            let levels = differences.levels(*size, 0);
+            let of_length = |doublings: usize| {
+                let longer = levels.doubled(doublings as u32);
+                (Neighbourhood::new(&longer), longer)
+            };
+            let of_lengths: Vec<(Neighbourhood, BlockLevels)> = (0..freedoms.len()).map(of_length).collect();
+            for (slots, loudest) in stretches.iter().zip(&mut loudest) {
+                let own = differences.number(slots.start)..differences.number(slots.end);
+                let doublings = (own.len() / size).checked_ilog2().unwrap_or(0) as usize;
+                let Some(doublings) = freedoms.len().checked_sub(1).map(|last| last.min(doublings)) else { continue };
+                let ((neighbourhood, levels), freedom) = (&of_lengths[doublings], freedoms[doublings]);
+                let size = size << doublings;
+                let ratio =
+                    |at: usize| Some(levels.known[at].1 / neighbourhood.level(at, freedom.block)?.max(self.floor));
+                let positions = levels.positions(&(own.start / size..own.end.div_ceil(size)));
+                let ratio = positions.filter_map(ratio).fold(0.0, f64::max);
+                if ratio >= loudest.0 {
+                    let chance = freedom.wandering.map_or(0.0, |of| of.exceedance(ratio) * levels.count as f64);
+                    *loudest = (ratio, chance);
+                }
+            }
+        }
+        loudest.into_iter().map(|(_, chance)| chance >= SIGNIFICANCE).collect()
     }
 
-    fn at_known_time(&self, series: &Series, known: &Knock) -> Option<Knock> {
+    pub(super) fn at_known_time(&self, series: &Series, known: &Knock) -> Option<Knock> {
         let tests = self.scales.len() as f64;
         let of_scale = |scale: &Scale| {
-            let differences = SquaredDifferences::new(series, scale.n);
+            // Blocks of the known length, up to one beyond SIDE of them on either side.
+            let reach = (SIDE as u64 + 2) * (known.slots.end - known.slots.start + 2 * scale.n as u64);
+            let around = known.slots.start.saturating_sub(reach)..known.slots.end.saturating_add(reach);
+            let differences = SquaredDifferences::within(series, scale.n, &around);
             let from = differences.number(known.slots.start);
             let length = differences.number(known.slots.end).checked_sub(from + 1)?;
             if length < FEWEST_DIFFERENCES {
@@ -378,14 +386,14 @@ impl Blocks {
     /// Degrees of freedom of `levels`: `noise` in steady noise, at most `shorter`, less if they wander.
     fn fit(
         differences: &SquaredDifferences,
-        (levels, mut moves): (&[Option<f64>], bool),
+        (levels, mut moves): (&BlockLevels, bool),
         period_s: f64,
         (size, noise): (usize, f64),
         shorter: BlockFreedom,
     ) -> Self {
         let mut freedoms: Vec<BlockFreedom> = Vec::new();
         for doublings in doublings(differences, size, period_s) {
-            let mut longer = longer_levels(levels, doublings);
+            let mut longer = levels.doubled(doublings);
             let of_noise = noise * f64::from(1_u32 << doublings);
             // Levels that wander at a short length do so at a longer one, which may have too few blocks to show it.
             let shorter = freedoms.last().map_or(shorter, |freedom| freedom.times(2.0));
@@ -395,7 +403,7 @@ impl Blocks {
             let neighbours = Neighbourhood::new(&longer).freedom(block).min(shorter.neighbours);
             let wandering = scatter.and_then(|of| of.wandering(of_noise, moves || shorter.wandering.is_some()));
             if wandering.is_some() && !moves {
-                remove_loudest(&mut longer);
+                remove_loudest(&mut longer.known);
                 moves = LevelScatter::new(&longer).is_some_and(|rest| rest.wandering(of_noise, false).is_some());
             }
             freedoms.push(BlockFreedom { block, neighbours, wandering: wandering.or(shorter.wandering) });
@@ -405,12 +413,14 @@ impl Blocks {
 }
 
 /// Removes the levels of the loudest stretch, as long as all knocks of a channel may be together.
-fn remove_loudest(levels: &mut [Option<f64>]) {
+fn remove_loudest(levels: &mut Vec<(usize, f64)>) {
     let length = ((LARGEST_SHARE * levels.len() as f64).ceil() as usize).max(1);
-    let sum = |from: &usize| levels[*from..from + length].iter().flatten().sum::<f64>();
+    let mut sums = vec![0.0];
+    levels.iter().for_each(|(_, level)| sums.push(sums[sums.len() - 1] + level));
+    let sum = |from: &usize| sums[from + length] - sums[*from];
     let loudest = (0..(levels.len() + 1).saturating_sub(length)).max_by(|a, b| sum(a).total_cmp(&sum(b)));
     if let Some(from) = loudest {
-        levels[from..from + length].fill(None);
+        levels.drain(from..from + length);
     }
 }
 
@@ -419,6 +429,16 @@ impl BlockFreedom {
     fn times(self, longer: f64) -> Self {
         Self { block: longer * self.block, neighbours: longer * self.neighbours, ..self }
     }
+}
+
+/// Sample periods of the samples within knocks, in ascending order.
+pub(crate) fn slots_within(series: &Series, knocks: &[Knock]) -> Vec<u64> {
+    let position = |end: u64| series.slots.partition_point(|slot| *slot < end);
+    let of_knock = |knock: &Knock| &series.slots[position(knock.slots.start)..position(knock.slots.end)];
+    let mut slots: Vec<u64> = knocks.iter().flat_map(of_knock).copied().collect();
+    slots.sort_unstable();
+    slots.dedup();
+    slots
 }
 
 /// Adds a knock, or merges it with those at less distance than the length of the shorter.
@@ -433,39 +453,18 @@ pub(super) fn join(knocks: &mut Vec<Knock>, mut knock: Knock) {
 /// The likeliest stretch of a raised level around a block, tried at the root of the block's ratio.
 fn knock_around(block: &LoudBlock, differences: &SquaredDifferences, p_value: f64) -> Knock {
     let quiet = block.quiet / TRIMMED_MEAN;
-    let tried = block.ratio.sqrt();
     let length = block.differences.len();
-    // ln likelihood ratio of each difference; correlated ones count as fewer.
-    let weight = 0.5 * block.freedom.block / length as f64;
     let window =
         block.differences.start.saturating_sub(4 * length)..(block.differences.end + 4 * length).min(differences.len());
-    let gain = |square: f64| {
-        if !square.is_finite() {
-            return 0.0;
-        }
-        let ratio = (square / quiet).min(LARGEST_SQUARE * block.ratio);
-        weight * (ratio * (1.0 - 1.0 / tried) - tried.ln())
-    };
-    let gains: Vec<f64> = differences.squares(window.clone()).map(gain).collect();
-    let mut sums = vec![0.0];
-    for gain in &gains {
-        sums.push(sums[sums.len() - 1] + gain);
-    }
+    let squares = differences.squares(window.clone());
+    let levels = [quiet, block.ratio.sqrt() * quiet];
+    let change = ChangeOfLevel::new(&squares, levels, block.ratio * quiet, block.freedom.block / length as f64);
     let middle = (block.differences.start + block.differences.end) / 2 - window.start;
-    let by = |a: &usize, b: &usize| sums[*a].total_cmp(&sums[*b]);
-    let start = (0..=middle).min_by(by).unwrap_or(middle);
-    let end = (middle + 1..sums.len()).max_by(by).unwrap_or(middle + 1);
-    let starts = || (0..=middle).filter(|&at| sums[at] < sums[start] + LIKELIHOOD_LOSS);
-    let ends = || (middle + 1..sums.len()).filter(|&at| sums[at] > sums[end] - LIKELIHOOD_LOSS);
-    let bounds = |possible: &mut dyn Iterator<Item = usize>, likeliest: usize| {
-        possible.fold((likeliest, likeliest), |(low, high), at| (low.min(at), high.max(at)))
-    };
-    let (start_low, start_high) = bounds(&mut starts(), start);
-    let (end_low, end_high) = bounds(&mut ends(), end);
+    let [start_low, start, start_high] = change.place(0..middle + 1);
+    let [end_low, end, end_high] = change.place_of_return(middle + 1..change.len());
     let certain = if end_low > start_high + FEWEST_DIFFERENCES { start_high..end_low } else { start..end };
-    let inside = differences.squares(window.start + certain.start..window.start + certain.end);
-    let (sum, count) =
-        inside.filter(|square| square.is_finite()).fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0));
+    let inside = squares[certain].iter().filter(|square| square.is_finite());
+    let (sum, count) = inside.fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0));
     let ratio = sum / f64::max(count, 1.0) / quiet;
     let freedom = block.freedom.block * count / length as f64;
     let half = NORMAL_975 * (2.0 / freedom + 2.0 / block.freedom.neighbours).sqrt();
@@ -537,12 +536,6 @@ impl Knock {
     }
 
     /// The reported knock; `channels` names all channels that show it, this one included.
-    pub(crate) fn detection(&self, series: &Series, channels: &[&'static str]) -> Detection {
-        let excluded = series.slots.iter().copied().filter(|slot| self.slots.contains(slot)).collect();
-        let effect = self.interval(series.period_s, channels).into();
-        Detection { effect, correction: Some(Correction::Exclude(excluded)) }
-    }
-
     pub(crate) fn interval(&self, period_s: f64, channels: &[&'static str]) -> NoisyInterval {
         let time = |slot: u64| slot as f64 * period_s;
         let bounded = |of: BoundedSlot| BoundedEstimate::new(time(of.value), time(of.low), time(of.high));

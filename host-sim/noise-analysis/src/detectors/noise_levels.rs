@@ -50,50 +50,96 @@ pub(super) fn averaging_factors(period_s: f64) -> impl Iterator<Item = usize> {
     (0..).map(|octave| 1_usize << octave).take_while(move |&n| n == 1 || n as f64 * period_s <= LONGEST_AVERAGE_S)
 }
 
-/// Squares of the differences of neighbouring averages over `n` samples; one for each average but the last.
+/// Differences of neighbouring averages over `n` samples, numbered by the first average. It has those alone of which both averages
+/// have enough samples, so that its memory does not grow with a gap.
 pub(super) struct SquaredDifferences {
     pub(super) n: usize,
     start: u64,
-    /// `NaN` where an average has too few samples.
+    /// Number of differences of the series, with those that are missing.
+    count: usize,
+    /// In the order of their numbers.
     differences: Vec<f64>,
+    /// Number and position of the first difference after each gap.
+    runs: Vec<(usize, usize)>,
 }
 
 impl SquaredDifferences {
     pub(super) fn new(series: &Series, n: usize) -> Self {
+        Self::within(series, n, &series.span)
+    }
+
+    /// Those of the averages that lie in `slots`.
+    pub(super) fn within(series: &Series, n: usize, slots: &Range<u64>) -> Self {
         let start = series.span.start;
         let shift = n.trailing_zeros();
-        let count = (series.span.end.saturating_sub(start) >> shift) as usize;
-        let (mut sums, mut filled) = (vec![0.0; count], vec![0_u32; count]);
-        for (&slot, &value) in series.slots.iter().zip(series.values.iter()) {
-            let at = ((slot - start) >> shift) as usize;
-            if at < count {
-                sums[at] += value;
-                filled[at] += 1;
-            }
-        }
-        let difference = |at: usize| {
-            let [a, b] = [f64::from(filled[at]), f64::from(filled[at + 1])];
-            if a.min(b) < (LEAST_FILL * n as f64).max(1.0) {
-                return f64::NAN;
-            }
-            let full = n as f64;
-            if a == full && b == full {
-                return sums[at + 1] / full - sums[at] / full;
-            }
-            // Normalised: white noise has the same variance in every difference, whatever is missing.
-            (sums[at + 1] / b - sums[at] / a) / (0.5 * n as f64 * (1.0 / a + 1.0 / b)).sqrt()
+        let averages = (series.span.end.saturating_sub(start) >> shift) as usize;
+        let [first, end] = [slots.start, slots.end].map(|end| series.slots.partition_point(|slot| *slot < end));
+        #[cfg(test)]
+        tests::count(end - first);
+        let mut all = Self {
+            n,
+            start,
+            count: averages.saturating_sub(1),
+            differences: Vec::with_capacity((end - first) >> shift),
+            runs: Vec::new(),
         };
-        Self { n, start, differences: (0..count.saturating_sub(1)).map(difference).collect() }
+        let number_of = |slot: &u64| ((slot - start) >> shift) as usize;
+        let (full, mut last, mut position) = (n as f64, None::<(usize, f64, f64)>, first);
+        for slots in series.slots[first..end].chunk_by(|one, other| number_of(one) == number_of(other)) {
+            let (number, filled) = (number_of(&slots[0]), slots.len() as f64);
+            let sum = series.values[position..position + slots.len()].iter().sum::<f64>();
+            position += slots.len();
+            if number == averages || filled < (LEAST_FILL * full).max(1.0) {
+                continue;
+            }
+            if let Some((before, last_sum, last_filled)) = last
+                && before + 1 == number
+            {
+                let difference = sum / filled - last_sum / last_filled;
+                // Normalised: white noise has the same variance in every difference, whatever is missing.
+                let excess = 0.5 * full * (1.0 / last_filled + 1.0 / filled);
+                all.push(before, if excess == 1.0 { difference } else { difference / excess.sqrt() });
+            }
+            last = Some((number, sum, filled));
+        }
+        all
+    }
+
+    fn push(&mut self, number: usize, difference: f64) {
+        let follows = |&(first, position): &(usize, usize)| first + self.differences.len() - position == number;
+        if !self.runs.last().is_some_and(follows) {
+            self.runs.push((number, self.differences.len()));
+        }
+        self.differences.push(difference);
     }
 
     pub(super) fn len(&self) -> usize {
-        self.differences.len()
+        self.count
     }
 
-    pub(super) fn squares(&self, differences: Range<usize>) -> impl Iterator<Item = f64> + '_ {
-        self.differences[differences].iter().map(|value| value * value)
+    /// Position of the first difference with this number or a later one.
+    fn position(&self, number: usize) -> usize {
+        let later = self.runs.partition_point(|(first, _)| *first <= number);
+        let end = self.runs.get(later).map_or(self.differences.len(), |(_, position)| *position);
+        later.checked_sub(1).map_or(0, |run| (self.runs[run].1 + number - self.runs[run].0).min(end))
     }
 
+    /// Number of the difference at a position.
+    fn number_at(&self, position: usize) -> usize {
+        let (first, from) = self.runs[self.runs.partition_point(|(_, from)| *from <= position) - 1];
+        first + position - from
+    }
+
+    /// The square of each of these differences; `NaN` of a missing one.
+    pub(super) fn squares(&self, differences: Range<usize>) -> Vec<f64> {
+        let mut squares = vec![f64::NAN; differences.len()];
+        for position in self.position(differences.start)..self.position(differences.end) {
+            squares[self.number_at(position) - differences.start] = self.differences[position].powi(2);
+        }
+        squares
+    }
+
+    /// Number of the first difference that begins in this sample period or later.
     pub(super) fn number(&self, slot: u64) -> usize {
         (slot.saturating_sub(self.start)).div_ceil(self.n as u64) as usize
     }
@@ -108,34 +154,48 @@ impl SquaredDifferences {
         self.level_without(TRIMMED, differences, &mut Vec::new())
     }
 
-    pub(super) fn half_level(&self, differences: Range<usize>) -> Option<f64> {
-        self.level_without(0.5, differences, &mut Vec::new())
-    }
-
-    fn level_without(&self, left_out: f64, differences: Range<usize>, present: &mut Vec<f64>) -> Option<f64> {
-        let all = differences.len();
-        let within = self.differences.get(differences)?.iter().map(|value| value * value);
-        present.clear();
-        present.extend(within.filter(|square| square.is_finite()));
-        if present.is_empty() || 2 * present.len() < all {
+    fn level_without(&self, left_out: f64, differences: Range<usize>, squares: &mut Vec<f64>) -> Option<f64> {
+        let present = self.position(differences.start)..self.position(differences.end);
+        if differences.end > self.count || present.is_empty() || 2 * present.len() < differences.len() {
             return None;
         }
-        let kept = (present.len() as f64 * (1.0 - left_out)).ceil() as usize;
-        if kept < present.len() {
-            present.select_nth_unstable_by(kept, f64::total_cmp);
+        squares.clear();
+        squares.extend(self.differences[present].iter().map(|difference| difference * difference));
+        let kept = (squares.len() as f64 * (1.0 - left_out)).ceil() as usize;
+        if kept < squares.len() {
+            squares.select_nth_unstable_by(kept, f64::total_cmp);
         }
-        Some(present[..kept].iter().sum::<f64>() / kept as f64)
+        Some(squares[..kept].iter().sum::<f64>() / kept as f64)
     }
 
-    pub(super) fn levels(&self, size: usize, from: usize) -> Vec<Option<f64>> {
-        let mut present = Vec::with_capacity(size);
-        let starts = (from..(self.differences.len() + 1).saturating_sub(size)).step_by(size);
-        starts.map(|start| self.level_without(TRIMMED, start..start + size, &mut present)).collect()
+    /// Levels of the blocks of `size` differences from the difference `from` on.
+    pub(super) fn levels(&self, size: usize, from: usize) -> BlockLevels {
+        let count = self.count.saturating_sub(from) / size;
+        self.levels_without(TRIMMED, size, from, 0..count)
+    }
+
+    /// The same, of the smaller half of the squares, of these blocks alone.
+    pub(super) fn half_levels(&self, size: usize, from: usize, blocks: Range<usize>) -> BlockLevels {
+        self.levels_without(0.5, size, from, blocks)
+    }
+
+    fn levels_without(&self, left_out: f64, size: usize, from: usize, blocks: Range<usize>) -> BlockLevels {
+        let start = |block: usize| from + block * size;
+        let (mut known, mut squares) = (Vec::new(), Vec::with_capacity(size));
+        let (mut position, end) = (self.position(start(blocks.start)), self.position(start(blocks.end)));
+        while position < end {
+            let block = (self.number_at(position) - from) / size;
+            known.extend(
+                self.level_without(left_out, start(block)..start(block + 1), &mut squares).map(|level| (block, level)),
+            );
+            position = self.position(start(block + 1));
+        }
+        BlockLevels { count: blocks.end, known }
     }
 
     /// Degrees of freedom of blocks of [`FEW_DIFFERENCES`] and of [`DIFFERENCES`]: `m/(1 + 2 Σ (1 − k/m) ρ_k²)`.
     pub(super) fn freedoms(&self) -> [f64; 2] {
-        let covariances = Covariances::new(&self.differences);
+        let covariances = Covariances::new(self);
         let variance = covariances.at(0).0;
         let square = |lag: usize| {
             let (covariance, count) = covariances.at(lag);
@@ -153,44 +213,36 @@ impl SquaredDifferences {
 
 /// Mean products of differences at a lag.
 struct Covariances {
+    /// 0 where a difference is missing.
     values: Vec<f64>,
-    /// 1 or 0 per difference; empty if none is missing.
+    /// 1 or 0 per difference.
     present: Vec<f64>,
 }
 
 impl Covariances {
-    /// From all `differences`, or from [`STRETCHES`] of a long record, separated by missing values.
-    fn new(differences: &[f64]) -> Self {
-        if differences.len() > 2 * STRETCHES * STRETCH {
-            let from = |stretch: usize| stretch * (differences.len() - STRETCH) / (STRETCHES - 1);
-            let apart = [f64::NAN; DIFFERENCES];
-            let parts = (0..STRETCHES).flat_map(|stretch| {
-                differences[from(stretch)..from(stretch) + STRETCH].iter().chain(&apart).copied().collect::<Vec<f64>>()
-            });
-            return Self::of_all(&parts.collect::<Vec<f64>>());
+    /// From all `differences`, or from [`STRETCHES`] of a long record. A gap, and the end of a stretch, is as long as the longest lag at
+    /// most.
+    fn new(differences: &SquaredDifferences) -> Self {
+        let of = &differences.differences;
+        let (stretches, length) = if of.len() > 2 * STRETCHES * STRETCH { (STRETCHES, STRETCH) } else { (1, of.len()) };
+        let (mut values, mut present, mut next) = (Vec::new(), Vec::new(), None);
+        for stretch in 0..stretches {
+            let from = stretch * (of.len() - length) / (stretches - 1).max(1);
+            for (position, difference) in of.iter().enumerate().skip(from).take(length) {
+                let number = differences.number_at(position);
+                let missing = next.map_or(0, |next: usize| number.abs_diff(next).min(DIFFERENCES));
+                values.extend(std::iter::repeat_n(0.0, missing).chain([*difference]));
+                present.extend(std::iter::repeat_n(0.0, missing).chain([1.0]));
+                next = Some(number + 1);
+            }
         }
-        Self::of_all(differences)
-    }
-
-    fn of_all(differences: &[f64]) -> Self {
-        let is_missing = |value: &f64| !value.is_finite();
-        let present = if differences.iter().any(is_missing) {
-            differences.iter().map(|value| f64::from(u8::from(!is_missing(value)))).collect()
-        } else {
-            Vec::new()
-        };
-        let values = differences.iter().map(|value| if is_missing(value) { 0.0 } else { *value }).collect();
         Self { values, present }
     }
 
     fn at(&self, lag: usize) -> (f64, f64) {
-        let later = |of: &'_ [f64]| lag.min(of.len());
-        let count = if self.present.is_empty() {
-            self.values.len().saturating_sub(lag) as f64
-        } else {
-            sum_of_products(&self.present, &self.present[later(&self.present)..])
-        };
-        (sum_of_products(&self.values, &self.values[later(&self.values)..]) / f64::max(count, 1.0), count)
+        let of_lag = |of: &[f64]| sum_of_products(of, &of[lag.min(of.len())..]);
+        let count = of_lag(&self.present);
+        (of_lag(&self.values) / f64::max(count, 1.0), count)
     }
 }
 
@@ -208,13 +260,37 @@ fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
 }
 
-pub(super) fn longer_levels(levels: &[Option<f64>], doublings: u32) -> Vec<Option<f64>> {
-    let size = 1_usize << doublings;
-    let mean = |chunk: &[Option<f64>]| {
-        let (sum, count) = chunk.iter().flatten().fold((0.0, 0_usize), |(sum, count), level| (sum + level, count + 1));
-        (2 * count > size || count == size).then(|| sum / count as f64)
-    };
-    levels.chunks_exact(size).map(mean).collect()
+/// Levels of the blocks of a record, one after the other.
+pub(super) struct BlockLevels {
+    /// Number of blocks, with those that have no level.
+    pub(super) count: usize,
+    /// Number and level of each block that has enough differences, in ascending order.
+    pub(super) known: Vec<(usize, f64)>,
+}
+
+impl BlockLevels {
+    /// The levels of blocks of so many times twice the length, of most of which the level is known.
+    pub(super) fn doubled(&self, doublings: u32) -> Self {
+        let size = 1_usize << doublings;
+        let count = self.count >> doublings;
+        let blocks = self.known.chunk_by(|one, other| one.0 >> doublings == other.0 >> doublings);
+        let mean = |blocks: &[(usize, f64)]| {
+            let number = blocks[0].0 >> doublings;
+            let is_known = number < count && (2 * blocks.len() > size || blocks.len() == size);
+            is_known.then(|| (number, blocks.iter().map(|(_, level)| level).sum::<f64>() / blocks.len() as f64))
+        };
+        Self { count, known: blocks.filter_map(mean).collect() }
+    }
+
+    pub(super) fn levels(&self) -> Vec<f64> {
+        self.known.iter().map(|(_, level)| *level).collect()
+    }
+
+    /// Positions in `known` of these blocks.
+    pub(super) fn positions(&self, blocks: &Range<usize>) -> Range<usize> {
+        let position = |block: usize| self.known.partition_point(|(number, _)| *number < block);
+        position(blocks.start)..position(blocks.end)
+    }
 }
 
 /// Doublings of `size` differences at which a record is examined, as long as a block has neighbours.
@@ -233,32 +309,30 @@ pub(super) fn doublings(differences: &SquaredDifferences, size: usize, period_s:
     (0..24).take_while(is_examined)
 }
 
-/// Medians of up to [`NEIGHBOURS`] blocks before and after each block, without the next one on either side.
+/// Medians of up to [`NEIGHBOURS`] known levels before and after that of each block, without those of the next block on either side.
 pub(super) struct Neighbourhood {
     sides: Vec<[Option<f64>; 2]>,
 }
 
 impl Neighbourhood {
-    pub(super) fn new(levels: &[Option<f64>]) -> Self {
-        let known: Vec<f64> = levels.iter().copied().flatten().collect();
+    pub(super) fn new(levels: &BlockLevels) -> Self {
+        let (blocks, known) = (&levels.known, levels.levels());
         let medians = running_medians(&known, NEIGHBOURS);
-        let side = |known_of: Range<usize>| match known_of.len() {
-            NEIGHBOURS => medians.get(known_of.start).copied(),
-            FEWEST_NEIGHBOURS.. => Some(median(&mut known[known_of].to_vec())),
+        let side = |side: Range<usize>| match side.len() {
+            NEIGHBOURS => medians.get(side.start).copied(),
+            FEWEST_NEIGHBOURS.. => Some(median(&mut known[side].to_vec())),
             _ => None,
         };
-        let mut before = vec![0];
-        for level in levels {
-            before.push(before[before.len() - 1] + usize::from(level.is_some()));
-        }
         let sides = |at: usize| {
-            let (until, from) = (before[at.saturating_sub(1)], before[(at + 2).min(levels.len())]);
+            let is_next = |other: usize| blocks.get(other).is_some_and(|of| of.0.abs_diff(blocks[at].0) == 1);
+            let until = at - usize::from(at > 0 && is_next(at - 1));
+            let from = at + 1 + usize::from(is_next(at + 1));
             [until.saturating_sub(NEIGHBOURS)..until, from..known.len().min(from + NEIGHBOURS)].map(side)
         };
-        Self { sides: (0..levels.len()).map(sides).collect() }
+        Self { sides: (0..known.len()).map(sides).collect() }
     }
 
-    /// Level of the neighbours of a block: that of the louder side, or at an end of the record the known one.
+    /// Level of the neighbours of the block at a position: that of the louder side, or at an end of the record the known one.
     pub(super) fn level(&self, at: usize, freedom: f64) -> Option<f64> {
         let level = self.sides[at].into_iter().flatten().max_by(f64::total_cmp)?;
         // Median of χ²/ν by Wilson and Hilferty.
@@ -302,8 +376,8 @@ pub(super) struct LevelScatter {
 }
 
 impl LevelScatter {
-    pub(super) fn new(levels: &[Option<f64>]) -> Option<Self> {
-        let known: Vec<f64> = levels.iter().copied().flatten().collect();
+    pub(super) fn new(levels: &BlockLevels) -> Option<Self> {
+        let known = levels.levels();
         let medians = running_medians(&known, (2 * NEIGHBOURS + 1).min(known.len()));
         let around = |at: usize| medians[at.saturating_sub(NEIGHBOURS).min(medians.len() - 1)];
         let ratio = |(at, level): (usize, &f64)| level / around(at);
@@ -392,4 +466,22 @@ pub(super) fn clipped_deviation(errors: &[f64]) -> f64 {
         limit = CLIP * deviation;
     }
     deviation
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use std::cell::Cell;
+
+    thread_local! {
+        static SAMPLES_READ: Cell<u64> = const { Cell::new(0) };
+    }
+
+    pub(super) fn count(samples: usize) {
+        SAMPLES_READ.set(SAMPLES_READ.get() + samples as u64);
+    }
+
+    /// Samples of which this thread has taken differences.
+    pub(in crate::detectors) fn samples_read() -> u64 {
+        SAMPLES_READ.get()
+    }
 }

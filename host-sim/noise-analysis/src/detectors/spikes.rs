@@ -126,11 +126,9 @@ impl FoundSpikes {
         Self { jumps: 0, ..self.kept(|spike| spike.slot < slot) }
     }
 
-    /// The spikes that are no part of louder noise: all, if most stand out locally.
+    /// The spikes that stand out of the noise around each of them.
     pub(crate) fn out_of_noise(&self) -> Self {
-        let stands_out = self.spikes.iter().filter(|spike| spike.stands_out).count();
-        let wanders = 2 * stands_out < self.spikes.len();
-        self.kept(|spike| spike.stands_out || !wanders)
+        self.kept(|spike| spike.stands_out)
     }
 
     pub(crate) fn extend(&mut self, later: Self) {

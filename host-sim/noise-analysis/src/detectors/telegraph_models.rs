@@ -1,6 +1,7 @@
 //! Models for telegraph noise: a hidden Markov chain of two states, and a Gaussian process with exponential
 //! autocorrelation, in white noise. Missing values are `NaN`.
 
+use crate::bounds::BoundedEstimate;
 use std::f64::consts::PI;
 
 /// Most rounds of the fit; it ends when a round gains less than `SETTLED` in ln likelihood.
@@ -284,7 +285,7 @@ pub(super) fn gauss_markov_log_likelihood(values: &[f64]) -> f64 {
     let longest = LONGEST * values.len() as f64;
     let (mut step_of_time, mut step_of_ratio) =
         ((longest / SHORTEST).ln() / (TRIED - 1) as f64, (STRONGEST / WEAKEST).ln() / (TRIED - 1) as f64);
-    let at = |time: f64, ratio: f64| (kalman_log_likelihood(values, time.exp(), ratio.exp()), time, ratio);
+    let at = |time: f64, ratio: f64| (Filtered::new(values, time.exp(), ratio.exp()).log_likelihood(), time, ratio);
     let tries = (0..TRIED * TRIED).map(|try_| {
         let (i, j) = ((try_ / TRIED) as f64, (try_ % TRIED) as f64);
         at(SHORTEST.ln() + step_of_time * i, WEAKEST.ln() + step_of_ratio * j)
@@ -302,26 +303,104 @@ pub(super) fn gauss_markov_log_likelihood(values: &[f64]) -> f64 {
     best.0
 }
 
-/// By a Kalman filter: correlation time in steps, variance over the white noise's, which is profiled.
-fn kalman_log_likelihood(values: &[f64], time: f64, ratio: f64) -> f64 {
-    let decay = (-1.0 / time).exp();
-    // 1 − decay², without cancellation.
-    let drive = -(-2.0 / time).exp_m1() * ratio;
-    let (mut state, mut variance) = (0.0, ratio);
-    let (mut squares, mut spreads, mut count) = (0.0, LogOfProduct::default(), 0.0);
-    for &value in values {
-        if value.is_finite() {
-            let spread = variance + 1.0;
-            let error: f64 = value - state;
-            squares += error * error / spread;
-            spreads.multiply(spread);
-            count += 1.0;
-            let gain = variance / spread;
-            state += gain * error;
-            variance *= 1.0 - gain;
-        }
-        state *= decay;
-        variance = decay * decay * variance + drive;
+/// Steps of the grid of a posterior distribution per parameter, and the ln likelihood below the highest one that is left out of it.
+const STEPS: usize = 32;
+const NEGLIGIBLE: f64 = 8.0;
+
+/// Correlation time in steps, at most as long as the `values`, and standard deviation of a Gaussian process with exponential
+/// autocorrelation in white noise of any mean: medians and 95 % bounds if all logarithms of its parameters are as probable.
+pub(super) fn gauss_markov_posterior(values: &[f64]) -> (BoundedEstimate, BoundedEstimate) {
+    let mut bounds = [(SHORTEST.ln(), (values.len() as f64).ln()), (WEAKEST.ln(), STRONGEST.ln())];
+    let mut grid = Vec::new();
+    // Once over all, and once where the likelihood is high.
+    for _ in 0..2 {
+        let steps = bounds.map(|(low, high)| (high - low) / (STEPS - 1) as f64);
+        let at = |parameter: usize, number: usize| bounds[parameter].0 + steps[parameter] * number as f64;
+        let place = |number: usize| {
+            let (time, ratio) = (at(0, number / STEPS), at(1, number % STEPS));
+            let (log_probability, deviation) = Filtered::new(values, time.exp(), ratio.exp()).of_any_mean(ratio.exp());
+            (log_probability, [time, ratio], deviation)
+        };
+        grid = (0..STEPS * STEPS).map(place).collect::<Vec<(f64, [f64; 2], f64)>>();
+        let highest = grid.iter().map(|of| of.0).fold(f64::NEG_INFINITY, f64::max);
+        grid.retain(|of| of.0 > highest - NEGLIGIBLE);
+        grid.iter_mut().for_each(|of| of.0 = (of.0 - highest).exp());
+        bounds = [0, 1].map(|parameter| {
+            let of = || grid.iter().map(|(_, place, _)| place[parameter]);
+            let reach = |end: f64| end.clamp(bounds[parameter].0, bounds[parameter].1);
+            let (low, high) = (of().fold(f64::INFINITY, f64::min), of().fold(f64::NEG_INFINITY, f64::max));
+            (reach(low - steps[parameter]), reach(high + steps[parameter]))
+        });
     }
-    independent_log_likelihood(count, squares) - 0.5 * spreads.value()
+    (
+        quantiles(grid.iter().map(|(weight, [time, _], _)| (time.exp(), *weight)).collect()),
+        quantiles(grid.iter().map(|(weight, _, deviation)| (*deviation, *weight)).collect()),
+    )
+}
+
+/// Median and 95 % bounds of values with their weights.
+fn quantiles(mut values: Vec<(f64, f64)>) -> BoundedEstimate {
+    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let all: f64 = values.iter().map(|(_, weight)| weight).sum();
+    let [low, value, high] = [0.025, 0.5, 0.975].map(|part| {
+        let mut below = 0.0;
+        let is_reached = |(_, weight): &&(f64, f64)| {
+            below += weight;
+            below >= part * all
+        };
+        values.iter().find(is_reached).or(values.last()).map_or(0.0, |(value, _)| *value)
+    });
+    BoundedEstimate::new(value, low, high)
+}
+
+/// Errors of the predictions of a Kalman filter for a process in white noise, of the values and of a constant 1, each over its deviation,
+/// in units of the white noise's deviation.
+struct Filtered {
+    count: f64,
+    /// Sums of products: values with themselves, with ones, ones with themselves.
+    products: [f64; 3],
+    /// Sum of the logarithms of the variances of the errors.
+    spreads: f64,
+}
+
+impl Filtered {
+    /// For a correlation time in steps and a variance over that of the white noise.
+    fn new(values: &[f64], time: f64, ratio: f64) -> Self {
+        let decay = (-1.0 / time).exp();
+        // 1 − decay², without cancellation.
+        let drive = -(-2.0 / time).exp_m1() * ratio;
+        let (mut state, mut state_of_one, mut variance) = (0.0, 0.0, ratio);
+        let (mut products, mut spreads, mut count) = ([0.0; 3], LogOfProduct::default(), 0.0);
+        for &value in values {
+            if value.is_finite() {
+                let spread = variance + 1.0;
+                let (error, of_one) = (value - state, 1.0 - state_of_one);
+                for (sum, product) in products.iter_mut().zip([error * error, error * of_one, of_one * of_one]) {
+                    *sum += product / spread;
+                }
+                spreads.multiply(spread);
+                count += 1.0;
+                let gain = variance / spread;
+                state += gain * error;
+                state_of_one += gain * of_one;
+                variance *= 1.0 - gain;
+            }
+            state *= decay;
+            state_of_one *= decay;
+            variance = decay * decay * variance + drive;
+        }
+        Self { count, products, spreads: spreads.value() }
+    }
+
+    /// Of values of mean 0, at the likeliest variance of the white noise.
+    fn log_likelihood(&self) -> f64 {
+        independent_log_likelihood(self.count, self.products[0]) - 0.5 * self.spreads
+    }
+
+    /// ln probability, of values of any mean and variance, but for a constant; and the standard deviation of the process.
+    fn of_any_mean(&self, ratio: f64) -> (f64, f64) {
+        let [squares, cross, ones] = self.products;
+        let (squares, freedom) = (squares - cross * cross / ones, self.count - 1.0);
+        (-0.5 * (freedom * squares.ln() + self.spreads + ones.ln()), (ratio * squares / freedom).sqrt())
+    }
 }

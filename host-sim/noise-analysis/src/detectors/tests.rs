@@ -190,6 +190,22 @@ fn loud_noise_has_no_spikes_and_spikes_stand_out_of_it() {
     );
 }
 
+/// Of 200 louder samples more than fifty are beyond the limit, and a few beyond that of the noise around them.
+#[test]
+fn other_spikes_make_no_spikes_of_louder_noise() {
+    let mut series = Case::hiding(Vec::new(), 400.0, 9).series(GYRO);
+    let mut random = ChaCha8Rng::seed_from_u64(2);
+    for value in &mut series.values_mut()[20_000..20_200] {
+        *value += 6.0 * white() * random.sample::<f64, _>(StandardNormal);
+    }
+    let spikes: Vec<u64> = (0..100).map(|number| 25_000 + 400 * number).collect();
+    spikes.iter().for_each(|&at| series.values_mut()[at as usize] += 60.0 * white());
+    let found = spikes::find(&series, &[]).expect("spikes");
+    let (louder, others): (Vec<u64>, Vec<u64>) = found.excluded().iter().partition(|slot| **slot < 21_000);
+    assert_eq!(others, spikes);
+    assert!(louder.len() < 8, "{louder:?}");
+}
+
 /// Exponential, Laplace and Student noise, and ten samples beyond 30,000 exponential ones.
 #[test]
 fn noise_with_heavy_tails_has_no_spikes() {

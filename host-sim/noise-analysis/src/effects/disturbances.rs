@@ -1,4 +1,4 @@
-//! Times and samples at which the noise differs: spikes, louder intervals, changes of the level, motions.
+//! Times and samples at which the noise differs: spikes, louder intervals, changes of the level, motions; and a level that wanders.
 
 use super::kind::{AddedVariance, AveragingTime, Kind, NamedParameter, Occurrence, named};
 use crate::bounds::{BoundedEstimate, ChannelEstimate};
@@ -121,6 +121,34 @@ impl Kind for LevelChange {
         let ratio = self.ratio.value.powi(2);
         let mean = before + (1.0 - before) * ratio;
         AddedVariance::modelled((1.0 - ratio.min(1.0) / mean) * at.model_avar)
+    }
+}
+
+/// A level of the noise that grows and falls all the time: its logarithm is a Gauss-Markov process.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct WanderingLevel {
+    /// Standard deviation of the logarithm of the noise's deviation.
+    #[serde(skip)]
+    pub deviation: BoundedEstimate,
+    /// Time in which the correlation of the level falls to 1/e, s; at most the length of the record.
+    #[serde(skip)]
+    pub time_constant_s: BoundedEstimate,
+    /// Of as high a correlation of the levels of blocks with later ones.
+    pub p_value: f64,
+}
+
+impl Kind for WanderingLevel {
+    fn parameters(&self) -> Vec<NamedParameter> {
+        vec![
+            named("deviation", self.deviation.scaled(100.0).parameter("%")).size().lasting(),
+            named("time_constant", self.time_constant_s.parameter("s")).lasting(),
+        ]
+    }
+
+    fn avar(&self, at: &AveragingTime) -> AddedVariance {
+        // What the mean of a log-normal variance has more than its median: the model has the mean.
+        let over_median = -(-2.0 * self.deviation.value.powi(2)).exp_m1();
+        AddedVariance::modelled(over_median * at.model_avar)
     }
 }
 

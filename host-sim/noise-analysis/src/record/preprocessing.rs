@@ -6,13 +6,13 @@
 
 use crate::detectors::bias::{self, BiasChanges, BiasSensitivity};
 use crate::detectors::bias_response::BiasResponse;
-use crate::detectors::knock_search::{self, LoudStretches, SearchedChannel, slots_within};
-use crate::detectors::knocks::Knock;
+use crate::detectors::knock_search::{self, LoudStretches, SearchedChannel};
+use crate::detectors::knocks::{Knock, slots_within};
 use crate::detectors::output_range::find_noise_below_count;
 use crate::detectors::spikes::{self, SpikeRule};
 use crate::detectors::vibration_rectification::{Acceleration, largest_sensitivity};
-use crate::effects::Effect;
-use crate::effects::findings::{Correction, Detection};
+use crate::effects::findings::Correction;
+use crate::effects::{Effect, NoisyInterval};
 use crate::parallel::{self, per_channel};
 use crate::record::condensed_record::CondensedRecord;
 use crate::samples::exclusion::Exclusion;
@@ -210,9 +210,9 @@ impl Shown {
             let excluded = spikes.as_ref().map(|found| found.excluded().to_vec()).unwrap_or_default();
             let (bias, found) = bias_of(record, channel, (&once, &quiet), &forces, &excluded);
             let BiasChanges { step, ramp, responses, .. } = found;
-            let events = knock_detections(measurement, &loud, &once[channel], channel).into_iter().chain(spikes);
-            let events = events.chain(step).chain(ramp).map(|detection| detection.effect);
-            let effects = responses.iter().map(|of| of.effect.clone()).chain(events).collect();
+            let changes = spikes.into_iter().chain(step).chain(ramp).map(|detection| detection.effect);
+            let knocked = intervals(measurement, &loud, channel).into_iter().map(Effect::from);
+            let effects = responses.iter().map(|of| of.effect.clone()).chain(knocked).chain(changes).collect();
             (ShownInChannel { knocks: slots_within(&once[channel], knocks), spikes: excluded, bias }, effects)
         };
         let (channels, effects): (Vec<_>, Vec<_>) = per_channel(measurement.ids(), of_channel).into_iter().unzip();
@@ -315,19 +315,15 @@ fn without_knocks(series: &PerChannel<Series>, loud: &PerChannel<LoudStretches>)
     series.with_ids().map(of).collect()
 }
 
-fn knock_detections(
-    measurement: &Measurement,
-    loud: &PerChannel<LoudStretches>,
-    series: &Series,
-    channel: ChannelId,
-) -> Vec<Detection> {
-    let detection = |knock: &Knock| {
+/// The knocks of a channel, with the names of the channels that show each.
+fn intervals(measurement: &Measurement, loud: &PerChannel<LoudStretches>, channel: ChannelId) -> Vec<NoisyInterval> {
+    let interval = |knock: &Knock| {
         let shows = |others: &LoudStretches| others.knocks.iter().any(|other| other.overlaps(knock));
         let shown = loud.with_ids().filter(|(_, others)| shows(others));
         let shown: Vec<&'static str> = shown.map(|(of, _)| measurement[of].profile.name).collect();
-        knock.detection(series, &shown)
+        knock.interval(measurement.period_s(), &shown)
     };
-    loud[channel].knocks.iter().map(detection).collect()
+    loud[channel].knocks.iter().map(interval).collect()
 }
 
 /// Loud stretches of each of the `parts` of a record, by the rules of the first part; none in other channels.

@@ -64,8 +64,9 @@ impl SampleScreen {
             let Some(rule) = rule else { return (None, Vec::new()) };
             let (singles, disturbances) = rule.separate(found.before(periods), periods);
             // If they are no spikes in the whole recording, those of a part are none.
-            let spikes = rule.detection(found, (hours, periods), channel.profile.unit);
-            let spikes = spikes.and_then(|_| rule.detection(&singles, (hours, periods), channel.profile.unit));
+            let spikes = rule.detection(&found.out_of_noise(), (hours, periods), channel.profile.unit);
+            let in_part = || rule.detection(&singles.out_of_noise(), (hours, periods), channel.profile.unit);
+            let spikes = spikes.and_then(|_| in_part());
             (spikes.map(|found| found.effect), disturbances.into_iter().map(Knock::from).collect::<Vec<Knock>>())
         };
         let found: Vec<(Option<Effect>, Vec<Knock>)> =
@@ -111,7 +112,7 @@ impl SampleScreen {
                 from..to
             };
             let knocks: Vec<usize> = disturbances.iter().flat_map(|of| within(&of.slots)).collect();
-            let spikes_alone: Vec<usize> = singles.slots().filter_map(position).collect();
+            let spikes_alone: Vec<usize> = singles.out_of_noise().slots().filter_map(position).collect();
             for (cause, positions) in [("spikes", spikes_alone), ("knock", knocks), ("repeated", repeated.clone())] {
                 if !positions.is_empty() {
                     channel.refused.insert(cause, positions);

@@ -97,6 +97,8 @@ pub(crate) struct ChannelFacts {
     pub period_s: f64,
     /// s
     pub duration_s: f64,
+    /// Allan variance of neighbouring samples.
+    pub avar: f64,
     /// Whether the noise is large enough against the resolution, at short averaging times, that rounding adds white noise alone.
     pub is_dithered: bool,
     /// Whether it is at the shortest averaging time.

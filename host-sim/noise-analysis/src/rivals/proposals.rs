@@ -69,6 +69,7 @@ pub(crate) fn propose(profile: &SensorProfile, findings: &ChannelFindings) -> (V
         resolution,
         period_s,
         duration_s: fit.covariates.curve.samples() as f64 * period_s,
+        avar: fit.curve.points().first().map_or(0.0, |point| point.avar),
         is_dithered: fit.is_dithered(profile, resolution, DITHERED_OCTAVES),
         is_dithered_at_once: fit.is_dithered(profile, resolution, 1),
         slope_of_ends: None,

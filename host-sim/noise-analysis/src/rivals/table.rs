@@ -4,7 +4,8 @@
 use crate::bounds::BoundedEstimate;
 use crate::detectors::random_telegraph::explains_spikes;
 use crate::effects::{
-    CommonMode, Effect, MarkovProcess, Observation, Refutation, TelegraphEvidence, TelegraphNoise, Unexplained,
+    AddedVariance, AveragingTime, CommonMode, Effect, MarkovProcess, Observation, Refutation, TelegraphEvidence,
+    TelegraphNoise, Unexplained,
 };
 use crate::fit::channel_fit::FREQUENCY_BY_OCTAVES;
 use crate::fit::noise_terms::{is_filter, is_line, is_same_time, line_frequency};
@@ -113,7 +114,7 @@ const fn row(
 
 /// The rows, in their order.
 #[rustfmt::skip]
-pub static RIVALRIES: [Rivalry; 48] = [
+pub static RIVALRIES: [Rivalry; 51] = [
     // Lines and signals of the spectrum.
     row("line above half the rate of the means", "line of the means", "at its alias, and as wide", "means sample it too slowly",
         Rule::Line(|of| of.faster.iter().any(|faster| is_alias(of.line, faster, of.period_s)))),
@@ -291,9 +292,19 @@ pub static RIVALRIES: [Rivalry; 48] = [
         "a temperature that differs before and after it follows by chance",
         Rule::Channel(|of| of.others().any(|other| matches!(other.effect, Effect::LevelChange(_)))
             && matches!((of.origin(), of.effect()), (Origin::Level, Effect::Unexplained(_))))),
-    row("level of the noise that changes", "spikes", "always", "the limit of a spike is that of a constant level",
-        Rule::Channel(|of| matches!(of.effect(), Effect::Spikes(_))
-            && of.others().any(|other| matches!(other.origin, Origin::Level)))),
+    row("level of the noise by temperature, motion", "wandering level of the noise", "always", "either changes the level",
+        Rule::Channel(|of| matches!(of.effect(), Effect::WanderingLevel(_)) && (of.level_by_temperature().is_some()
+            || of.others().any(|other| matches!(other.effect, Effect::MotionInterval(_)))))),
+    row("lines and signals", "wandering level of the noise", "less than 0.64 of their part of the variance of neighbours' differences",
+        "the logarithm of the amplitude of a narrow band has the deviation π/√24",
+        Rule::Channel(|of| matches!(of.effect(), Effect::WanderingLevel(level)
+            if level.deviation.low < PI / 24.0_f64.sqrt() * of.part_of_signals()))),
+    row("rounding to counts", "wandering level of the noise", "not dithered at the shortest averaging time",
+        "the bias decides how often two counts alternate",
+        Rule::Channel(|of| matches!(of.effect(), Effect::WanderingLevel(_)) && !of.facts.is_dithered_at_once)),
+    row("level of the noise that changes", "spikes", "always, but for a level that wanders", "the limit of a spike is that of a constant level",
+        Rule::Channel(|of| matches!(of.effect(), Effect::Spikes(_)) && of.others().any(|other|
+            matches!(other.origin, Origin::Level) && !matches!(other.effect, Effect::WanderingLevel(_))))),
     row("telegraph noise", "spikes", "no more frequent than visits of one sample to a level, and no larger",
         "a visit to a level that lasts a sample is a spike",
         Rule::Channel(|of| match (of.effect(), of.others().find_map(|other| telegraph(&other.effect))) {
@@ -503,6 +514,19 @@ impl<'a> Claim<'a> {
             }) => Some(*explained),
             _ => None,
         })
+    }
+
+    /// The part of lines and signals in the Allan variance of neighbouring samples.
+    fn part_of_signals(&self) -> f64 {
+        let ChannelFacts { period_s, avar, .. } = *self.facts;
+        let at = AveragingTime { n: 1, period_s, samples: 1, model_avar: 0.0, adev_of: &|_, _| None };
+        let of_signal = |effect: &Effect| match effect {
+            Effect::ModulatedLine(_) | Effect::Chirp(_) | Effect::Periodic(_) | Effect::ShotNoise(_) => true,
+            other => other.is_line(),
+        };
+        let signals = self.others().filter(|other| of_signal(&other.effect));
+        let added: AddedVariance = signals.map(|other| other.effect.kind().avar(&at)).sum();
+        ((added.modelled + added.corrected) / avar).min(1.0)
     }
 
     fn track(&self) -> Option<&'a FrequencyTrack> {

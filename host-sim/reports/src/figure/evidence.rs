@@ -43,6 +43,7 @@ pub(crate) fn evidence(report: &Report, index: usize, number: usize) -> Option<P
             in_time(report, channel, finding, Some(Place { label, from, to }))
         }
         Effect::ShotNoise(_)
+        | Effect::WanderingLevel(_)
         | Effect::LinearDrift(_)
         | Effect::TurnOnTransient(_)
         | Effect::CommonMode(_)

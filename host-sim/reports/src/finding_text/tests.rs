@@ -229,6 +229,7 @@ fn examples() -> Vec<Effect> {
         }
         .into(),
         LevelChange { time_s: MOMENT, ratio: about(2.0, 0.1), explained: 0.9, p_value: 1e-9 }.into(),
+        WanderingLevel { deviation: about(0.3, 0.04), time_constant_s: about(60.0, 9.0), p_value: 1e-9 }.into(),
         StuckOutput {
             fraction: exact(0.003),
             from_s: MOMENT,

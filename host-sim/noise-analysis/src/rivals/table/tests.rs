@@ -49,6 +49,7 @@ impl Claims {
 
 /// A channel of 1000 s at 100 Hz with much noise against its resolution, whose ends differ as a ramp of 1 a second makes them.
 const DITHERED: ChannelFacts = ChannelFacts {
+    avar: 1.0,
     resolution: 1e-3,
     period_s: 0.01,
     duration_s: 1000.0,
@@ -110,6 +111,10 @@ fn common_mode(time_constant_s: f64) -> Effect {
 fn spikes() -> Effect {
     let (threshold_sigmas, largest_sigmas) = (5.0, 6.0);
     Spikes { rate_per_hour: known(10.0), size: size(1.0), count: 3, threshold_sigmas, largest_sigmas }.into()
+}
+
+fn wandering_level() -> Effect {
+    WanderingLevel { deviation: known(0.3), time_constant_s: known(60.0), p_value: 1e-9 }.into()
 }
 
 fn motion(size_g: f64) -> Effect {
@@ -375,6 +380,11 @@ fn cases() -> Vec<([&'static str; 2], Claims, Vec<&'static str>)> {
             channel([of(level_change(0.8), Origin::Level), of(by_temperature(0.9), Origin::Level)]), vec!["unexplained"]),
         (["change of the level of the noise", "level of the noise by temperature"],
             channel([of(level_change(0.9), Origin::Level), of(by_temperature(0.8), Origin::Level)]), vec!["level_change"]),
+        (["level of the noise by temperature, motion", "wandering level of the noise"],
+            channel([of(wandering_level(), Origin::Level), of(by_temperature(0.9), Origin::Level)]), vec!["unexplained"]),
+        (["lines and signals", "wandering level of the noise"],
+            channel([of(wandering_level(), Origin::Level), of(sinusoid(40.0, known(1.2)), OF_LINE)]), vec!["sinusoid"]),
+        (["rounding to counts", "wandering level of the noise"], later(wandering_level(), Origin::Level), vec![]),
         (["level of the noise that changes", "spikes"],
             channel([of(spikes(), Origin::Samples), of(level_change(0.9), Origin::Level)]), vec!["level_change"]),
         (["telegraph noise", "spikes"], channel([of(spikes(), Origin::Samples), of(levels(1.0, 1.0), OF_LEVELS)]), vec!["telegraph"]),
@@ -420,6 +430,8 @@ fn rows_do_not_reach_beyond_their_conditions() {
         [of(likely_levels(50.0, 1.0, 33.0), OF_LEVELS), decays],
         [of(drift(1.9), OF_RAMP), of(sinusoid(10.0, known(1.0)), OF_LINE)],
         [of(spikes(), Origin::Samples), of(levels(2.0, 1.0), OF_LEVELS)],
+        [of(spikes(), Origin::Samples), of(wandering_level(), Origin::Level)],
+        [of(wandering_level(), Origin::Level), of(sinusoid(40.0, known(0.5)), OF_LINE)],
     ];
     for proposals in beyond {
         let names: Vec<&str> = proposals.iter().map(|proposal| proposal.effect.name()).collect();
